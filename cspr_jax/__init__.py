@@ -1,0 +1,1 @@
+"""What a cable-suspended parallel robot can reach when it swings, and how."""

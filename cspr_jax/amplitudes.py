@@ -1,0 +1,217 @@
+"""Amplitude functions A(tau): how the size of the swing grows from its start to its end.
+
+Every one of them is a piecewise polynomial, kept as such: values and derivatives are exact, a new
+one is a row of coefficients, and the largest value of any derivative is known, which is what a
+certificate between samples needs.
+"""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.errors import InputError
+from cspr_jax.numerics import leaf, polynomial
+
+HIGHEST_DERIVATIVE = 5
+NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3")
+BOUNDARY_TOLERANCE = 1e-9
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Amplitude:
+    """A piecewise polynomial on [0, 1].
+
+    Fields:
+        knots: (n_pieces - 1,) where one piece ends and the next begins, increasing.
+        origins: (n_pieces,) point about which each piece is expanded.
+        coefficients: (n_pieces, degree + 1) of the powers of (tau - origin), lowest first.
+        largest: (6,) largest |A|, |A'|, ... |A^(5)| over [0, 1], rounded up.
+        lowest: () smallest A over [0, 1].
+        highest: () largest A over [0, 1].
+        name: for people.
+    """
+
+    knots: Array
+    origins: Array
+    coefficients: Array
+    largest: Array
+    lowest: Array
+    highest: Array
+    name: str = dataclasses.field(metadata={"static": True})
+
+
+def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array, ...]:
+    """A and its derivatives with respect to tau.
+
+    Args:
+        amplitude: the function.
+        tau: (...) normalised time in [0, 1]; at a knot the piece on its right answers.
+        order: the highest derivative wanted, at most 5.
+
+    Returns:
+        (A, A', ..., A^(order)), each (...), in the dtype of `tau`.
+    """
+    table = amplitude.coefficients.astype(tau.dtype)
+    origins = amplitude.origins.astype(tau.dtype)
+    local = jnp.broadcast_to(origins[0], tau.shape)
+    selected = [jnp.broadcast_to(c, tau.shape) for c in table[0]]
+    for i in range(1, table.shape[0]):
+        later = tau >= amplitude.knots[i - 1].astype(tau.dtype)
+        local = jnp.where(later, origins[i], local)
+        selected = [jnp.where(later, c, s) for c, s in zip(table[i], selected, strict=True)]
+    offset = tau - local
+    return tuple(
+        polynomial([math.perm(i, j) * selected[i] for i in range(j, len(selected))], offset) for j in range(order + 1)
+    )
+
+
+def local_bounds(amplitude: Amplitude, middle: Array, radius: Array) -> tuple[Array, ...]:
+    """Upper bounds of |A|, |A'|, ..., |A''''| on an interval that holds no knot inside.
+
+    The value in the middle plus the radius times the largest next derivative (mean value
+    theorem), and never more than the largest over [0, 1].
+
+    Args:
+        amplitude: the function.
+        middle: (...) middle of the interval.
+        radius: (...) half of its width.
+
+    Returns:
+        five arrays (...).
+    """
+    values = derivatives(amplitude, middle, order=HIGHEST_DERIVATIVE - 1)
+    largest = amplitude.largest.astype(middle.dtype)
+    return tuple(jnp.minimum(jnp.abs(v) + radius * largest[j + 1], largest[j]) for j, v in enumerate(values))
+
+
+def from_pieces(
+    name: str, knots: Sequence[float], origins: Sequence[float], pieces: Sequence[Sequence[float]]
+) -> Amplitude:
+    """Amplitude function from its pieces, with its extreme values found.
+
+    Args:
+        name: for people.
+        knots: (n_pieces - 1,) increasing, inside ]0, 1[.
+        origins: (n_pieces,).
+        pieces: n_pieces sequences of coefficients, lowest power first.
+
+    Returns:
+        the amplitude function, float64.
+    """
+    degree = max(len(piece) for piece in pieces)
+    table = np.zeros((len(pieces), degree))
+    for row, piece in zip(table, pieces, strict=True):
+        row[: len(piece)] = piece
+    ends = [0.0, *knots, 1.0]
+    extremes = np.zeros((HIGHEST_DERIVATIVE + 1, len(pieces), 2))
+    for i, (origin, row) in enumerate(zip(origins, table, strict=True)):
+        curve = np.polynomial.Polynomial(row)
+        for j in range(HIGHEST_DERIVATIVE + 1):
+            extremes[j, i] = _extremes(curve.deriv(j) if j else curve, ends[i] - origin, ends[i + 1] - origin)
+    largest = np.abs(extremes).max((1, 2)) * (1.0 + 1e-9)
+    return Amplitude(
+        leaf(knots), leaf(origins), leaf(table), leaf(largest), leaf(extremes[0].min()), leaf(extremes[0].max()), name
+    )
+
+
+def _extremes(curve: np.polynomial.Polynomial, start: float, stop: float) -> tuple[float, float]:
+    stationary = curve.deriv().roots() if curve.degree() > 0 else np.zeros(0)
+    # A double root may come out as a close complex pair: its real part is near enough to evaluate.
+    inside = [x.real for x in np.atleast_1d(stationary) if abs(x.imag) < 1e-3 and start < x.real < stop]
+    values = curve(np.array([start, stop, *inside]))
+    return float(values.min()), float(values.max())
+
+
+def named(name: str, epsilon: float | None = None) -> Amplitude:
+    """One of the amplitude functions of the thesis.
+
+    "A1", "quintic" (also "A2"), "A3": thesis (1.101) and (2.50). "effective": (1.110), a cubic-like
+    start, a straight middle and the mirrored end. "effective-c3": the same idea with
+    A'' = k tau (epsilon - tau)^2 at the start, whose third derivative does not jump.
+
+    Args:
+        name: one of `NAMES`.
+        epsilon: length of the curved ends of the last two, in ]0, 0.5].
+
+    Returns:
+        the amplitude function.
+
+    Raises:
+        InputError: unknown name; epsilon missing, superfluous or out of range.
+    """
+    polynomials = {
+        "A1": (0, 0, 0, 4, -3),
+        "quintic": (0, 0, 0, 10, -15, 6),
+        "A2": (0, 0, 0, 10, -15, 6),
+        "A3": (0, 0, 0, 6, -7, 2),
+    }
+    if name in polynomials:
+        if epsilon is not None:
+            raise InputError("epsilon", epsilon, f'no epsilon with "{name}"')
+        return from_pieces(name, (), (0.0,), (polynomials[name],))
+    if name not in NAMES:
+        raise InputError("name", name, "one of " + ", ".join(NAMES))
+    if epsilon is None or not 0.0 < epsilon <= 0.5:
+        raise InputError("epsilon", epsilon, "a number in ]0, 0.5]")
+    return _with_straight_middle(name, epsilon)
+
+
+def _with_straight_middle(name: str, epsilon: float) -> Amplitude:
+    e = epsilon
+    start: tuple[float, ...]
+    if name == "effective":
+        slope = 1.0 / (1.0 - e)  # (1.109)
+        start = (0.0, 0.0, 0.0, slope / e**2, -slope / (2 * e**3))  # (1.106)
+    else:
+        slope = 1.0 / (1.0 - 0.8 * e)
+        k = 12.0 * slope / e**4
+        start = (0.0, 0.0, 0.0, k * e**2 / 6, -k * e / 6, k / 20)
+    at_knot = sum(c * e**i for i, c in enumerate(start))
+    # The end is the start turned by half a turn: A(tau) = 1 - start(1 - tau), in powers of tau - 1.
+    end = (1.0, *(-c * (-1) ** i for i, c in enumerate(start) if i > 0))
+    label = f"{name} (epsilon {e:g})"
+    return from_pieces(label, (e, 1.0 - e), (0.0, e, 1.0), (start, (at_knot, slope), end))
+
+
+def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
+    """A user's own amplitude function, c[0] + c[1] tau + c[2] tau^2 + ...
+
+    Args:
+        coefficients: at least one finite number, lowest power first, at most 20.
+
+    Returns:
+        the amplitude function; its boundary conditions are checked by the trajectory that uses it.
+
+    Raises:
+        InputError: no coefficient, too many, or one that is not finite.
+    """
+    if not 1 <= len(coefficients) <= 20 or not all(math.isfinite(c) for c in coefficients):
+        raise InputError("polynomial", list(coefficients), "1 to 20 finite coefficients, lowest power first")
+    return from_pieces("polynomial", (), (0.0,), (tuple(coefficients),))
+
+
+def boundary_errors(amplitude: Amplitude) -> list[str]:
+    """The conditions of thesis (2.49) that a function breaks: A(0) = 0, A(1) = 1, A' and A'' zero at both ends.
+
+    Args:
+        amplitude: the function.
+
+    Returns:
+        one text such as "A''(1) = -12, must be 0" for each broken condition.
+    """
+    first, last = np.asarray(amplitude.coefficients)[[0, -1]]
+    errors = []
+    for tau, row, origin in ((0, first, amplitude.origins[0]), (1, last, amplitude.origins[-1])):
+        curve = np.polynomial.Polynomial(row)
+        for order, mark in enumerate(("", "'", "''")):
+            value = float((curve.deriv(order) if order else curve)(tau - float(origin)))
+            wanted = float(tau if order == 0 else 0)
+            if not abs(value - wanted) <= BOUNDARY_TOLERANCE * float(amplitude.largest[order]):
+                errors.append(f"A{mark}({tau}) = {value:g}, must be {wanted:g}")
+    return errors

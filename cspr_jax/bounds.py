@@ -1,0 +1,58 @@
+"""Bounds on a function and its first two derivatives over an interval, and their arithmetic.
+
+A certificate that holds between samples needs a bound on a second derivative. Instead of writing
+out the derivative of each constraint by hand, its factors are bounded once and combined by
+Leibniz' rule.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+
+class Bounds(NamedTuple):
+    """Upper bounds of |f|, |f'| and |f''| over one interval; arrays of one shape.
+
+    Fields:
+        value: (...) bound of |f|.
+        slope: (...) bound of |f'|, derivative with respect to the interval's variable.
+        curvature: (...) bound of |f''|.
+    """
+
+    value: Array
+    slope: Array
+    curvature: Array
+
+    def __add__(self, other: "Bounds") -> "Bounds":  # type: ignore[override]
+        """Bounds of f + g, and of f - g."""
+        return Bounds(self.value + other.value, self.slope + other.slope, self.curvature + other.curvature)
+
+    def __mul__(self, other: "Bounds") -> "Bounds":  # type: ignore[override]
+        """Bounds of f g (Leibniz)."""
+        return Bounds(
+            self.value * other.value,
+            self.slope * other.value + self.value * other.slope,
+            self.curvature * other.value + 2.0 * self.slope * other.slope + self.value * other.curvature,
+        )
+
+    def times(self, factor: Array | float) -> "Bounds":
+        """Bounds of factor f, for a constant factor (its sign does not matter)."""
+        size = jnp.abs(factor)
+        return Bounds(size * self.value, size * self.slope, size * self.curvature)
+
+    def combined(self, other: "Bounds") -> "Bounds":
+        """Bounds of the length of a vector whose perpendicular components have these bounds."""
+        return Bounds(
+            jnp.hypot(self.value, other.value),
+            jnp.hypot(self.slope, other.slope),
+            jnp.hypot(self.curvature, other.curvature),
+        )
+
+    def turned(self, rate: Array) -> "Bounds":
+        """Bounds of the length of a vector and its derivatives, seen from axes it turns against at a constant rate."""
+        return Bounds(
+            self.value,
+            self.slope + rate * self.value,
+            self.curvature + 2.0 * rate * self.slope + rate**2 * self.value,
+        )

@@ -1,0 +1,84 @@
+"""What can go wrong on the host, and the exit code that says so."""
+
+import enum
+
+
+class ExitCode(enum.IntEnum):
+    """Exit codes of every command."""
+
+    DONE = 0
+    NOT_FEASIBLE = 1
+    BAD_INPUT = 2
+    REFUSED = 3
+    INPUT_OUTPUT = 4
+    SELF_CHECK = 5
+    INTERNAL = 70
+    INTERRUPTED = 130
+    TERMINATED = 143
+
+
+class CsprError(Exception):
+    """An error that a user can act on: one line, an exit code."""
+
+    exit_code = ExitCode.INTERNAL
+
+
+class InputError(CsprError, ValueError):
+    """A value that cannot be used, without the file it came from.
+
+    Args:
+        key: the key or argument, dotted.
+        value: what was given.
+        allowed: what would be right.
+    """
+
+    exit_code = ExitCode.BAD_INPUT
+
+    def __init__(self, key: str, value: object, allowed: str) -> None:
+        """Keep the parts, so that a reader of files can add its name."""
+        super().__init__(f"{key} = {shown(value)}: must be {allowed}")
+        self.key, self.value, self.allowed = key, value, allowed
+
+
+class ConfigError(CsprError):
+    """A fault in a file: names the file, the key, the value and what is allowed.
+
+    Args:
+        file: the file's name.
+        message: the rest of the line.
+    """
+
+    exit_code = ExitCode.BAD_INPUT
+
+    def __init__(self, file: object, message: str) -> None:
+        """Join the file's name and the message."""
+        super().__init__(f"{file}: {message}")
+
+
+class RefusedError(CsprError):
+    """A run that would mix with, or overwrite, somebody's results."""
+
+    exit_code = ExitCode.REFUSED
+
+
+class StoreError(CsprError):
+    """A file that cannot be read or written."""
+
+    exit_code = ExitCode.INPUT_OUTPUT
+
+
+def shown(value: object) -> str:
+    """A value as a message shows it: TOML spelling, at most 60 characters.
+
+    Args:
+        value: anything.
+
+    Returns:
+        the text.
+    """
+    if value is None:
+        return "(missing)"
+    if isinstance(value, bool):
+        return str(value).lower()
+    text = f'"{value}"' if isinstance(value, str) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,1 @@
+"""Verdict and margin of one trajectory."""

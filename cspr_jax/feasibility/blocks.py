@@ -1,0 +1,62 @@
+"""Where a segment is cut for a first look: blocks between the knots of the amplitude function."""
+
+import itertools
+import math
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.amplitudes import Amplitude
+
+# Intervals between the samples of one block.
+INTERVALS = 16
+# The table has a multiple of this many rows, and room for this many more blocks than arcs: one shape for most calls.
+ROWS, SPARE = 32, 8
+
+
+def blocks(amplitude: Amplitude, max_arcs: int) -> tuple[np.ndarray, np.ndarray]:
+    """Edges of the blocks of a first look, for each number of arcs p: some p + 4 blocks, none across a knot.
+
+    Args:
+        amplitude: its knots are block edges.
+        max_arcs: largest number of arcs.
+
+    Returns:
+        edges (n_rows, n_edges), n_rows > max_arcs, with row p for p arcs, padded with ones; and the
+        number of blocks of each row (n_rows,).
+    """
+    pieces = list(itertools.pairwise([0.0, *np.asarray(amplitude.knots).tolist(), 1.0]))
+    n_rows = -(-(max_arcs + 1) // ROWS) * ROWS
+    rows = []
+    for arcs in range(n_rows):
+        cuts = [np.linspace(a, b, 1 + math.ceil((arcs + 4) * (b - a) - 1e-9))[:-1] for a, b in pieces]
+        rows.append(np.concatenate([*cuts, [1.0]]))
+    counts = np.array([len(row) - 1 for row in rows], np.int32)
+    table = np.ones((n_rows, max(n_rows + SPARE, int(counts.max()) + 1)))
+    for row, target in zip(rows, table, strict=True):
+        target[: len(row)] = row
+    return table, counts
+
+
+def over_blocks(edges: Array, counts: Array, arcs: Array, first, step):
+    """Fold a function over the blocks of each segment.
+
+    Args:
+        edges: (n_rows, n_edges) as `blocks` gives them.
+        counts: (n_rows,).
+        arcs: (n,) number of arcs of each segment.
+        first: state to start from.
+        step: (state, start, stop) -> state, with start and stop (n,). A segment with fewer blocks sees its last again.
+
+    Returns:
+        the last state.
+    """
+    index = arcs.astype(jnp.int32)
+    count, flat, row = counts[index], edges.reshape(-1), edges.shape[1] * index
+
+    def body(i, state):
+        place = row + jnp.minimum(i, count - 1)
+        return step(state, flat[place], flat[place + 1])
+
+    return lax.fori_loop(0, jnp.max(count), body, first)

@@ -1,0 +1,192 @@
+"""Verdicts that hold between the samples.
+
+A slack f with |f''| <= M on an interval of length h satisfies f >= min(f at its ends) - M h^2 / 8.
+The interval [0, 1] is cut into blocks at the knots of the amplitude function, and each block into 16
+intervals; M comes from the closed form, one a block. A segment is
+
+    proved feasible    if this lower bound exceeds the tolerance in every block,
+    proved infeasible  if a sample lies below minus the tolerance,
+    cut finer          otherwise, only where it is open; each cut divides the gap by 256,
+    undecided          if the gap has closed to the tolerance and zero is still inside.
+
+The tolerance covers rounding (see `tolerance`). A limit that is touched exactly, such as a target
+on the floor, counts as met: limits are allowed twice the tolerance.
+"""
+
+import dataclasses
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.amplitudes import Amplitude
+from cspr_jax.feasibility.blocks import INTERVALS, blocks, over_blocks
+from cspr_jax.feasibility.criteria import curvatures, slacks
+from cspr_jax.feasibility.limits import Limits, given
+from cspr_jax.feasibility.slacks import largest_term
+from cspr_jax.grids import in_batches
+from cspr_jax.robots import PointMassRobot
+from cspr_jax.trajectories.hypocycloid import Segment
+
+SMALLEST_MARGIN = 1e-9
+BATCH = 1024
+FINEST_CUT = 6
+
+
+class Shared(NamedTuple):
+    """What all segments of a call share.
+
+    Fields:
+        robot: a point mass on three cables.
+        limits: limits beyond taut cables.
+        amplitude: A.
+    """
+
+    robot: PointMassRobot
+    limits: Limits
+    amplitude: Amplitude
+
+
+@dataclasses.dataclass(frozen=True)
+class Proof:
+    """What is proved of n segments. `feasible` and `infeasible` exclude each other; neither is undecided.
+
+    Fields:
+        feasible: (n,) every criterion is met at every instant.
+        infeasible: (n,) some criterion is broken at some instant.
+        sampled: (n, n_criteria) smallest slack that a sample attains.
+        bound: (n, n_criteria) what a first look proves that no slack falls below.
+    """
+
+    feasible: np.ndarray
+    infeasible: np.ndarray
+    sampled: np.ndarray
+    bound: np.ndarray
+
+
+def tolerance(amplitude: Amplitude, segment: Segment, arcs: Array) -> Array:
+    """Distance from zero within which a slack is undecided.
+
+    1e-9, plus 512 units of rounding of the largest term that a pseudotension can hold: the float64
+    error of a slack is measured below a tenth of that (tests).
+
+    Args:
+        amplitude: A.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs.
+
+    Returns:
+        () the tolerance.
+    """
+    terms = largest_term(amplitude, segment, arcs)
+    return SMALLEST_MARGIN + 512.0 * jnp.finfo(terms.dtype).eps * terms
+
+
+def block_bounds(shared: Shared, segments: Segment, arcs: Array, start: Array, stop: Array) -> tuple[Array, Array]:
+    """Smallest sampled slack, and proved lower bound, of each criterion over one block of each segment.
+
+    Args:
+        shared: robot, limits and amplitude.
+        segments: leaves (n, ...).
+        arcs: (n,).
+        start: (n,) tau where each block starts.
+        stop: (n,) tau where it stops; no knot inside.
+
+    Returns:
+        sampled (n_criteria, n) and proved (n_criteria, n).
+    """
+    weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
+    tau = start * (1.0 - weight) + stop * weight
+    values = jax.vmap(jax.vmap(partial(slacks, *shared)), in_axes=(None, None, 0))(segments, arcs, tau)
+    sampled = jnp.stack([jnp.min(v, axis=0) for v in values])
+    bound = jnp.stack(jax.vmap(partial(curvatures, *shared))(segments, arcs, start, stop))
+    return sampled, sampled - bound * ((stop - start) / INTERVALS) ** 2 / 8.0
+
+
+@jax.jit
+def _first_look(shared: Shared, edges: Array, counts: Array, arguments) -> tuple[Array, Array, Array]:
+    segments, arcs = arguments
+
+    def step(state, start, stop):
+        sampled, proved = block_bounds(shared, segments, arcs, start, stop)
+        return jnp.minimum(state[0], sampled), jnp.minimum(state[1], proved)
+
+    nothing = jnp.full((2 + len(given(shared.limits)), *arcs.shape), jnp.inf, arcs.dtype)
+    sampled, proved = over_blocks(edges, counts, arcs, (nothing, nothing), step)
+    near = jax.vmap(partial(tolerance, shared.amplitude))(segments, arcs)
+    return sampled.T, proved.T, near
+
+
+@jax.jit
+def _closer_look(shared: Shared, arguments) -> tuple[Array, Array]:
+    sampled, proved = block_bounds(shared, *arguments)
+    return sampled.T, proved.T
+
+
+def prove(shared: Shared, segments: Segment, arcs: np.ndarray) -> Proof:
+    """Decide segments, each with a given number of arcs.
+
+    Args:
+        shared: robot, limits and amplitude.
+        segments: leaves (n, ...), of the parity of `arcs`; float64.
+        arcs: (n,) number of arcs, 1 or more.
+
+    Returns:
+        the proofs.
+    """
+    arcs = np.asarray(arcs, float)
+    edges, counts = blocks(shared.amplitude, int(arcs.max()))
+    order = np.argsort(arcs, kind="stable")
+    back = np.argsort(order, kind="stable")
+    arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
+    look = in_batches(partial(_first_look, shared, edges, counts), arguments, size=BATCH)
+    sampled, bound, near = jax.tree.map(lambda x: x[back], look)
+    allowed = _allowance(sampled.shape[1], near)
+    feasible = (bound + allowed > near[:, None]).all(1)
+    infeasible = ~(sampled + allowed >= -near[:, None]).all(1)
+    open_ones = np.flatnonzero(~feasible & ~infeasible)
+    if len(open_ones):
+        some_segments, some_arcs = jax.tree.map(lambda x: x[open_ones], (segments, arcs))
+        table = (edges, counts)
+        feasible[open_ones], infeasible[open_ones] = _cut(shared, some_segments, some_arcs, near[open_ones], table)
+    return Proof(feasible, infeasible, sampled, bound)
+
+
+def _allowance(n_criteria: int, near: np.ndarray) -> np.ndarray:
+    # Limits may be touched; cables may not be slack, and the spool plane may not be reached.
+    is_limit = np.arange(n_criteria) >= 2
+    return 2.0 * near[:, None] * is_limit
+
+
+def _cut(shared: Shared, segments: Segment, arcs: np.ndarray, near: np.ndarray, table) -> tuple[np.ndarray, np.ndarray]:
+    # Items are blocks of segments that are still open: owner, start, stop.
+    edges, counts = table
+    refuted, stuck = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool)
+    count = counts[arcs.astype(int)]
+    owner = np.repeat(np.arange(len(arcs)), count)
+    place = np.concatenate([np.arange(c) for c in count])
+    row = arcs.astype(int)[owner]
+    start, stop = edges[row, place], edges[row, place + 1]
+    for _ in range(FINEST_CUT):
+        items = (*jax.tree.map(lambda x, o=owner: x[o], (segments, arcs)), start, stop)
+        sampled, proved = in_batches(partial(_closer_look, shared), items, size=BATCH)
+        limit, allowed = near[owner, None], _allowance(sampled.shape[1], near[owner])
+        np.logical_or.at(refuted, owner, ~(sampled + allowed >= -limit).all(1))
+        unproved = ~(proved + allowed > limit)
+        closed = (unproved & (sampled - proved <= 0.5 * limit)).any(1)
+        np.logical_or.at(stuck, owner, closed)
+        keep = unproved.any(1) & ~refuted[owner] & ~stuck[owner]
+        if not keep.any():
+            return ~refuted & ~stuck, refuted
+        owner, start, stop = _sixteenths(owner[keep], start[keep], stop[keep])
+    stuck[owner] = True
+    return ~refuted & ~stuck, refuted
+
+
+def _sixteenths(owner: np.ndarray, start: np.ndarray, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    weight = np.arange(INTERVALS + 1) / INTERVALS
+    edge = start[:, None] * (1.0 - weight) + stop[:, None] * weight
+    return np.repeat(owner, INTERVALS), edge[:, :-1].ravel(), edge[:, 1:].ravel()

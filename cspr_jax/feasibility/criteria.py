@@ -1,0 +1,77 @@
+"""All criteria of a segment together, in one order: taut cables, below the spools, then the limits that are given."""
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.amplitudes import Amplitude
+from cspr_jax.feasibility.limits import FLAGS, Limits, given, limit_curvatures, limit_slacks
+from cspr_jax.feasibility.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.robots import PointMassRobot
+from cspr_jax.trajectories.hypocycloid import Segment
+
+
+def flags(limits: Limits) -> tuple[Verdict, ...]:
+    """The flag that says that a criterion is broken, for each criterion.
+
+    Args:
+        limits: which limits are given.
+
+    Returns:
+        n_criteria flags.
+    """
+    return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(FLAGS[name] for name in given(limits)))
+
+
+def slacks(
+    robot: PointMassRobot, limits: Limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array
+) -> tuple[Array, ...]:
+    """The smallest slack of each criterion over the cables, at one instant.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: what else must be met.
+        amplitude: A.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        tau: () normalised time.
+
+    Returns:
+        n_criteria numbers ().
+    """
+    now = instant(segment, amplitude, arcs, tau)
+    taut = jnp.minimum(jnp.minimum(now.kappa[0], now.kappa[1]), now.kappa[2])
+    return (taut, now.eta, *limit_slacks(robot, limits, segment, arcs, tau, now))
+
+
+def curvatures(
+    robot: PointMassRobot,
+    limits: Limits,
+    amplitude: Amplitude,
+    segment: Segment,
+    arcs: Array,
+    start: Array,
+    stop: Array,
+) -> tuple[Array, ...]:
+    """Bound of the second derivative of each criterion's slacks over an interval.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: what else must be met.
+        amplitude: A.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        start: () tau.
+        stop: () tau, larger; no knot between.
+
+    Returns:
+        n_criteria numbers ().
+    """
+    over = stretch(segment, amplitude, arcs, start, stop)
+    kappa = taut_bounds(segment, arcs, over)
+    eta = row_bounds(segment, arcs, over, segment.tilt)
+    return (
+        jnp.max(kappa.curvature),
+        eta.curvature,
+        *limit_curvatures(robot, limits, segment, arcs, over, kappa),
+    )

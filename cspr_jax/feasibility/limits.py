@@ -1,0 +1,215 @@
+"""Limits of tension, height, cable length, speed and acceleration, as slacks.
+
+In the notation of `slacks`, with rho_k the length of cable k, F = f / (m g), and rates with respect
+to tau; w_k = (p - a_k) . p'. The tension of cable k is m g kappa_k rho_k / (3 z0 eta).
+
+    tension        kappa_k rho_k / (3 z0) - F_min eta,   F_max eta - kappa_k rho_k / (3 z0)
+    floor          (floor - z) / z0
+    length         (rho_max^2 - rho_k^2) / (2 z0^2)
+    speed          (rho_k^2 - (w_k / (T v_max))^2) / (2 z0^2)
+    acceleration   (a_max T^2 rho_k^3 -+ (rho_k^2 w_k' - w_k^2)) / (a_max T^2 z0^3)
+
+Each is dimensionless and free of a division that could blow up.
+"""
+
+import dataclasses
+import math
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.bounds import Bounds
+from cspr_jax.feasibility.slacks import Instant, Stretch, row_bounds
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.numerics import sincospi
+from cspr_jax.robots import PointMassRobot
+from cspr_jax.trajectories.hypocycloid import Segment, duration, oscillation
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Limits:
+    """Limits beyond taut cables; None where there is none.
+
+    Fields:
+        tension_min: (3,) N.
+        tension_max: (3,) N.
+        floor: () z of the floor, z down, m.
+        cable_length_max: (3,) m.
+        cable_speed_max: (3,) m/s, of paying out and of winding in.
+        cable_acceleration_max: (3,) m/s^2, of either sign.
+    """
+
+    tension_min: Array | None = None
+    tension_max: Array | None = None
+    floor: Array | None = None
+    cable_length_max: Array | None = None
+    cable_speed_max: Array | None = None
+    cable_acceleration_max: Array | None = None
+
+
+FLAGS = {
+    "tension_min": Verdict.SLACK_CABLE,
+    "tension_max": Verdict.OVER_TENSION,
+    "floor": Verdict.BELOW_FLOOR,
+    "cable_length_max": Verdict.CABLE_TOO_LONG,
+    "cable_speed_max": Verdict.CABLE_TOO_FAST,
+    "cable_acceleration_max": Verdict.CABLE_OVER_ACCELERATION,
+}
+
+
+def given(limits: Limits) -> tuple[str, ...]:
+    """Names of the limits that are given, in the order of their slacks.
+
+    Args:
+        limits: the limits.
+
+    Returns:
+        the names.
+    """
+    return tuple(name for name in FLAGS if getattr(limits, name) is not None)
+
+
+def limit_slacks(
+    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, now: Instant
+) -> tuple[Array, ...]:
+    """The smallest slack of each limit over the cables, at one instant.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: the limits.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        tau: () normalised time.
+        now: the state at `tau`.
+
+    Returns:
+        one () for each limit of `given`.
+    """
+    if not given(limits):
+        return ()
+    position, slope, curvature = _path(segment, arcs, tau, now)
+    rays = position - robot.base_points
+    length = jnp.linalg.norm(rays, axis=1)
+    rate = rays @ slope
+    rate_slope = jnp.dot(slope, slope) + rays @ curvature
+    z0, time, weight = segment.hub[2] - _centre_depth(robot), duration(segment, arcs), robot.mass * robot.gravity
+    lift = jnp.stack(now.kappa) * length / (3.0 * z0)
+    found = []
+    for name in given(limits):
+        limit = getattr(limits, name)
+        if name == "tension_min":
+            slack = lift - limit / weight * now.eta
+        elif name == "tension_max":
+            slack = limit / weight * now.eta - lift
+        elif name == "floor":
+            slack = (limit - position[2]) / z0
+        elif name == "cable_length_max":
+            slack = (limit**2 - length**2) / (2.0 * z0**2)
+        elif name == "cable_speed_max":
+            slack = (length**2 - (rate / (time * limit)) ** 2) / (2.0 * z0**2)
+        else:
+            bend = jnp.abs(length**2 * rate_slope - rate**2) / (limit * time**2)
+            slack = (length**3 - bend) / z0**3
+        found.append(jnp.min(slack))
+    return tuple(found)
+
+
+def _centre_depth(robot: PointMassRobot) -> Array:
+    return jnp.mean(robot.base_points[:, 2])
+
+
+def _path(segment: Segment, arcs: Array, tau: Array, now: Instant) -> tuple[Array, Array, Array]:
+    # Position and its first two derivatives in tau.
+    period, ratio = oscillation(segment, arcs)
+    span = segment.end_radius - segment.start_radius
+    r, r1 = segment.start_radius + span * now.amplitude_values[0], span * now.amplitude_values[1]
+    sine, cosine = sincospi(segment.sense * arcs * tau)
+    lateral, axial = sincospi(segment.sense * segment.precession * tau)
+    slope_r = r1 * cosine - r * segment.sense * period / (math.pi * arcs) * sine
+    slope_t = r1 * ratio * sine
+    slope = jnp.stack([axial * slope_r + lateral * slope_t, axial * slope_t - lateral * slope_r])
+    return segment.hub + segment.plane @ now.c, segment.plane @ slope, segment.plane @ (period * (now.d - now.c))
+
+
+def limit_curvatures(
+    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, over: Stretch, kappa: Bounds
+) -> tuple[Array, ...]:
+    """Bound of the second derivative of each limit's slack over an interval.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: the limits.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        over: the interval.
+        kappa: bounds of the variable part of the pseudotensions over it, leaves (3,).
+
+    Returns:
+        one () for each limit of `given`, the largest over the cables.
+    """
+    if not given(limits):
+        return ()
+    z0, time, weight = segment.hub[2] - _centre_depth(robot), duration(segment, arcs), robot.mass * robot.gravity
+    pace, pull = _pace(segment, arcs, over)
+    length = _length(robot, segment, over, pace)
+    found = []
+    for name in given(limits):
+        limit = getattr(limits, name)
+        if name in ("tension_min", "tension_max"):
+            whole = kappa._replace(value=1.0 + kappa.value)
+            eta = row_bounds(segment, arcs, over, segment.tilt)
+            bounds = (whole * length).times(1.0 / (3.0 * z0)) + eta.times(limit / weight)
+        elif name == "floor":
+            bounds = row_bounds(segment, arcs, over, segment.plane[2]).times(1.0 / z0)
+        elif name == "cable_length_max":
+            bounds = (length * length).times(0.5 / z0**2)
+        elif name == "cable_speed_max":
+            rate = _rate(length, pace, pull)
+            bounds = (length * length).times(0.5 / z0**2) + (rate * rate).times(0.5 / (time * limit * z0) ** 2)
+        else:
+            rate, slope = _rate(length, pace, pull), _rate_slope(length, pace, pull)
+            bend = length * length * slope + rate * rate
+            bounds = (length * length * length + bend.times(1.0 / (limit * time**2))).times(1.0 / z0**3)
+        found.append(jnp.max(bounds.curvature))
+    return tuple(found)
+
+
+def _pace(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]:
+    # Bounds of the length of c and of its first two derivatives; the same of its second derivative.
+    period, ratio = oscillation(segment, arcs)
+    omega = math.pi * arcs
+    turn = math.pi * segment.precession
+    one = jnp.ones_like(omega)
+    wave = Bounds(one, omega, omega**2)
+    rho = over.bend.times(1.0 / period)
+    c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(turn)
+    d_r = rho * wave + (over.growth * wave).times(2.0 / omega)
+    d_t = ((rho + over.size.times(2.0)) * wave).times(ratio)
+    return c, (d_r.combined(d_t).turned(turn) + c).times(period)  # c'' = T^2 lambda (d - c)
+
+
+def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds) -> Bounds:
+    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (3,).
+    at_middle = jnp.linalg.norm(segment.hub + segment.plane @ over.place - robot.base_points, axis=1)
+    change = over.radius * pace.slope
+    nearest = jnp.maximum(at_middle - change, 0.0)
+    slope = jnp.broadcast_to(pace.slope, nearest.shape)
+    return Bounds(at_middle + change, slope, slope**2 / nearest + pace.curvature)
+
+
+def _rate(length: Bounds, pace: Bounds, pull: Bounds) -> Bounds:
+    # w = ray . p'
+    return Bounds(
+        length.value * pace.slope,
+        pace.slope**2 + length.value * pace.curvature,
+        3.0 * pace.slope * pace.curvature + length.value * pull.slope,
+    )
+
+
+def _rate_slope(length: Bounds, pace: Bounds, pull: Bounds) -> Bounds:
+    # w' = |p'|^2 + ray . p''
+    whole = _rate(length, pace, pull)
+    last = 3.0 * pace.curvature**2 + 4.0 * pace.slope * pull.slope + length.value * pull.curvature
+    return Bounds(whole.slope, whole.curvature, last)

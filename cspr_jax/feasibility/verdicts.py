@@ -1,0 +1,46 @@
+"""Verdicts: bit flags, each with a sentence. No jax here: files and tables use them too."""
+
+import enum
+
+
+class Verdict(enum.IntFlag):
+    """Why a trajectory is not, or not provably, feasible; 0 is feasible."""
+
+    FEASIBLE = 0
+    SLACK_CABLE = 1
+    OVER_TENSION = 2
+    SINGULAR = 4
+    CABLE_CABLE = 8
+    CABLE_PLATFORM = 16
+    ABOVE_SPOOLS = 32
+    BELOW_FLOOR = 64
+    CABLE_TOO_LONG = 128
+    CABLE_TOO_FAST = 256
+    NO_ARCS = 512
+    NOT_FINITE = 1024
+    UNDECIDED = 2048
+    CABLE_OVER_ACCELERATION = 4096
+    FEWER_ARCS_UNDECIDED = 8192
+
+    @property
+    def text(self) -> str:
+        """The flags' names joined by "+"; "feasible" without any."""
+        return "+".join(flag.name.lower() for flag in type(self) if flag & self and flag.name) or "feasible"
+
+
+SENTENCES = {
+    Verdict.SLACK_CABLE: "A cable would have to push, or falls below its smallest tension.",
+    Verdict.OVER_TENSION: "A cable exceeds its largest tension.",
+    Verdict.SINGULAR: "The cables cannot carry every wrench at some pose on the way.",
+    Verdict.CABLE_CABLE: "Two cables touch.",
+    Verdict.CABLE_PLATFORM: "A cable touches the platform.",
+    Verdict.ABOVE_SPOOLS: "The effector is on or above the plane of the spools.",
+    Verdict.BELOW_FLOOR: "The effector goes through the floor.",
+    Verdict.CABLE_TOO_LONG: "A cable exceeds its largest length.",
+    Verdict.CABLE_TOO_FAST: "A cable exceeds its largest speed.",
+    Verdict.NO_ARCS: "No number of arcs up to the largest is feasible; the other flags are the best candidate's.",
+    Verdict.NOT_FINITE: "The numbers overflowed or are undefined.",
+    Verdict.UNDECIDED: "The margin is within the stated tolerance of zero: neither proved nor refuted.",
+    Verdict.CABLE_OVER_ACCELERATION: "A cable exceeds its largest acceleration.",
+    Verdict.FEWER_ARCS_UNDECIDED: "Feasible as stated, but a smaller number of arcs could not be refuted.",
+}

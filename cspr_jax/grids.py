@@ -1,0 +1,39 @@
+"""Batches of one shape: the only place that vectorises.
+
+XLA compiles for one shape, and the bits of its results can depend on it. So every call has the
+same shape: the last batch is padded with its own last element, and trimmed.
+"""
+
+from collections.abc import Callable
+
+import jax
+import numpy as np
+
+
+def in_batches(function: Callable, arguments, *, size: int):
+    """Apply a compiled function to arrays of any length, in batches of one length.
+
+    Args:
+        function: takes one pytree whose leaves have leading dimension `size`, returns a pytree likewise.
+        arguments: pytree of NumPy arrays (n, ...), n >= 0.
+        size: length of a batch.
+
+    Returns:
+        pytree of NumPy arrays (n, ...); None if n is 0.
+    """
+    leaves = jax.tree.leaves(arguments)
+    count = len(leaves[0])
+    if count == 0:
+        return None
+    pending = [
+        function(jax.tree.map(lambda a, s=start: _padded(a[s : s + size], size), arguments))
+        for start in range(0, count, size)
+    ]
+    parts = [jax.tree.map(np.asarray, part) for part in pending]
+    return jax.tree.map(lambda *pieces: np.concatenate(pieces)[:count], *parts)
+
+
+def _padded(array: np.ndarray, size: int) -> np.ndarray:
+    if len(array) == size:
+        return array
+    return np.concatenate([array, np.repeat(array[-1:], size - len(array), axis=0)])

@@ -1,0 +1,1 @@
+"""Maps, one module a kind: targets and parameters to verdicts, arcs, durations and margins."""

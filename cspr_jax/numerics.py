@@ -1,0 +1,64 @@
+"""Elementary functions that XLA compiles well, for one number or an array of any shape."""
+
+import math
+from typing import cast
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+# Terms that keep the truncation below half a unit in the last place on |x| <= pi / 2.
+_SINE_TERMS = {"float64": 11, "float32": 7}
+_COSINE_TERMS = {"float64": 12, "float32": 7}
+
+
+def polynomial(coefficients, x: Array) -> Array:
+    """Value of c[0] + c[1] x + c[2] x^2 + ... by Horner's rule.
+
+    Args:
+        coefficients: (n,) sequence, lowest power first; numbers, or arrays of the shape of `x`.
+        x: (...) argument.
+
+    Returns:
+        (...) value, in the dtype of `x`.
+    """
+    value = jnp.zeros_like(x)
+    for coefficient in reversed(coefficients):
+        value = value * x + coefficient
+    return value
+
+
+def sincospi(x: Array) -> tuple[Array, Array]:
+    """sin(pi x) and cos(pi x), by range reduction and a polynomial.
+
+    The sine and cosine of XLA's CPU backend run one element at a time; this runs in vector
+    registers. Counting the angle in half turns makes the reduction exact.
+
+    Args:
+        x: (...) angle in half turns (1 is pi radians); |x| below 2^50.
+
+    Returns:
+        sin(pi x): (...) and cos(pi x): (...), each within 3e-16 (float64) or 2e-7 (float32) of the truth.
+    """
+    half_turns = jnp.round(x)
+    angle = x - half_turns
+    square = (math.pi * angle) ** 2
+    sign = 1.0 - 2.0 * (half_turns - 2.0 * jnp.floor(0.5 * half_turns))
+    kind = str(x.dtype)
+    sine = polynomial([(-1) ** i / math.factorial(2 * i + 1) for i in range(_SINE_TERMS[kind])], square)
+    cosine = polynomial([(-1) ** i / math.factorial(2 * i) for i in range(_COSINE_TERMS[kind])], square)
+    return sign * (math.pi * angle) * sine, sign * cosine
+
+
+def leaf(value) -> Array:
+    """A float64 NumPy array, as a leaf of a pytree that compiled functions take.
+
+    NumPy and not jax: jax would round it to float32 where 64 bits are off.
+
+    Args:
+        value: number or nested sequence.
+
+    Returns:
+        the array.
+    """
+    return cast(Array, np.asarray(value, float))

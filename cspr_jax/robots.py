@@ -1,0 +1,95 @@
+"""The robot as the kernels see it: geometry, mass and gravity in the product's axes (z down)."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.errors import InputError
+from cspr_jax.numerics import leaf
+
+STANDARD_GRAVITY = 9.81
+# Below these ratios three spools count as lying on a line, and their plane as vertical.
+SMALLEST_AREA_RATIO = 1e-6
+SMALLEST_LEVEL_RATIO = 1e-3
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class PointMassRobot:
+    """A point mass on three cables.
+
+    Fields:
+        base_points: (3, 3) where the cables leave their spools, one a row, in cable order; z down, m.
+        mass: () of the effector, kg.
+        gravity: () along +z, m/s^2.
+        name: for people.
+    """
+
+    base_points: Array
+    mass: Array
+    gravity: Array
+    name: str = dataclasses.field(default="robot", metadata={"static": True})
+
+
+def point_mass_robot(
+    base_points, *, mass: float, gravity: float = STANDARD_GRAVITY, name: str = "robot"
+) -> PointMassRobot:
+    """A point-mass robot, its geometry checked.
+
+    Args:
+        base_points: (3, 3) spool points, one a row, z down, m. Any triangle whose plane is not vertical.
+        mass: kg, positive.
+        gravity: m/s^2, positive.
+        name: for people.
+
+    Returns:
+        the robot, float64 NumPy leaves.
+
+    Raises:
+        InputError: wrong shape, not finite, spools on a line, a vertical spool plane, mass or gravity not positive.
+    """
+    points = np.asarray(base_points, float)
+    if points.shape != (3, 3) or not np.isfinite(points).all():
+        raise InputError("base_points", base_points, "three points of three finite coordinates")
+    for key, value in (("mass", mass), ("gravity", gravity)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError(key, value, "a finite number > 0")
+    sides = np.roll(points, -1, 0) - points
+    normal = np.cross(sides[0], sides[1])
+    size = np.linalg.norm(normal)
+    if not size > SMALLEST_AREA_RATIO * (np.linalg.norm(sides, axis=1).max() ** 2):
+        raise InputError("base_points", points.tolist(), "three spools that are not on one line")
+    if not abs(normal[2]) > SMALLEST_LEVEL_RATIO * size:
+        raise InputError("base_points", points.tolist(), "three spools whose plane is not vertical")
+    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), name)
+
+
+def centroid(robot: PointMassRobot) -> Array:
+    """Centroid of the spools, thesis (1.75).
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        (3,) position, m.
+    """
+    return jnp.mean(robot.base_points, axis=0)
+
+
+def plane_normal(robot: PointMassRobot) -> Array:
+    """Normal of the spool plane, scaled so that its vertical component is 1.
+
+    The depth below the plane, measured along the vertical, is normal . (p - centroid).
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        (3,) the third component is 1; (0, 0, 1) for level spools.
+    """
+    a = robot.base_points
+    area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
+    return area / area[2]

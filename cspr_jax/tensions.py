@@ -1,0 +1,68 @@
+"""The force balance of a point mass on three cables, at one instant."""
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.robots import PointMassRobot
+
+
+def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
+    """Pseudotensions kappa, thesis (2.12) to (2.14): Adj(M) (p'' - g).
+
+    They have the sign of the tensions below the spools, and need no division. The sign is
+    corrected for spools numbered the other way round, so that it never depends on the labels.
+
+    Args:
+        robot: a point mass on three cables.
+        position: (3,) of the mass, z down, m.
+        acceleration: (3,) m/s^2.
+
+    Returns:
+        (3,) in cable order, m^3/s^2; positive pulls, as long as the mass is below the spool plane.
+    """
+    a = robot.base_points
+    following, preceding = jnp.roll(a, -1, axis=0), jnp.roll(a, -2, axis=0)
+    adjugate = jnp.cross(position, following - preceding) + jnp.cross(following, preceding)
+    area = jnp.cross(a[1] - a[0], a[2] - a[0])[2]
+    return -jnp.sign(area) * (adjugate @ _relative_acceleration(robot, acceleration))
+
+
+def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
+    """Cable tensions, thesis (2.2) to (2.7), as kappa / det(M) times mass and length.
+
+    Args:
+        robot: a point mass on three cables.
+        position: (3,) of the mass, z down, m.
+        acceleration: (3,) m/s^2.
+
+    Returns:
+        (3,) in cable order, N. Not clipped: a negative entry is the push that a cable cannot give.
+        Infinite or NaN in the spool plane, where M is singular.
+    """
+    rays = robot.base_points - position  # (2.6)
+    adjugate = jnp.stack([jnp.cross(rays[1], rays[2]), jnp.cross(rays[2], rays[0]), jnp.cross(rays[0], rays[1])])
+    determinant = jnp.dot(adjugate[2], rays[2])  # (2.9)
+    per_length = adjugate @ _relative_acceleration(robot, acceleration) / determinant  # (2.7), (2.11)
+    return robot.mass * per_length * jnp.linalg.norm(rays, axis=1)  # (2.4)
+
+
+def cable_motion(robot: PointMassRobot, position: Array, velocity: Array, acceleration: Array) -> tuple[Array, ...]:
+    """Lengths of the cables, (2.1), and their first two derivatives in time.
+
+    Args:
+        robot: a point mass on three cables.
+        position: (3,) m.
+        velocity: (3,) m/s.
+        acceleration: (3,) m/s^2.
+
+    Returns:
+        lengths (3,) m, rates (3,) m/s (positive pays out), accelerations (3,) m/s^2, in cable order.
+    """
+    rays = position - robot.base_points
+    lengths = jnp.linalg.norm(rays, axis=1)
+    rates = rays @ velocity / lengths
+    return lengths, rates, (jnp.dot(velocity, velocity) + rays @ acceleration - rates**2) / lengths
+
+
+def _relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:
+    return acceleration.at[2].add(-robot.gravity)  # p'' - g, z down

@@ -1,0 +1,1 @@
+"""Trajectory families, one file each."""

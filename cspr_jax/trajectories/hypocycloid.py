@@ -1,0 +1,254 @@
+"""The standard hypocycloid between two points, thesis chapter 2.
+
+The effector swings in a plane through p0, the point below the centroid at depth z0. Its path is a
+hypocycloid whose size changes from r1 to r2; every arc ends in a cusp. With lambda = g / z0 the
+end accelerations are those of a pendulum hung from the centroid.
+
+Two forms of the same motion stand here. `motion` is the printed one, (2.32) to (2.48). `swing` is
+the closed form: the hypocycloid is an ellipse, swept p / 2 times, which slowly precesses by the
+angle delta = psi (p even) or pi - psi (p odd), so that all that oscillates fast is one sine and one
+cosine of p pi tau, which do not depend on the points. They agree to 1e-12 (tests).
+
+Degenerate cases. A rest end (a point at p0) makes the motion a straight line, delta = 0, and an odd
+p is allowed: its first swing goes away from the target. Where start and end lie on one line through
+p0 and the arcs still need a plane (psi = 0 with p odd, psi = pi with p even), the plane is the one
+least inclined to the spool plane. psi = 0 with p = 1 has no duration: see `duration`.
+"""
+
+import dataclasses
+import math
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax import robots
+from cspr_jax.amplitudes import Amplitude, derivatives
+from cspr_jax.numerics import sincospi
+from cspr_jax.robots import PointMassRobot
+
+# Relative to z0 or to a radius: below this a point is at p0, or on the line through p0.
+COINCIDENT = 1e-12
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Segment:
+    """What one segment is, for one parity of the number of arcs.
+
+    With c the position in the plane of the trajectory and d = c + c'' / lambda, the normalised
+    pseudotension of cable k is 1 + tilt . c + pull_k . d + twist_k (c x d).
+
+    Fields:
+        plane: (3, 2) unit vectors q_h1 and q_h2 of (2.30), as columns.
+        hub: (3,) the point p0, m.
+        start_radius: () r1 of (2.39), m.
+        end_radius: () r2, m.
+        precession: () delta, in half turns, in [0, 1].
+        sense: () +1 (p odd) or -1 (p even): sign of theta_h, (2.34).
+        rate: () lambda of (2.26), 1/s^2.
+        tilt: (2,) slope of the plane: depth below the spools over z0 is 1 + tilt . c; 1/m.
+        pull: (3, 2) one row a cable, 1/m.
+        twist: (3,) one a cable, 1/m^2.
+    """
+
+    plane: Array
+    hub: Array
+    start_radius: Array
+    end_radius: Array
+    precession: Array
+    sense: Array
+    rate: Array
+    tilt: Array
+    pull: Array
+    twist: Array
+
+
+def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: Array) -> Segment:
+    """The segment from one point to another.
+
+    Args:
+        robot: a point mass on three cables.
+        start: (3,) p1, m.
+        end: (3,) p2, m.
+        z0: () depth of p0 below the centroid of the spools, m.
+        odd: () whether the number of arcs is odd.
+
+    Returns:
+        the segment for arcs of that parity.
+    """
+    centre = robots.centroid(robot)
+    hub = centre + jnp.stack([jnp.zeros_like(z0), jnp.zeros_like(z0), z0])
+    q1, q2, r1, r2, precession = _plane(start - hub, end - hub, z0, robots.plane_normal(robot), odd)
+    plane = jnp.stack([q1, q2], axis=1)
+    tilt, pull, twist = _couplings(robot, hub - centre, plane)
+    sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
+    return Segment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, tilt, pull, twist)
+
+
+def _plane(v1: Array, v2: Array, z0: Array, normal: Array, odd: Array) -> tuple[Array, Array, Array, Array, Array]:
+    r1, r2 = jnp.linalg.norm(v1), jnp.linalg.norm(v2)  # (2.39)
+    from_rest, to_rest = r1 < COINCIDENT * z0, r2 < COINCIDENT * z0
+    toward_end = v2 / jnp.where(to_rest, 1.0, r2)
+    x_axis = jnp.zeros_like(v1).at[0].set(1.0)
+    q1 = jnp.where(from_rest, jnp.where(odd, -1.0, 1.0) * toward_end, v1 / jnp.where(from_rest, 1.0, r1))
+    q1 = jnp.where(from_rest & to_rest, x_axis, q1)
+    along = jnp.dot(q1, v2)
+    across = v2 - q1 * along  # (2.30)
+    distance = jnp.linalg.norm(across)
+    in_line = from_rest | to_rest | (distance < COINCIDENT * r2)
+    q2 = jnp.where(in_line, _least_inclined(normal, q1, x_axis), across / jnp.where(in_line, 1.0, distance))
+    # delta, not psi: its arctangent keeps its digits where psi is close to pi.
+    delta = jnp.arctan2(jnp.where(in_line, 0.0, distance), jnp.where(odd, -along, along)) / math.pi
+    delta = jnp.where(from_rest | to_rest, 0.0, delta)
+    return q1, q2, jnp.where(from_rest, 0.0, r1), jnp.where(to_rest, 0.0, r2), delta
+
+
+def _least_inclined(normal: Array, q1: Array, x_axis: Array) -> Array:
+    level = jnp.cross(normal, q1)
+    size = jnp.linalg.norm(level)
+    upright = size < COINCIDENT
+    fallback = x_axis - q1 * jnp.dot(q1, x_axis)
+    return jnp.where(upright, fallback / jnp.linalg.norm(fallback), level / jnp.where(upright, 1.0, size))
+
+
+def _couplings(robot: PointMassRobot, hub: Array, plane: Array) -> tuple[Array, Array, Array]:
+    # From (2.12)-(2.14) with p'' - g = -lambda (p - centroid) + lambda Q d, divided by their value at rest in p0.
+    a = robot.base_points - robots.centroid(robot)
+    area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
+    scale = 3.0 / (area[2] * hub[2])
+    opposite = jnp.roll(a, -1, axis=0) - jnp.roll(a, -2, axis=0)  # a2 - a3, a3 - a1, a1 - a2
+    tilt = robots.plane_normal(robot) @ plane / hub[2]
+    pull = -scale * (jnp.cross(hub, opposite) + area / 3.0) @ plane
+    twist = scale * (opposite @ jnp.cross(plane[:, 0], plane[:, 1]))
+    return tilt, pull, twist
+
+
+def oscillation(segment: Segment, arcs: Array) -> tuple[Array, Array]:
+    """T^2 lambda, and the ratio nu of the axes of the ellipse.
+
+    Args:
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs p, a float.
+
+    Returns:
+        T^2 lambda: () equal to theta_h^2 (n_h - 1) of (2.47), and nu = delta / (pi p): ().
+    """
+    ratio = segment.precession / arcs
+    # 1 - ratio first: it is what vanishes for p = 1 and psi -> 0.
+    return (math.pi * arcs) ** 2 * (1.0 - ratio) * (1.0 + ratio), ratio
+
+
+def duration(segment: Segment, arcs: Array) -> Array:
+    """Duration T of a segment, (2.47).
+
+    Args:
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs.
+
+    Returns:
+        () seconds; 0 for p = 1 between points on one ray from p0, which is no trajectory.
+    """
+    return jnp.sqrt(oscillation(segment, arcs)[0] / segment.rate)
+
+
+def swing(segment: Segment, amplitude_values: tuple[Array, ...], arcs: Array, tau: Array) -> tuple[Array, Array]:
+    """Closed form of the motion in the plane of the trajectory, at one instant.
+
+    In the frame e_r, e_t that precesses with the ellipse, with C, S the cosine and sine of the
+    phase sense pi p tau and ' = d / dtau,
+
+        c = r (C e_r + nu S e_t)
+        d = c + c'' / lambda = [rho C - 2 sense r' S / (pi p)] e_r + nu (rho + 2 r) S e_t,
+
+    rho = r'' / (T^2 lambda); c'' here is the second derivative in time.
+
+    Args:
+        segment: of the parity of `arcs`.
+        amplitude_values: A, A', A'' at `tau`, each ().
+        arcs: () number of arcs, a float.
+        tau: () normalised time.
+
+    Returns:
+        c: (2,) and d: (2,) along q_h1 and q_h2, m.
+    """
+    span = segment.end_radius - segment.start_radius
+    r = segment.start_radius + span * amplitude_values[0]  # (2.48)
+    period, ratio = oscillation(segment, arcs)
+    rho = span * amplitude_values[2] / period
+    sine, cosine = sincospi(segment.sense * arcs * tau)
+    lateral, axial = sincospi(segment.sense * segment.precession * tau)
+    c_r, c_t = r * cosine, ratio * r * sine
+    d_r = rho * cosine - 2.0 * segment.sense * span * amplitude_values[1] * sine / (math.pi * arcs)
+    d_t = ratio * (rho + 2.0 * r) * sine
+    c = jnp.stack([axial * c_r + lateral * c_t, axial * c_t - lateral * c_r])
+    d = jnp.stack([axial * d_r + lateral * d_t, axial * d_t - lateral * d_r])
+    return c, d
+
+
+def motion(segment: Segment, amplitude: Amplitude, arcs: Array, tau: Array) -> tuple[Array, Array, Array]:
+    """Position, velocity and acceleration at one instant, as printed in (2.31) to (2.48).
+
+    Args:
+        segment: of the parity of `arcs`.
+        amplitude: A.
+        arcs: () number of arcs, a float.
+        tau: () normalised time in [0, 1].
+
+    Returns:
+        position (3,) m, velocity (3,) m/s, acceleration (3,) m/s^2.
+    """
+    theta = segment.sense * math.pi * (arcs - segment.precession)  # (2.34)
+    n = 2.0 * math.pi * arcs / jnp.abs(theta)  # (2.35)
+    slow, fast = theta * tau, (n - 1.0) * theta * tau
+    u = (
+        jnp.stack([(n - 1.0) * jnp.cos(slow) + jnp.cos(fast), (n - 1.0) * jnp.sin(slow) - jnp.sin(fast)]) / n
+    )  # (2.32-33)
+    u1 = theta * (n - 1.0) / n * jnp.stack([-jnp.sin(slow) - jnp.sin(fast), jnp.cos(slow) - jnp.cos(fast)])
+    u2 = (
+        theta**2
+        * (n - 1.0)
+        / n
+        * jnp.stack([-jnp.cos(slow) - (n - 1.0) * jnp.cos(fast), -jnp.sin(slow) + (n - 1.0) * jnp.sin(fast)])
+    )
+    span = segment.end_radius - segment.start_radius
+    a0, a1, a2 = derivatives(amplitude, tau, order=2)
+    r, r1, r2 = segment.start_radius + span * a0, span * a1, span * a2  # (2.48)
+    time = duration(segment, arcs)
+    position = segment.hub + segment.plane @ (r * u)  # (2.31), (2.38)
+    velocity = segment.plane @ (r1 * u + r * u1) / time  # (2.42)
+    acceleration = segment.plane @ (r2 * u + 2.0 * r1 * u1 + r * u2) / time**2  # (2.43)
+    return position, velocity, acceleration
+
+
+def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Array:
+    """Left-hand side of (2.55): positive means that enough arcs make the segment feasible.
+
+    Args:
+        segment: of either parity.
+        amplitude: A; one that overshoots counts with its largest radius.
+
+    Returns:
+        () at most 1.
+    """
+    span = segment.end_radius - segment.start_radius
+    ends = segment.start_radius + span * jnp.stack([amplitude.lowest, amplitude.highest]).astype(span.dtype)
+    return 1.0 - jnp.max(jnp.abs(ends)) * jnp.linalg.norm(segment.tilt)
+
+
+def limit_of_many_arcs(segment: Segment, amplitude: Amplitude, tau: Array) -> Array:
+    """Smallest normalised pseudotension as the number of arcs of this parity grows, at one instant.
+
+    1 - r(tau) |tilt . e_r(tau)|: exact, where (2.55) bounds the direction of the swing by the worst.
+
+    Args:
+        segment: of the parity in question.
+        amplitude: A.
+        tau: () normalised time.
+
+    Returns:
+        () its minimum over tau is the limit of the margin.
+    """
+    r = segment.start_radius + (segment.end_radius - segment.start_radius) * derivatives(amplitude, tau, order=0)[0]
+    lateral, axial = sincospi(segment.sense * segment.precession * tau)
+    return 1.0 - jnp.abs(r * (segment.tilt[0] * axial - segment.tilt[1] * lateral))

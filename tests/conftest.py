@@ -1,0 +1,34 @@
+"""Settings for every test: 64 bits, strict promotion; robots that many tests share."""
+
+import jax
+import numpy as np
+import pytest
+
+jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_numpy_rank_promotion", "allow")
+
+from hypothesis import HealthCheck, settings
+
+from cspr_jax import robots
+
+settings.register_profile("default", deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+settings.load_profile("default")
+
+
+def equilateral(radius: float) -> np.ndarray:
+    """Spools of (2.17) to (2.19)."""
+    half = np.sqrt(3.0) / 2.0
+    return radius * np.array([[half, -0.5, 0.0], [-half, -0.5, 0.0], [0.0, 1.0, 0.0]])
+
+
+@pytest.fixture(scope="session")
+def prototype():
+    """The robot of chapter 2."""
+    return robots.point_mass_robot(equilateral(0.26), mass=0.198, name="prototype")
+
+
+@pytest.fixture(scope="session")
+def tilted():
+    """A general triangle: no symmetry, tilted plane, labels the other way round, centroid off the origin."""
+    points = [[1.3, 0.2, -0.1], [-0.4, 1.1, 0.25], [-0.9, -0.8, 0.05]]
+    return robots.point_mass_robot(np.array(points)[[0, 1, 2]], mass=1.7, gravity=9.80665, name="tilted")
