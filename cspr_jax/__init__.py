@@ -1,1 +1,39 @@
-"""What a cable-suspended parallel robot can reach when it swings, and how."""
+"""What a cable-suspended parallel robot can reach when it swings, and how.
+
+Importing the package loads nothing heavy: each public name is loaded when it is first used.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cspr_jax.amplitudes import named as amplitude
+    from cspr_jax.api import load_robot as load_robot
+    from cspr_jax.api import minimum_arcs as minimum_arcs
+    from cspr_jax.api import plan as plan
+    from cspr_jax.feasibility.limits import Limits as Limits
+    from cspr_jax.feasibility.verdicts import Verdict as Verdict
+    from cspr_jax.results import open_result as open_result
+    from cspr_jax.robots import point_mass_robot as point_mass_robot
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "Limits": ("cspr_jax.feasibility.limits", "Limits"),
+    "Verdict": ("cspr_jax.feasibility.verdicts", "Verdict"),
+    "amplitude": ("cspr_jax.amplitudes", "named"),
+    "load_robot": ("cspr_jax.api", "load_robot"),
+    "minimum_arcs": ("cspr_jax.api", "minimum_arcs"),
+    "open_result": ("cspr_jax.results", "open_result"),
+    "plan": ("cspr_jax.api", "plan"),
+    "point_mass_robot": ("cspr_jax.robots", "point_mass_robot"),
+}
+__all__ = ["Limits", "Verdict", "amplitude", "load_robot", "minimum_arcs", "open_result", "plan", "point_mass_robot"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first used."""
+    if name not in _PUBLIC:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, attribute = _PUBLIC[name]
+    return getattr(importlib.import_module(module), attribute)

@@ -15,12 +15,14 @@ INTERVALS = 16
 ROWS, SPARE = 32, 8
 
 
-def blocks(amplitude: Amplitude, max_arcs: int) -> tuple[np.ndarray, np.ndarray]:
-    """Edges of the blocks of a first look, for each number of arcs p: some p + 4 blocks, none across a knot.
+def blocks(amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Edges of blocks, for each number of arcs p: some density (p + 4) blocks, none across a knot.
 
     Args:
         amplitude: its knots are block edges.
         max_arcs: largest number of arcs.
+        density: 1 for a first look.
+        least: smallest number of blocks.
 
     Returns:
         edges (n_rows, n_edges), n_rows > max_arcs, with row p for p arcs, padded with ones; and the
@@ -30,7 +32,8 @@ def blocks(amplitude: Amplitude, max_arcs: int) -> tuple[np.ndarray, np.ndarray]
     n_rows = -(-(max_arcs + 1) // ROWS) * ROWS
     rows = []
     for arcs in range(n_rows):
-        cuts = [np.linspace(a, b, 1 + math.ceil((arcs + 4) * (b - a) - 1e-9))[:-1] for a, b in pieces]
+        wanted = max(density * (arcs + 4), least)
+        cuts = [np.linspace(a, b, 1 + math.ceil(wanted * (b - a) - 1e-9))[:-1] for a, b in pieces]
         rows.append(np.concatenate([*cuts, [1.0]]))
     counts = np.array([len(row) - 1 for row in rows], np.int32)
     table = np.ones((n_rows, max(n_rows + SPARE, int(counts.max()) + 1)))

@@ -54,25 +54,49 @@ def refined_minimum(function, tau: Array, values: Array) -> Array:
     return jnp.minimum(jnp.minimum(jnp.min(values), jnp.min(f)), function(nearer))
 
 
-def _block_minima(shared: Shared, segment: Segment, arcs: Array, start: Array, stop: Array) -> tuple[Array, ...]:
+def _block_minima(
+    function, shared: Shared, segment: Segment, arcs: Array, start: Array, stop: Array
+) -> tuple[Array, ...]:
     weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
     tau = start * (1.0 - weight) + stop * weight
-    values = jax.vmap(partial(slacks, *shared, segment, arcs))(tau)
+    values = jax.vmap(partial(function, *shared, segment, arcs))(tau)
     return tuple(
-        refined_minimum(lambda t, which=which: slacks(*shared, segment, arcs, t)[which], tau, v)
+        refined_minimum(lambda t, which=which: function(*shared, segment, arcs, t)[which], tau, v)
         for which, v in enumerate(values)
     )
 
 
-@jax.jit
-def _minima(shared: Shared, edges: Array, counts: Array, arguments) -> Array:
+@partial(jax.jit, static_argnums=(0, 1))
+def _minima(function, n_values: int, shared: Shared, edges: Array, counts: Array, arguments) -> Array:
     segments, arcs = arguments
 
     def step(state, start, stop):
-        return jnp.minimum(state, jnp.stack(jax.vmap(partial(_block_minima, shared))(segments, arcs, start, stop)))
+        found = jax.vmap(partial(_block_minima, function, shared))(segments, arcs, start, stop)
+        return jnp.minimum(state, jnp.stack(found))
 
-    nothing = jnp.full((2 + len(given(shared.limits)), *arcs.shape), jnp.inf, arcs.dtype)
+    nothing = jnp.full((n_values, *arcs.shape), jnp.inf, arcs.dtype)
     return over_blocks(edges, counts, arcs, nothing, step).T
+
+
+def smallest_values(function, n_values: int, shared: Shared, segments: Segment, arcs: np.ndarray, table) -> np.ndarray:
+    """Smallest values along each segment of functions of one instant, refined between samples.
+
+    Args:
+        function: (robot, limits, amplitude, segment, arcs, tau) -> n_values numbers (); hashable.
+        n_values: how many.
+        shared: robot, limits and amplitude.
+        segments: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n,) number of arcs, 1 or more.
+        table: blocks to sample, from `blocks.blocks`.
+
+    Returns:
+        (n, n_values).
+    """
+    arcs = np.asarray(arcs, float)
+    order = np.argsort(arcs, kind="stable")
+    arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
+    found = in_batches(partial(_minima, function, n_values, shared, *table), arguments, size=BATCH)
+    return found[np.argsort(order, kind="stable")]
 
 
 def margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> np.ndarray:
@@ -88,9 +112,5 @@ def margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> np.ndarray:
     Returns:
         (n, n_criteria) in the order of `criteria.flags`.
     """
-    arcs = np.asarray(arcs, float)
-    order = np.argsort(arcs, kind="stable")
-    table = blocks(shared.amplitude, int(arcs.max()))
-    arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    found = in_batches(partial(_minima, shared, *table), arguments, size=BATCH)
-    return found[np.argsort(order, kind="stable")]
+    table = blocks(shared.amplitude, int(np.max(arcs)))
+    return smallest_values(slacks, 2 + len(given(shared.limits)), shared, segments, arcs, table)

@@ -61,6 +61,25 @@ def _segments(shared: Shared, points) -> tuple[Segment, Segment, jax.Array]:
     return jax.vmap(one)(*points)
 
 
+def segments_between(
+    shared: Shared, starts: np.ndarray, ends: np.ndarray, z0: np.ndarray
+) -> tuple[dict[int, Segment], np.ndarray]:
+    """Segments of many pairs of points.
+
+    Args:
+        shared: gives the robot and the amplitude function.
+        starts: (n, 3) m, z down.
+        ends: (n, 3) m.
+        z0: (n,) m.
+
+    Returns:
+        the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...), and the
+        left-hand side of (2.55), (n,).
+    """
+    even, odd, infinity = in_batches(partial(_segments, shared), (starts, ends, z0), size=sieve.BATCH)
+    return {0: even, 1: odd}, infinity
+
+
 @jax.jit
 def _durations(arguments) -> jax.Array:
     return jax.vmap(hypocycloid.duration)(*arguments)
@@ -96,19 +115,18 @@ def minimum_arcs(
         InputError: an amplitude function that breaks (2.49); max_arcs below 1; z0 not positive; jax without 64 bits.
     """
     _check(shared, z0, max_arcs)
-    even, odd, infinity = in_batches(partial(_segments, shared), (starts, ends, z0), size=sieve.BATCH)
-    parities = {0: even, 1: odd}
-    upper = _sieved(shared, even, odd, max_arcs, dtype)
+    parities, infinity = segments_between(shared, starts, ends, z0)
+    upper = _sieved(shared, parities[0], parities[1], max_arcs, dtype)
     if arcs is not None:
         fixed = np.asarray(arcs)[:, None]
         upper = np.where((fixed == 0) | (fixed == np.arange(1, max_arcs + 1)), upper, -np.inf)
     found, doubtful, bound = _search(shared, parities, upper)
     tried, slack = _best(shared, parities, upper, found)
-    chosen = _pick(parities, np.arange(len(found)), tried)
+    chosen = pick(parities, np.arange(len(found)), tried)
     duration = in_batches(_durations, (chosen, tried.astype(float)), size=sieve.BATCH)
     none = np.flatnonzero(found == 0)
     if len(none):
-        bound[none] = prove(shared, _pick(parities, none, tried[none]), tried[none]).bound[:, :2].min(1)
+        bound[none] = prove(shared, pick(parities, none, tried[none]), tried[none]).bound[:, :2].min(1)
     return Answers(
         found,
         tried,
@@ -156,7 +174,17 @@ def _end_slacks(shared: Shared, odd: Segment) -> jax.Array:
     return jax.vmap(one)(odd)
 
 
-def _pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Segment:
+def pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Segment:
+    """Some segments, each of the parity of its number of arcs.
+
+    Args:
+        parities: as `segments_between` gives them.
+        rows: (m,) which segments.
+        arcs: (m,) number of arcs of each.
+
+    Returns:
+        leaves (m, ...).
+    """
     is_odd = arcs % 2 == 1
 
     def choose(even, odd):
@@ -176,7 +204,7 @@ def _search(
         if not len(rows):
             return found, doubtful, bound
         arcs = np.argmax(alive[rows], axis=1) + 1
-        proof = prove(shared, _pick(parities, rows, arcs), arcs)
+        proof = prove(shared, pick(parities, rows, arcs), arcs)
         found[rows[proof.feasible]] = arcs[proof.feasible]
         bound[rows] = proof.bound[:, :2].min(1)
         doubtful[rows[~proof.feasible & ~proof.infeasible]] = True
@@ -188,7 +216,7 @@ def _best(
 ) -> tuple[np.ndarray, np.ndarray]:
     # Margins at the number of arcs found, else at the candidate with the largest; upper bounds say where to look next.
     tried = np.where(found > 0, found, np.argmax(upper, axis=1) + 1)
-    slack = margins(shared, _pick(parities, np.arange(len(found)), tried), tried)
+    slack = margins(shared, pick(parities, np.arange(len(found)), tried), tried)
     best = slack.min(1)
     rest = np.where(found[:, None] > 0, -np.inf, upper)
     rest[np.arange(len(rest)), tried - 1] = -np.inf
@@ -197,7 +225,7 @@ def _best(
         if not len(rows):
             return tried, slack
         arcs = np.argmax(rest[rows], axis=1) + 1
-        candidate = margins(shared, _pick(parities, rows, arcs), arcs)
+        candidate = margins(shared, pick(parities, rows, arcs), arcs)
         rest[rows, arcs - 1] = -np.inf
         better = candidate.min(1) > best[rows]
         tried[rows[better]], slack[rows[better]] = arcs[better], candidate[better]

@@ -1,0 +1,41 @@
+# `make demo` and `make test` work on a machine with Python 3.11 or newer and make; all goes into .venv.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+.PHONY: demo test soak check bench docs clean
+
+demo: $(STAMP)
+	$(BIN)/cspr table 2.1
+	$(BIN)/cspr run sweeps/demo.toml -o results/demo
+	$(BIN)/cspr plot results/demo/demo.h5 -o results/demo/demo.png
+	@echo "Look at results/demo/demo.png; the data are in results/demo/demo.h5."
+
+test: $(STAMP)
+	$(BIN)/python -m pytest -m "not soak"
+
+soak: $(STAMP)
+	$(BIN)/python -m pytest -m soak
+
+check: $(STAMP)
+	$(BIN)/ruff format --check cspr_jax tests benchmarks
+	$(BIN)/ruff check cspr_jax tests benchmarks
+	$(BIN)/mypy
+
+bench: $(STAMP)
+	$(BIN)/cspr bench
+	$(BIN)/python benchmarks/million_targets.py
+
+docs: $(STAMP)
+	$(BIN)/python docs/generate_reference.py
+
+$(STAMP): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "cspr_jax needs Python 3.11 or newer; call: make PYTHON=python3.11"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	touch $(STAMP)
+
+clean:
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis results/demo

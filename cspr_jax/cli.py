@@ -1,0 +1,255 @@
+"""The command line. Each command imports what it needs when it runs: `cspr --help` answers at once."""
+
+import argparse
+import contextlib
+import json
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from cspr_jax import __version__
+from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
+
+EPILOGUE = "exit codes: 0 done; 1 answered, not all feasible; 2 bad input; 3 refused; 4 I/O error; 70 internal error"
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One line for a mistake, instead of the usage."""
+        self.exit(ExitCode.BAD_INPUT, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        arguments: words after `cspr`; None: those of the process.
+
+    Returns:
+        the exit code.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.command(options))
+    except CsprError as error:
+        sys.stderr.write("".join(f"cspr: {line}\n" for line in str(error).splitlines()))
+        return int(error.exit_code)
+    except KeyboardInterrupt:
+        sys.stderr.write("cspr: interrupted; nothing half-written was left\n")
+        return int(ExitCode.INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of our output has gone; there is nobody left to tell.
+        with contextlib.suppress(OSError):
+            sys.stdout.close()
+        return int(ExitCode.DONE)
+    except Exception:
+        traceback.print_exc()
+        sys.stderr.write(f"cspr {__version__}: internal error; please report it with the lines above and your file\n")
+        return int(ExitCode.INTERNAL)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="cspr", description="What a cable-suspended robot can reach when it swings.", epilog=EPILOGUE)
+    parser.add_argument("--version", action="version", version=f"cspr {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
+
+    def add(name: str, command: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=text, description=text, epilog="files: docs/reference.md has every key")
+        sub.set_defaults(command=command)
+        return sub
+
+    run = add("run", _run, "compute a sweep file into an HDF5 result; its path is the last line printed")
+    run.add_argument("sweep", type=Path, help="sweep file (TOML)")
+    run.add_argument("-o", "--output", type=Path, metavar="DIR", help="run directory (default results/...)")
+    plan = add("plan", _plan, "plan a sequence of poses")
+    plan.add_argument("plan", type=Path, help="plan file (TOML)")
+    plan.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    plan.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the motion to FILE.csv or FILE.h5")
+    plan.add_argument("--rate", type=float, metavar="HZ", help="rows a second (default: `samples` rows a segment)")
+    plot = add("plot", _plot, "draw a result file")
+    plot.add_argument("result", type=Path, help="result of `cspr run`, or motion of `cspr plan -o FILE.h5`")
+    plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
+    plot.add_argument("--quantity", help="quantity of a map (default arcs); see `cspr quantities`")
+    plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
+    table = add("table", _table, "compute a published table again, beside the printed numbers")
+    table.add_argument("name", nargs="?", help="such as 2.1")
+    table.add_argument("--list", action="store_true", help="list the tables")
+    table.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    robots = add("robots", _robots, "list the catalogue of robots")
+    robots.add_argument("--json", action="store_true", help="print one JSON array and nothing else")
+    quantities = add("quantities", _quantities, "list the quantities that a result can hold")
+    quantities.add_argument("--json", action="store_true", help="print one JSON array and nothing else")
+    bench = add("bench", _bench, "measure checks per second beside a NumPy version of the same check")
+    bench.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    return parser
+
+
+def _use_64_bits() -> None:
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+
+
+def _print_json(value: Any) -> None:
+    sys.stdout.write(json.dumps(value, allow_nan=False) + "\n")
+
+
+def _print(renderable: Any) -> None:
+    from rich.console import Console
+
+    # A pipe gets lines of a width of their own, so that no column is folded.
+    Console(width=None if sys.stdout.isatty() else 140, highlight=False).print(renderable)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from cspr_jax import sweep as sweeps
+
+    sweep = sweeps.read_sweep(options.sweep)
+    _use_64_bits()
+    with _progress() as on_tile:
+        path, finished = sweeps.run(sweep, options.output or sweeps.run_directory(sweep), on_tile=on_tile)
+    if finished:
+        sys.stdout.write("already finished; nothing was computed\n")
+    sys.stdout.write(f"{path}\n")
+    return ExitCode.DONE
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[int, int], None]]:
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("cells", total=None, rate="compiling")
+
+        def on_tile(done: int, total: int) -> None:
+            elapsed = progress.tasks[0].elapsed or 0.0
+            rate = f"{done / elapsed:,.0f} cells/s" if done and elapsed else "compiling"
+            progress.update(task, completed=done, total=total, rate=rate)
+
+        yield on_tile
+
+
+def _plan(options: argparse.Namespace) -> int:
+    if options.output is not None and options.output.suffix not in (".csv", ".h5"):
+        raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
+    if options.rate is not None and not 0.0 < options.rate < float("inf"):
+        raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
+    _use_64_bits()
+    from cspr_jax import motions, planning, reports
+
+    plan = planning.plan(options.plan)
+    feasible = reports.is_feasible(plan)
+    if options.json:
+        _print_json(reports.plan_object(plan))
+    else:
+        _print(reports.plan_table(plan))
+    if options.output is not None and feasible:
+        motions.write_rows(plan, options.output, rate=options.rate)
+    elif options.output is not None:
+        sys.stderr.write(f"cspr: {options.output}: not written, since a segment is not proved feasible\n")
+    return ExitCode.DONE if feasible else ExitCode.NOT_FEASIBLE
+
+
+def _plot(options: argparse.Namespace) -> int:
+    at = {}
+    for text in options.at:
+        axis, _, value = text.partition("=")
+        try:
+            at[axis] = float(value)
+        except ValueError as error:
+            raise ConfigError("--at", f"{shown(text)}: must be AXIS=VALUE, such as z=1.7") from error
+    from cspr_jax.plots import plot
+
+    output = options.output or options.result.with_suffix(".png")
+    plot(options.result, output, quantity=options.quantity, at=at)
+    sys.stdout.write(f"{output}\n")
+    return ExitCode.DONE
+
+
+def _table(options: argparse.Namespace) -> int:
+    _use_64_bits()
+    from cspr_jax import tables
+
+    if options.list:
+        sys.stdout.write("".join(f"{name}  {source.title}\n" for name, source in tables.TABLES.items()))
+        return ExitCode.DONE
+    if options.name not in tables.TABLES:
+        raise ConfigError("table", f"{shown(options.name)}: must be one of {', '.join(tables.TABLES)}")
+    cells = tables.table_cells(options.name)
+    if options.json:
+        _print_json(tables.table_object(options.name, cells))
+    else:
+        _print(tables.table_for_people(options.name, cells))
+    return ExitCode.DONE
+
+
+def _robots(options: argparse.Namespace) -> int:
+    from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
+
+    found = [read_robot(CATALOGUE / f"{name}.toml").model_dump(exclude_none=True) for name in catalogue_names()]
+    if options.json:
+        _print_json(found)
+        return ExitCode.DONE
+    from rich.table import Table
+
+    table = Table()
+    for head in ("name", "cables", "mass (kg)", "z axis", "limits", "source"):
+        table.add_column(head)
+    for robot in found:
+        limits = ", ".join(key for key in robot if key.startswith(("tension", "cable")))
+        row = (
+            robot["name"],
+            str(len(robot["base_points"])),
+            f"{robot['mass']:g}",
+            robot["z_axis"],
+            limits,
+            robot["source"],
+        )
+        table.add_row(*row)
+    _print(table)
+    return ExitCode.DONE
+
+
+def _quantities(options: argparse.Namespace) -> int:
+    import dataclasses
+
+    from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY
+
+    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY}
+    found = [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
+    if options.json:
+        _print_json(found)
+        return ExitCode.DONE
+    from rich.table import Table
+
+    table = Table()
+    for head in ("group", "name", "units", "description"):
+        table.add_column(head)
+    for row in found:
+        table.add_row(row["group"], row["name"], row["units"], row["description"])
+    _print(table)
+    return ExitCode.DONE
+
+
+def _bench(options: argparse.Namespace) -> int:
+    _use_64_bits()
+    from cspr_jax.bench import bench
+
+    found = bench()
+    if options.json:
+        _print_json(found)
+        return ExitCode.DONE
+    rates, ratios = found["three_cable"], found["ratio_to_numpy"]
+    heading = f"best of {found['repeats']}, {found['cores']} cores, {found['device']}"
+    sys.stdout.write(f"three-cable checks per second, {heading}\n")
+    for kind, rate in rates.items():
+        ratio = f"  {ratios[kind]:5.0f} x NumPy" if kind in ratios else ""
+        sys.stdout.write(f"  {kind:8s} {rate / 1e6:8.1f} M/s{ratio}\n")
+    return ExitCode.DONE

@@ -1,0 +1,48 @@
+"""Plan files: a sequence of poses to be reached."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from cspr_jax.config.reading import Table
+from cspr_jax.config.robot import LimitKeys, Point, Positive
+from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, TrajectoryKeys
+
+
+class Choice(Table):
+    """How z0 is chosen."""
+
+    choose: Literal["mean", "conservative", "fastest"] = Field(
+        description='"mean" height of the targets, "conservative" (2.58), or "fastest" by search'
+    )
+
+
+Depth = Annotated[
+    Annotated[Positive, Tag("~number")] | Annotated[Choice, Tag("~choice")],
+    Discriminator(lambda value: "~choice" if isinstance(value, dict | Choice) else "~number"),
+]
+
+
+class Pose(Table):
+    """One pose of the sequence."""
+
+    position: Point | None = Field(None, description="target [x, y, z], m; a rest pose may leave it out")
+    rest: bool = Field(False, description="true: at rest in P0, below the centroid of the spools")
+    arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] | None = Field(
+        None, description="fixes the number of arcs of the segment that ends here"
+    )
+
+
+class PlanFile(TrajectoryKeys, LimitKeys):
+    """A plan."""
+
+    format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
+    robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
+    z0: Depth = Field(
+        description='depth of P0 below the centroid, m, or { choose = "mean" | "conservative" | "fastest" }'
+    )
+    samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
+    floor: float | None = Field(None, description="z of the floor, m")
+    pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
+        description="the poses in their order, at least two [[pose]] tables"
+    )

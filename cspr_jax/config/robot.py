@@ -1,0 +1,96 @@
+"""Robot files and the catalogue."""
+
+import difflib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from cspr_jax.config.reading import Table, checked, read_toml
+from cspr_jax.errors import ConfigError, shown
+
+CATALOGUE = Path(__file__).parent.parent / "catalogue"
+
+Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, Field(gt=0)]
+PerCable = Annotated[
+    Annotated[Positive, Tag("~one")] | Annotated[list[Positive], Field(min_length=3, max_length=3), Tag("~each")],
+    Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
+]
+
+
+class LimitKeys(Table):
+    """Limits beyond taut cables; a plan's or a sweep's stand over those of the robot file."""
+
+    tension_min: PerCable | None = Field(None, description="smallest tension, one number or one a cable, N")
+    tension_max: PerCable | None = Field(None, description="largest tension, one number or one a cable, N")
+    cable_length_max: PerCable | None = Field(None, description="largest cable length, one number or one a cable, m")
+    cable_speed_max: PerCable | None = Field(None, description="largest cable speed, one number or one a cable, m/s")
+    cable_acceleration_max: PerCable | None = Field(
+        None, description="largest cable acceleration, one number or one a cable, m/s^2"
+    )
+
+
+class RobotFile(LimitKeys):
+    """A point mass on three cables."""
+
+    name: str = Field(description="name of the robot", min_length=1)
+    base_points: Annotated[list[Point], Field(min_length=3, max_length=3)] = Field(
+        description="where the cables leave their spools: three points [x, y, z] in cable order, m"
+    )
+    mass: Positive = Field(description="mass of the effector, kg")
+    gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
+    z_axis: Literal["down", "up"] = Field("down", description='direction of the z axis, "down" or "up"')
+    source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
+
+
+def catalogue_names() -> list[str]:
+    """Names of the robots that come with the package.
+
+    Returns:
+        the names, sorted.
+    """
+    return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
+
+
+def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
+    """The robot that a plan or sweep names.
+
+    Args:
+        reference: a catalogue name, a path (relative to the file that holds it), or an inline table.
+        file: named in errors.
+        directory: of that file.
+
+    Returns:
+        the robot.
+
+    Raises:
+        ConfigError: no such robot, or a mistake in it.
+    """
+    if isinstance(reference, dict):
+        return checked(RobotFile, reference, file, at="robot")
+    if not isinstance(reference, str):
+        raise ConfigError(file, f"robot = {shown(reference)}: must be a catalogue name, a path, or a [robot] table")
+    if reference.endswith(".toml") or "/" in reference:
+        return read_robot(directory / reference)
+    if reference in catalogue_names():
+        return read_robot(CATALOGUE / f"{reference}.toml")
+    near = difflib.get_close_matches(reference, catalogue_names(), n=1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    names = ", ".join(catalogue_names())
+    raise ConfigError(file, f"robot = {shown(reference)}: {hint}must be one of {names}, or a path to a .toml file")
+
+
+def read_robot(path: Path) -> RobotFile:
+    """A robot file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        the robot.
+
+    Raises:
+        ConfigError: a mistake in it.
+    """
+    return checked(RobotFile, read_toml(path), path)

@@ -1,0 +1,103 @@
+"""Sweep files: a map over a grid."""
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from cspr_jax.config.reading import Table
+from cspr_jax.config.robot import LimitKeys, Point
+from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.quantities import STORABLE
+
+LARGEST_COUNT = 1_000_000_000
+
+
+class AxisRange(Table):
+    """Equidistant points."""
+
+    start: float = Field(description="first point")
+    stop: float = Field(description="last point, included")
+    count: Annotated[int, Field(ge=1, le=LARGEST_COUNT)] = Field(description="number of points, at least 1")
+
+    @model_validator(mode="after")
+    def _spread(self) -> "AxisRange":
+        if self.count > 1 and self.start == self.stop:
+            raise ValueError("a range whose stop differs from its start when count > 1")
+        if not math.isfinite(self.stop - self.start):
+            raise ValueError("a range whose length is a finite number")
+        return self
+
+
+Axis = Annotated[
+    Annotated[AxisRange, Tag("~range")]
+    | Annotated[list[float], Field(min_length=1, max_length=10_000_000), Tag("~values")],
+    Discriminator(lambda value: "~range" if isinstance(value, dict | AxisRange) else "~values"),
+]
+_OF_TARGETS = "{} of the targets, m: {{ start, stop, count }} or a list"
+_OF_STARTS = "{} of the start points, m, in place of that in trajectory.from"
+
+
+class Axes(Table):
+    """The grid is the product of its axes; their order in the file is the order of the result's dimensions."""
+
+    x: Axis = Field(description=_OF_TARGETS.format("x"))
+    y: Axis = Field(description=_OF_TARGETS.format("y"))
+    z: Axis = Field(description=_OF_TARGETS.format("z"))
+    z0: Axis = Field(description="depth of P0 below the centroid of the spools, m: a list or a range; all > 0")
+    from_x: Axis | None = Field(None, description=_OF_STARTS.format("x"))
+    from_y: Axis | None = Field(None, description=_OF_STARTS.format("y"))
+    from_z: Axis | None = Field(None, description=_OF_STARTS.format("z"))
+
+
+class From(Table):
+    """Where every segment starts."""
+
+    position: Point | None = Field(None, description="start point [x, y, z], m")
+    rest: bool = Field(False, description="true: at rest in P0")
+
+    @model_validator(mode="after")
+    def _one(self) -> "From":
+        if self.rest == (self.position is not None):
+            raise ValueError("{ position = [x, y, z] } or { rest = true }, one of them")
+        return self
+
+
+class SweepTrajectory(TrajectoryKeys):
+    """The trajectory of every cell."""
+
+    start: From | None = Field(
+        None, alias="from", description="{ position = [x, y, z] } or { rest = true }; or axes from_x, from_y and from_z"
+    )
+
+
+class SweepLimits(LimitKeys):
+    """Limits of every cell."""
+
+    floor: float | None = Field(None, description="z of the floor, m")
+
+
+class Run(Table):
+    """How to compute and what to keep."""
+
+    dtype: Literal["float64", "float32"] = Field(
+        "float64", description="of stored numbers, and of the sieve; verdicts are float64's in both"
+    )
+    tile: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1)] | None = Field(
+        None, description="shape of the block computed at a time, one number an axis"
+    )
+    store: Annotated[list[Literal[STORABLE]], Field(min_length=1)] | None = Field(  # type: ignore[valid-type]
+        None, description="quantities to store; see `cspr quantities`"
+    )
+
+
+class SweepFile(Table):
+    """A sweep."""
+
+    format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
+    map: Literal["minimum-arcs"] = Field(description='kind of map: "minimum-arcs"')
+    robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
+    axes: Axes = Field(description="[axes] x, y, z and z0, each { start, stop, count } or a list")
+    trajectory: SweepTrajectory = Field(description="[trajectory] with family, amplitude, max_arcs and from")
+    limits: SweepLimits = Field(default_factory=SweepLimits, description="[limits]")
+    run: Run = Field(default_factory=Run, description="[run] dtype, tile, store")

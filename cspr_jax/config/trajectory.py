@@ -1,0 +1,60 @@
+"""Keys that plans and sweeps share: the trajectory family, its amplitude function, gravity."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from cspr_jax.config.reading import Table
+from cspr_jax.config.robot import Positive
+
+LARGEST_MAX_ARCS = 1000
+
+
+class NamedAmplitude(Table):
+    """An amplitude function with a parameter."""
+
+    name: Literal["effective", "effective-c3"] = Field(description='"effective" (1.110) or "effective-c3"')
+    epsilon: Annotated[float, Field(gt=0, le=0.5)] | Literal["best"] = Field(
+        description='length of the curved ends, in ]0, 0.5], or "best" (plans only)'
+    )
+
+
+class PolynomialAmplitude(Table):
+    """A user's own amplitude function."""
+
+    polynomial: Annotated[list[float], Field(min_length=1, max_length=20)] = Field(
+        description="coefficients c0, c1, ... of c0 + c1 tau + c2 tau^2 + ..."
+    )
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, dict | Table):
+        return (
+            "~polynomial"
+            if "polynomial" in (value if isinstance(value, dict) else value.model_fields_set)
+            else "~named"
+        )
+    return "~plain"
+
+
+AmplitudeKey = Annotated[
+    Annotated[Literal["A1", "quintic", "A2", "A3"], Tag("~plain")]
+    | Annotated[NamedAmplitude, Tag("~named")]
+    | Annotated[PolynomialAmplitude, Tag("~polynomial")],
+    Discriminator(_kind),
+]
+
+
+class TrajectoryKeys(Table):
+    """What both a plan and a sweep say of the trajectory."""
+
+    family: Literal["hypocycloid-standard"] = Field(
+        "hypocycloid-standard", description='trajectory family: "hypocycloid-standard" (thesis chapter 2)'
+    )
+    amplitude: AmplitudeKey = Field(
+        "quintic",
+        description='"quintic" (A2), { name = "effective" or "effective-c3", epsilon = ... }, { polynomial = [...] }; '
+        "must meet (2.49), which A1 and A3 do not",
+    )
+    max_arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] = Field(30, description="largest number of arcs tried")
+    gravity: Positive | None = Field(None, description="gravity, m/s^2; stands over the robot file's (default 9.81)")

@@ -1,0 +1,78 @@
+"""What a segment asks of the robot: tensions, heights, cable lengths and speeds, at their extremes."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax import tensions
+from cspr_jax.feasibility.blocks import INTERVALS, blocks
+from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.margins import smallest_values
+from cspr_jax.trajectories import hypocycloid
+from cspr_jax.trajectories.hypocycloid import Segment
+
+
+@dataclasses.dataclass(frozen=True)
+class Extremes:
+    """What a segment asks of the robot, refined between samples; (n,) each.
+
+    Fields:
+        tension_min: N.
+        tension_max: N.
+        mu_min: smallest tension per mass and length, 1/s^2.
+        depth_ratio_min: depth below the spools over z0.
+        lowest: largest z, z down, m.
+        length_max: m.
+        speed_max: of a cable, m/s.
+        acceleration_max: of a cable, m/s^2.
+        samples: number of instants looked at.
+    """
+
+    tension_min: np.ndarray
+    tension_max: np.ndarray
+    mu_min: np.ndarray
+    depth_ratio_min: np.ndarray
+    lowest: np.ndarray
+    length_max: np.ndarray
+    speed_max: np.ndarray
+    acceleration_max: np.ndarray
+    samples: np.ndarray
+
+
+def _demands(robot, limits, amplitude, segment, arcs, tau):
+    del limits
+    position, velocity, acceleration = hypocycloid.motion(segment, amplitude, arcs, tau)
+    force = tensions.tensions(robot, position, acceleration)
+    length, rate, rate_slope = tensions.cable_motion(robot, position, velocity, acceleration)
+    depth = 1.0 + segment.tilt @ (segment.plane.T @ (position - segment.hub))
+    return (
+        jnp.min(force),
+        -jnp.max(force),
+        jnp.min(force / length) / robot.mass,
+        depth,
+        -position[2],
+        -jnp.max(length),
+        -jnp.max(jnp.abs(rate)),
+        -jnp.max(jnp.abs(rate_slope)),
+    )
+
+
+def extremes(shared: Shared, segments: Segment, arcs: np.ndarray, least_samples: int) -> Extremes:
+    """What segments ask of the robot: at least 64 samples an arc, refined where a value is extreme.
+
+    Args:
+        shared: robot, limits and amplitude.
+        segments: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n,).
+        least_samples: smallest number of samples of a segment.
+
+    Returns:
+        the extremes.
+    """
+    table = blocks(shared.amplitude, int(arcs.max()), density=4, least=-(-least_samples // INTERVALS))
+    found = smallest_values(_demands, 8, shared, segments, arcs, table)
+    signs = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
+    columns = (found * signs).T
+    names = [field.name for field in dataclasses.fields(Extremes)][:-1]
+    return Extremes(**dict(zip(names, columns, strict=True)), samples=table[1][arcs] * INTERVALS + 1)

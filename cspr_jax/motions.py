@@ -1,0 +1,110 @@
+"""A plan's motion as rows over time: CSV or HDF5."""
+
+import csv
+import io
+from pathlib import Path
+
+import h5py
+import jax
+import numpy as np
+
+from cspr_jax import tensions
+from cspr_jax.errors import ConfigError
+from cspr_jax.planning import Plan
+from cspr_jax.problem import axis_signs
+from cspr_jax.quantities import TRAJECTORY
+from cspr_jax.store import new_file, write_text
+from cspr_jax.trajectories import hypocycloid
+
+_COMPONENTS = {
+    "position": "xyz",
+    "velocity": "xyz",
+    "acceleration": "xyz",
+    "length": "123",
+    "rate": "123",
+    "tension": "123",
+}
+LARGEST_ROWS = 20_000_000
+
+
+@jax.jit
+def _states(shared, segment, arcs, tau):
+    def one(t):
+        position, velocity, acceleration = hypocycloid.motion(segment, shared.amplitude, arcs, t)
+        length, rate, _ = tensions.cable_motion(shared.robot, position, velocity, acceleration)
+        return position, velocity, acceleration, length, rate, tensions.tensions(shared.robot, position, acceleration)
+
+    return jax.vmap(one)(tau)
+
+
+def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
+    """States along a plan.
+
+    Args:
+        plan: the plan.
+        rate: rows a second over the whole plan, Hz; None: `samples` rows a segment, ends included.
+
+    Returns:
+        "t" (n,) s and the other names of `quantities.TRAJECTORY`, (n, 3), in the plan's axes.
+    """
+    duration = plan.answers.duration
+    starts = np.concatenate([[0.0], np.cumsum(duration)])
+    parts = []
+    for i, length in enumerate(duration):
+        if rate is None:
+            tau = np.linspace(0.0, 1.0, plan.keys.samples)
+        else:
+            ticks = np.arange(np.ceil(starts[i] * rate - 1e-9), np.ceil(starts[i + 1] * rate - 1e-9))
+            tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
+        segment = jax.tree.map(lambda x, i=i: x[i], plan.segments)
+        states = _states(plan.shared, segment, float(plan.answers.tried_arcs[i]), tau)
+        parts.append((starts[i] + tau * length, *(np.asarray(s) for s in states)))
+    found = {name: np.concatenate(column) for name, column in zip(TRAJECTORY, zip(*parts, strict=True), strict=True)}
+    for name in ("position", "velocity", "acceleration"):
+        found[name] = found[name] * axis_signs(plan.spec)
+    return found
+
+
+def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
+    """Write the motion of a plan to a .csv or .h5 file.
+
+    Args:
+        plan: the plan.
+        path: its ending says which.
+        rate: rows a second, Hz, or None.
+
+    Raises:
+        ConfigError: another ending, or too many rows.
+        StoreError: the disk or the folder refuses.
+    """
+    if rate is not None and rate * plan.answers.duration.sum() > LARGEST_ROWS:
+        raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
+    found = rows(plan, rate=rate)
+    if path.suffix == ".csv":
+        write_text(path, _csv(found))
+    else:
+        _write_hdf5(plan, path, found)
+
+
+def _csv(found: dict[str, np.ndarray]) -> str:
+    heads = ["t", *(f"{name}_{part}" for name, parts in _COMPONENTS.items() for part in parts)]
+    table = np.column_stack([found["t"], *(found[name] for name in _COMPONENTS)])
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(heads)
+    writer.writerows([[repr(float(value)) for value in row] for row in table])
+    return text.getvalue()
+
+
+def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
+    attributes = {"Conventions": "CF-1.11", "robot": plan.spec.name, "z_axis": plan.spec.z_axis, "z0": plan.z0}
+    with new_file(path, attributes) as file:
+        for name, labels in (("t", found["t"]), ("axis", list("xyz")), ("cable", [1, 2, 3])):
+            file[name] = labels
+            file[name].make_scale(name)
+        for name, quantity in TRAJECTORY.items():
+            data: h5py.Dataset = file[name] if name in file else file.create_dataset(name, data=found[name])
+            data.attrs.update({"units": quantity.units, "long_name": quantity.long_name})
+            if name != "t":
+                data.dims[0].attach_scale(file["t"])
+                data.dims[1].attach_scale(file["axis" if _COMPONENTS[name] == "xyz" else "cable"])

@@ -1,0 +1,75 @@
+"""Plans: a sequence of poses, each segment with its smallest number of arcs and what it asks of the cables."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from cspr_jax import problem
+from cspr_jax.choices import answers_along, best_amplitude, chosen_depth, pose_points
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.reading import checked, read_toml
+from cspr_jax.config.robot import RobotFile, resolve_robot
+from cspr_jax.config.trajectory import NamedAmplitude
+from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.extremes import Extremes, extremes
+from cspr_jax.maps.minimum_arcs import Answers, pick, segments_between
+from cspr_jax.trajectories.hypocycloid import Segment
+
+# Where a search for z0 takes "best" epsilon to be, until it is chosen.
+FIRST_EPSILON = 0.2
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """A planned sequence.
+
+    Fields:
+        spec: the robot as its file has it.
+        keys: the plan file.
+        shared: robot, limits, amplitude function.
+        z0: m.
+        points: (n + 1, 3) in the kernels' axes, m.
+        answers: of the n segments.
+        extremes: of the n segments.
+        segments: of the n segments, each of the parity of its number of arcs.
+    """
+
+    spec: RobotFile
+    keys: PlanFile
+    shared: Shared
+    z0: float
+    points: np.ndarray
+    answers: Answers
+    extremes: Extremes
+    segments: Segment
+
+
+def plan(path: Path) -> Plan:
+    """Plan the sequence of a plan file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        the plan, feasible or not.
+
+    Raises:
+        ConfigError: a mistake in the file.
+    """
+    keys = checked(PlanFile, read_toml(path), path)
+    spec = resolve_robot(keys.robot, path, path.parent)
+    robot = problem.build_robot(spec, keys, path)
+    limits = problem.build_limits(spec, keys, keys.floor, path)
+    amplitude = problem.build_amplitude(keys, path, epsilon=FIRST_EPSILON)
+    shared = Shared(robot, limits, amplitude)
+    z0 = chosen_depth(shared, spec, keys, path)
+    if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
+        shared = shared._replace(amplitude=best_amplitude(shared, spec, keys, z0, path))
+    points = pose_points(robot, spec, keys, z0)
+    depth = np.full(len(points) - 1, z0)
+    answers = answers_along(shared, keys, points, depth)
+    parities, _ = segments_between(shared, points[:-1], points[1:], depth)
+    segments = pick(parities, np.arange(len(depth)), answers.tried_arcs)
+    asked = extremes(shared, segments, answers.tried_arcs, keys.samples)
+    return Plan(spec, keys, shared, z0, points, answers, asked, segments)

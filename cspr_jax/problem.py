@@ -1,0 +1,118 @@
+"""From checked files to what the kernels take: robot, limits, amplitude function, axes."""
+
+import numpy as np
+
+from cspr_jax import amplitudes, robots
+from cspr_jax.amplitudes import Amplitude, boundary_errors
+from cspr_jax.config.robot import LimitKeys, RobotFile
+from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
+from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.feasibility.limits import Limits
+from cspr_jax.numerics import leaf
+from cspr_jax.robots import STANDARD_GRAVITY, PointMassRobot
+
+# A z-up file is turned by half a turn about x: a rotation, so that nothing is mirrored.
+_TURN = {"down": np.array([1.0, 1.0, 1.0]), "up": np.array([1.0, -1.0, -1.0])}
+
+
+def axis_signs(spec: RobotFile) -> np.ndarray:
+    """Factors between a file's axes and the kernels' (z down); the same both ways.
+
+    Args:
+        spec: the robot, whose z_axis holds for the whole file.
+
+    Returns:
+        (3,) of +1 and -1.
+    """
+    return _TURN[spec.z_axis]
+
+
+def gravity_of(spec: RobotFile, keys: TrajectoryKeys) -> float:
+    """Gravity: the plan's or sweep's, else the robot's, else 9.81 m/s^2.
+
+    Args:
+        spec: the robot.
+        keys: of the plan or sweep.
+
+    Returns:
+        m/s^2.
+    """
+    return keys.gravity or spec.gravity or STANDARD_GRAVITY
+
+
+def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot:
+    """The robot, in the kernels' axes.
+
+    Args:
+        spec: the robot file's content.
+        keys: of the plan or sweep.
+        file: named in errors.
+
+    Returns:
+        the robot.
+
+    Raises:
+        ConfigError: its geometry cannot be used.
+    """
+    try:
+        points = np.asarray(spec.base_points) * axis_signs(spec)
+        return robots.point_mass_robot(points, mass=spec.mass, gravity=gravity_of(spec, keys), name=spec.name)
+    except InputError as error:
+        raise ConfigError(file, f"robot.{error}") from error
+
+
+def build_amplitude(keys: TrajectoryKeys, file: object, *, epsilon: float | None = None, at: str = "") -> Amplitude:
+    """The amplitude function, its boundary conditions checked.
+
+    Args:
+        keys: of the plan or sweep.
+        file: named in errors.
+        epsilon: stands in for "best".
+        at: prefix of the key in errors.
+
+    Returns:
+        the function.
+
+    Raises:
+        ConfigError: it breaks (2.49), or epsilon = "best" where one value must be given.
+    """
+    key = keys.amplitude
+    if isinstance(key, PolynomialAmplitude):
+        amplitude, given = amplitudes.from_polynomial(key.polynomial), shown(list(key.polynomial))
+    elif isinstance(key, NamedAmplitude):
+        value = key.epsilon if isinstance(key.epsilon, float) else epsilon
+        if value is None:
+            raise ConfigError(file, f'{at}amplitude.epsilon = "best": must be a number in ]0, 0.5] (a plan can choose)')
+        amplitude, given = amplitudes.named(key.name, value), shown(key.name)
+    else:
+        amplitude, given = amplitudes.named(key), shown(key)
+    broken = boundary_errors(amplitude)
+    if broken:
+        raise ConfigError(file, f"{at}amplitude = {given}: must meet (2.49), but " + "; ".join(broken))
+    return amplitude
+
+
+def build_limits(spec: RobotFile, keys: LimitKeys, floor: float | None, file: object) -> Limits:
+    """Limits of the file over those of the robot.
+
+    Args:
+        spec: the robot.
+        keys: of the plan or sweep.
+        floor: z of the floor in the file's axes, or None.
+        file: named in errors.
+
+    Returns:
+        the limits.
+
+    Raises:
+        ConfigError: a smallest tension that is not below the largest.
+    """
+    found = {}
+    for name in LimitKeys.model_fields:
+        value = getattr(keys, name) if getattr(keys, name) is not None else getattr(spec, name)
+        found[name] = None if value is None else leaf(np.broadcast_to(np.asarray(value, float), (3,)))
+    low, high = found["tension_min"], found["tension_max"]
+    if low is not None and high is not None and not (np.asarray(low) < np.asarray(high)).all():
+        raise ConfigError(file, f"tension_min = {np.asarray(low).tolist()}: must be below tension_max for every cable")
+    depth = None if floor is None else leaf(floor * axis_signs(spec)[2])
+    return Limits(floor=depth, **found)

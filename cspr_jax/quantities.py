@@ -1,0 +1,107 @@
+"""The one table of everything that a result file can hold: it gives names, units, labels and docs."""
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+
+from cspr_jax.feasibility.verdicts import SENTENCES
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """A dataset of a result file, or a coordinate of its axes.
+
+    Fields:
+        name: of the dataset.
+        units: as in UDUNITS; "1" for a pure number.
+        long_name: a short phrase for labels.
+        description: one sentence.
+        kind: "float" (of the run's dtype) or the NumPy name of an integer type.
+    """
+
+    name: str
+    units: str
+    long_name: str
+    description: str
+    kind: Literal["float", "uint16", "int16"] = "float"
+
+
+AXES = {
+    q.name: q
+    for q in (
+        Quantity("x", "m", "x of the target", "Horizontal coordinate of the target."),
+        Quantity("y", "m", "y of the target", "Horizontal coordinate of the target."),
+        Quantity("z", "m", "z of the target", "Vertical coordinate of the target; see z_axis."),
+        Quantity("z0", "m", "depth of P0 below the centroid", "The point P0 about which the effector swings."),
+        Quantity("from_x", "m", "x of the start point", "Horizontal coordinate of the start point."),
+        Quantity("from_y", "m", "y of the start point", "Horizontal coordinate of the start point."),
+        Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
+    )
+}
+
+QUANTITIES = {
+    q.name: q
+    for q in (
+        Quantity("arcs", "1", "smallest number of arcs", "Smallest number of arcs proved feasible; 0: none.", "int16"),
+        Quantity("verdict", "1", "verdict", "Bit flags; 0 is feasible.", "uint16"),
+        Quantity(
+            "duration",
+            "s",
+            "duration",
+            "Duration with `arcs` arcs, or with `tried_arcs` where arcs is 0.",
+        ),
+        Quantity(
+            "margin",
+            "1",
+            "smallest normalised pseudotension",
+            "Smallest pseudotension over its value at rest in P0, or depth below the spools over z0.",
+        ),
+        Quantity(
+            "margin_bound", "1", "proved lower bound of the margin", "No instant of the segment has a smaller margin."
+        ),
+        Quantity(
+            "feasible_at_infinity",
+            "1",
+            "feasibility at infinity",
+            "Left-hand side of thesis (2.55): positive means that enough arcs make the segment feasible.",
+        ),
+        Quantity(
+            "tried_arcs",
+            "1",
+            "number of arcs of the best candidate",
+            "Equal to `arcs` where it is positive, else the number of arcs with the largest margin.",
+            "int16",
+        ),
+        Quantity(
+            "limit_margin",
+            "1",
+            "smallest slack of the limits",
+            "Smallest dimensionless slack of the limits given (docs/limits); infinite where there is none.",
+        ),
+    )
+}
+TRAJECTORY = {
+    q.name: q
+    for q in (
+        Quantity("t", "s", "time", "Time since the start of the plan."),
+        Quantity("position", "m", "position", "Position of the effector (x, y, z)."),
+        Quantity("velocity", "m s-1", "velocity", "Velocity of the effector (x, y, z)."),
+        Quantity("acceleration", "m s-2", "acceleration", "Acceleration of the effector (x, y, z)."),
+        Quantity("length", "m", "cable length", "Length of each cable, in cable order."),
+        Quantity("rate", "m s-1", "cable rate", "Rate of each cable's length; positive pays out."),
+        Quantity("tension", "N", "cable tension", "Tension of each cable, in cable order."),
+    )
+}
+STORABLE = tuple(QUANTITIES)
+DEFAULT_STORE = ("arcs", "verdict", "duration", "margin", "feasible_at_infinity")
+
+
+def flag_attributes() -> dict[str, object]:
+    """The CF attributes that explain `verdict`.
+
+    Returns:
+        flag_masks and flag_meanings.
+    """
+    masks = np.array([flag.value for flag in SENTENCES], np.uint16)
+    return {"flag_masks": masks, "flag_meanings": " ".join(flag.text for flag in SENTENCES)}

@@ -1,0 +1,141 @@
+"""A plan as JSON and as a table for people."""
+
+import math
+from typing import Any
+
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.planning import Plan
+from cspr_jax.problem import axis_signs
+
+SCHEMA = 1
+
+
+def plan_object(plan: Plan) -> dict[str, Any]:
+    """The object that `cspr plan --json` prints.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        plain values; what does not apply, or is not finite, is None.
+    """
+    segments = [_segment_object(plan, i) for i in range(len(plan.answers.arcs))]
+    found = {
+        "schema": SCHEMA,
+        "robot": plan.spec.name,
+        "family": plan.keys.family,
+        "amplitude": plan.shared.amplitude.name,
+        "z0": plan.z0,
+        "z_axis": plan.spec.z_axis,
+        "gravity": float(plan.shared.robot.gravity),
+        "segments": segments,
+        "total_duration": float(plan.answers.duration.sum()),
+        "feasible": is_feasible(plan),
+    }
+    return _finite(found)
+
+
+def is_feasible(plan: Plan) -> bool:
+    """Whether every segment is proved feasible.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        the claim.
+    """
+    return bool((plan.answers.arcs > 0).all())
+
+
+def verdict_text(verdict: int, arcs: int) -> str:
+    """A verdict as a plan shows it.
+
+    Args:
+        verdict: flags.
+        arcs: number of arcs found, 0 if none.
+
+    Returns:
+        "feasible", "undecided", or the flags joined by "+".
+    """
+    return "feasible" if arcs > 0 else Verdict(int(verdict)).text
+
+
+def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
+    answers, asked = plan.answers, plan.extremes
+    arcs = int(answers.arcs[i])
+    return {
+        "from": i,
+        "to": i + 1,
+        "arcs": arcs or None,
+        "tried_arcs": int(answers.tried_arcs[i]),
+        "oscillations": None,
+        "duration": float(answers.duration[i]),
+        "tension_min": float(asked.tension_min[i]),
+        "tension_max": float(asked.tension_max[i]),
+        "mu_min": float(asked.mu_min[i]),
+        "margin": float(answers.margin[i]),
+        "margin_bound": float(answers.margin_bound[i]),
+        "limit_margin": float(answers.limit_margin[i]),
+        "det_sign_constant": bool(asked.depth_ratio_min[i] > 0.0),
+        "cable_interference": None,
+        "platform_interference": None,
+        "verdict": verdict_text(answers.verdict[i], arcs),
+        "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
+        "beta_hat": None,
+        "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
+        "z_lowest": float(asked.lowest[i] * axis_signs(plan.spec)[2]),
+        "cable_length_max": float(asked.length_max[i]),
+        "cable_speed_max": float(asked.speed_max[i]),
+        "cable_acceleration_max": float(asked.acceleration_max[i]),
+        "samples": int(asked.samples[i]),
+    }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def plan_table(plan: Plan):
+    """The plan as a table for a terminal.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        a rich table.
+    """
+    from rich.table import Table  # only a terminal needs it
+
+    title = f"{plan.spec.name}: {plan.keys.family}, {plan.shared.amplitude.name}, z0 = {plan.z0:.6g} m"
+    table = Table(title=title, caption=_caption(plan), title_justify="left", caption_justify="left")
+    heads = ("to", "position (m)", "arcs", "T (s)", "margin", "tension (N)", "p → ∞", "verdict")
+    for head in heads:
+        table.add_column(head, justify="left" if head in ("position (m)", "verdict") else "right")
+    signs = axis_signs(plan.spec)
+    for i, segment in enumerate(plan_object(plan)["segments"]):
+        position = ", ".join(f"{value:.4g}" for value in plan.points[i + 1] * signs)
+        table.add_row(
+            str(i + 1),
+            f"({position})",
+            str(segment["arcs"] or f"- ({segment['tried_arcs']})"),
+            _number(segment["duration"], ".2f"),
+            _number(segment["margin"], ".4f"),
+            f"{_number(segment['tension_min'], '.3f')} .. {_number(segment['tension_max'], '.3f')}",
+            _number(segment["feasible_at_infinity"], ".4f"),
+            segment["verdict"],
+        )
+    return table
+
+
+def _caption(plan: Plan) -> str:
+    total = f"total {plan.answers.duration.sum():.2f} s; z {plan.spec.z_axis}"
+    note = "" if is_feasible(plan) else "; - (p): none found, the numbers are those of the best candidate p"
+    return f"{total}{note}"
+
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)

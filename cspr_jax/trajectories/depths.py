@@ -1,0 +1,64 @@
+"""Guides for z0, the depth of P0 below the centroid of the spools."""
+
+import numpy as np
+
+from cspr_jax.robots import PointMassRobot, centroid, plane_normal
+
+
+def _depths(robot: PointMassRobot, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    below = np.asarray(targets) - np.asarray(centroid(robot))
+    normal = np.asarray(plane_normal(robot))
+    return below, below @ normal, normal
+
+
+def mean_depth(robot: PointMassRobot, targets: np.ndarray) -> float:
+    """Mean height of the targets, as chosen in thesis section 2.9.
+
+    Args:
+        robot: gives the centroid.
+        targets: (n, 3) m, z down.
+
+    Returns:
+        z0, m.
+    """
+    return float(_depths(robot, targets)[0][:, 2].mean())
+
+
+def least_depth(robot: PointMassRobot, targets: np.ndarray) -> float:
+    """Bound (2.59): below it some target cannot be reached with many arcs, though perhaps with few.
+
+    Args:
+        robot: any triangle of spools; the depth is measured below their plane, along the vertical.
+        targets: (n, 3) m, z down.
+
+    Returns:
+        z0, m.
+    """
+    return float(_depths(robot, targets)[1].max() / 2.0)
+
+
+def conservative_depth(robot: PointMassRobot, targets: np.ndarray) -> float:
+    """Bound (2.58): above it every segment between the targets is feasible with enough arcs.
+
+    It keeps every target inside the sphere about P0 that touches the spool plane,
+    |p - p0| < z0 / |n| with n the plane's normal of unit vertical component. For a plane that is
+    not level the condition is quadratic in z0, and can fail for large z0 too, or for all.
+
+    Args:
+        robot: any triangle of spools.
+        targets: (n, 3) m, z down, below the spools.
+
+    Returns:
+        z0, m; NaN if there is none.
+    """
+    below, depth, normal = _depths(robot, targets)
+    height, square = below[:, 2], (below**2).sum(1)
+    slope = 1.0 - 1.0 / (normal @ normal)  # 0 for a level plane
+    inside = height**2 - slope * square
+    if not ((depth > 0.0) & (inside >= 0.0) & (height > 0.0)).all():
+        return float("nan")
+    root = np.sqrt(inside)
+    lowest = float((square / (height + root)).max())
+    if slope > 0.0 and lowest >= float(((height + root) / slope).min()):
+        return float("nan")
+    return lowest
