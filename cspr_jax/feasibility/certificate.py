@@ -6,7 +6,7 @@ intervals; M comes from the closed form, one a block. A segment is
 
     proved feasible    if this lower bound exceeds the tolerance in every block,
     proved infeasible  if a sample lies below minus the tolerance,
-    cut finer          otherwise, only where it is open; each cut divides the gap by 256,
+    cut finer          otherwise, only where it is open; each cut into quarters divides the gap by 16,
     undecided          if the gap has closed to the tolerance and zero is still inside.
 
 The tolerance covers rounding (see `tolerance`). A limit that is touched exactly, such as a target
@@ -33,7 +33,7 @@ from cspr_jax.trajectories.hypocycloid import Segment
 
 SMALLEST_MARGIN = 1e-9
 BATCH = 1024
-FINEST_CUT = 6
+FINEST_CUT = 12
 
 
 class Shared(NamedTuple):
@@ -181,12 +181,12 @@ def _cut(shared: Shared, segments: Segment, arcs: np.ndarray, near: np.ndarray, 
         keep = unproved.any(1) & ~refuted[owner] & ~stuck[owner]
         if not keep.any():
             return ~refuted & ~stuck, refuted
-        owner, start, stop = _sixteenths(owner[keep], start[keep], stop[keep])
+        owner, start, stop = _quarters(owner[keep], start[keep], stop[keep])
     stuck[owner] = True
     return ~refuted & ~stuck, refuted
 
 
-def _sixteenths(owner: np.ndarray, start: np.ndarray, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    weight = np.arange(INTERVALS + 1) / INTERVALS
+def _quarters(owner: np.ndarray, start: np.ndarray, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    weight = np.arange(5) / 4.0
     edge = start[:, None] * (1.0 - weight) + stop[:, None] * weight
-    return np.repeat(owner, INTERVALS), edge[:, :-1].ravel(), edge[:, 1:].ravel()
+    return np.repeat(owner, 4), edge[:, :-1].ravel(), edge[:, 1:].ravel()

@@ -23,7 +23,7 @@ from cspr_jax.bounds import Bounds
 from cspr_jax.feasibility.slacks import Instant, Stretch, row_bounds
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.numerics import sincospi
-from cspr_jax.robots import PointMassRobot
+from cspr_jax.robots import PointMassRobot, plane_normal
 from cspr_jax.trajectories.hypocycloid import Segment, duration, oscillation
 
 
@@ -153,26 +153,26 @@ def limit_curvatures(
         return ()
     z0, time, weight = segment.hub[2] - _centre_depth(robot), duration(segment, arcs), robot.mass * robot.gravity
     pace, pull = _pace(segment, arcs, over)
-    length = _length(robot, segment, over, pace)
+    eta = row_bounds(segment, arcs, over, segment.tilt)
+    length = _length(robot, segment, over, pace, eta)
+    square = 2.0 * (pace.slope**2 + length.value * pace.curvature)  # of rho^2, without rho's own division
     found = []
     for name in given(limits):
         limit = getattr(limits, name)
         if name in ("tension_min", "tension_max"):
             whole = kappa._replace(value=1.0 + kappa.value)
-            eta = row_bounds(segment, arcs, over, segment.tilt)
-            bounds = (whole * length).times(1.0 / (3.0 * z0)) + eta.times(limit / weight)
+            bound = ((whole * length).times(1.0 / (3.0 * z0)) + eta.times(limit / weight)).curvature
         elif name == "floor":
-            bounds = row_bounds(segment, arcs, over, segment.plane[2]).times(1.0 / z0)
+            bound = row_bounds(segment, arcs, over, segment.plane[2]).curvature / z0
         elif name == "cable_length_max":
-            bounds = (length * length).times(0.5 / z0**2)
+            bound = 0.5 * square / z0**2
         elif name == "cable_speed_max":
             rate = _rate(length, pace, pull)
-            bounds = (length * length).times(0.5 / z0**2) + (rate * rate).times(0.5 / (time * limit * z0) ** 2)
+            bound = 0.5 * (square + (rate * rate).curvature / (time * limit) ** 2) / z0**2
         else:
-            rate, slope = _rate(length, pace, pull), _rate_slope(length, pace, pull)
-            bend = length * length * slope + rate * rate
-            bounds = (length * length * length + bend.times(1.0 / (limit * time**2))).times(1.0 / z0**3)
-        found.append(jnp.max(bounds.curvature))
+            cube = 6.0 * length.value * pace.slope**2 + 3.0 * length.value**2 * pace.curvature
+            bound = (cube + _bend(length, pace, pull, square).curvature / (limit * time**2)) / z0**3
+        found.append(jnp.max(bound))
     return tuple(found)
 
 
@@ -190,11 +190,13 @@ def _pace(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]
     return c, (d_r.combined(d_t).turned(turn) + c).times(period)  # c'' = T^2 lambda (d - c)
 
 
-def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds) -> Bounds:
-    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (3,).
+def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Bounds:
+    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (3,). No cable is shorter than
+    # the distance from the spool plane.
     at_middle = jnp.linalg.norm(segment.hub + segment.plane @ over.place - robot.base_points, axis=1)
     change = over.radius * pace.slope
-    nearest = jnp.maximum(at_middle - change, 0.0)
+    depth = (1.0 + segment.tilt @ over.place - over.radius * eta.slope) * (segment.hub[2] - _centre_depth(robot))
+    nearest = jnp.maximum(jnp.maximum(at_middle - change, depth / jnp.linalg.norm(plane_normal(robot))), 0.0)
     slope = jnp.broadcast_to(pace.slope, nearest.shape)
     return Bounds(at_middle + change, slope, slope**2 / nearest + pace.curvature)
 
@@ -208,8 +210,9 @@ def _rate(length: Bounds, pace: Bounds, pull: Bounds) -> Bounds:
     )
 
 
-def _rate_slope(length: Bounds, pace: Bounds, pull: Bounds) -> Bounds:
-    # w' = |p'|^2 + ray . p''
-    whole = _rate(length, pace, pull)
+def _bend(length: Bounds, pace: Bounds, pull: Bounds, square: Array) -> Bounds:
+    # rho^2 w' - w^2, with w' = |p'|^2 + ray . p'' and the bounds of rho^2 that need no division.
+    rate = _rate(length, pace, pull)
     last = 3.0 * pace.curvature**2 + 4.0 * pace.slope * pull.slope + length.value * pull.curvature
-    return Bounds(whole.slope, whole.curvature, last)
+    slope = Bounds(rate.slope, rate.curvature, last)
+    return Bounds(length.value**2, 2.0 * length.value * pace.slope, square) * slope + rate * rate
