@@ -77,7 +77,7 @@ QUANTITIES = {
             "limit_margin",
             "1",
             "smallest slack of the limits",
-            "Smallest dimensionless slack of the limits given (docs/limits); infinite where there is none.",
+            "Smallest dimensionless slack of the limits given (docs/theory.md); infinite where there is none.",
         ),
     )
 }

@@ -19,10 +19,17 @@ PerCable = Annotated[
 ]
 
 
+NotNegative = Annotated[float, Field(ge=0)]
+NotNegativePerCable = Annotated[
+    Annotated[NotNegative, Tag("~one")] | Annotated[list[NotNegative], Field(min_length=3, max_length=3), Tag("~each")],
+    Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
+]
+
+
 class LimitKeys(Table):
     """Limits beyond taut cables; a plan's or a sweep's stand over those of the robot file."""
 
-    tension_min: PerCable | None = Field(None, description="smallest tension, one number or one a cable, N")
+    tension_min: NotNegativePerCable | None = Field(None, description="smallest tension, one number or one a cable, N")
     tension_max: PerCable | None = Field(None, description="largest tension, one number or one a cable, N")
     cable_length_max: PerCable | None = Field(None, description="largest cable length, one number or one a cable, m")
     cable_speed_max: PerCable | None = Field(None, description="largest cable speed, one number or one a cable, m/s")
