@@ -83,7 +83,8 @@ def _sections(
     shown = np.unique(np.linspace(0, count - 1, min(PANELS, count)).round().astype(int))
     columns = min(3, len(shown))
     lines = -(-len(shown) // columns)
-    figure = Figure(figsize=(3.1 * columns + 1.3, 3.2 * lines + 0.8), layout="constrained")
+    size = (3.1 * columns + 1.3, 3.2 * lines + 0.8) if len(shown) > 1 else (7.0, 5.6)
+    figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
     colours, norm = _colours(name, data[:, :, shown])
     for panel in grid.flat[len(shown) :]:
@@ -99,6 +100,9 @@ def _sections(
     bar = figure.colorbar(image, ax=grid, shrink=0.9, label=_label(result, name))
     if name in ("arcs", "tried_arcs"):
         _count_ticks(bar, int(data[:, :, shown].max()))
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside lower left", ncols=len(handles), fontsize=9, frameon=False)
     notes = [*_start_note(result), *notes, *_constants(result, across, panels)]
     notes.append(f"z axis {result.attributes.get('z_axis', 'down')}")
     text = ", ".join(dict.fromkeys(notes))
@@ -130,13 +134,17 @@ def _section(panel: Axes, result: Result, values: np.ndarray, across: list[str],
     image = panel.pcolormesh(x, y, values.T, cmap=colours, norm=norm, rasterized=True)
     if all(result.units[axis] == "m" for axis in across):
         panel.set_aspect("equal")
+    if across[1] == "z" and result.attributes.get("z_axis", "down") == "down":
+        panel.yaxis.set_inverted(True)
     if across == ["x", "y"] and "base_points" in result.attributes:
         base = np.asarray(result.attributes["base_points"])
         panel.fill(base[:, 0], base[:, 1], fill=False, edgecolor="white", linewidth=2.4)
-        panel.fill(base[:, 0], base[:, 1], fill=False, edgecolor="black", linewidth=1.0)
+        panel.fill(base[:, 0], base[:, 1], fill=False, edgecolor="black", linewidth=1.0, label="spools")
     start = _start(result)
     if all(axis in start for axis in across):
-        panel.plot(*(start[axis] for axis in across), "o", color="white", markeredgecolor="black", markersize=5)
+        panel.plot(
+            *(start[axis] for axis in across), "o", color="white", markeredgecolor="black", markersize=5, label="start"
+        )
     return image
 
 

@@ -10,7 +10,7 @@ from cspr_jax.config.robot import LimitKeys, Point
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.quantities import STORABLE
 
-LARGEST_COUNT = 1_000_000_000
+LARGEST_COUNT = 10_000_000
 
 
 class AxisRange(Table):
@@ -31,7 +31,7 @@ class AxisRange(Table):
 
 Axis = Annotated[
     Annotated[AxisRange, Tag("~range")]
-    | Annotated[list[float], Field(min_length=1, max_length=10_000_000), Tag("~values")],
+    | Annotated[list[float], Field(min_length=1, max_length=LARGEST_COUNT), Tag("~values")],
     Discriminator(lambda value: "~range" if isinstance(value, dict | AxisRange) else "~values"),
 ]
 _OF_TARGETS = "{} of the targets, m: {{ start, stop, count }} or a list"
