@@ -22,7 +22,6 @@ NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3")
 BOUNDARY_TOLERANCE = 1e-9
 
 
-@jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Amplitude:
     """A piecewise polynomial on [0, 1].
@@ -43,7 +42,12 @@ class Amplitude:
     largest: Array
     lowest: Array
     highest: Array
-    name: str = dataclasses.field(metadata={"static": True})
+    name: str = ""
+
+
+# The name stays outside: compiled functions do not see it, and are not compiled again for another one.
+_FIELDS = [field.name for field in dataclasses.fields(Amplitude)]
+jax.tree_util.register_dataclass(Amplitude, _FIELDS[:-1], [], drop_fields=["name"])
 
 
 def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array, ...]:

@@ -16,7 +16,6 @@ SMALLEST_AREA_RATIO = 1e-6
 SMALLEST_LEVEL_RATIO = 1e-3
 
 
-@jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class PointMassRobot:
     """A point mass on three cables.
@@ -31,7 +30,11 @@ class PointMassRobot:
     base_points: Array
     mass: Array
     gravity: Array
-    name: str = dataclasses.field(default="robot", metadata={"static": True})
+    name: str = ""
+
+
+# The name stays outside: compiled functions do not see it, and are not compiled again for another one.
+jax.tree_util.register_dataclass(PointMassRobot, ["base_points", "mass", "gravity"], [], drop_fields=["name"])
 
 
 def point_mass_robot(
