@@ -1,10 +1,13 @@
 """All criteria of a segment together, in one order: taut cables, below the spools, then the limits that are given."""
 
+import functools
+import itertools
+
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.amplitudes import Amplitude
-from cspr_jax.feasibility.limits import FLAGS, Limits, given, limit_curvatures, limit_slacks
+from cspr_jax.feasibility.limits import COUNTS, FLAGS, Limits, given, limit_curvatures, limit_slacks
 from cspr_jax.feasibility.slacks import instant, row_bounds, stretch, taut_bounds
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.robots import PointMassRobot
@@ -23,10 +26,45 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
     return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(FLAGS[name] for name in given(limits)))
 
 
+def counts(limits: Limits) -> tuple[int, ...]:
+    """How many smooth functions each criterion is the smallest of.
+
+    Args:
+        limits: which limits are given.
+
+    Returns:
+        n_criteria numbers.
+    """
+    return (3, 1, *(COUNTS[name] for name in given(limits)))
+
+
+def smooth_slacks(
+    robot: PointMassRobot, limits: Limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array
+) -> tuple[Array, ...]:
+    """Every slack of every criterion, at one instant: smooth functions of tau.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: what else must be met.
+        amplitude: A.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        tau: () normalised time.
+
+    Returns:
+        numbers (), as many as `counts` adds up to, criterion by criterion.
+    """
+    now = instant(segment, amplitude, arcs, tau)
+    found = [*now.kappa, now.eta]
+    for slack in limit_slacks(robot, limits, segment, arcs, tau, now):
+        found += slack
+    return tuple(found)
+
+
 def slacks(
     robot: PointMassRobot, limits: Limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array
 ) -> tuple[Array, ...]:
-    """The smallest slack of each criterion over the cables, at one instant.
+    """The smallest slack of each criterion, at one instant.
 
     Args:
         robot: a point mass on three cables.
@@ -39,9 +77,8 @@ def slacks(
     Returns:
         n_criteria numbers ().
     """
-    now = instant(segment, amplitude, arcs, tau)
-    taut = jnp.minimum(jnp.minimum(now.kappa[0], now.kappa[1]), now.kappa[2])
-    return (taut, now.eta, *limit_slacks(robot, limits, segment, arcs, tau, now))
+    every = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
+    return tuple(functools.reduce(jnp.minimum, itertools.islice(every, count)) for count in counts(limits))
 
 
 def curvatures(

@@ -71,7 +71,7 @@ def extremes(shared: Shared, segments: Segment, arcs: np.ndarray, least_samples:
         the extremes.
     """
     table = blocks(shared.amplitude, int(arcs.max()), density=4, least=-(-least_samples // INTERVALS))
-    found = smallest_values(_demands, 8, shared, segments, arcs, table)
+    found = smallest_values(_demands, 8, shared, segments, arcs, table, n_refined=8)
     signs = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
     columns = (found * signs).T
     names = [field.name for field in dataclasses.fields(Extremes)][:-1]

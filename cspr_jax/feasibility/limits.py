@@ -59,6 +59,10 @@ FLAGS = {
 }
 
 
+# Smooth functions of each: one a cable, one of the height, two a cable for an absolute value.
+COUNTS = {name: {"floor": 1, "cable_acceleration_max": 6}.get(name, 3) for name in FLAGS}
+
+
 def given(limits: Limits) -> tuple[str, ...]:
     """Names of the limits that are given, in the order of their slacks.
 
@@ -73,8 +77,8 @@ def given(limits: Limits) -> tuple[str, ...]:
 
 def limit_slacks(
     robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, now: Instant
-) -> tuple[Array, ...]:
-    """The smallest slack of each limit over the cables, at one instant.
+) -> tuple[list[Array], ...]:
+    """The slacks of each limit, at one instant: smooth functions, one a cable or more.
 
     Args:
         robot: a point mass on three cables.
@@ -85,7 +89,7 @@ def limit_slacks(
         now: the state at `tau`.
 
     Returns:
-        one () for each limit of `given`.
+        a list of () for each limit of `given`, as long as `COUNTS` says.
     """
     if not given(limits):
         return ()
@@ -110,9 +114,9 @@ def limit_slacks(
         elif name == "cable_speed_max":
             slack = (length**2 - (rate / (time * limit)) ** 2) / (2.0 * z0**2)
         else:
-            bend = jnp.abs(length**2 * rate_slope - rate**2) / (limit * time**2)
-            slack = (length**3 - bend) / z0**3
-        found.append(jnp.min(slack))
+            bend = (length**2 * rate_slope - rate**2) / (limit * time**2)
+            slack = jnp.concatenate([length**3 - bend, length**3 + bend]) / z0**3
+        found.append([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])])
     return tuple(found)
 
 

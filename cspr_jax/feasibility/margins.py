@@ -1,24 +1,29 @@
-"""The margin of a segment: the smallest slack it attains, refined between the samples."""
+"""The smallest value along a segment of functions of one instant, refined between the samples.
+
+Every block is sampled; where its smallest sample lies, a parabola estimates the minimum. The best
+three estimates of a function over all blocks are then refined by two parabolas, each narrower.
+"""
 
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, lax
 
 from cspr_jax.feasibility.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.feasibility.certificate import BATCH, Shared
-from cspr_jax.feasibility.criteria import slacks
-from cspr_jax.feasibility.limits import given
+from cspr_jax.feasibility.criteria import counts, smooth_slacks
 from cspr_jax.grids import in_batches
 from cspr_jax.trajectories.hypocycloid import Segment
 
-ZOOM = 1.0 / 16.0
+CANDIDATES = 3
+# Distance of the points of the first refining parabola, in steps between samples, and of the next ones.
+FIRST_WIDTH, NARROWER = 1.0 / 4.0, 1.0 / 16.0
 
 
-def vertex(left: Array, middle: Array, right: Array) -> Array:
-    """Where the parabola through three equidistant values is smallest, in steps from the middle one.
+def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
+    """Where the parabola through three equidistant values is smallest, and its value there.
 
     Args:
         left: () value one step before.
@@ -26,60 +31,91 @@ def vertex(left: Array, middle: Array, right: Array) -> Array:
         right: () value one step after.
 
     Returns:
-        () in [-1, 1]; an end where the parabola has no minimum inside.
+        steps from the middle one, () in [-1, 1]; the value, (). An end where there is no minimum inside.
     """
     bend = left - 2.0 * middle + right
     move = 0.5 * (left - right) / jnp.where(bend > 0.0, bend, 1.0)
-    return jnp.clip(jnp.where(bend > 0.0, move, jnp.sign(left - right)), -1.0, 1.0)
+    move = jnp.clip(jnp.where(bend > 0.0, move, jnp.sign(left - right)), -1.0, 1.0)
+    return move, middle + 0.5 * move * (right - left) + 0.5 * move**2 * bend
 
 
-def refined_minimum(function, tau: Array, values: Array) -> Array:
-    """Smallest value of a smooth function near its smallest sample, by two parabolas, the second 16 times narrower.
+def _block_estimates(function, shared: Shared, segment: Segment, arcs: Array, start: Array, stop: Array):
+    # For each function: an estimate of its minimum in the block, and where.
+    weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
+    tau = start * (1.0 - weight) + stop * weight
+    estimates, places = [], []
+    for values in jax.vmap(partial(function, *shared, segment, arcs))(tau):
+        i = jnp.argmin(values)
+        inner = jnp.clip(i, 1, INTERVALS - 1)
+        move, estimate = vertex(values[inner - 1], values[inner], values[inner + 1])
+        better = estimate < values[i]
+        estimates.append(jnp.where(better, estimate, values[i]))
+        places.append(jnp.where(better, tau[inner] + move * (tau[1] - tau[0]), tau[i]))
+    return jnp.stack(estimates), jnp.stack(places)
+
+
+def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[Array, Array]:
+    # Keep the candidates in order, the new one in its place; leaves (CANDIDATES, n_values, n).
+    estimates, places = [], []
+    for old_estimate, old_place in zip(*best, strict=True):
+        first = estimate < old_estimate
+        estimates.append(jnp.where(first, estimate, old_estimate))
+        places.append(jnp.where(first, place, old_place))
+        estimate, place = jnp.where(first, old_estimate, estimate), jnp.where(first, old_place, place)
+    return jnp.stack(estimates), jnp.stack(places)
+
+
+def refined_minimum(function, tau: Array, step: Array) -> Array:
+    """Smallest value of a smooth function near an estimated minimum, by two parabolas.
 
     Args:
         function: () -> ().
-        tau: (n,) equidistant, n >= 3.
-        values: (n,) of the function there.
+        tau: () the estimate.
+        step: () distance of the samples that it came from.
 
     Returns:
-        () a value that the function attains, at most the smallest sample; its distance from the
-        minimum is of sixth order in the step.
+        () a value that the function attains.
     """
-    i = jnp.clip(jnp.argmin(values), 1, len(tau) - 2)
-    step = tau[1] - tau[0]
-    near = jnp.clip(tau[i] + step * vertex(values[i - 1], values[i], values[i + 1]), tau[0], tau[-1])
-    close = jnp.clip(near + ZOOM * step * jnp.array([-1.0, 0.0, 1.0]), tau[0], tau[-1])
-    f = jax.vmap(function)(close)
-    nearer = jnp.clip(close[1] + ZOOM * step * vertex(f[0], f[1], f[2]), tau[0], tau[-1])
-    return jnp.minimum(jnp.minimum(jnp.min(values), jnp.min(f)), function(nearer))
+
+    def narrow(i, state):
+        smallest, at, width = state
+        points = jnp.clip(at + width * jnp.array([-1.0, 0.0, 1.0]), 0.0, 1.0)
+        values = jax.vmap(function)(points)
+        at = jnp.clip(points[1] + width * vertex(*values)[0], 0.0, 1.0)
+        return jnp.minimum(smallest, jnp.min(values)), at, width * NARROWER
+
+    first = (jnp.full_like(tau, jnp.inf), tau, step * FIRST_WIDTH)
+    # The third round evaluates where the second ended.
+    return lax.fori_loop(0, 3, narrow, first)[0]
 
 
-def _block_minima(
-    function, shared: Shared, segment: Segment, arcs: Array, start: Array, stop: Array
-) -> tuple[Array, ...]:
-    weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
-    tau = start * (1.0 - weight) + stop * weight
-    values = jax.vmap(partial(function, *shared, segment, arcs))(tau)
-    return tuple(
-        refined_minimum(lambda t, which=which: function(*shared, segment, arcs, t)[which], tau, v)
-        for which, v in enumerate(values)
-    )
-
-
-@partial(jax.jit, static_argnums=(0, 1))
-def _minima(function, n_values: int, shared: Shared, edges: Array, counts: Array, arguments) -> Array:
+@partial(jax.jit, static_argnums=(0, 1, 2))
+def _minima(function, n_values: int, n_refined: int, shared: Shared, edges: Array, counts: Array, arguments) -> Array:
     segments, arcs = arguments
 
     def step(state, start, stop):
-        found = jax.vmap(partial(_block_minima, function, shared))(segments, arcs, start, stop)
-        return jnp.minimum(state, jnp.stack(found))
+        found = jax.vmap(partial(_block_estimates, function, shared), out_axes=1)(segments, arcs, start, stop)
+        return _insert(state, *found)
 
-    nothing = jnp.full((n_values, *arcs.shape), jnp.inf, arcs.dtype)
-    return over_blocks(edges, counts, arcs, nothing, step).T
+    nothing = jnp.full((CANDIDATES, n_values, *arcs.shape), jnp.inf, arcs.dtype)
+    estimates, places = over_blocks(edges, counts, arcs, (nothing, jnp.zeros_like(nothing)), step)
+    steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)])
+
+    def refine(segment, p, place, width):
+        # place: (CANDIDATES, n_refined). One copy of the function serves all of its values: it compiles much faster.
+        def one(which, tau):
+            return refined_minimum(lambda t: jnp.stack(function(*shared, segment, p, t)[:n_refined])[which], tau, width)
+
+        return jnp.min(jax.vmap(jax.vmap(one), in_axes=(None, 0))(jnp.arange(n_refined), place), axis=0)
+
+    refined = jax.vmap(refine, in_axes=(0, 0, 2, 0))(segments, arcs, places[:, :n_refined], steps)
+    return jnp.concatenate([refined, estimates[0, n_refined:].T], axis=1)
 
 
-def smallest_values(function, n_values: int, shared: Shared, segments: Segment, arcs: np.ndarray, table) -> np.ndarray:
-    """Smallest values along each segment of functions of one instant, refined between samples.
+def smallest_values(
+    function, n_values: int, shared: Shared, segments: Segment, arcs: np.ndarray, table, *, n_refined: int
+) -> np.ndarray:
+    """Smallest values along each segment of functions of one instant.
 
     Args:
         function: (robot, limits, amplitude, segment, arcs, tau) -> n_values numbers (); hashable.
@@ -88,6 +124,8 @@ def smallest_values(function, n_values: int, shared: Shared, segments: Segment, 
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, 1 or more.
         table: blocks to sample, from `blocks.blocks`.
+        n_refined: of how many, from the first, the minimum is refined to a value that is attained; the
+            others are the estimates of parabolas through the samples.
 
     Returns:
         (n, n_values).
@@ -95,7 +133,7 @@ def smallest_values(function, n_values: int, shared: Shared, segments: Segment, 
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    found = in_batches(partial(_minima, function, n_values, shared, *table), arguments, size=BATCH)
+    found = in_batches(partial(_minima, function, n_values, n_refined, shared, *table), arguments, size=BATCH)
     return found[np.argsort(order, kind="stable")]
 
 
@@ -113,4 +151,8 @@ def margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> np.ndarray:
         (n, n_criteria) in the order of `criteria.flags`.
     """
     table = blocks(shared.amplitude, int(np.max(arcs)))
-    return smallest_values(slacks, 2 + len(given(shared.limits)), shared, segments, arcs, table)
+    groups = counts(shared.limits)
+    # The smallest over the cables has kinks, each cable's own slack has none: they are refined apart.
+    # Limits are many: their slacks stay estimates.
+    every = smallest_values(smooth_slacks, sum(groups), shared, segments, arcs, table, n_refined=sum(groups[:2]))
+    return np.minimum.reduceat(every, np.cumsum([0, *groups[:-1]]), axis=1)
