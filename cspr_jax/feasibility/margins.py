@@ -148,11 +148,13 @@ def margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> np.ndarray:
         arcs: (n,) number of arcs, 1 or more.
 
     Returns:
-        (n, n_criteria) in the order of `criteria.flags`.
+        (n, n_criteria) in the order of `criteria.flags`; NaN where the motion is not finite.
     """
     table = blocks(shared.amplitude, int(np.max(arcs)))
     groups = counts(shared.limits)
     # The smallest over the cables has kinks, each cable's own slack has none: they are refined apart.
     # Limits are many: their slacks stay estimates.
     every = smallest_values(smooth_slacks, sum(groups), shared, segments, arcs, table, n_refined=sum(groups[:2]))
-    return np.minimum.reduceat(every, np.cumsum([0, *groups[:-1]]), axis=1)
+    smallest = np.minimum.reduceat(every, np.cumsum([0, *groups[:-1]]), axis=1)
+    # A compiled minimum may pass over NaN; what has no finite minimum has none.
+    return np.where(np.isfinite(smallest), smallest, np.nan)

@@ -1,0 +1,204 @@
+"""The shape of the package: layers, what may import what, sizes, docstrings, no paths of one machine."""
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "cspr_jax"
+
+# From the bottom up, as docs/architecture.md draws them; a package stands for its modules, a longer name goes first.
+LAYERS = (
+    ("errors", "numerics", "bounds", "grids"),
+    ("amplitudes", "robots"),
+    ("tensions",),
+    ("trajectories",),
+    ("feasibility",),
+    ("maps", "maps.minimum_arcs", "maps.sieve"),
+    ("config", "identity", "quantities", "tiles"),
+    ("problem", "store", "results"),
+    ("maps.cells",),
+    ("sweep", "planning", "choices", "api"),
+    ("bench", "tables", "reports", "motions", "plots"),
+    ("cli", "__main__"),
+)
+KERNELS = tuple(name for layer in LAYERS[:6] for name in layer)
+WITHOUT_JAX = (
+    "cli",
+    "errors",
+    "config.plan",
+    "config.reading",
+    "config.robot",
+    "config.sweep",
+    "config.trajectory",
+    "feasibility.verdicts",
+    "identity",
+    "quantities",
+    "tiles",
+    "store",
+    "results",
+    "plots",
+)
+LEVELS = {name: level for level, layer in enumerate(LAYERS) for name in layer}
+
+
+def _name(path: Path) -> str:
+    """Module name below cspr_jax; "" for the package itself."""
+    return ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix("__init__").rstrip(".")
+
+
+MODULES = {_name(path): ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
+INNER = [name for name in MODULES if name]
+
+
+def _level(name: str) -> int | None:
+    """Layer of a module: its own, else that of its package."""
+    return LEVELS.get(name, LEVELS.get(name.split(".")[0]))
+
+
+def _imports(tree: ast.AST) -> Iterator[str]:
+    """Everything imported anywhere in a module, dotted, from "import a" and "from a import b"."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def _inner_imports(name: str) -> set[str]:
+    """Modules of the package that a module imports; `__version__` is the package's own."""
+    found = set()
+    for target in _imports(MODULES[name]):
+        if target.split(".")[0] == "cspr_jax" and target != "cspr_jax.__version__":
+            inner = target.removeprefix("cspr_jax").removeprefix(".")
+            found.add(inner if inner in MODULES else inner.rpartition(".")[0])
+    return found
+
+
+def _functions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    return (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+
+
+def test_every_module_has_a_layer():
+    assert [name for name in INNER if _level(name) is None] == []
+    assert [name for name in LEVELS if name not in MODULES] == []
+
+
+@pytest.mark.parametrize("name", INNER)
+def test_imports_point_down(name):
+    upward = [target for target in _inner_imports(name) if not target or _level(target) > _level(name)]
+    assert upward == []
+
+
+def test_imports_have_no_cycle():
+    left = {name: _inner_imports(name) - {name} for name in INNER}
+    while left:
+        free = [name for name, targets in left.items() if not targets & left.keys()]
+        assert free, f"cycle among {sorted(left)}"
+        for name in free:
+            del left[name]
+
+
+@pytest.mark.parametrize("name", [name for name in INNER if _level(name) < 6])
+def test_kernels_know_no_files_and_pictures(name):
+    assert name.startswith(KERNELS)
+    heavy = {target.split(".")[0] for target in _imports(MODULES[name])}
+    assert not heavy & {"h5py", "matplotlib", "rich", "pydantic", "argparse", "tomllib"}
+
+
+def test_files_side_loads_no_jax_and_the_command_line_nothing_heavy():
+    code = f"""
+import importlib, sys
+import cspr_jax
+import cspr_jax.cli
+def loaded(*names):
+    return [name for name in names if name in sys.modules]
+found = loaded("jax", "h5py", "matplotlib", "pydantic", "numpy", "rich")
+try:
+    cspr_jax.cli.main(["--help"])
+except SystemExit:
+    found += loaded("jax", "h5py", "matplotlib", "pydantic", "numpy", "rich")
+for name in {WITHOUT_JAX!r}:
+    importlib.import_module("cspr_jax." + name)
+    found += [name for _ in loaded("jax")]
+print("found:", found)
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "found: []"
+    assert {name for name in INNER if name.startswith("config.")} <= set(WITHOUT_JAX)
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_sizes(name):
+    path = PACKAGE.joinpath(*name.split(".")) if name else PACKAGE
+    path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    assert len(path.read_text("utf-8").splitlines()) <= 400
+    for function in _functions(MODULES[name]):
+        length = function.end_lineno - function.lineno + 1
+        if ast.get_docstring(function) is not None:
+            length -= function.body[0].end_lineno - function.body[0].lineno + 1
+        assert length <= 60, function.name
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_no_assert_and_no_print(name):
+    nodes = list(ast.walk(MODULES[name]))
+    assert not [node.lineno for node in nodes if isinstance(node, ast.Assert)]
+    calls = [node for node in nodes if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)]
+    assert not [node.lineno for node in calls if node.func.id == "print"]
+
+
+def _public(tree: ast.Module) -> Iterator[tuple[ast.AST, bool]]:
+    """Public functions and classes of a module, methods with True; not the arithmetic of a class on itself."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            yield node, False
+            if isinstance(node, ast.ClassDef):
+                methods = [n for n in node.body if isinstance(n, ast.FunctionDef) and n.name[0] != "_"]
+                yield from ((n, True) for n in methods if getattr(n.returns, "value", None) != node.name)
+
+
+def _answers(node: ast.AST) -> bool:
+    """Whether a function returns or yields a value, those inside it left out."""
+    if isinstance(node, ast.Return | ast.Yield | ast.YieldFrom):
+        return node.value is not None
+    inner = (child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.FunctionDef | ast.Lambda))
+    return any(_answers(child) for child in inner)
+
+
+def _missing_parts(function: ast.FunctionDef, is_method: bool) -> list[str]:
+    """Sections and parameters that a Google-style docstring lacks."""
+    text = ast.get_docstring(function) or ""
+    given = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs][is_method:]
+    missing = [arg.arg for arg in given if not re.search(rf"^Args:\n(.*\n)*? +{arg.arg}: ", text, re.M)]
+    is_property = any(isinstance(d, ast.Name) and d.id == "property" for d in function.decorator_list)
+    if _answers(function) and not is_property and not re.search(r"^(Returns|Yields):", text, re.M):
+        missing.append("Returns")
+    return missing
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_docstrings(name):
+    tree = MODULES[name]
+    assert ast.get_docstring(tree)
+    for node, is_method in _public(tree):
+        assert ast.get_docstring(node), node.name
+        if isinstance(node, ast.FunctionDef):
+            assert _missing_parts(node, is_method) == [], node.name
+
+
+def test_nothing_names_a_machine_or_the_shared_folder():
+    """Neither code, docs nor data hold a path of the machine they were made on."""
+    folders = ("cspr_jax", "tests", "docs", "sweeps", "benchmarks", ".ci", "results/reference")
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*") if path.is_file()]
+    files += [path for path in ROOT.iterdir() if path.suffix in ("", ".md", ".toml") and path.is_file()]
+    assert len(files) > 50
+    pattern = re.compile(rb"(?<![\w.])/(work|tmp|root|home)/" + rb"|\.\./" + rb"shared/|shared" + rb"/notes")
+    named = [str(path) for path in files if "__pycache__" not in path.parts and pattern.search(path.read_bytes())]
+    assert named == []

@@ -1,0 +1,115 @@
+"""What the documents show works: Python, commands, sweep files, links, and the generated reference."""
+
+import importlib.util
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+
+from cspr_jax import cli, tables
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.reading import checked, read_toml
+from cspr_jax.quantities import QUANTITIES
+from cspr_jax.sweep import read_sweep
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "README.md", ROOT / "results" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page: Path, *languages: str) -> list[str]:
+    """Fenced blocks of a page, in some languages."""
+    return [text for language, text in FENCE.findall(page.read_text("utf-8")) if language in languages]
+
+
+def commands(page: Path) -> list[list[str]]:
+    """The words of every `cspr` command of a page's shell blocks, comments left out."""
+    lines = [line.removeprefix("$ ") for text in blocks(page, "sh", "console", "bash") for line in text.splitlines()]
+    words = [shlex.split(line, comments=True) for line in lines]
+    return [line for line in words if line[:1] == ["cspr"]]
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """A working directory with the files that documents name, free to be written to."""
+    for name in ("sweeps", "results/reference"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_fences_are_seen():
+    """Every fence opens and closes a block, so no block escapes the tests below."""
+    for page in PAGES:
+        text = page.read_text("utf-8")
+        assert len(re.findall(r"^\s*```", text, re.MULTILINE)) == 2 * len(FENCE.findall(text)), page
+    assert blocks(ROOT / "README.md", "python") and len(commands(ROOT / "README.md")) >= 6
+
+
+def test_python_of_the_readme_runs(checkout, capsys):
+    namespace: dict[str, object] = {"__name__": "readme"}
+    for text in blocks(ROOT / "README.md", "python"):
+        exec(compile(text, "README.md", "exec"), namespace)
+    assert capsys.readouterr().out.strip()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_of_the_documents_parse(page, checkout):
+    for words in commands(page):
+        options = cli._parser().parse_args(words[1:])
+        named = getattr(options, "sweep", None) or getattr(options, "plan", None)
+        if named is not None:
+            assert (ROOT / named).is_file(), words
+        if words[1] == "table" and options.name:
+            assert options.name in tables.TABLES
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_sweeps_of_the_documents_are_read(page, checkout):
+    for text in blocks(page, "toml"):
+        path = checkout / "shown.toml"
+        path.write_text(text, "utf-8")
+        if "map" in read_toml(path):
+            assert read_sweep(path).grid.size > 0
+
+
+def test_files_in_sweeps_are_read():
+    for path in sorted((ROOT / "sweeps").rglob("*.toml")):
+        if "pose" in read_toml(path):
+            assert len(checked(PlanFile, read_toml(path), path).pose) > 1
+        else:
+            assert read_sweep(path).grid.size > 0
+
+
+def test_the_reference_is_generated():
+    place = ROOT / "docs" / "generate_reference.py"
+    spec = importlib.util.spec_from_file_location("generate_reference", place)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    text = module.reference_text()
+    assert text == (ROOT / "docs" / "reference.md").read_text("utf-8"), "call `make docs`"
+    wanted = [*QUANTITIES, "schema", "from_x", "cable_speed_max", "epsilon", "z_axis", "max_arcs", "samples", "tile"]
+    assert all(f"`{name}`" in text for name in wanted)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    text = FENCE.sub("", page.read_text("utf-8"))
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if not re.match(r"[a-z]+://|mailto:", target):
+            name, _, anchor = target.partition("#")
+            path = (page.parent / name).resolve() if name else page
+            assert path.exists() and path.is_relative_to(ROOT.resolve()), target
+            if anchor:
+                heads = re.findall(r"^#+ (.*)$", path.read_text("utf-8"), re.MULTILINE)
+                slugs = [re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads]
+                assert anchor in slugs, target
+
+
+def test_what_the_readme_names_is_there():
+    text = (ROOT / "README.md").read_text("utf-8")
+    named = re.findall(r"\b(?:tests|docs|sweeps|benchmarks)/[\w/]+(?:\.\w+)?", text)
+    assert len(named) > 5 and all((ROOT / name).exists() for name in named)
+    assert not re.search(r"@[A-Z0-9]+@", text), "a number that was never filled in"
