@@ -131,6 +131,6 @@ def test_vertex_of_a_parabola():
     """The step of the refinement: exact for parabolas, and within the samples otherwise."""
     for place in (-0.9, -0.2, 0.0, 0.7):
         left, middle, right = ((x - place) ** 2 for x in (-1.0, 0.0, 1.0))
-        assert float(vertex(jnp.asarray(left), jnp.asarray(middle), jnp.asarray(right))) == pytest.approx(place)
-    assert float(vertex(*(jnp.asarray(v) for v in (0.0, 1.0, 1.5)))) == -1.0  # bent down: an end
-    assert float(vertex(*(jnp.asarray(v) for v in (6.25, 2.25, 0.25)))) == 1.0  # beyond: clipped
+        assert float(vertex(jnp.asarray(left), jnp.asarray(middle), jnp.asarray(right))[0]) == pytest.approx(place)
+    assert float(vertex(*(jnp.asarray(v) for v in (0.0, 1.0, 1.5)))[0]) == -1.0  # bent down: an end
+    assert float(vertex(*(jnp.asarray(v) for v in (6.25, 2.25, 0.25)))[0]) == 1.0  # beyond: clipped
