@@ -20,6 +20,9 @@ from cspr_jax.numerics import leaf, polynomial
 HIGHEST_DERIVATIVE = 5
 NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3")
 BOUNDARY_TOLERANCE = 1e-9
+# Shorter ends ask for accelerations that no robot has, and lose the digits of A'' to rounding.
+SMALLEST_EPSILON = 1e-3
+LARGEST_COEFFICIENT = 1e9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -141,7 +144,7 @@ def named(name: str, epsilon: float | None = None) -> Amplitude:
 
     Args:
         name: one of `NAMES`.
-        epsilon: length of the curved ends of the last two, in ]0, 0.5].
+        epsilon: length of the curved ends of the last two, from 0.001 to 0.5.
 
     Returns:
         the amplitude function.
@@ -161,8 +164,8 @@ def named(name: str, epsilon: float | None = None) -> Amplitude:
         return from_pieces(name, (), (0.0,), (polynomials[name],))
     if name not in NAMES:
         raise InputError("name", name, "one of " + ", ".join(NAMES))
-    if epsilon is None or not 0.0 < epsilon <= 0.5:
-        raise InputError("epsilon", epsilon, "a number in ]0, 0.5]")
+    if epsilon is None or not SMALLEST_EPSILON <= epsilon <= 0.5:
+        raise InputError("epsilon", epsilon, f"a number from {SMALLEST_EPSILON} to 0.5")
     return _with_straight_middle(name, epsilon)
 
 
@@ -195,8 +198,8 @@ def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
     Raises:
         InputError: no coefficient, too many, or one that is not finite.
     """
-    if not 1 <= len(coefficients) <= 20 or not all(math.isfinite(c) for c in coefficients):
-        raise InputError("polynomial", list(coefficients), "1 to 20 finite coefficients, lowest power first")
+    if not 1 <= len(coefficients) <= 20 or not all(abs(c) <= LARGEST_COEFFICIENT for c in coefficients):
+        raise InputError("polynomial", list(coefficients), "1 to 20 coefficients of at most 1e9, lowest power first")
     return from_pieces("polynomial", (), (0.0,), (tuple(coefficients),))
 
 

@@ -1,6 +1,8 @@
 """What can go wrong on the host, and the exit code that says so."""
 
+import datetime
 import enum
+import reprlib
 
 
 class ExitCode(enum.IntEnum):
@@ -52,7 +54,7 @@ class ConfigError(CsprError):
 
     def __init__(self, file: object, message: str) -> None:
         """Join the file's name and the message."""
-        super().__init__(f"{file}: {message}")
+        super().__init__(one_line(f"{file}: {message}"))
 
 
 class RefusedError(CsprError):
@@ -65,6 +67,23 @@ class StoreError(CsprError):
     """A file that cannot be read or written."""
 
     exit_code = ExitCode.INPUT_OUTPUT
+
+
+# Containers are cut before they are written out: a user's may be nested thousands deep.
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxdict, _SHORT.maxother = 3, 12, 12, 60
+
+
+def one_line(text: str) -> str:
+    """Text with line breaks and other control characters written out, as it may hold what a user typed.
+
+    Args:
+        text: anything.
+
+    Returns:
+        the text, all of it printable.
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def shown(value: object) -> str:
@@ -80,5 +99,7 @@ def shown(value: object) -> str:
         return "(missing)"
     if isinstance(value, bool):
         return str(value).lower()
-    text = f'"{value}"' if isinstance(value, str) else repr(value)
+    if isinstance(value, datetime.date | datetime.time):
+        return str(value)
+    text = f'"{value}"' if isinstance(value, str) else _SHORT.repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

@@ -13,6 +13,7 @@ from cspr_jax.numerics import leaf
 STANDARD_GRAVITY = 9.81
 # Below these ratios three spools count as lying on a line, and their plane as vertical.
 SMALLEST_AREA_RATIO = 1e-6
+LARGEST_LENGTH = 1e6  # m; beyond, products of lengths lose their meaning
 SMALLEST_LEVEL_RATIO = 1e-3
 
 
@@ -55,8 +56,8 @@ def point_mass_robot(
         InputError: wrong shape, not finite, spools on a line, a vertical spool plane, mass or gravity not positive.
     """
     points = np.asarray(base_points, float)
-    if points.shape != (3, 3) or not np.isfinite(points).all():
-        raise InputError("base_points", base_points, "three points of three finite coordinates")
+    if points.shape != (3, 3) or not (np.abs(points) <= LARGEST_LENGTH).all():
+        raise InputError("base_points", base_points, "three points of three coordinates, at most 1e6 m")
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(key, value, "a finite number > 0")

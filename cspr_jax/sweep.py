@@ -13,7 +13,7 @@ from cspr_jax import __version__
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, SweepFile
-from cspr_jax.errors import ConfigError, RefusedError, StoreError, shown
+from cspr_jax.errors import ConfigError, RefusedError, StoreError, one_line, shown
 from cspr_jax.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.quantities import DEFAULT_STORE
 from cspr_jax.store import bytes_needed, new_result, write_text
@@ -196,7 +196,9 @@ def _refuse_other(sweep: Sweep, directory: Path) -> None:
         for key in sorted(before.keys() | now.keys())
         if before.get(key) != now.get(key)
     ]
-    raise RefusedError("\n".join(lines) or f"{directory}: holds a run of another format: choose another -o")
+    if not lines:
+        lines = [f"{directory}: holds a run of another format: choose another -o"]
+    raise RefusedError("\n".join(one_line(line) for line in lines))
 
 
 def _flat(value: Any, key: str = "") -> dict[str, Any]:

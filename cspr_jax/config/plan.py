@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from cspr_jax.config.reading import Table
-from cspr_jax.config.robot import LimitKeys, Point, Positive
+from cspr_jax.config.robot import Coordinate, LimitKeys, Point, Positive
 from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, TrajectoryKeys
 
 
@@ -42,7 +42,7 @@ class PlanFile(TrajectoryKeys, LimitKeys):
         description='depth of P0 below the centroid, m, or { choose = "mean" | "conservative" | "fastest" }'
     )
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
-    floor: float | None = Field(None, description="z of the floor, m")
+    floor: Coordinate | None = Field(None, description="z of the floor, m")
     pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
         description="the poses in their order, at least two [[pose]] tables"
     )

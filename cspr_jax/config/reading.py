@@ -20,7 +20,7 @@ Model = TypeVar("Model", bound="Table")
 class Table(BaseModel):
     """A TOML table: every key known, types as written, numbers finite, nothing changed afterwards."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -44,7 +44,9 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(path, f"cannot be read: {error.strerror or error}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(path, f"is not UTF-8 text: {error.reason} at byte {error.start}") from error
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except RecursionError as error:
+        raise ConfigError(path, "is not TOML: nested too deeply") from error
+    except ValueError as error:
         raise ConfigError(path, f"is not TOML: {error}") from error
 
 
@@ -65,6 +67,8 @@ def checked(model: type[Model], data: Any, file: object, *, at: str = "") -> Mod
     """
     try:
         return model.model_validate(data)
+    except RecursionError as error:
+        raise ConfigError(file, "is nested too deeply") from error
     except ValidationError as error:
         found = error.errors(include_url=False)
         # A misspelt key explains a missing one: show it first.
@@ -74,7 +78,10 @@ def checked(model: type[Model], data: Any, file: object, *, at: str = "") -> Mod
 
 
 def _line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
-    parts = [part for part in error["loc"] if not str(part).startswith(VARIANT)]
+    # The last part of an unknown or missing key is the user's own, whatever it looks like.
+    own = error["loc"][-1:] if error["type"] in ("extra_forbidden", "missing") else ()
+    parts = [part for part in error["loc"][: len(error["loc"]) - len(own)] if not str(part).startswith(VARIANT)]
+    parts += own
     key = _key([*([at] if at else []), *parts]) or "the file"
     if error["type"] == "extra_forbidden":
         return f"unknown key {key} = {shown(error['input'])}: {_suggestion(model, parts)}"

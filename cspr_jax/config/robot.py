@@ -11,15 +11,18 @@ from cspr_jax.errors import ConfigError, shown
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
-Point = Annotated[list[float], Field(min_length=3, max_length=3)]
-Positive = Annotated[float, Field(gt=0)]
+# Beyond these bounds squares and cubes of numbers overflow; no robot is near them.
+LARGEST_LENGTH = 1e6
+Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
+Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, Field(gt=0, le=1e9)]
 PerCable = Annotated[
     Annotated[Positive, Tag("~one")] | Annotated[list[Positive], Field(min_length=3, max_length=3), Tag("~each")],
     Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
 ]
 
 
-NotNegative = Annotated[float, Field(ge=0)]
+NotNegative = Annotated[float, Field(ge=0, le=1e9)]
 NotNegativePerCable = Annotated[
     Annotated[NotNegative, Tag("~one")] | Annotated[list[NotNegative], Field(min_length=3, max_length=3), Tag("~each")],
     Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),

@@ -1,12 +1,11 @@
 """Sweep files: a map over a grid."""
 
-import math
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from cspr_jax.config.reading import Table
-from cspr_jax.config.robot import LimitKeys, Point
+from cspr_jax.config.robot import Coordinate, LimitKeys, Point
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.quantities import STORABLE
 
@@ -16,22 +15,20 @@ LARGEST_COUNT = 10_000_000
 class AxisRange(Table):
     """Equidistant points."""
 
-    start: float = Field(description="first point")
-    stop: float = Field(description="last point, included")
+    start: Coordinate = Field(description="first point")
+    stop: Coordinate = Field(description="last point, included")
     count: Annotated[int, Field(ge=1, le=LARGEST_COUNT)] = Field(description="number of points, at least 1")
 
     @model_validator(mode="after")
     def _spread(self) -> "AxisRange":
         if self.count > 1 and self.start == self.stop:
             raise ValueError("a range whose stop differs from its start when count > 1")
-        if not math.isfinite(self.stop - self.start):
-            raise ValueError("a range whose length is a finite number")
         return self
 
 
 Axis = Annotated[
     Annotated[AxisRange, Tag("~range")]
-    | Annotated[list[float], Field(min_length=1, max_length=LARGEST_COUNT), Tag("~values")],
+    | Annotated[list[Coordinate], Field(min_length=1, max_length=LARGEST_COUNT), Tag("~values")],
     Discriminator(lambda value: "~range" if isinstance(value, dict | AxisRange) else "~values"),
 ]
 _OF_TARGETS = "{} of the targets, m: {{ start, stop, count }} or a list"
@@ -74,7 +71,7 @@ class SweepTrajectory(TrajectoryKeys):
 class SweepLimits(LimitKeys):
     """Limits of every cell."""
 
-    floor: float | None = Field(None, description="z of the floor, m")
+    floor: Coordinate | None = Field(None, description="z of the floor, m")
 
 
 class Run(Table):
@@ -89,6 +86,13 @@ class Run(Table):
     store: Annotated[list[Literal[STORABLE]], Field(min_length=1)] | None = Field(  # type: ignore[valid-type]
         None, description="quantities to store; see `cspr quantities`"
     )
+
+    @field_validator("store")
+    @classmethod
+    def _once(cls, names: list[str] | None) -> list[str] | None:
+        if names is not None and len(set(names)) < len(names):
+            raise ValueError("a list without repetitions")
+        return names
 
 
 class SweepFile(Table):

@@ -14,15 +14,16 @@ class NamedAmplitude(Table):
     """An amplitude function with a parameter."""
 
     name: Literal["effective", "effective-c3"] = Field(description='"effective" (1.110) or "effective-c3"')
-    epsilon: Annotated[float, Field(gt=0, le=0.5)] | Literal["best"] = Field(
-        description='length of the curved ends, in ]0, 0.5], or "best" (plans only)'
-    )
+    epsilon: Annotated[
+        Annotated[float, Field(ge=1e-3, le=0.5), Tag("~number")] | Annotated[Literal["best"], Tag("~best")],
+        Discriminator(lambda value: "~best" if isinstance(value, str) else "~number"),
+    ] = Field(description='length of the curved ends, from 0.001 to 0.5, or "best" (plans only)')
 
 
 class PolynomialAmplitude(Table):
     """A user's own amplitude function."""
 
-    polynomial: Annotated[list[float], Field(min_length=1, max_length=20)] = Field(
+    polynomial: Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=1, max_length=20)] = Field(
         description="coefficients c0, c1, ... of c0 + c1 tau + c2 tau^2 + ..."
     )
 
