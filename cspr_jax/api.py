@@ -81,6 +81,8 @@ def minimum_arcs(
     ends = np.asarray(targets, float)
     if ends.ndim != 2 or ends.shape[1] != 3 or not len(ends) or not np.isfinite(ends).all():
         raise InputError("targets", f"shape {ends.shape}", "finite numbers of shape (n, 3), n >= 1")
+    if np.shape(z0) not in ((), (len(ends),)):
+        raise InputError("z0", f"shape {np.shape(z0)}", f"a number > 0, or ({len(ends)},) of them")
     depth = np.broadcast_to(np.asarray(z0, float), (len(ends),))
     if start is None:
         starts = np.asarray(centroid(robot), float) + np.stack(

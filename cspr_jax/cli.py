@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import json
+import math
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -165,9 +166,13 @@ def _plot(options: argparse.Namespace) -> int:
             at[axis] = float(value)
         except ValueError as error:
             raise ConfigError("--at", f"{shown(text)}: must be AXIS=VALUE, such as z=1.7") from error
+        if not math.isfinite(at[axis]):
+            raise ConfigError("--at", f"{shown(text)}: must be a finite number")
     from cspr_jax.plots import plot
 
     output = options.output or options.result.with_suffix(".png")
+    if not output.suffix:
+        raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
     plot(options.result, output, quantity=options.quantity, at=at)
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE

@@ -59,7 +59,8 @@ def open_result(path: Path) -> Result:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise StoreError(f"{path}: cannot be read as a result: {reason}") from error
     data = {name: array for name, array in found.items() if name not in scales}
-    if not data or not order or "robot" not in attributes:
+    known = "map" in attributes or ({"position", "tension"} <= data.keys() and "t" in order)
+    if not data or not order or "robot" not in attributes or not known:
         raise StoreError(f"{path}: is not a result of cspr: it has no quantities with named axes")
     return Result({name: found[name] for name in order}, data, units, labels, attributes)
 

@@ -32,7 +32,10 @@ FILES = {
         ("[run]", Run),
     ],
     "Plan files": [("", PlanFile), ("[[pose]]", Pose), ("z0, chosen", Choice)],
-    "Amplitude functions": [("amplitude, with a parameter", NamedAmplitude), ("amplitude, your own", PolynomialAmplitude)],
+    "Amplitude functions": [
+        ("amplitude, with a parameter", NamedAmplitude),
+        ("amplitude, your own", PolynomialAmplitude),
+    ],
     "Robot files": [("", RobotFile)],
 }
 
@@ -54,7 +57,9 @@ def reference_text() -> str:
             parts.append((f"`{place}`: " if place else "") + (model.__doc__ or "").split("\n")[0] + "\n")
             parts.append(_keys(model))
     parts.append("## Quantities of a result\n\n" + _quantities(QUANTITIES) + "\nAxes:\n\n" + _quantities(AXES))
-    parts.append("## Columns of a motion\n\n`cspr plan -o FILE.csv` writes `t`, then `_x _y _z` or `_1 _2 _3` of each.\n")
+    parts.append(
+        "## Columns of a motion\n\n`cspr plan -o FILE.csv` writes `t`, then `_x _y _z` or `_1 _2 _3` of each.\n"
+    )
     parts.append(_quantities(TRAJECTORY))
     rows = "".join(f"| {flag.value} | `{flag.text}` | {text} |\n" for flag, text in SENTENCES.items())
     parts.append(f"## Verdicts\n\nBit flags; 0 is feasible.\n\n| bit | name | meaning |\n|---|---|---|\n{rows}")

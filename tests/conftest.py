@@ -1,16 +1,13 @@
-"""Settings for every test: 64 bits, strict promotion; robots that many tests share."""
+"""Settings for every test: 64 bits, repeatable examples; robots that many tests share."""
 
 import jax
 import numpy as np
 import pytest
-
-jax.config.update("jax_enable_x64", True)
-jax.config.update("jax_numpy_rank_promotion", "allow")
-
 from hypothesis import HealthCheck, settings
 
 from cspr_jax import robots
 
+jax.config.update("jax_enable_x64", True)
 settings.register_profile("default", deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 settings.load_profile("default")
 

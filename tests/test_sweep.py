@@ -97,6 +97,7 @@ def test_dimensions_are_in_the_order_of_the_file(tiny):
         for name in QUANTITIES:
             assert file[name].shape == (2, 4, 5, 3)
             assert [dim[0].name for dim in file[name].dims] == ["/z0", "/y", "/x", "/z"]
+            assert file[name].fletcher32 and file[name].compression == "gzip"
     assert len(np.unique(data["arcs"])) > 4
     assert sorted(tree(folder)) == ["run/run.json", "run/tiny.h5", "tiny.toml"]
 

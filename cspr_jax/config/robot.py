@@ -11,7 +11,7 @@ from cspr_jax.errors import ConfigError, shown
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
-# Beyond these bounds squares and cubes of numbers overflow; no robot is near them.
+# Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots`, which imports jax.
 LARGEST_LENGTH = 1e6
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]

@@ -20,6 +20,7 @@ from cspr_jax.feasibility.margins import margins
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.grids import in_batches
 from cspr_jax.maps import sieve
+from cspr_jax.robots import LARGEST_LENGTH
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -149,8 +150,9 @@ def _check(shared: Shared, z0: np.ndarray, max_arcs: int) -> None:
         )
     if max_arcs < 1:
         raise InputError("max_arcs", max_arcs, "an integer >= 1")
-    if not (np.asarray(z0) > 0.0).all():
-        raise InputError("z0", float(np.min(z0)), "a number > 0")
+    fits = (np.asarray(z0) > 0.0) & (np.asarray(z0) <= LARGEST_LENGTH)
+    if not fits.all():
+        raise InputError("z0", float(np.asarray(z0)[~fits][0]), "a number > 0, at most 1e6 m")
 
 
 def _sieved(shared: Shared, even: Segment, odd: Segment, max_arcs: int, dtype: str) -> np.ndarray:
