@@ -183,9 +183,10 @@ def test_the_best_epsilon(tmp_path, monkeypatch):
     for candidates, wanted in (((0.2, 0.05, 0.1), 0.1), ((0.2, 0.05), 0.05)):
         monkeypatch.setattr(choices, "EPSILONS", np.array(candidates))
         assert planned(tmp_path, plain.replace("EPS", '"best"')) == plans[wanted]
-    compiled.clear()
-    monkeypatch.setattr(choices, "EPSILONS", np.array([0.21, 0.06, 0.11]))
-    planned(tmp_path, plain.replace("EPS", '"best"'))
+    for candidates in ([0.21, 0.06, 0.11], [0.22, 0.07, 0.12]):
+        compiled.clear()
+        monkeypatch.setattr(choices, "EPSILONS", np.array(candidates))
+        planned(tmp_path, plain.replace("EPS", '"best"'))
     assert not [event for event in compiled if "backend_compile" in event]
 
 

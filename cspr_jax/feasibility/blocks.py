@@ -11,8 +11,8 @@ from cspr_jax.amplitudes import Amplitude
 
 # Intervals between the samples of one block.
 INTERVALS = 16
-# The table has a multiple of this many rows, and room for this many more blocks than arcs: one shape for most calls.
-ROWS, SPARE = 32, 8
+# Rows and columns of the table are multiples of this, so that most calls have one shape.
+STEP = 32
 
 
 def blocks(amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -29,17 +29,21 @@ def blocks(amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int 
         number of blocks of each row (n_rows,).
     """
     pieces = list(itertools.pairwise([0.0, *np.asarray(amplitude.knots).tolist(), 1.0]))
-    n_rows = -(-(max_arcs + 1) // ROWS) * ROWS
+    n_rows = _rounded(max_arcs + 1)
     rows = []
     for arcs in range(n_rows):
         wanted = max(density * (arcs + 4), least)
         cuts = [np.linspace(a, b, 1 + math.ceil(wanted * (b - a) - 1e-9))[:-1] for a, b in pieces]
         rows.append(np.concatenate([*cuts, [1.0]]))
     counts = np.array([len(row) - 1 for row in rows], np.int32)
-    table = np.ones((n_rows, max(n_rows + SPARE, int(counts.max()) + 1)))
+    table = np.ones((n_rows, _rounded(int(counts.max()) + 1)))
     for row, target in zip(rows, table, strict=True):
         target[: len(row)] = row
     return table, counts
+
+
+def _rounded(count: int) -> int:
+    return -(-count // STEP) * STEP
 
 
 def over_blocks(edges: Array, counts: Array, arcs: Array, first, step):

@@ -8,9 +8,12 @@ import numpy as np
 from cspr_jax import tensions
 from cspr_jax.feasibility.blocks import INTERVALS, blocks
 from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.margins import smallest_values
+from cspr_jax.feasibility.margins import Functions, smallest_values
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
+
+# Plans have few segments, but may ask for a million samples of each.
+BATCH = 16
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,8 +74,8 @@ def extremes(shared: Shared, segments: Segment, arcs: np.ndarray, least_samples:
         the extremes.
     """
     table = blocks(shared.amplitude, int(arcs.max()), density=4, least=-(-least_samples // INTERVALS))
-    found = smallest_values(_demands, 8, shared, segments, arcs, table, n_refined=8)
+    found = smallest_values(Functions(_demands, 8, 8), shared, segments, arcs, table, batch=BATCH)
     signs = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
-    columns = (found * signs).T
+    columns = (found * signs + 0.0).T  # no -0
     names = [field.name for field in dataclasses.fields(Extremes)][:-1]
     return Extremes(**dict(zip(names, columns, strict=True)), samples=table[1][arcs] * INTERVALS + 1)

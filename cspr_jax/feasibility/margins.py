@@ -4,7 +4,9 @@ Every block is sampled; where its smallest sample lies, a parabola estimates the
 three estimates of a function over all blocks are then refined by two parabolas, each narrower.
 """
 
+from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -89,22 +91,38 @@ def refined_minimum(function, tau: Array, step: Array) -> Array:
     return lax.fori_loop(0, 3, narrow, first)[0]
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
-def _minima(function, n_values: int, n_refined: int, shared: Shared, edges: Array, counts: Array, arguments) -> Array:
+class Functions(NamedTuple):
+    """Functions of one instant, whose smallest values are wanted.
+
+    Fields:
+        evaluate: (robot, limits, amplitude, segment, arcs, tau) -> `number` numbers (); hashable.
+        number: how many.
+        refined: of how many, from the first, the minimum is refined to a value that is attained; the
+            others stay the estimates of parabolas through the samples.
+    """
+
+    evaluate: Callable
+    number: int
+    refined: int
+
+
+@partial(jax.jit, static_argnums=0)
+def _minima(functions: Functions, shared: Shared, edges: Array, counts: Array, arguments) -> Array:
     segments, arcs = arguments
+    evaluate, _, n_refined = functions
 
     def step(state, start, stop):
-        found = jax.vmap(partial(_block_estimates, function, shared), out_axes=1)(segments, arcs, start, stop)
+        found = jax.vmap(partial(_block_estimates, evaluate, shared), out_axes=1)(segments, arcs, start, stop)
         return _insert(state, *found)
 
-    nothing = jnp.full((CANDIDATES, n_values, *arcs.shape), jnp.inf, arcs.dtype)
+    nothing = jnp.full((CANDIDATES, functions.number, *arcs.shape), jnp.inf, arcs.dtype)
     estimates, places = over_blocks(edges, counts, arcs, (nothing, jnp.zeros_like(nothing)), step)
     steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)])
 
     def refine(segment, p, place, width):
         # place: (CANDIDATES, n_refined). One copy of the function serves all of its values: it compiles much faster.
         def one(which, tau):
-            return refined_minimum(lambda t: jnp.stack(function(*shared, segment, p, t)[:n_refined])[which], tau, width)
+            return refined_minimum(lambda t: jnp.stack(evaluate(*shared, segment, p, t)[:n_refined])[which], tau, width)
 
         return jnp.min(jax.vmap(jax.vmap(one), in_axes=(None, 0))(jnp.arange(n_refined), place), axis=0)
 
@@ -113,27 +131,25 @@ def _minima(function, n_values: int, n_refined: int, shared: Shared, edges: Arra
 
 
 def smallest_values(
-    function, n_values: int, shared: Shared, segments: Segment, arcs: np.ndarray, table, *, n_refined: int
+    functions: Functions, shared: Shared, segments: Segment, arcs: np.ndarray, table, *, batch: int = BATCH
 ) -> np.ndarray:
     """Smallest values along each segment of functions of one instant.
 
     Args:
-        function: (robot, limits, amplitude, segment, arcs, tau) -> n_values numbers (); hashable.
-        n_values: how many.
+        functions: of one instant.
         shared: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, 1 or more.
         table: blocks to sample, from `blocks.blocks`.
-        n_refined: of how many, from the first, the minimum is refined to a value that is attained; the
-            others are the estimates of parabolas through the samples.
+        batch: segments computed at a time.
 
     Returns:
-        (n, n_values).
+        (n, functions.number).
     """
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    found = in_batches(partial(_minima, function, n_values, n_refined, shared, *table), arguments, size=BATCH)
+    found = in_batches(partial(_minima, functions, shared, *table), arguments, size=batch)
     return found[np.argsort(order, kind="stable")]
 
 
@@ -154,7 +170,8 @@ def margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> np.ndarray:
     groups = counts(shared.limits)
     # The smallest over the cables has kinks, each cable's own slack has none: they are refined apart.
     # Limits are many: their slacks stay estimates.
-    every = smallest_values(smooth_slacks, sum(groups), shared, segments, arcs, table, n_refined=sum(groups[:2]))
+    functions = Functions(smooth_slacks, sum(groups), sum(groups[:2]))
+    every = smallest_values(functions, shared, segments, arcs, table)
     smallest = np.minimum.reduceat(every, np.cumsum([0, *groups[:-1]]), axis=1)
     # A compiled minimum may pass over NaN; what has no finite minimum has none.
     return np.where(np.isfinite(smallest), smallest, np.nan)
