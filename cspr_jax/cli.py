@@ -13,7 +13,13 @@ from typing import Any, NoReturn
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
 
-EPILOGUE = "exit codes: 0 done; 1 answered, not all feasible; 2 bad input; 3 refused; 4 I/O error; 70 internal error"
+EPILOGUE = (
+    "exit codes: 0 done; 1 answered, not all feasible; 2 bad input; 3 refused; 4 I/O error or damaged file; "
+    "5 numerical self-check failed; 70 internal error; 130, 143 stopped, run it again to go on"
+)
+
+LARGEST_WORKERS = 256
+VERIFIED = ("tiles", "shards", "missing", "cells", "cells_near_zero", "mixed")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -45,6 +51,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with contextlib.suppress(OSError):
             sys.stdout.close()
         return int(ExitCode.DONE)
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        sys.stderr.write(f"cspr: {place}{error.strerror or error}\n")
+        return int(ExitCode.INPUT_OUTPUT)
     except Exception:
         traceback.print_exc()
         sys.stderr.write(f"cspr {__version__}: internal error; please report it with the lines above and your file\n")
@@ -64,6 +74,19 @@ def _parser() -> argparse.ArgumentParser:
     run = add("run", _run, "compute a sweep file into an HDF5 result; its path is the last line printed")
     run.add_argument("sweep", type=Path, help="sweep file (TOML)")
     run.add_argument("-o", "--output", type=Path, metavar="DIR", help="run directory (default results/...)")
+    run.add_argument("--workers", type=int, default=1, metavar="N", help="processes on this machine (default 1)")
+    run.add_argument("--scheduler", metavar="ADDRESS", help="dask.distributed scheduler, such as tcp://host:8786")
+    run.add_argument(
+        "--accept-environment-change", action="store_true", help="go on with another version, machine or library"
+    )
+    run.add_argument("--prune", action="store_true", help="remove the shards once the result is complete")
+    for name, command, text in (
+        ("status", _status, "say how far a run has come, without touching it"),
+        ("verify", _verify, "read again everything of a run, or a result file, and check it"),
+    ):
+        sub = add(name, command, text)
+        sub.add_argument("path", type=Path, help="run directory" + (" or result file" if name == "verify" else ""))
+        sub.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan = add("plan", _plan, "plan a sequence of poses")
     plan.add_argument("plan", type=Path, help="plan file (TOML)")
     plan.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
@@ -105,16 +128,84 @@ def _print(renderable: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from cspr_jax import sweep as sweeps
+    from cspr_jax.sweep import engine
+    from cspr_jax.sweep.definition import read_sweep, run_directory
+    from cspr_jax.sweep.signals import stop_signals
 
-    sweep = sweeps.read_sweep(options.sweep)
-    _use_64_bits()
-    with _progress() as on_tile:
-        path, finished = sweeps.run(sweep, options.output or sweeps.run_directory(sweep), on_tile=on_tile)
-    if finished:
-        sys.stdout.write("already finished; nothing was computed\n")
+    if options.workers < 1 or options.workers > LARGEST_WORKERS:
+        raise ConfigError("--workers", f"{options.workers}: must be an integer from 1 to {LARGEST_WORKERS}")
+    if options.scheduler is not None and options.workers != 1:
+        raise ConfigError("--workers", f"{options.workers}: must be absent beside --scheduler")
+    sweep = read_sweep(options.sweep)
+    directory = options.output or run_directory(sweep)
+    choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
+    with stop_signals() as stop, _progress() as on_tile:
+        hooks = engine.Hooks(stop, on_tile, warn=_warn)
+        work = engine.Run(sweep, directory, choices, hooks)
+        path = work.finished()
+        if path is None:
+            with _executor(options, sweep) as executor:
+                path = work.go(executor).result
+        else:
+            sys.stdout.write("already finished; nothing was computed\n")
     sys.stdout.write(f"{path}\n")
     return ExitCode.DONE
+
+
+def _warn(line: str) -> None:
+    sys.stderr.write(f"cspr: {line}\n")
+
+
+@contextlib.contextmanager
+def _executor(options: argparse.Namespace, sweep: Any) -> Iterator[Any]:
+    from cspr_jax.sweep import executors
+    from cspr_jax.sweep.tile import TileMap
+
+    tile_map = TileMap(sweep)  # refuses a hopeless sweep before anything is made
+    if options.scheduler is not None:
+        from cspr_jax.sweep.distributed import Scheduler
+
+        workers = Scheduler(sweep, options.scheduler, accept_environment_change=options.accept_environment_change)
+        try:
+            yield workers
+        finally:
+            workers.close()
+    elif options.workers > 1:
+        yield executors.Processes(sweep, options.workers)
+    else:
+        yield executors.ThisProcess(tile_map)
+
+
+def _status(options: argparse.Namespace) -> int:
+    from cspr_jax.sweep.inspection import status
+
+    found = status(options.path)
+    if options.json:
+        _print_json(found)
+        return ExitCode.DONE
+    last = found["last"] or {}
+    sys.stdout.write(
+        f"{found['directory']}: {found['sweep']}, identity {found['identity'][:12]}\n"
+        f"  {found['shards']} of {found['tiles']} tiles as shards, {found['quarantined']} set aside, "
+        f"{found['unfinished']} unfinished\n"
+        f"  result: {found['result'] or 'not yet'}\n"
+        f"  last: {last.get('event', '-')} at {last.get('time', '-')}\n"
+    )
+    return ExitCode.DONE
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from cspr_jax.sweep.inspection import verify
+
+    found = verify(options.path)
+    if options.json:
+        _print_json(found)
+    else:
+        counts = ", ".join(f"{key} {found[key]}" for key in VERIFIED if key in found)
+        sys.stdout.write(f"{found['path']}: {counts}\n")
+    for fault in found["faults"]:
+        sys.stderr.write(f"cspr: {fault}: run the sweep again to make it anew\n")
+    return ExitCode.INPUT_OUTPUT if found["faults"] else ExitCode.DONE
 
 
 @contextlib.contextmanager

@@ -24,6 +24,16 @@ class CsprError(Exception):
 
     exit_code = ExitCode.INTERNAL
 
+    def __reduce__(self) -> tuple:
+        """Errors come whole out of worker processes, whatever their constructor takes."""
+        return _rebuilt, (type(self), self.args, self.__dict__)
+
+
+def _rebuilt(kind: type[CsprError], arguments: tuple, state: dict) -> CsprError:
+    error = kind.__new__(kind, *arguments)
+    error.__dict__.update(state)
+    return error
+
 
 class InputError(CsprError, ValueError):
     """A value that cannot be used, without the file it came from.
@@ -67,6 +77,32 @@ class StoreError(CsprError):
     """A file that cannot be read or written."""
 
     exit_code = ExitCode.INPUT_OUTPUT
+
+
+class ResourceError(CsprError):
+    """Memory or workers that do not suffice."""
+
+    exit_code = ExitCode.INPUT_OUTPUT
+
+
+class SelfCheckError(CsprError):
+    """Numbers that contradict each other."""
+
+    exit_code = ExitCode.SELF_CHECK
+
+
+class StoppedError(CsprError):
+    """A run that was asked to stop, and can go on.
+
+    Args:
+        message: the line.
+        exit_code: that of the signal.
+    """
+
+    def __init__(self, message: str, exit_code: ExitCode) -> None:
+        """Keep the signal's exit code."""
+        super().__init__(message)
+        self.exit_code = exit_code
 
 
 # Containers are cut before they are written out: a user's may be nested thousands deep.

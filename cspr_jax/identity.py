@@ -4,7 +4,9 @@ import hashlib
 import json
 from typing import Any
 
-FORMAT_VERSION = 1
+from cspr_jax.errors import shown
+
+FORMAT_VERSION = 2
 
 
 def canonical_json(value: Any) -> str:
@@ -19,6 +21,18 @@ def canonical_json(value: Any) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
+def digest(value: Any) -> str:
+    """Hash of a value.
+
+    Args:
+        value: as for `canonical_json`.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    return hashlib.sha256(canonical_json(value).encode()).hexdigest()
+
+
 def identity(settings: dict[str, Any]) -> str:
     """Hash of resolved settings and the version of the file format.
 
@@ -28,4 +42,28 @@ def identity(settings: dict[str, Any]) -> str:
     Returns:
         64 hexadecimal digits.
     """
-    return hashlib.sha256(canonical_json({"format": FORMAT_VERSION, **settings}).encode()).hexdigest()
+    return digest({"format": FORMAT_VERSION, **settings})
+
+
+def differences(here: dict[str, Any], there: dict[str, Any]) -> list[str]:
+    """What differs between two sets of settings, one phrase a key.
+
+    Args:
+        here: nested settings.
+        there: nested settings.
+
+    Returns:
+        "key = value here, value there", sorted by key.
+    """
+    now, before = _flat(here), _flat(there)
+    return [
+        f"{key} = {shown(now.get(key))} here, {shown(before.get(key))} there"
+        for key in sorted(before.keys() | now.keys())
+        if before.get(key) != now.get(key)
+    ]
+
+
+def _flat(value: Any, key: str = "") -> dict[str, Any]:
+    if not isinstance(value, dict):
+        return {key: value}
+    return {k: v for name, inner in value.items() for k, v in _flat(inner, f"{key}.{name}" if key else name).items()}

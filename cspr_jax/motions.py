@@ -13,7 +13,9 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.planning import Plan
 from cspr_jax.problem import axis_signs
 from cspr_jax.quantities import TRAJECTORY
-from cspr_jax.store import new_file, write_text
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.netcdf import new_hdf5, set_attributes
+from cspr_jax.store.publishing import publish
 from cspr_jax.trajectories import hypocycloid
 
 _COMPONENTS = {
@@ -81,7 +83,7 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
         raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
     found = rows(plan, rate=rate)
     if path.suffix == ".csv":
-        write_text(path, _csv(found))
+        publish(Disk(), path, _csv(found).encode())
     else:
         _write_hdf5(plan, path, found)
 
@@ -98,13 +100,13 @@ def _csv(found: dict[str, np.ndarray]) -> str:
 
 def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
     attributes = {"Conventions": "CF-1.11", "robot": plan.spec.name, "z_axis": plan.spec.z_axis, "z0": plan.z0}
-    with new_file(path, attributes) as file:
+    with new_hdf5(path, attributes) as file:
         for name, labels in (("t", found["t"]), ("axis", list("xyz")), ("cable", [1, 2, 3])):
             file[name] = labels
             file[name].make_scale(name)
         for name, quantity in TRAJECTORY.items():
             data: h5py.Dataset = file[name] if name in file else file.create_dataset(name, data=found[name])
-            data.attrs.update({"units": quantity.units, "long_name": quantity.long_name})
+            set_attributes(data, {"units": quantity.units, "long_name": quantity.long_name})
             if name != "t":
                 data.dims[0].attach_scale(file["t"])
                 data.dims[1].attach_scale(file["axis" if _COMPONENTS[name] == "xyz" else "cable"])

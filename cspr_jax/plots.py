@@ -1,6 +1,5 @@
 """Pictures of result files: sections of maps, motions over time."""
 
-import json
 from pathlib import Path
 
 import matplotlib
@@ -112,7 +111,7 @@ def _sections(
 
 def _start(result: Result) -> dict[str, float]:
     # Where all segments start, if it is one place.
-    start = json.loads(result.attributes.get("settings", "{}")).get("trajectory", {}).get("from") or {}
+    start = result.settings.get("trajectory", {}).get("from") or {}
     moving = any(axis.startswith("from_") for axis in result.axes)
     return {} if moving else dict(zip("xyz", start.get("position") or (), strict=False))
 

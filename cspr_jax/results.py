@@ -1,6 +1,7 @@
 """Reading result files."""
 
 import dataclasses
+import json
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,10 @@ import h5py
 import numpy as np
 
 from cspr_jax.errors import StoreError
+from cspr_jax.store.netcdf import UNREADABLE, plain, refuse_foreign
+
+# A result is read into memory as a whole: bytes of its data.
+LARGEST_DATA = 8e9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -20,6 +25,7 @@ class Result:
         units: of axes and quantities.
         labels: long names of axes and quantities.
         attributes: of the file.
+        settings: of the sweep; empty for a motion.
     """
 
     axes: dict[str, np.ndarray]
@@ -27,6 +33,7 @@ class Result:
     units: dict[str, str]
     labels: dict[str, str]
     attributes: dict[str, Any]
+    settings: dict[str, Any]
 
     @property
     def is_map(self) -> bool:
@@ -48,21 +55,36 @@ def open_result(path: Path) -> Result:
     """
     try:
         with h5py.File(path, "r") as file:
+            refuse_foreign(path, file, LARGEST_DATA)
             everything = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset)}
             scales = {name for name, item in everything.items() if item.is_scale}
             order = _dimensions(everything, scales)
             found = {name: np.asarray(item) for name, item in everything.items()}
-            units = {name: str(item.attrs.get("units", "")) for name, item in everything.items()}
-            labels = {name: str(item.attrs.get("long_name", name)) for name, item in everything.items()}
-            attributes = dict(file.attrs)
-    except (OSError, KeyError, ValueError, RuntimeError, IndexError) as error:
+            units = {name: str(plain(item.attrs.get("units", ""))) for name, item in everything.items()}
+            names = {name: str(plain(item.attrs.get("long_name", name))) for name, item in everything.items()}
+            attributes = {name: plain(value) for name, value in file.attrs.items()}
+            settings = json.loads(attributes.get("settings", "{}"))
+    except (*UNREADABLE, MemoryError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise StoreError(f"{path}: cannot be read as a result: {reason}") from error
     data = {name: array for name, array in found.items() if name not in scales}
-    known = "map" in attributes or ({"position", "tension"} <= data.keys() and "t" in order)
-    if not data or not order or "robot" not in attributes or not known:
+    axes = {name: found[name] for name in order}
+    if not _is_ours(axes, data, attributes) or not isinstance(settings, dict):
         raise StoreError(f"{path}: is not a result of cspr: it has no quantities with named axes")
-    return Result({name: found[name] for name in order}, data, units, labels, attributes)
+    return Result(axes, data, units, names, attributes, settings)
+
+
+def _is_ours(axes: dict[str, np.ndarray], data: dict[str, np.ndarray], attributes: dict[str, Any]) -> bool:
+    # A map over a grid, or a motion over time, with numbers of the right shapes.
+    if not data or not axes or not isinstance(attributes.get("robot"), str):
+        return False
+    if "map" in attributes:
+        shape = tuple(points.size for points in axes.values())
+        numbers = [*axes.values(), *data.values()]
+        return all(array.dtype.kind in "fiu" for array in numbers) and all(a.shape == shape for a in data.values())
+    needed = {"position": 2, "tension": 2}
+    fits = all(name in data and data[name].ndim == n and data[name].dtype.kind == "f" for name, n in needed.items())
+    return fits and "t" in axes and all(data[name].shape == (axes["t"].size, 3) for name in needed)
 
 
 def _dimensions(everything: dict[str, h5py.Dataset], scales: set[str]) -> list[str]:

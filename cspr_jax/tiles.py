@@ -26,6 +26,33 @@ def tile_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(reversed(tile))
 
 
+def tile_places(shape: tuple[int, ...], tile: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
+    """Where each tile of a grid lies; those at the border may be smaller.
+
+    Args:
+        shape: of the grid.
+        tile: shape of a tile.
+
+    Yields:
+        one slice an axis.
+    """
+    starts = [range(0, n, step) for n, step in zip(shape, tile, strict=True)]
+    for corner in itertools.product(*starts):
+        yield tuple(slice(a, min(a + t, n)) for a, t, n in zip(corner, tile, shape, strict=True))
+
+
+def place_shape(place: tuple[slice, ...]) -> tuple[int, ...]:
+    """Shape of a tile.
+
+    Args:
+        place: where it lies.
+
+    Returns:
+        the shape.
+    """
+    return tuple(part.stop - part.start for part in place)
+
+
 @dataclasses.dataclass(frozen=True)
 class Grid:
     """The product of named axes.
@@ -49,14 +76,12 @@ class Grid:
         return math.prod(self.shape)
 
     def places(self) -> Iterator[tuple[slice, ...]]:
-        """Where each tile lies; those at the border may be smaller.
+        """Where each tile lies; see `tile_places`.
 
-        Yields:
-            one slice an axis.
+        Returns:
+            one slice an axis, of each tile.
         """
-        starts = [range(0, n, step) for n, step in zip(self.shape, self.tile, strict=True)]
-        for corner in itertools.product(*starts):
-            yield tuple(slice(a, min(a + t, n)) for a, t, n in zip(corner, self.tile, self.shape, strict=True))
+        return tile_places(self.shape, self.tile)
 
     def cells(self, place: tuple[slice, ...]) -> dict[str, np.ndarray]:
         """Coordinates of the cells of a tile.

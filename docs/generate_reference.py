@@ -16,10 +16,12 @@ EXITS = {
     ExitCode.DONE: "done",
     ExitCode.NOT_FEASIBLE: "answered, but not every segment is proved feasible",
     ExitCode.BAD_INPUT: "bad input; nothing was written",
-    ExitCode.REFUSED: "refused: the run directory holds another sweep",
+    ExitCode.REFUSED: "refused: the run directory is being written, or holds another sweep, or another environment began it",
     ExitCode.INPUT_OUTPUT: "a file cannot be read or written, or is damaged",
+    ExitCode.SELF_CHECK: "the computed numbers contradict each other; nothing of them was kept",
     ExitCode.INTERNAL: "internal error; please report it",
-    ExitCode.INTERRUPTED: "interrupted; nothing half-written is left",
+    ExitCode.INTERRUPTED: "stopped by Ctrl-C; finished tiles are kept, run it again to go on",
+    ExitCode.TERMINATED: "stopped by SIGTERM; likewise",
 }
 FILES = {
     "Sweep files": [

@@ -15,7 +15,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
-from cspr_jax.sweep import read_sweep
+from cspr_jax.sweep.definition import read_sweep
 
 PLAN = """schema = 1
 robot = "prototype"
@@ -178,7 +178,7 @@ def test_no_file_and_a_directory(capsys, tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
     assert "none.toml: cannot be read: No such file" in refused(capsys, tmp_path, command, "none.toml")
-    assert "folder: cannot be read: Is a directory" in refused(capsys, tmp_path, command, "folder")
+    assert "folder: is not a file" in refused(capsys, tmp_path, command, "folder")
 
 
 @pytest.mark.parametrize("count", [10_000_000, 1_000_000_000])

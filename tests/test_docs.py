@@ -12,7 +12,7 @@ from cspr_jax import cli, tables
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.quantities import QUANTITIES
-from cspr_jax.sweep import read_sweep
+from cspr_jax.sweep.definition import read_sweep
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "results" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

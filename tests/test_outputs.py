@@ -19,7 +19,7 @@ from cspr_jax.maps import sieve
 from cspr_jax.plots import NONE_COLOUR
 from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY, flag_attributes
 from cspr_jax.reports import plan_object
-from cspr_jax.store import new_result
+from cspr_jax.store.netcdf import make_datasets, new_hdf5
 
 ROOT = Path(__file__).parent.parent
 SHAPE = {"x": 5, "y": 4, "z": 8, "z0": 1}
@@ -105,8 +105,9 @@ def made(path: Path, sizes: dict[str, int] = SHAPE, **attributes: object) -> Pat
     known = {"map": "minimum-arcs", "robot": "prototype", "z_axis": "down", "base_points": np.eye(3) * 0.3}
     known["settings"] = json.dumps({"trajectory": {"from": {"position": [0.7, 0.7, 3.0]}}})
     store, tile = ["arcs", "margin"], tuple(sizes.values())
-    with new_result(path, axes, store, dtype="float64", tile=tile, attributes=known | attributes) as writer:
-        writer.write(tuple(slice(0, n) for n in tile), {"arcs": arcs, "margin": arcs / 4.0 - 2.0})
+    with new_hdf5(path, known | attributes) as file:
+        make_datasets(file, axes, store, dtype="float64", tile=tile)
+        file["arcs"][...], file["margin"][...] = arcs, arcs / 4.0 - 2.0
     return path
 
 

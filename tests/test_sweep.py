@@ -15,9 +15,10 @@ from oracles import point_mass
 
 import cspr_jax
 from cspr_jax.cli import main
+from cspr_jax.errors import SelfCheckError
 from cspr_jax.maps.cells import CellMap
 from cspr_jax.quantities import QUANTITIES
-from cspr_jax.sweep import read_sweep
+from cspr_jax.sweep.definition import read_sweep
 
 ROOT = Path(__file__).parent.parent
 START = [0.7, 0.7, 3.0]
@@ -30,6 +31,10 @@ FROM = "from = { position = [0.7, 0.7, 3.0] }"
 TILT = [[0.3, 0.05, -0.02], [-0.2, 0.25, 0.06], [-0.1, -0.3, 0.01]]
 FLOATS = [name for name, quantity in QUANTITIES.items() if quantity.kind == "float"]
 COUNTS = [name for name in QUANTITIES if name not in FLOATS]
+
+
+# What a run of one tile leaves.
+FINISHED = ["LOCK", "log.jsonl", "run.json", "shards/00000.h5", "tiny.h5"]
 
 
 def sweep_file(folder: Path, axes: str = AXES, start: str = FROM, run: str = "", robot: str = '"prototype"') -> Path:
@@ -99,7 +104,7 @@ def test_dimensions_are_in_the_order_of_the_file(tiny):
             assert [dim[0].name for dim in file[name].dims] == ["/z0", "/y", "/x", "/z"]
             assert file[name].fletcher32 and file[name].compression == "gzip"
     assert len(np.unique(data["arcs"])) > 4
-    assert sorted(tree(folder)) == ["run/run.json", "run/tiny.h5", "tiny.toml"]
+    assert sorted(tree(folder)) == [*(f"run/{name}" for name in FINISHED), "tiny.toml"]
 
 
 def test_cells_are_what_python_answers(tiny, prototype):
@@ -173,7 +178,7 @@ def test_a_second_run_computes_nothing_and_another_sweep_is_refused(tiny, tmp_pa
     sweep_file(tmp_path)
     folder = tmp_path / "run"
     folder.mkdir()
-    for path in (tiny[0] / "run").iterdir():
+    for path in (tiny[0] / "run").glob("*.*"):
         (folder / path.name).write_bytes(path.read_bytes())
     before = tree(folder)
     monkeypatch.setattr(CellMap, "__call__", None)
@@ -210,7 +215,7 @@ def test_xarray_sees_names_units_and_flags(tiny):
         assert data["x"].attrs["units"] == "m" and data["x"].attrs["long_name"] == "x of the target"
         assert data["duration"].attrs["units"] == "s" and data["arcs"].attrs["units"] == "1"
         assert all(data[name].attrs["long_name"] for name in (*QUANTITIES, *data.coords))
-        assert data.attrs["z_axis"] == "down" and data.attrs["robot"] == "prototype" and data.attrs["schema"] == 1
+        assert data.attrs["z_axis"] == "down" and data.attrs["robot"] == "prototype" and data.attrs["schema"] == 2
         flags = data["verdict"].attrs
         names = dict(zip(flags["flag_masks"].tolist(), flags["flag_meanings"].split(), strict=True))
         assert names == {flag.value: flag.name.lower() for flag in cspr_jax.Verdict if flag}
@@ -218,27 +223,48 @@ def test_xarray_sees_names_units_and_flags(tiny):
         assert float(here["duration"]) == tiny[2]["duration"][1, 0, 0, 0]
 
 
-@pytest.mark.parametrize(("failure", "code"), [(KeyboardInterrupt(), 130), (OSError(28, "No space left"), 4)])
-def test_a_failure_leaves_nothing_half_written(tiny, tmp_path, monkeypatch, failure, code):
-    path, calls = sweep_file(tmp_path, run="tile = [1, 4, 5, 3]"), []
+@pytest.mark.parametrize(
+    ("failure", "code"), [(MemoryError(), 4), (SelfCheckError("tile 1"), 5), (ValueError("a mistake of ours"), 70)]
+)
+def test_a_failure_keeps_what_is_finished(tiny, tmp_path, monkeypatch, failure, code):
+    path, calls, whole = sweep_file(tmp_path, run="tile = [1, 4, 5, 3]"), [], CellMap.__call__
 
     def fails_at_the_second_tile(self, cells):
         calls.append(len(cells["x"]))
         if len(calls) == 2:
             raise failure
-        return dict.fromkeys(QUANTITIES, np.zeros(60))
+        return whole(self, cells)
 
     with monkeypatch.context() as patch:
         patch.setattr(CellMap, "__call__", fails_at_the_second_tile)
         found, out, err = cspr("run", path, "-o", tmp_path / "run")
-    assert (found, out, calls) == (code, "", [60, 60])
-    assert len(err.splitlines()) == 1 and err.startswith("cspr: ")
-    assert sorted(tree(tmp_path)) == ["run/run.json", "tiny.toml"]
-    found, out, err = cspr("run", path, "-o", tmp_path / "run")
-    assert (found, err) == (0, "")
+        assert (found, out, calls) == (code, "", [60, 60])
+        assert err.splitlines()[-1].startswith("cspr") and (code == 70 or len(err.splitlines()) == 1)
+        kept = ["LOCK", "log.jsonl", "run.json", "shards/00000.h5"]
+        assert sorted(tree(tmp_path / "run")) == kept
+        found, out, err = cspr("run", path, "-o", tmp_path / "run")
+        assert (found, err, calls) == (0, "", [60, 60, 60])
     again = cspr_jax.open_result(tmp_path / "run" / "tiny.h5")
     np.testing.assert_array_equal(again.data["arcs"], tiny[2]["arcs"])
-    assert sorted(tree(tmp_path)) == ["run/run.json", "run/tiny.h5", "tiny.toml"]
+    assert sorted(tree(tmp_path / "run")) == sorted([*kept, "shards/00001.h5", "tiny.h5"])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("margin", -1.0), ("margin", np.nan), ("verdict", 1), ("duration", 0.0), ("margin_bound", 2.0)]
+)
+def test_numbers_that_contradict_each_other_are_refused(tmp_path, monkeypatch, name, value):
+    """A processor that miscalculates: nothing of the tile is kept, and the exit code says so."""
+    whole = CellMap.__call__
+
+    def broken(self, cells):
+        answers = {key: array.copy() for key, array in whole(self, cells).items()}
+        answers[name][np.flatnonzero(answers["arcs"] > 0)[3]] = value
+        return answers
+
+    monkeypatch.setattr(CellMap, "__call__", broken)
+    code, out, err = cspr("run", sweep_file(tmp_path), "-o", tmp_path / "run")
+    assert (code, out, len(err.splitlines())) == (5, "", 1) and "1 of 120 cells" in err
+    assert sorted(tree(tmp_path / "run")) == ["LOCK", "log.jsonl", "run.json"]
 
 
 @pytest.mark.parametrize("output", ["taken", "taken/below"])

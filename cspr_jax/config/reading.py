@@ -23,6 +23,54 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
+def read_text(path: Path) -> str:
+    """Text of a file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        its text.
+
+    Raises:
+        ConfigError: the file cannot be read, is larger than 1 MB, or is not UTF-8.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise ConfigError(path, "is not a file")
+        size = path.stat().st_size
+        if size > LARGEST_FILE:
+            raise ConfigError(path, f"file of {size} bytes: must be at most {LARGEST_FILE}")
+        return path.read_text("utf-8")
+    except OSError as error:
+        raise ConfigError(path, f"cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(path, f"is not UTF-8 text: {error.reason} at byte {error.start}") from error
+    except ValueError as error:
+        raise ConfigError(path, f"cannot be read: {error}") from error
+
+
+def parse_toml(text: str, path: Path) -> dict[str, Any]:
+    """Contents of a TOML text.
+
+    Args:
+        text: the text.
+        path: named in errors.
+
+    Returns:
+        its tables.
+
+    Raises:
+        ConfigError: it is not TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError as error:
+        raise ConfigError(path, "is not TOML: nested too deeply") from error
+    except ValueError as error:
+        raise ConfigError(path, f"is not TOML: {error}") from error
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """Contents of a TOML file.
 
@@ -35,19 +83,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         ConfigError: the file cannot be read, is larger than 1 MB, or is not TOML.
     """
-    try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise ConfigError(path, f"file of {size} bytes: must be at most {LARGEST_FILE}")
-        return tomllib.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise ConfigError(path, f"cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(path, f"is not UTF-8 text: {error.reason} at byte {error.start}") from error
-    except RecursionError as error:
-        raise ConfigError(path, "is not TOML: nested too deeply") from error
-    except ValueError as error:
-        raise ConfigError(path, f"is not TOML: {error}") from error
+    return parse_toml(read_text(path), path)
 
 
 def checked(model: type[Model], data: Any, file: object, *, at: str = "") -> Model:

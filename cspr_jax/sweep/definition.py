@@ -1,25 +1,26 @@
-"""A sweep: from its file to a result file, tile by tile."""
+"""A sweep: its file, checked, with everything that decides its result."""
 
 import dataclasses
-import json
+import math
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cspr_jax import __version__
-from cspr_jax.config.reading import checked, read_toml
+from cspr_jax.config.reading import checked, parse_toml, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, SweepFile
-from cspr_jax.errors import ConfigError, RefusedError, StoreError, one_line, shown
+from cspr_jax.errors import ConfigError, shown
 from cspr_jax.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.quantities import DEFAULT_STORE
-from cspr_jax.store import bytes_needed, new_result, write_text
+from cspr_jax.store.netcdf import bytes_needed
+from cspr_jax.store.shards import Layout
 from cspr_jax.tiles import LARGEST_TILE, Grid, tile_shape
 
-_TARGET = ("x", "y", "z")
+# Each tile is a file.
+LARGEST_TILES = 1_000_000
 _START = ("from_x", "from_y", "from_z")
 
 
@@ -34,6 +35,7 @@ class Sweep:
         grid: its axes and tiles.
         store: quantities to keep.
         settings: everything that decides the result's numbers.
+        text: of the file, as it was read.
     """
 
     file: Path
@@ -42,11 +44,22 @@ class Sweep:
     grid: Grid
     store: list[str]
     settings: dict[str, Any]
+    text: str
 
     @property
     def identity(self) -> str:
         """Hash of the settings."""
         return identity(self.settings)
+
+    @property
+    def name(self) -> str:
+        """The file's name, without its ending."""
+        return self.file.stem
+
+    @property
+    def layout(self) -> Layout:
+        """What its shards have in common."""
+        return Layout(self.identity, self.store, self.keys.run.dtype)
 
 
 def read_sweep(path: Path) -> Sweep:
@@ -61,21 +74,22 @@ def read_sweep(path: Path) -> Sweep:
     Raises:
         ConfigError: a mistake in it.
     """
-    data = read_toml(path)
+    text = read_text(path)
+    data = parse_toml(text, path)
     keys = checked(SweepFile, data, path)
     robot = resolve_robot(keys.robot, path, path.parent)
     _check_start(keys, path)
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
     store = list(keys.run.store or DEFAULT_STORE)
     tile = _tile(keys, tuple(counts.values()), path)
-    _check_room(counts, store, keys.run.dtype, path)
+    _check_size(counts, tile, store, keys.run.dtype, path)
     axes = {name: _points(getattr(keys.axes, name)) for name in data["axes"]}
     if not (axes["z0"] > 0.0).all():
         raise ConfigError(path, f"axes.z0 = {shown(float(axes['z0'].min()))}: must be a number > 0")
     settings = keys.model_dump(mode="json", by_alias=True)
     settings |= {"robot": robot.model_dump(mode="json"), "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
-    return Sweep(path, keys, robot, Grid(axes, tile), store, settings)
+    return Sweep(path, keys, robot, Grid(axes, tile), store, settings, text)
 
 
 def _count(axis: AxisRange | list[float]) -> int:
@@ -111,14 +125,38 @@ def _tile(keys: SweepFile, shape: tuple[int, ...], path: Path) -> tuple[int, ...
     return tuple(min(t, n) for t, n in zip(tile, shape, strict=True))
 
 
-def _check_room(counts: dict[str, int], store: list[str], dtype: str, path: Path) -> None:
-    needed, free = bytes_needed(tuple(counts.values()), store, dtype), shutil.disk_usage(Path.cwd()).free
+def _check_size(counts: dict[str, int], tile: tuple[int, ...], store: list[str], dtype: str, path: Path) -> None:
+    # Before any memory is taken; `check_room` looks at what is free when the run starts.
+    needed, whole = bytes_needed(tuple(counts.values()), store, dtype), shutil.disk_usage(Path.cwd()).total
+    if needed > whole:
+        raise ConfigError(path, _too_large(counts, needed, whole))
+    tiles = math.prod(-(-n // t) for n, t in zip(counts.values(), tile, strict=True))
+    if tiles > LARGEST_TILES:
+        raise ConfigError(path, f"run.tile = {shown(list(tile))}: {tiles} tiles: must be at most {LARGEST_TILES}")
+
+
+def check_room(sweep: Sweep, directory: Path, done: float) -> None:
+    """Refuse a sweep whose files would not fit on the disk.
+
+    Args:
+        sweep: the sweep.
+        directory: of the run; it need not be there yet.
+        done: part of the tiles that are there already.
+
+    Raises:
+        ConfigError: too little room.
+    """
+    folder = next(place for place in (directory, *directory.resolve().parents) if place.is_dir())
+    needed = bytes_needed(sweep.grid.shape, sweep.store, sweep.keys.run.dtype) * (1.0 - 0.5 * done)
+    free = shutil.disk_usage(folder).free
     if needed > free:
-        cells = " x ".join(str(n) for n in counts.values())
-        raise ConfigError(
-            path,
-            f"axes: a grid of {cells} needs {needed / 1e9:.3g} GB: must fit on the disk ({free / 1e9:.3g} GB free)",
-        )
+        counts = {name: len(points) for name, points in sweep.grid.axes.items()}
+        raise ConfigError(sweep.file, _too_large(counts, needed, free))
+
+
+def _too_large(counts: dict[str, int], needed: float, free: float) -> str:
+    cells = " x ".join(str(n) for n in counts.values())
+    return f"axes: a grid of {cells} needs {needed / 1e9:.3g} GB: must fit on the disk ({free / 1e9:.3g} GB free)"
 
 
 def run_directory(sweep: Sweep) -> Path:
@@ -133,81 +171,15 @@ def run_directory(sweep: Sweep) -> Path:
     return Path("results") / f"{sweep.file.stem}-{sweep.identity[:12]}"
 
 
-def run(
-    sweep: Sweep, directory: Path, *, on_tile: Callable[[int, int], None] = lambda done, total: None
-) -> tuple[Path, bool]:
-    """Compute a sweep and publish its result; a finished one is left as it is.
+def attributes(sweep: Sweep) -> dict[str, Any]:
+    """What a result file says of its sweep.
 
     Args:
         sweep: the sweep.
-        directory: the run's own folder; made if absent.
-        on_tile: called with cells done and cells in all.
 
     Returns:
-        path of the result file, and whether it had been there before.
-
-    Raises:
-        ConfigError: nothing in the grid can be computed.
-        RefusedError: the folder belongs to another sweep.
-        StoreError: the disk or the folder refuses.
+        attributes of the whole file.
     """
-    from cspr_jax.maps.cells import CellMap  # compiled code is loaded only when it is needed
-
-    result = directory / f"{sweep.file.stem}.h5"
-    _refuse_other(sweep, directory)
-    if result.exists():
-        return result, True
-    compute = CellMap(sweep.robot, sweep.keys, sweep.file)
-    compute.refuse_hopeless(sweep.grid)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"{directory}: cannot be made: {error.strerror}") from error
-    write_text(directory / "run.json", json.dumps({"identity": sweep.identity, **sweep.settings}, indent=1) + "\n")
-    grid, dtype = sweep.grid, sweep.keys.run.dtype
-    with new_result(
-        result, grid.axes, sweep.store, dtype=dtype, tile=grid.tile, attributes=_attributes(sweep)
-    ) as writer:
-        done = 0
-        on_tile(done, grid.size)
-        for place in grid.places():
-            shape = tuple(part.stop - part.start for part in place)
-            answers = compute(grid.cells(place))
-            writer.write(place, {name: answers[name].reshape(shape) for name in sweep.store})
-            done += int(np.prod(shape))
-            on_tile(done, grid.size)
-    return result, False
-
-
-def _refuse_other(sweep: Sweep, directory: Path) -> None:
-    record = directory / "run.json"
-    if not record.exists():
-        return
-    try:
-        old = json.loads(record.read_text("utf-8"))
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{record}: cannot be read: {error}") from error
-    if old.get("identity") == sweep.identity:
-        return
-    old.pop("identity", None)
-    before, now = _flat(old), _flat(sweep.settings)
-    lines = [
-        f"{directory}: {key} = {shown(now.get(key))} here, {shown(before.get(key))} there: must be equal, or another -o"
-        for key in sorted(before.keys() | now.keys())
-        if before.get(key) != now.get(key)
-    ]
-    if not lines:
-        lines = [f"{directory}: holds a run of another format: choose another -o"]
-    raise RefusedError("\n".join(one_line(line) for line in lines))
-
-
-def _flat(value: Any, key: str = "") -> dict[str, Any]:
-    if not isinstance(value, dict):
-        return {key: value}
-    return {k: v for name, inner in value.items() for k, v in _flat(inner, f"{key}.{name}" if key else name).items()}
-
-
-def _attributes(sweep: Sweep) -> dict[str, Any]:
     robot = sweep.robot
     title = f"Smallest number of arcs, robot {robot.name}, amplitude {sweep.settings['trajectory']['amplitude']}"
     return {

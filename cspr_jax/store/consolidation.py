@@ -1,0 +1,155 @@
+"""The result of a run: a copy of its shards in one file, checked again after it was written."""
+
+import dataclasses
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from cspr_jax.errors import StoreError
+from cspr_jax.identity import digest, identity
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.netcdf import (
+    UNREADABLE,
+    file_size,
+    labels,
+    make_datasets,
+    open_hdf5,
+    plain,
+    refuse_foreign,
+    set_attributes,
+)
+from cspr_jax.store.publishing import new_file
+from cspr_jax.store.shards import DamagedError, Layout, Shard, digest_of
+from cspr_jax.tiles import Grid
+
+LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES = 1 << 30, 1 << 28
+
+
+@dataclasses.dataclass(frozen=True)
+class Content:
+    """What a result holds, as found by reading all of it.
+
+    Fields:
+        identity: of the sweep.
+        settings: of the sweep.
+        cells: how many.
+        tiles: how many.
+        near_zero: cells whose margin lies within 1e-9 of zero.
+        mixed: whether its shards come from different environments.
+    """
+
+    identity: str
+    settings: dict[str, Any]
+    cells: int
+    tiles: int
+    near_zero: int
+    mixed: bool
+
+
+def consolidate(
+    disk: Disk,
+    path: Path,
+    layout: Layout,
+    grid: Grid,
+    shards: Iterator[Shard],
+    attributes: dict[str, Any],
+    *,
+    between: Callable[[], None] = lambda: None,
+) -> None:
+    """Write the result, read it back, and give it its name.
+
+    Args:
+        disk: what to write with.
+        path: final name.
+        layout: of the run.
+        grid: its axes and tiles.
+        shards: one a tile, in order, verified.
+        attributes: of the file; must hold "environment".
+        between: called before each tile; may raise.
+
+    Raises:
+        StoreError: the disk refuses, or does not give back what was written.
+    """
+    digests, environments, near_zero = [], set(), 0
+    with new_file(disk, path) as descriptor:
+        with open_hdf5(disk, descriptor, attributes) as file:
+            make_datasets(file, grid.axes, layout.store, dtype=layout.dtype, tile=grid.tile)
+            for place, shard in zip(grid.places(), shards, strict=True):
+                between()
+                for name in layout.store:
+                    file[name][place] = shard.values[name]
+                digests.append(shard.digest)
+                environments.add(shard.environment)
+                near_zero += shard.near_zero
+            mixed = int(environments != {attributes["environment"]})
+            found = {"cells_near_zero": near_zero, "mixed": mixed, "environments": " ".join(sorted(environments))}
+            set_attributes(file, found)
+            set_attributes(file, {"content_sha256": _fold(file, grid.axes, digests)})
+        with os.fdopen(os.dup(descriptor), "rb") as again, h5py.File(again, "r") as file:
+            again_digests = _digests(file, grid, layout.store, between)
+            if again_digests != digests or _fold(file, grid.axes, digests) != plain(file.attrs["content_sha256"]):
+                raise StoreError(f"{path}: the disk does not give back what was written: check the disk")
+
+
+def _fold(file: h5py.File, axes: dict[str, np.ndarray], digests: list[str]) -> str:
+    # Of labels, axes and tiles.
+    return hashlib.sha256("\n".join([digest(labels(file)), digest_of(axes), *digests]).encode()).hexdigest()
+
+
+def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[], None]) -> list[str]:
+    found = []
+    for place in grid.places():
+        between()
+        found.append(digest_of({name: np.asarray(file[name][place]) for name in store}))
+    return found
+
+
+def read_content(path: Path) -> Content:
+    """Read all of a result and compare it with its checksums.
+
+    Args:
+        path: the file.
+
+    Returns:
+        what it holds.
+
+    Raises:
+        DamagedError: it is not what was written, or was not written by this program.
+    """
+    if file_size(path) < 0:
+        raise DamagedError("it is not a file")
+    try:
+        with h5py.File(path, "r") as file:
+            settings = json.loads(plain(file.attrs["settings"]))
+            if identity(settings) != plain(file.attrs["identity"]):
+                raise DamagedError("its settings and its identity do not fit")
+            tile, store = tuple(settings["run"]["tile"]), list(settings["run"]["store"])
+            if set(file) != {*settings["dimensions"], *store}:
+                raise DamagedError("it holds other datasets than its settings say")
+            refuse_foreign(path, file, np.iinfo(np.int64).max)
+            if any(file[name].nbytes > LARGEST_AXIS_BYTES for name in settings["dimensions"]):
+                raise DamagedError("its axes have no fitting size")
+            grid = Grid({name: np.asarray(file[name]).reshape(-1) for name in settings["dimensions"]}, tile)
+            _check_shapes(file, grid, store)
+            digests = _digests(file, grid, store, lambda: None)
+            if _fold(file, grid.axes, digests) != plain(file.attrs["content_sha256"]):
+                raise DamagedError("its content has changed")
+            near_zero, mixed = int(file.attrs["cells_near_zero"]), bool(file.attrs["mixed"])
+    except (StoreError, *UNREADABLE, MemoryError) as error:
+        raise DamagedError(f"it cannot be read: {str(error).splitlines()[0] if str(error) else error!r}") from error
+    tiles = sum(1 for _ in grid.places())
+    return Content(identity(settings), settings, grid.size, tiles, near_zero, mixed)
+
+
+def _check_shapes(file: h5py.File, grid: Grid, store: list[str]) -> None:
+    if any(file[name].shape != grid.shape for name in store) or len(grid.tile) != len(grid.shape):
+        raise DamagedError("its datasets do not fit its axes")
+    largest = max(file[name].dtype.itemsize for name in store) * float(np.prod([float(n) for n in grid.tile]))
+    if largest > LARGEST_TILE_BYTES or not all(isinstance(n, int) and n > 0 for n in grid.tile):
+        raise DamagedError("its tiles have no fitting size")

@@ -1,0 +1,246 @@
+"""HDF5 in netCDF-4 layout: named axes with units, checksums on data and metadata."""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from cspr_jax.errors import StoreError
+from cspr_jax.quantities import AXES, QUANTITIES, Quantity, flag_attributes
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.publishing import new_file
+from cspr_jax.store.stream import DiskFile
+
+# The format whose metadata carry checksums.
+LAYOUT = ("v110", "v110")
+# What h5py raises on a file that is damaged or not HDF5.
+UNREADABLE = (OSError, KeyError, ValueError, RuntimeError, IndexError, TypeError, AttributeError, ArithmeticError)
+
+
+@contextlib.contextmanager
+def new_hdf5(path: Path, attributes: dict[str, Any], *, disk: Disk | None = None) -> Iterator[h5py.File]:
+    """An HDF5 file that appears under its name only when it is whole.
+
+    Args:
+        path: final name.
+        attributes: of the whole file.
+        disk: what to write with.
+
+    Yields:
+        the open file.
+
+    Raises:
+        StoreError: the disk or the folder refuses.
+    """
+    disk = disk or Disk()
+    with new_file(disk, path) as descriptor, open_hdf5(disk, descriptor, attributes) as file:
+        yield file
+
+
+@contextlib.contextmanager
+def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterator[h5py.File]:
+    """An HDF5 file in an empty file that is open; what the disk refuses is raised when HDF5 has closed it.
+
+    Args:
+        disk: what to write with.
+        descriptor: of the empty file.
+        attributes: of the whole file.
+
+    Yields:
+        the open file.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    through = DiskFile(disk, descriptor)
+    try:
+        with h5py.File(through, "w", libver=LAYOUT) as file:
+            set_attributes(file, attributes)
+            yield file
+    except UNREADABLE:
+        through.raise_failure()  # HDF5's complaint follows from it
+        raise
+    through.raise_failure()
+
+
+def make_datasets(
+    file: h5py.File, axes: dict[str, np.ndarray], store: list[str], *, dtype: str, tile: tuple[int, ...]
+) -> None:
+    """The empty datasets of a result over a grid, with their axes.
+
+    Args:
+        file: an empty HDF5 file.
+        axes: coordinates, in the order of the dimensions.
+        store: names of the quantities.
+        dtype: of quantities of kind "float".
+        tile: chunk shape.
+    """
+    for name, points in axes.items():
+        scale = file.create_dataset(name, data=points, track_times=False)
+        describe(scale, AXES[name])
+        scale.make_scale(name)
+    shape = tuple(len(points) for points in axes.values())
+    for name in store:
+        data = new_dataset(file, name, shape, dtype_of(name, dtype), tile)
+        describe(data, QUANTITIES[name])
+        if name == "verdict":
+            set_attributes(data, flag_attributes())
+        for i, axis in enumerate(axes):
+            data.dims[i].attach_scale(file[axis])
+
+
+def new_dataset(file: h5py.File, name: str, shape: tuple[int, ...], dtype: str, chunk: tuple[int, ...]) -> h5py.Dataset:
+    """An empty dataset, compressed and with checksums.
+
+    Args:
+        file: where.
+        name: its name.
+        shape: its shape.
+        dtype: of NumPy.
+        chunk: shape of its chunks.
+
+    Returns:
+        the dataset.
+    """
+    return file.create_dataset(
+        name, shape, dtype, chunks=chunk, compression="gzip", shuffle=True, fletcher32=True, track_times=False
+    )
+
+
+def dtype_of(name: str, dtype: str) -> str:
+    """Type of a stored quantity.
+
+    Args:
+        name: of the quantity.
+        dtype: of those of kind "float".
+
+    Returns:
+        NumPy's name.
+    """
+    kind = QUANTITIES[name].kind
+    return dtype if kind == "float" else kind
+
+
+def describe(data: h5py.Dataset, quantity: Quantity) -> None:
+    """Write units and names beside a dataset.
+
+    Args:
+        data: the dataset.
+        quantity: what it is.
+    """
+    set_attributes(
+        data, {"units": quantity.units, "long_name": quantity.long_name, "description": quantity.description}
+    )
+
+
+def set_attributes(item: h5py.HLObject, values: dict[str, Any]) -> None:
+    """Write attributes; text has a fixed length, which is what netCDF does, and lies under HDF5's checksums.
+
+    Args:
+        item: a file or dataset.
+        values: by name.
+    """
+    for name, value in values.items():
+        if isinstance(value, str):
+            data = value.encode()
+            item.attrs.create(name, np.bytes_(data), dtype=h5py.string_dtype("utf-8", max(len(data), 1)))
+        else:
+            item.attrs[name] = value
+
+
+def plain(value: Any) -> Any:
+    """The value of an attribute as Python has it.
+
+    Args:
+        value: as h5py reads it.
+
+    Returns:
+        text, numbers, lists of them; NumPy arrays stay what they are.
+    """
+    if isinstance(value, bytes):
+        return value.decode()
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def labels(file: h5py.File) -> dict[str, Any]:
+    """Everything that a file says of its data: attributes, and names of dimensions.
+
+    Args:
+        file: open.
+
+    Returns:
+        plain values, by name of the dataset; "/" for the file.
+    """
+    found = {"/": _attributes(file)}
+    for name, item in file.items():
+        names = [[scale.name for scale in dimension.values()] for dimension in item.dims]
+        found[name] = {"attributes": _attributes(item), "dimensions": names}
+    return found
+
+
+def _attributes(item: h5py.HLObject) -> dict[str, Any]:
+    # References are how dimensions are kept; checksums are checked on their own.
+    hidden = ("content_sha256", "DIMENSION_LIST", "REFERENCE_LIST")
+    return {name: _listed(plain(value)) for name, value in item.attrs.items() if name not in hidden}
+
+
+def _listed(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:
+    """Room that a run needs at most, its shards and its result together.
+
+    Args:
+        shape: of the grid.
+        store: names of the quantities.
+        dtype: of quantities of kind "float".
+
+    Returns:
+        bytes.
+    """
+    one = sum(np.dtype(dtype_of(name, dtype)).itemsize for name in store)
+    # Twice the data, and a tenth for chunks that do not compress and for what describes them.
+    return int(2.1 * np.prod([float(n) for n in shape]) * one) + (1 << 20)
+
+
+def refuse_foreign(path: Path, file: h5py.File, largest: float) -> None:
+    """Refuse a file whose data lie in other files, or would not fit into memory.
+
+    Args:
+        path: named in the error.
+        file: open.
+        largest: bytes that all data may take.
+
+    Raises:
+        StoreError: it is one.
+    """
+    total = 0
+    for name, item in file.items():
+        if not isinstance(item, h5py.Dataset):
+            continue
+        if item.is_virtual or item.external:
+            raise StoreError(f"{path}: {name}: its data lie in other files: must be in this one")
+        total += int(np.prod([float(n) for n in item.shape or ()])) * item.dtype.itemsize
+    if total > largest:
+        raise StoreError(f"{path}: holds {total / 1e9:.3g} GB of data: must be at most {largest / 1e9:.3g} GB")
+
+
+def file_size(path: Path) -> int:
+    """Size of a regular file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        bytes; -1 if it is not a regular file, a link included.
+    """
+    try:
+        found = os.lstat(path)
+    except OSError:
+        return -1
+    return found.st_size if (found.st_mode & 0o170000) == 0o100000 else -1

@@ -1,0 +1,116 @@
+"""Files and folders that are there whole or not at all.
+
+A file gets its name only when it is whole and on the disk: written under another name in the same
+folder, flushed, renamed, and the folder flushed. A crash leaves the old state or the new one.
+"""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from cspr_jax.errors import StoreError
+from cspr_jax.store.disk import USUAL, Disk, write_all
+
+
+def part_of(path: Path) -> Path:
+    """Name under which a file is written until it is whole.
+
+    Args:
+        path: its final name.
+
+    Returns:
+        the name, in the same folder.
+    """
+    return path.with_name(f".{path.name}.{os.getpid()}.part")
+
+
+@contextlib.contextmanager
+def new_file(disk: Disk, path: Path, *, mode: int = USUAL) -> Iterator[int]:
+    """A file that gets its name when the block ends well, and leaves nothing when it does not.
+
+    Args:
+        disk: what to write with.
+        path: final name.
+        mode: its permissions.
+
+    Yields:
+        a descriptor, for writing and reading.
+
+    Raises:
+        StoreError: the disk or the folder refuses.
+    """
+    part = part_of(path)
+    try:
+        file = disk.create(part, mode)
+        try:
+            try:
+                yield file
+                disk.sync(file)
+            finally:
+                os.close(file)
+            disk.replace(part, path)
+        except BaseException:
+            with contextlib.suppress(OSError):  # the first failure tells more
+                disk.unlink(part)
+            raise
+        disk.sync_folder(path.parent)
+    except OSError as error:
+        raise refusal(path, error) from error
+
+
+def publish(disk: Disk, path: Path, data: bytes, *, mode: int = USUAL) -> None:
+    """Write a small file whole or not at all.
+
+    Args:
+        disk: what to write with.
+        path: its name.
+        data: its content.
+        mode: its permissions.
+
+    Raises:
+        StoreError: the disk or the folder refuses.
+    """
+    with new_file(disk, path, mode=mode) as file:
+        write_all(disk, file, data)
+
+
+def make_folders(disk: Disk, path: Path) -> None:
+    """Make a folder and those above it, each named on the disk before the next.
+
+    Args:
+        disk: what to write with.
+        path: the folder.
+
+    Raises:
+        StoreError: the disk or a folder refuses.
+    """
+    missing = []
+    folder = path
+    while not folder.is_dir():
+        missing.append(folder)
+        if folder.parent == folder:
+            break
+        folder = folder.parent
+    try:
+        for folder in reversed(missing):
+            with contextlib.suppress(FileExistsError):  # somebody made it meanwhile
+                disk.make_folder(folder)
+            disk.sync_folder(folder.parent)
+        if not path.is_dir():
+            raise NotADirectoryError(20, "Not a directory")
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be made: {error.strerror or error}") from error
+
+
+def refusal(path: Path, error: OSError) -> StoreError:
+    """What to tell when a file cannot be written.
+
+    Args:
+        path: the file.
+        error: the system's.
+
+    Returns:
+        the error to raise.
+    """
+    return StoreError(f"{path}: cannot be written: {error.strerror or error}; make room or choose another -o")

@@ -1,0 +1,188 @@
+"""Shards: the file of one tile, immutable once it has its name.
+
+A shard is HDF5 behind a user block of 512 bytes that holds the SHA-256 of everything after it. So a
+flipped bit is found before HDF5 reads the file, and any HDF5 tool still opens it.
+"""
+
+import dataclasses
+import hashlib
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from cspr_jax.identity import canonical_json
+from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, file_size, new_dataset
+
+BLOCK = 512
+LARGEST_SHARD = 64 << 20
+_MAGIC = b"cspr shard 1, sha256 of the rest: "
+
+
+class DamagedError(Exception):
+    """A shard or a result that is not what was written."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    """What the shards of a run have in common.
+
+    Fields:
+        identity: of the sweep.
+        store: names of the quantities.
+        dtype: of quantities of kind "float".
+    """
+
+    identity: str
+    store: list[str]
+    dtype: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Shard:
+    """The content of a shard.
+
+    Fields:
+        index: of the tile.
+        environment: hash of what computed it.
+        near_zero: cells whose margin lies within 1e-9 of zero.
+        values: (n_1, ..., n_k) for each stored quantity.
+    """
+
+    index: int
+    environment: str
+    near_zero: int
+    values: dict[str, np.ndarray]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of names, types, shapes and values."""
+        return digest_of(self.values)
+
+
+def digest_of(values: dict[str, np.ndarray]) -> str:
+    """SHA-256 over name, type, shape and bytes of arrays, sorted by name.
+
+    Args:
+        values: the arrays.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    total = hashlib.sha256()
+    for name in sorted(values):
+        array = np.ascontiguousarray(values[name])
+        total.update(canonical_json([name, array.dtype.str, list(array.shape)]).encode())
+        total.update(array.data.cast("B") if array.size else b"")
+    return total.hexdigest()
+
+
+def encode(layout: Layout, shard: Shard) -> bytes:
+    """A shard as bytes; equal shards give equal bytes.
+
+    Args:
+        layout: of the run.
+        shard: its content.
+
+    Returns:
+        the file's content.
+    """
+    memory = io.BytesIO()
+    with h5py.File(memory, "w", libver=LAYOUT, userblock_size=BLOCK) as file:
+        file.attrs["header"] = canonical_json(_header(layout, shard.index, shard.environment, shard.near_zero))
+        file.attrs["content_sha256"] = shard.digest
+        for name in layout.store:
+            array = shard.values[name]
+            new_dataset(file, name, array.shape, dtype_of(name, layout.dtype), array.shape)[...] = array
+    data = memory.getvalue()
+    return _block(data[BLOCK:]) + data[BLOCK:]
+
+
+def _block(rest: bytes) -> bytes:
+    return (_MAGIC + hashlib.sha256(rest).hexdigest().encode() + b"\n").ljust(BLOCK, b"\0")
+
+
+def _header(layout: Layout, index: int, environment: str, near_zero: int) -> dict[str, Any]:
+    return {"identity": layout.identity, "tile": index, "environment": environment, "near_zero": near_zero}
+
+
+def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -> Shard:
+    """A shard, checked in every respect.
+
+    Args:
+        path: the file.
+        layout: of the run.
+        index: of the tile that it must hold.
+        shape: of the tile.
+
+    Returns:
+        its content.
+
+    Raises:
+        DamagedError: it is anything else.
+    """
+    file, header = _opened(path)
+    with file:
+        if header["identity"] != layout.identity:
+            raise DamagedError("it belongs to another sweep")
+        if header["tile"] != index:
+            raise DamagedError(f"it holds tile {header['tile']}")
+        try:
+            if set(file) != set(layout.store):
+                raise DamagedError("it holds other quantities")
+            if any(file[name].dtype.str != np.dtype(dtype_of(name, layout.dtype)).str for name in layout.store):
+                raise DamagedError("it holds other types")
+            if any(file[name].shape != shape for name in layout.store):
+                raise DamagedError("it holds a tile of another shape")
+            values = {name: np.asarray(file[name]) for name in layout.store}
+            written = file.attrs["content_sha256"]
+        except UNREADABLE as error:
+            raise DamagedError(f"HDF5 cannot read it: {_reason(error)}") from error
+    shard = Shard(index, str(header["environment"]), int(header["near_zero"]), values)
+    if shard.digest != written:
+        raise DamagedError("its content has changed")
+    return shard
+
+
+def identity_in(path: Path) -> str | None:
+    """The identity that a shard names.
+
+    Args:
+        path: the file.
+
+    Returns:
+        the identity, or None if the shard is damaged.
+    """
+    try:
+        file, header = _opened(path)
+    except DamagedError:
+        return None
+    file.close()
+    return str(header["identity"])
+
+
+def _opened(path: Path) -> tuple[h5py.File, dict[str, Any]]:
+    size = file_size(path)
+    if not BLOCK < size <= LARGEST_SHARD:
+        raise DamagedError("it is not a file of a fitting size")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise DamagedError(f"it cannot be read: {error.strerror}") from error
+    if data[:BLOCK] != _block(data[BLOCK:]):
+        raise DamagedError("its bytes have changed")
+    try:
+        file = h5py.File(io.BytesIO(data), "r")
+        header = json.loads(file.attrs["header"])
+        if not {"identity", "tile", "environment", "near_zero"} <= header.keys():
+            raise DamagedError("its header is not whole")
+    except UNREADABLE as error:
+        raise DamagedError(f"HDF5 cannot read it: {_reason(error)}") from error
+    return file, header
+
+
+def _reason(error: BaseException) -> str:
+    return str(error).splitlines()[0] if str(error) else type(error).__name__

@@ -1,0 +1,132 @@
+"""Whose a run directory is, and what may go on in it."""
+
+from pathlib import Path
+from typing import Any
+
+from cspr_jax.errors import RefusedError, one_line
+from cspr_jax.identity import differences
+from cspr_jax.store.folder import RunFolder
+from cspr_jax.store.record import Record, read_record, write_record
+from cspr_jax.store.shards import DamagedError, identity_in
+from cspr_jax.sweep.definition import Sweep
+
+
+def refuse_other_sweep(sweep: Sweep, folder: RunFolder) -> None:
+    """Refuse a directory that belongs to another sweep.
+
+    Args:
+        sweep: the sweep.
+        folder: the directory.
+
+    Raises:
+        RefusedError: with a line for each key that differs.
+    """
+    record = _record(folder.record)
+    if record is not None:
+        if record.identity != sweep.identity:
+            raise RefusedError(differing(sweep, folder, record.settings))
+        return
+    # Without a record that can be believed, the shards say whose they are.
+    if {identity_in(path) for path in folder.shards.glob("*.h5")} - {None, sweep.identity}:
+        raise RefusedError(one_line(f"{folder.path}: holds shards of another sweep: choose another -o"))
+
+
+def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> str:
+    """What differs between a sweep and the one that a directory belongs to.
+
+    Args:
+        sweep: the sweep.
+        folder: the directory.
+        settings: of the other one.
+
+    Returns:
+        a line for each key.
+    """
+    lines = differences(sweep.settings, settings) or ["the format of the run differs"]
+    return "\n".join(one_line(f"{folder.path}: {line}: must be equal, or another -o") for line in lines)
+
+
+def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], accept: bool) -> None:
+    """Refuse to go on with another program, library or machine than began.
+
+    Args:
+        folder: the directory.
+        environment: what computes now.
+        accept: whether it may be mixed in.
+
+    Raises:
+        RefusedError: with a line for each key that differs.
+    """
+    record = _record(folder.record)
+    if record is None or accept or record.environment == environment:
+        return
+    advice = "--accept-environment-change mixes them, another -o starts anew"
+    lines = differences(environment, record.environment)
+    raise RefusedError("\n".join(one_line(f"{folder.path}: {line}: {advice}") for line in lines))
+
+
+def refuse_worker(expected: dict[str, Any], found: dict[str, Any]) -> None:
+    """Refuse a tile of a worker that differs from what the run was begun with.
+
+    Args:
+        expected: environment of the run.
+        found: of the worker.
+
+    Raises:
+        RefusedError: with a line for each key that differs.
+    """
+    if found == expected:
+        return
+    advice = "--accept-environment-change takes it"
+    lines = differences(found, expected)
+    raise RefusedError("\n".join(one_line(f"a worker differs from the run: {line}: {advice}") for line in lines))
+
+
+def damage(path: Path) -> str | None:
+    """What is wrong with a run.json.
+
+    Args:
+        path: its name.
+
+    Returns:
+        a phrase, or None where it is whole or absent.
+    """
+    if not (path.exists() or path.is_symlink()):
+        return None
+    try:
+        read_record(path)
+    except DamagedError as error:
+        return str(error)
+    return None
+
+
+def own_record(sweep: Sweep, folder: RunFolder, environment: dict[str, Any], command: tuple[str, ...]) -> Record:
+    """The record of a directory that is the sweep's, written if it is not there.
+
+    Args:
+        sweep: the sweep.
+        folder: the directory.
+        environment: what computes.
+        command: words of the command.
+
+    Returns:
+        the record.
+
+    Raises:
+        StoreError: the disk or the folder refuses.
+    """
+    found = _record(folder.record)
+    if found is not None:
+        return found
+    source = {"file": sweep.file.name, "text": sweep.text, "command": list(command)}
+    record = Record(sweep.identity, sweep.settings, environment, source)
+    write_record(folder.disk, folder.record, record)
+    return record
+
+
+def _record(path: Path) -> Record | None:
+    # None where there is none, or a damaged one.
+    try:
+        return read_record(path)
+    except DamagedError:
+        return None

@@ -1,0 +1,255 @@
+"""A run: from a checked sweep to its result, going on where an earlier process was stopped or killed.
+
+The run directory is its own manifest. Nothing is remembered beside the shards; whatever moment a
+process dies at, the next one finds verified shards, computes the rest, and ends with the same bytes.
+"""
+
+import contextlib
+import dataclasses
+import math
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+
+from cspr_jax.errors import RefusedError, StoppedError, StoreError, one_line
+from cspr_jax.identity import canonical_json, digest
+from cspr_jax.store.consolidation import consolidate, read_content
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.folder import RunFolder
+from cspr_jax.store.publishing import make_folders, publish, refusal
+from cspr_jax.store.record import Record
+from cspr_jax.store.shards import DamagedError, Shard, encode, read_shard
+from cspr_jax.sweep import claims
+from cspr_jax.sweep.definition import Sweep, attributes, check_room
+from cspr_jax.sweep.signals import Stop
+from cspr_jax.sweep.work import Computed, Executor
+from cspr_jax.tiles import place_shape
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """How a run goes on.
+
+    Fields:
+        accept_environment_change: whether shards of another environment may be mixed in.
+        prune: whether shards are removed once the result is complete.
+        command: words of the command, for run.json.
+    """
+
+    accept_environment_change: bool = False
+    prune: bool = False
+    command: tuple[str, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """What a run did.
+
+    Fields:
+        result: path of the finished file.
+        computed: number of tiles computed now.
+        kept: number of tiles found finished.
+    """
+
+    result: Path
+    computed: int
+    kept: int
+
+
+@dataclasses.dataclass
+class Hooks:
+    """What a run tells and asks while it goes.
+
+    Fields:
+        stop: set when it shall end after the tile in progress.
+        on_tile: called with cells done and cells in all.
+        warn: called with a line for people.
+    """
+
+    stop: Stop = dataclasses.field(default_factory=Stop)
+    on_tile: Callable[[int, int], None] = lambda done, total: None
+    warn: Callable[[str], None] = lambda line: None
+
+
+class Run:
+    """One process's work on a run directory.
+
+    Args:
+        sweep: the sweep.
+        directory: the run's own folder; made if absent.
+        options: how it goes on.
+        hooks: what it tells and asks.
+        disk: what writes.
+    """
+
+    def __init__(
+        self,
+        sweep: Sweep,
+        directory: Path,
+        options: Options | None = None,
+        hooks: Hooks | None = None,
+        disk: Disk | None = None,
+    ) -> None:
+        """Nothing is touched yet."""
+        self._sweep, self._disk = sweep, disk or Disk()
+        self._options, self._hooks = options or Options(), hooks or Hooks()
+        self._folder = RunFolder(directory, sweep.name, self._disk)
+        self._places = list(sweep.grid.places())
+
+    def finished(self) -> Path | None:
+        """The result, if it is complete and holds what was written; nothing is computed and jax is not needed.
+
+        Returns:
+            its path, or None.
+
+        Raises:
+            RefusedError: the directory, or the result in it, belongs to another sweep.
+            StoreError: the disk refuses to remove shards.
+        """
+        claims.refuse_other_sweep(self._sweep, self._folder)
+        if not self._folder.result.exists():
+            return None
+        try:
+            content = read_content(self._folder.result)
+        except DamagedError as error:
+            if not self._folder.record.exists():
+                raise RefusedError(f"{self._folder.result}: is there, and {error}: choose another -o") from error
+            return None
+        if content.identity != self._sweep.identity:
+            raise RefusedError(claims.differing(self._sweep, self._folder, content.settings))
+        if self._options.prune and self._folder.shards.is_dir():
+            with self._folder.locked():
+                self._prune()
+        return self._folder.result
+
+    def go(self, executor: Executor) -> Outcome:
+        """Compute what is missing and publish the result.
+
+        Args:
+            executor: computes tiles.
+
+        Returns:
+            what was done.
+
+        Raises:
+            ConfigError: too little room on the disk.
+            RefusedError: another process writes here, or the environment has changed.
+            StoreError: the disk or the folder refuses.
+            StoppedError: asked to stop; what was finished is kept.
+        """
+        check_room(self._sweep, self._folder.path, len(list(self._folder.shards.glob("*.h5"))) / len(self._places))
+        environment, accept = executor.environment(), self._options.accept_environment_change
+        claims.refuse_other_environment(self._folder, environment, accept)  # before anything is made
+        self._folder.make()
+        with self._folder.locked():
+            claims.refuse_other_sweep(self._sweep, self._folder)
+            if (reason := claims.damage(self._folder.record)) is not None:
+                self._quarantine(self._folder.record, reason)
+            claims.refuse_other_environment(self._folder, environment, accept)
+            self._folder.sweep_leftovers()
+            record = claims.own_record(self._sweep, self._folder, environment, self._options.command)
+            make_folders(self._disk, self._folder.shards)
+            kept = self._verified(digest(environment))
+            self._folder.note("started", command=list(self._options.command), kept=len(kept))
+            computed = self._compute(executor, kept, record)
+            self._consolidate(record)
+            self._folder.note("finished", computed=computed)
+            if self._options.prune:
+                self._prune()
+        return Outcome(self._folder.result, computed, len(kept))
+
+    # -- tiles -----------------------------------------------------------------------------------
+
+    def _quarantine(self, path: Path, reason: str) -> None:
+        target = self._folder.set_aside(path)
+        self._folder.note("quarantined", file=path.name, reason=reason)
+        self._hooks.warn(one_line(f"{path}: {reason}: moved to {target} and made again"))
+
+    def _read(self, index: int) -> Shard:
+        return read_shard(self._folder.shard(index), self._sweep.layout, index, place_shape(self._places[index]))
+
+    def _verified(self, environment: str) -> list[int]:
+        # Tiles whose shard is there and is what was written; anything else under their names is set aside.
+        kept = []
+        known = {self._folder.shard(index): index for index in range(len(self._places))}
+        for path in sorted(self._folder.shards.iterdir()):
+            try:
+                if path not in known:
+                    raise DamagedError("it is no tile of this sweep")
+                shard = self._read(known[path])
+            except DamagedError as error:
+                self._quarantine(path, str(error))
+                continue
+            if shard.environment != environment and not self._options.accept_environment_change:
+                raise RefusedError(f"{path}: was computed in another environment: --accept-environment-change keeps it")
+            kept.append(known[path])
+        return kept
+
+    def _compute(self, executor: Executor, kept: list[int], record: Record) -> int:
+        done = sum(self._cells(index) for index in kept)
+        self._hooks.on_tile(done, self._sweep.grid.size)
+        finished = set(kept)
+        missing = [index for index in range(len(self._places)) if index not in finished]
+        with contextlib.closing(_as_generator(executor.tiles(missing, self._hooks.stop))) as tiles:
+            for computed in tiles:
+                if not self._options.accept_environment_change:
+                    claims.refuse_worker(record.environment, computed.environment)
+                index = computed.shard.index
+                publish(self._disk, self._folder.shard(index), encode(self._sweep.layout, computed.shard))
+                finished.add(index)
+                done += self._cells(index)
+                self._folder.note("tile", index=index)
+                self._hooks.on_tile(done, self._sweep.grid.size)
+        if len(finished) < len(self._places):
+            self._stopped(len(finished))
+        return len(missing)
+
+    def _cells(self, index: int) -> int:
+        return math.prod(place_shape(self._places[index]))
+
+    def _stopped(self, finished: int) -> None:
+        code = self._hooks.stop.code
+        line = f"{self._folder.path}: {finished} of {len(self._places)} tiles are kept; run it again to go on"
+        if code is None:
+            raise StoreError(line)
+        raise StoppedError(f"stopped: {line}", code)
+
+    # -- the result ------------------------------------------------------------------------------
+
+    def _consolidate(self, record: Record) -> None:
+        path = self._folder.result
+        if path.exists() or path.is_symlink():
+            try:
+                if read_content(path).identity == self._sweep.identity:
+                    return
+                raise DamagedError("it belongs to another sweep")
+            except DamagedError as error:
+                self._quarantine(path, str(error))
+        facts = {
+            **attributes(self._sweep),
+            "environment": digest(record.environment),
+            "environment_settings": canonical_json(record.environment),
+        }
+        shards = (self._read(index) for index in range(len(self._places)))
+
+        def between() -> None:
+            if self._hooks.stop:
+                self._stopped(len(self._places))
+
+        try:
+            consolidate(self._disk, path, self._sweep.layout, self._sweep.grid, shards, facts, between=between)
+        except DamagedError as error:
+            raise StoreError(
+                f"{self._folder.shards}: a shard changed while it was read: {error}; run it again"
+            ) from error
+
+    def _prune(self) -> None:
+        for path in sorted(self._folder.shards.glob("*.h5")):
+            try:
+                self._disk.unlink(path)
+            except OSError as error:
+                raise refusal(path, error) from error
+
+
+def _as_generator(tiles: Iterator[Computed]) -> Generator[Computed, None, None]:
+    # An iterator that can be closed, so that workers end when publishing fails.
+    yield from tiles

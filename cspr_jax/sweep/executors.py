@@ -1,0 +1,150 @@
+"""Who computes the tiles: this process, or several on this machine. One process publishes."""
+
+import concurrent.futures
+import contextlib
+import multiprocessing
+import os
+import pickle
+import signal
+import threading
+import time
+from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from cspr_jax.errors import ResourceError
+from cspr_jax.sweep.definition import Sweep
+from cspr_jax.sweep.environment import environment
+from cspr_jax.sweep.signals import CODES, Stop
+from cspr_jax.sweep.tile import TileMap, compute_tile
+from cspr_jax.sweep.work import Computed
+
+# Times that the workers may die, one after another, without a tile between.
+DEATHS = 3
+
+
+class ThisProcess:
+    """Tiles one after the other in this process.
+
+    Args:
+        tile_map: what computes one.
+    """
+
+    def __init__(self, tile_map: TileMap) -> None:
+        """Keep the map."""
+        self._tile_map = tile_map
+
+    def environment(self) -> dict[str, Any]:
+        """What computes.
+
+        Returns:
+            the environment of this process.
+        """
+        return environment()
+
+    def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
+        """Compute tiles in order.
+
+        Args:
+            indices: which ones.
+            stop: when it is set, what is in progress is finished and nothing is begun.
+
+        Yields:
+            the tiles.
+        """
+        for index in indices:
+            if stop:
+                return
+            yield self._tile_map(index)
+
+
+def _start_worker(parent: int) -> None:
+    # Signals reach the whole group: the parent decides. And no worker outlives it.
+    for number in CODES:
+        signal.signal(number, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+class Processes:
+    """Tiles in several processes of this machine.
+
+    Args:
+        sweep: the sweep.
+        count: how many processes.
+    """
+
+    def __init__(self, sweep: Sweep, count: int) -> None:
+        """Start nothing yet."""
+        self._pickled, self._count = pickle.dumps(sweep), count
+
+    def environment(self) -> dict[str, Any]:
+        """What computes: workers are the same program on the same machine.
+
+        Returns:
+            the environment of this process.
+        """
+        return environment()
+
+    def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
+        """Compute tiles in any order; one whose worker died is computed again.
+
+        Args:
+            indices: which ones.
+            stop: when it is set, what is in progress is finished and nothing is begun.
+
+        Yields:
+            the tiles.
+
+        Raises:
+            ResourceError: workers that keep dying.
+        """
+        waiting, deaths = list(indices), 0
+        while waiting and not stop:
+            try:
+                with contextlib.closing(self._pool_tiles(list(waiting), stop)) as tiles:
+                    for computed in tiles:
+                        waiting.remove(computed.shard.index)
+                        deaths = 0
+                        yield computed
+            except BrokenProcessPool as error:
+                deaths += 1
+                if deaths >= DEATHS:
+                    raise ResourceError(
+                        f"workers died {deaths} times without finishing a tile, perhaps for want of memory: "
+                        "--workers or run.tile must be smaller"
+                    ) from error
+
+    def _pool_tiles(self, waiting: list[int], stop: Stop) -> Generator[Computed, None, None]:
+        context = multiprocessing.get_context("spawn")
+        pool = concurrent.futures.ProcessPoolExecutor(
+            self._count, mp_context=context, initializer=_start_worker, initargs=(os.getpid(),)
+        )
+        stop.at_once = lambda: _kill(pool)
+        running: set[concurrent.futures.Future[Computed]] = set()
+        try:
+            while running or (waiting and not stop):
+                while waiting and not stop and len(running) < self._count:
+                    running.add(pool.submit(compute_tile, self._pickled, waiting.pop(0)))
+                done, running = concurrent.futures.wait(
+                    running, timeout=0.1, return_when=concurrent.futures.FIRST_COMPLETED
+                )
+                for future in done:
+                    yield future.result()
+        finally:
+            if running:
+                _kill(pool)
+            pool.shutdown(wait=True, cancel_futures=True)
+            stop.at_once = lambda: None
+
+
+def _kill(pool: concurrent.futures.ProcessPoolExecutor) -> None:
+    # Python 3.14 has kill_workers() for this.
+    for process in list((pool._processes or {}).values()):
+        with contextlib.suppress(OSError, ValueError):  # it may be gone
+            process.kill()

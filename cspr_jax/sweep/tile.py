@@ -1,0 +1,133 @@
+"""One tile of a sweep: its numbers, computed and checked."""
+
+import functools
+import pickle
+
+import jax
+import numpy as np
+
+from cspr_jax.errors import ResourceError, SelfCheckError
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.identity import digest
+from cspr_jax.maps.cells import CellMap
+from cspr_jax.store.shards import Shard
+from cspr_jax.sweep.definition import Sweep
+from cspr_jax.sweep.environment import environment
+from cspr_jax.sweep.work import Computed
+from cspr_jax.tiles import place_shape
+
+# Margins so near zero can change sign with the processor; how many there are stands in the result.
+NEAR_ZERO = 1e-9
+# How far a refined margin may lie below the bound proved for it.
+ROUNDING = 1e-8
+
+
+class TileMap:
+    """The map of a sweep, ready to compute its tiles.
+
+    Args:
+        sweep: the sweep.
+
+    Raises:
+        ConfigError: its robot, amplitude function or limits cannot be used, or nothing in its grid can be reached.
+    """
+
+    def __init__(self, sweep: Sweep) -> None:
+        """Refuse what cannot be computed."""
+        self._sweep = sweep
+        self._places = list(sweep.grid.places())
+        with jax.enable_x64(True):
+            self._cells = CellMap(sweep.robot, sweep.keys, sweep.file)
+            self._cells.refuse_hopeless(sweep.grid)
+
+    def __call__(self, index: int) -> Computed:
+        """Compute a tile.
+
+        Args:
+            index: of the tile, in the order of `Grid.places`.
+
+        Returns:
+            the tile.
+
+        Raises:
+            SelfCheckError: numbers that contradict each other.
+            ResourceError: the tile does not fit into memory.
+        """
+        place = self._places[index]
+        shape = place_shape(place)
+        try:
+            with jax.enable_x64(True):
+                answers = self._cells(self._sweep.grid.cells(place))
+        except (MemoryError, jax.errors.JaxRuntimeError) as error:
+            if isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error):
+                raise ResourceError(
+                    f"{self._sweep.file}: run.tile = {list(self._sweep.grid.tile)}: does not fit into memory: "
+                    "must be smaller"
+                ) from error
+            raise
+        check_answers(index, answers)
+        dtype = self._sweep.keys.run.dtype
+        values = {name: _stored(answers[name], dtype).reshape(shape) for name in self._sweep.store}
+        now = environment()
+        return Computed(Shard(index, digest(now), _near_zero(answers), values), now)
+
+
+def _stored(values: np.ndarray, dtype: str) -> np.ndarray:
+    # Counts and flags fit their small types: max_arcs is at most 1000, verdicts are uint16.
+    if values.dtype.kind == "f":
+        return values.astype(dtype)
+    return values.astype(np.int16 if values.dtype.kind == "i" else np.uint16)
+
+
+def _near_zero(answers: dict[str, np.ndarray]) -> int:
+    return int((np.abs(answers["margin"]) < NEAR_ZERO).sum())
+
+
+def check_answers(index: int, answers: dict[str, np.ndarray]) -> None:
+    """Refuse numbers that contradict each other, as a broken processor, driver or compiler gives them.
+
+    Args:
+        index: of the tile.
+        answers: (n,) each.
+
+    Raises:
+        SelfCheckError: which contradiction.
+    """
+    found, margin = answers["arcs"] > 0, answers["margin"]
+    verdict = answers["verdict"]
+    unsure = Verdict.FEWER_ARCS_UNDECIDED.value
+    faults = {
+        "a feasible cell with a margin below zero": found & ~(margin > -ROUNDING),
+        "a feasible cell whose verdict is not": found & ((verdict & ~np.uint16(unsure)) != 0),
+        "an infeasible cell whose verdict is 0": ~found & (verdict == 0),
+        "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
+        "a feasible cell without a duration": found & ~(np.isfinite(answers["duration"]) & (answers["duration"] > 0)),
+    }
+    for fault, cells in faults.items():
+        if cells.any():
+            raise SelfCheckError(
+                f"tile {index}: {int(cells.sum())} of {cells.size} cells: {fault}; nothing of it was kept; "
+                "check the machine, then run again"
+            )
+
+
+@functools.lru_cache(maxsize=2)
+def _tile_map(pickled: bytes) -> TileMap:
+    return TileMap(pickle.loads(pickled))
+
+
+def compute_tile(pickled: bytes, index: int) -> Computed:
+    """Compute a tile in a process that may not know the sweep yet.
+
+    Args:
+        pickled: the sweep.
+        index: of the tile.
+
+    Returns:
+        the tile.
+
+    Raises:
+        SelfCheckError: numbers that contradict each other.
+        ResourceError: the tile does not fit into memory.
+    """
+    return _tile_map(pickled)(index)

@@ -1,0 +1,45 @@
+"""What a run asks of those who compute its tiles."""
+
+import dataclasses
+from collections.abc import Iterable, Iterator
+from typing import Any, Protocol
+
+from cspr_jax.store.shards import Shard
+from cspr_jax.sweep.signals import Stop
+
+
+@dataclasses.dataclass(frozen=True)
+class Computed:
+    """A tile, and what computed it.
+
+    Fields:
+        shard: its content.
+        environment: of the process that computed it.
+    """
+
+    shard: Shard
+    environment: dict[str, Any]
+
+
+class Executor(Protocol):
+    """Computes tiles, in any order."""
+
+    def environment(self) -> dict[str, Any]:
+        """What computes.
+
+        Returns:
+            the environment of the process, or of the workers.
+        """
+        ...
+
+    def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
+        """Compute tiles.
+
+        Args:
+            indices: which ones.
+            stop: when it is set, what is in progress is finished and nothing is begun.
+
+        Yields:
+            the tiles.
+        """
+        ...

@@ -1,0 +1,1 @@
+"""Faults of disk, process and file, and what must survive them."""

@@ -1,0 +1,44 @@
+"""The command line, but its tiles are plain NumPy and take a given time: for kills, signals and limits.
+
+Usage: python paper_cspr.py SECONDS_A_TILE run SWEEP.toml -o DIR ...
+"""
+
+import contextlib
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from cspr_jax import cli
+from reliability.support import Paper
+
+
+class Slow(Paper):
+    """Paper that takes its time."""
+
+    def tiles(self, indices, stop):
+        for index in indices:
+            if stop:
+                return
+            end = time.monotonic() + SECONDS
+            while time.monotonic() < end:  # a signal does not shorten a tile
+                time.sleep(0.01)
+            yield from super().tiles([index], stop) if not stop else self._one(index)
+
+    def _one(self, index):
+        # The tile in progress when the signal came is finished.
+        from cspr_jax.sweep.signals import Stop
+
+        yield from super().tiles([index], Stop())
+
+
+@contextlib.contextmanager
+def paper(options, sweep):
+    yield Slow(sweep)
+
+
+if __name__ == "__main__":
+    SECONDS = float(sys.argv[1])
+    cli._executor = paper
+    sys.exit(cli.main(sys.argv[2:]))

@@ -1,0 +1,217 @@
+"""Flipped bits, cut files, files that are not what their name says: each is found, kept aside, and made again."""
+
+import json
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+from cspr_jax.cli import main
+from cspr_jax.errors import CsprError, RefusedError
+from cspr_jax.sweep.inspection import verify
+from reliability.support import Paper, check_same, content, go, sweep_of
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finished")
+    sweep = sweep_of(folder, tiles=4)
+    go(sweep, folder / "run")
+    return sweep, folder / "run", content(folder / "run")
+
+
+def without_quarantine(directory):
+    """What was set aside, moved out of the way."""
+    aside = directory / "quarantine"
+    found = sorted(path.name for path in aside.iterdir()) if aside.is_dir() else []
+    if aside.is_dir():
+        shutil.rmtree(aside)
+    return found
+
+
+def flip(path, rng, first=0, last=None):
+    data = bytearray(path.read_bytes())
+    bit = int(rng.integers(8 * first, 8 * (last or len(data))))
+    data[bit // 8] ^= 1 << (bit % 8)
+    path.chmod(0o644)
+    path.write_bytes(data)
+
+
+def flips(finished, tmp_path, count):
+    """Flip one bit of a shard, of the result, or of run.json; then run again. How many were noticed, of each kind."""
+    sweep, source, reference = finished
+    rng, noticed = np.random.default_rng(7), {"shard": 0, "result": 0, "run.json": 0}
+    directory = tmp_path / "run"
+    for i in range(count):
+        shutil.rmtree(directory, ignore_errors=True)
+        shutil.copytree(source, directory)
+        kind = ("shard", "result", "shard", "result", "run.json")[i % 5]
+        if kind == "shard":
+            shard = directory / "shards" / f"0000{i % 4}.h5"
+            flip(shard, rng, *((0, 1024) if i % 2 else ()))
+            os.unlink(directory / "small.h5")
+        elif kind == "result":
+            flip(directory / "small.h5", rng, *((0, 4096) if i % 4 == 1 else ()))
+        else:
+            flip(directory / "run.json", rng)
+            os.unlink(directory / "small.h5")
+        paper = Paper(sweep)
+        before = content(directory)
+        go(sweep, directory, paper=paper)
+        aside = without_quarantine(directory)
+        if kind == "result" and not aside:
+            # A bit that no content depends on: the file was left as it is.
+            assert content(directory) == before
+            shutil.copy(source / "small.h5", directory / "small.h5")
+        else:
+            noticed[kind] += 1
+            assert len(aside) == 1
+            assert len(paper.computed) == (kind == "shard")
+        check_same(directory, reference)
+    return noticed
+
+
+def check_flips(noticed, count):
+    assert noticed["shard"] == noticed["run.json"] * 2 == 2 * count // 5
+    assert noticed["result"] > 0.5 * 2 * count / 5
+
+
+def test_flipped_bits(finished, tmp_path):
+    check_flips(flips(finished, tmp_path, 100), 100)
+
+
+@pytest.mark.soak
+def test_flipped_bits_all(finished, tmp_path):
+    check_flips(flips(finished, tmp_path, 1000), 1000)
+
+
+def test_no_flip_of_the_result_changes_what_is_read(finished, tmp_path):
+    """Whatever bit of the result is flipped: verify tells, or every value and label is the old one."""
+    from cspr_jax.results import open_result
+
+    _, source, _ = finished
+    wanted, rng, silent = open_result(source / "small.h5"), np.random.default_rng(8), 0
+    for i in range(60):
+        path = tmp_path / f"{i}.h5"
+        shutil.copy(source / "small.h5", path)
+        flip(path, rng)
+        if verify(path)["faults"]:
+            continue
+        silent += 1
+        found = open_result(path)
+        for name, array in wanted.data.items():
+            np.testing.assert_array_equal(found.data[name], array)
+        assert (found.units, found.labels, list(found.axes)) == (wanted.units, wanted.labels, list(wanted.axes))
+    assert silent < 40
+
+
+def cut(path, rng):
+    path.write_bytes(path.read_bytes()[: int(rng.integers(0, path.stat().st_size))])
+
+
+def replacements(finished, tmp_path):
+    """Ways to put something else under the name of shard 2."""
+    _, source, _ = finished
+    other = sweep_of(tmp_path / "other", tiles=4, trajectory="max_arcs = 12")
+    go(other, tmp_path / "other" / "run")
+
+    def folder(path):
+        path.unlink()
+        path.mkdir()
+        (path / "inner").write_text("x")
+
+    def link(path):
+        shutil.move(path, path.parent.parent.parent / "elsewhere.h5")
+        path.symlink_to(path.parent.parent.parent / "elsewhere.h5")
+
+    return {
+        "empty": lambda path: path.write_bytes(b""),
+        "neighbour": lambda path: shutil.copy(source / "shards" / "00001.h5", path),
+        "other sweep": lambda path: shutil.copy(tmp_path / "other" / "run" / "shards" / "00002.h5", path),
+        "result": lambda path: shutil.copy(source / "small.h5", path),
+        "text": lambda path: path.write_text("hello\n" * 200),
+        "folder": folder,
+        "link": link,
+        "broken link": lambda path: (path.unlink(), path.symlink_to("nowhere")),
+        "stray": lambda path: shutil.copy(path, path.with_name("00099.h5")),
+        "foreign": lambda path: path.with_name("notes.txt").write_text("mine"),
+    }
+
+
+def test_replaced_shards(finished, tmp_path):
+    sweep, source, reference = finished
+    ways, directory = replacements(finished, tmp_path), tmp_path / "run"
+    rng = np.random.default_rng(9)
+    ways |= {f"cut {i}": lambda path: cut(path, rng) for i in range(30)}
+    for name, way in ways.items():
+        shutil.copytree(source, directory)
+        way(directory / "shards" / "00002.h5")
+        (directory / "small.h5").unlink()
+        paper = Paper(sweep)
+        go(sweep, directory, paper=paper)
+        assert len(without_quarantine(directory)) == 1, name
+        assert paper.computed == ([] if name in ("stray", "foreign") else [2]), name
+        check_same(directory, reference)
+        shutil.rmtree(directory)
+
+
+def test_cut_results(finished, tmp_path):
+    sweep, source, reference = finished
+    rng = np.random.default_rng(10)
+    shutil.copytree(source, tmp_path / "run")
+    for _ in range(30):
+        cut(tmp_path / "run" / "small.h5", rng)
+        assert verify(tmp_path / "run")["faults"]
+        go(sweep, tmp_path / "run")
+        assert without_quarantine(tmp_path / "run") == ["small.h5.0"]
+        check_same(tmp_path / "run", reference)
+
+
+def test_shards_of_another_sweep_are_not_touched_when_the_record_is_damaged(finished, tmp_path):
+    """A damaged run.json does not hand somebody's shards to another sweep."""
+    _, source, _ = finished
+    shutil.copytree(source, tmp_path / "run")
+    (tmp_path / "run" / "small.h5").unlink()
+    flip(tmp_path / "run" / "run.json", np.random.default_rng(1))
+    other = sweep_of(tmp_path / "other", tiles=4, trajectory="max_arcs = 12")
+    before = content(tmp_path / "run")
+    with pytest.raises(RefusedError, match="another sweep"):
+        go(other, tmp_path / "run")
+    assert content(tmp_path / "run") == before
+
+
+def test_somebodys_file_under_the_name_of_the_result(finished, tmp_path):
+    sweep, _, _ = finished
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "small.h5").write_text("mine")
+    with pytest.raises(CsprError, match="choose another -o"):
+        go(sweep, tmp_path / "run")
+    assert content(tmp_path / "run") == {"small.h5": b"mine"}
+
+
+def test_verify_and_status_tell_without_touching(finished, tmp_path, capsys):
+    _, source, _ = finished
+    shutil.copytree(source, tmp_path / "run")
+    directory = str(tmp_path / "run")
+    assert main(["verify", directory]) == 0
+    assert "tiles 4, shards 4, missing 0, cells 12" in capsys.readouterr().out
+    flip(tmp_path / "run" / "shards" / "00003.h5", np.random.default_rng(2))
+    (tmp_path / "run" / "shards" / "00000.h5").unlink()
+    (tmp_path / "run" / "shards" / ".00000.h5.12.part").write_bytes(b"x")
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*")}
+    assert main(["verify", directory, "--json"]) == 4
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert (found["shards"], found["missing"], len(found["faults"])) == (2, 1, 1)
+    assert len(err.splitlines()) == 1 and "00003.h5: its bytes have changed" in err
+    assert main(["status", directory, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["tiles"], found["shards"], found["unfinished"]) == (4, 3, 1)
+    assert found["last"]["event"] == "finished"
+    assert main(["status", directory]) == 0
+    assert "3 of 4 tiles" in capsys.readouterr().out
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*")} == before
+    for command in ("status", "verify"):
+        assert main([command, str(tmp_path)]) == 4
+        assert len(capsys.readouterr().err.splitlines()) == 1

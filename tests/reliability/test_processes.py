@@ -1,0 +1,228 @@
+"""Real processes: killed, stopped, started twice, short of memory or of disk, in places they may not write."""
+
+import errno
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from reliability.support import check_prefix, check_same, content, go, sweep_of
+
+PAPER = Path(__file__).with_name("paper_cspr.py")
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("job")
+    sweep = sweep_of(folder, tiles=12)
+    go(sweep, folder / "reference")
+    return sweep, content(folder / "reference")
+
+
+def start(sweep, directory, *options, seconds=0.02, **keywords):
+    command = [sys.executable, str(PAPER), str(seconds), "run", str(sweep.file), "-o", str(directory), *options]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, **keywords
+    )
+
+
+def finish(process, timeout=60):
+    """Exit code, and standard error."""
+    _, err = process.communicate(timeout=timeout)
+    return process.returncode, err
+
+
+def complete(sweep, directory, reference):
+    assert finish(start(sweep, directory, seconds=0)) == (0, "")
+    check_same(directory, reference)
+    shutil.rmtree(directory)
+
+
+def wait_for(path, process, seconds=20):
+    end = time.monotonic() + seconds
+    while not path.exists():
+        assert time.monotonic() < end and process.poll() is None
+        time.sleep(0.005)
+
+
+def kills(job, tmp_path, count):
+    sweep, reference = job
+    rng, directory, killed = np.random.default_rng(3), tmp_path / "run", 0
+    while killed < count:
+        process = start(sweep, directory)
+        time.sleep(rng.uniform(0.2, 1.0))
+        os.killpg(process.pid, signal.SIGKILL)
+        if finish(process)[0] == -signal.SIGKILL:
+            killed += 1
+            check_prefix(directory, reference)
+        else:
+            check_same(directory, reference)
+            shutil.rmtree(directory)
+    complete(sweep, directory, reference)
+
+
+def test_kills(job, tmp_path):
+    kills(job, tmp_path, 5)
+
+
+@pytest.mark.soak
+def test_kills_all(job, tmp_path):
+    kills(job, tmp_path, 200)
+
+
+def stops(job, tmp_path, count):
+    """Ctrl-C, SIGTERM, and Ctrl-C twice: the tile in progress is kept, and the code says what happened."""
+    sweep, reference = job
+    rng = np.random.default_rng(4)
+    for i in range(count):
+        directory = tmp_path / str(i)
+        number = (signal.SIGINT, signal.SIGTERM, signal.SIGINT)[i % 3]
+        process = start(sweep, directory, seconds=30 if i % 3 == 2 else 0.15)
+        wait_for(directory / "log.jsonl", process)
+        time.sleep(rng.uniform(0.0, 0.4))
+        process.send_signal(number)
+        if i % 3 == 2:
+            time.sleep(0.1)
+            process.send_signal(number)
+        code, err = finish(process, timeout=2)
+        assert code == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
+        assert len(err.splitlines()) == 1 and err.startswith("cspr: stopped") and "run it again" in err
+        check_prefix(directory, reference)
+        complete(sweep, directory, reference)
+
+
+def test_stop_signals(job, tmp_path):
+    stops(job, tmp_path, 6)
+
+
+@pytest.mark.soak
+def test_stop_signals_all(job, tmp_path):
+    stops(job, tmp_path, 100)
+
+
+def second_writers(job, tmp_path, count):
+    """While one writes, another is refused, whatever HDF5 does about locks; a dead one holds nothing."""
+    sweep, reference = job
+    for i in range(count):
+        directory = tmp_path / str(i)
+        environment = os.environ | ({"HDF5_USE_FILE_LOCKING": "FALSE"} if i % 2 else {})
+        holder = start(sweep, directory, seconds=0.3, env=environment)
+        wait_for(directory / "log.jsonl", holder)
+        code, err = finish(start(sweep, directory, env=environment), timeout=2)
+        assert (code, len(err.splitlines())) == (3, 1)
+        assert f"is being written by process {holder.pid} on " in err
+        os.kill(holder.pid, signal.SIGKILL)
+        finish(holder)
+        complete(sweep, directory, reference)
+
+
+def test_two_writers(job, tmp_path):
+    second_writers(job, tmp_path, 5)
+
+
+@pytest.mark.soak
+def test_two_writers_all(job, tmp_path):
+    second_writers(job, tmp_path, 50)
+
+
+def memory_limits(job, tmp_path, levels):
+    """Too little memory is an error or a success, never a missing tile; afterwards the run goes on."""
+    sweep, reference = job
+    codes = []
+    for i, megabytes in enumerate(levels):
+        directory, most = tmp_path / str(i), int(megabytes) << 20
+        process = start(
+            sweep,
+            directory,
+            seconds=0,
+            preexec_fn=lambda most=most: resource.setrlimit(resource.RLIMIT_AS, (most, most)),
+        )
+        code, _ = finish(process)
+        codes.append(code)
+        if code == 0:
+            check_same(directory, reference)
+        check_prefix(directory, reference)
+        complete(sweep, directory, reference)
+    return codes
+
+
+def test_little_memory(job, tmp_path):
+    codes = memory_limits(job, tmp_path, (120, 400, 3000))
+    assert codes[0] != 0 and codes[-1] == 0
+
+
+@pytest.mark.soak
+def test_little_memory_all(job, tmp_path):
+    codes = memory_limits(job, tmp_path, np.linspace(100, 1500, 30))
+    assert codes[0] != 0 and codes[-1] == 0
+
+
+def full_disks(job, tmp_path, count):
+    """A real disk of four megabytes that another program fills at some tile, and then leaves."""
+    sweep, reference = job
+    codes = []
+    for i in range(count):
+        disk, copy = tmp_path / str(i), tmp_path / f"copy{i}"
+        disk.mkdir()
+        run = f"{sys.executable} {PAPER} 0.05 run {sweep.file} -o {disk}/run"
+        script = f"""mount -t tmpfs -o size=4m none {disk} || exit 77
+            {run} 2> {tmp_path}/err &
+            until [ -e {disk}/run/shards/{i % 12:05d}.h5 ]; do sleep 0.01; done
+            head -c 9000000 /dev/zero > {disk}/filler
+            wait $!; first=$?
+            rm {disk}/filler; ls -AR {disk}/run > {tmp_path}/left
+            {run} || exit 78
+            cp -r {disk}/run {copy}; exit $first"""
+        done = subprocess.run(["unshare", "-m", "sh", "-c", script], capture_output=True, text=True)
+        if not copy.exists() and done.returncode in (1, 77):
+            pytest.skip("no private mounts here: " + done.stderr.strip())
+        codes.append(done.returncode)
+        assert done.returncode in (0, 4), done.stderr
+        if done.returncode:
+            assert len((tmp_path / "err").read_text().splitlines()) == 1
+            assert ".part" not in (tmp_path / "left").read_text()
+        check_same(copy, reference)
+    assert 4 in codes
+    return codes
+
+
+@pytest.mark.skipif(shutil.which("unshare") is None, reason="needs unshare")
+def test_a_full_disk(job, tmp_path):
+    full_disks(job, tmp_path, 3)
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(shutil.which("unshare") is None, reason="needs unshare")
+def test_a_full_disk_all(job, tmp_path):
+    full_disks(job, tmp_path, 20)
+
+
+def test_a_folder_that_may_not_be_written(job, tmp_path):
+    """As nobody: root may write everywhere."""
+    sweep, _ = job
+    readable = tmp_path / "open"
+    readable.mkdir()
+    shutil.copy(sweep.file, readable / "small.toml")
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o555)
+    for folder in (tmp_path, *tmp_path.parents):
+        if folder.stat().st_uid == os.getuid() and not folder.stat().st_mode & 0o005:
+            folder.chmod(folder.stat().st_mode | 0o005)
+    who = {"user": 65534, "group": 65534, "extra_groups": []} if os.getuid() == 0 else {}
+    command = [sys.executable, str(PAPER), "0", "run", str(readable / "small.toml"), "-o", str(closed / "run")]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, cwd=readable, **who)
+    except PermissionError:
+        pytest.skip("another user may not start this Python")
+    if "Permission denied" in done.stderr and "can't open file" in done.stderr:
+        pytest.skip("another user may not read the tests")
+    assert (done.returncode, len(done.stderr.splitlines())) == (4, 1), done.stderr
+    assert os.strerror(errno.EACCES) in done.stderr
+    assert list(closed.iterdir()) == []
