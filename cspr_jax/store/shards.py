@@ -8,6 +8,7 @@ import dataclasses
 import hashlib
 import io
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -147,21 +148,24 @@ def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -
     return shard
 
 
-def identity_in(path: Path) -> str | None:
-    """The identity that a shard names.
+def owners(paths: Iterable[Path]) -> set[tuple[str, str]]:
+    """Whose shards these are.
 
     Args:
-        path: the file.
+        paths: of the shards; damaged ones are passed over.
 
     Returns:
-        the identity, or None if the shard is damaged.
+        the identities of their sweeps, each with the hash of an environment.
     """
-    try:
-        file, header = _opened(path)
-    except DamagedError:
-        return None
-    file.close()
-    return str(header["identity"])
+    found = set()
+    for path in paths:
+        try:
+            file, header = _opened(path)
+        except DamagedError:
+            continue
+        file.close()
+        found.add((str(header["identity"]), str(header["environment"])))
+    return found
 
 
 def _opened(path: Path) -> tuple[h5py.File, dict[str, Any]]:

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.errors import RefusedError, one_line
-from cspr_jax.identity import differences
+from cspr_jax.identity import differences, digest
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.record import Record, read_record, write_record
-from cspr_jax.store.shards import DamagedError, identity_in
+from cspr_jax.store.shards import DamagedError, owners
 from cspr_jax.sweep.definition import Sweep
 
 
@@ -27,7 +27,7 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder) -> None:
             raise RefusedError(differing(sweep, folder, record.settings))
         return
     # Without a record that can be believed, the shards say whose they are.
-    if {identity_in(path) for path in folder.shards.glob("*.h5")} - {None, sweep.identity}:
+    if {identity for identity, _ in owners(folder.shards.glob("*.h5"))} - {sweep.identity}:
         raise RefusedError(one_line(f"{folder.path}: holds shards of another sweep: choose another -o"))
 
 
@@ -58,9 +58,13 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
         RefusedError: with a line for each key that differs.
     """
     record = _record(folder.record)
-    if record is None or accept or record.environment == environment:
+    if accept or (record is not None and record.environment == environment):
         return
     advice = "--accept-environment-change mixes them, another -o starts anew"
+    if record is None:
+        if {theirs for _, theirs in owners(folder.shards.glob("*.h5"))} - {digest(environment)}:
+            raise RefusedError(one_line(f"{folder.path}: its shards were computed in another environment: {advice}"))
+        return
     lines = differences(environment, record.environment)
     raise RefusedError("\n".join(one_line(f"{folder.path}: {line}: {advice}") for line in lines))
 

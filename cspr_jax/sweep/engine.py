@@ -111,7 +111,7 @@ class Run:
         try:
             content = read_content(self._folder.result)
         except DamagedError as error:
-            if not self._folder.record.exists():
+            if not (self._folder.record.exists() or self._folder.shards.is_dir()):
                 raise RefusedError(f"{self._folder.result}: is there, and {error}: choose another -o") from error
             return None
         if content.identity != self._sweep.identity:
