@@ -82,9 +82,11 @@ def _is_ours(axes: dict[str, np.ndarray], data: dict[str, np.ndarray], attribute
         shape = tuple(points.size for points in axes.values())
         numbers = [*axes.values(), *data.values()]
         return all(array.dtype.kind in "fiu" for array in numbers) and all(a.shape == shape for a in data.values())
-    needed = {"position": 2, "tension": 2}
-    fits = all(name in data and data[name].ndim == n and data[name].dtype.kind == "f" for name, n in needed.items())
-    return fits and "t" in axes and all(data[name].shape == (axes["t"].size, 3) for name in needed)
+    if "t" not in axes or not isinstance(attributes.get("z0"), float):
+        return False
+    shape = (axes["t"].size, 3)
+    found = [data.get(name) for name in ("position", "tension")]
+    return all(array is not None and array.dtype.kind == "f" and array.shape == shape for array in found)
 
 
 def _dimensions(everything: dict[str, h5py.Dataset], scales: set[str]) -> list[str]:

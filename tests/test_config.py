@@ -263,7 +263,7 @@ def read_plan(path):
 
 @pytest.mark.parametrize(("good", "read"), [(PLAN, read_plan), (SWEEP, read_sweep)], ids=["plan", "sweep"])
 def test_only_one_line_config_errors_escape(tmp_path, monkeypatch, good, read):
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=2_000_000))
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(total=2_000_000))
     path, outcomes = tmp_path / "in.toml", []
 
     @settings(max_examples=200)

@@ -1,6 +1,7 @@
 """TOML to a checked model; a mistake becomes one line that names file, key, value and what is allowed."""
 
 import difflib
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,6 +12,9 @@ from pydantic_core import ErrorDetails
 from cspr_jax.errors import ConfigError, shown
 
 LARGEST_FILE = 1 << 20
+# The time that tomllib takes grows with the square of a key's parts.
+LONGEST_KEY = 64
+_LONG_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{LONGEST_KEY - 1}}}""")
 # Names of the variants of a union; they are part of pydantic's location of an error, not of the user's key.
 VARIANT = "~"
 
@@ -63,6 +67,8 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
     Raises:
         ConfigError: it is not TOML.
     """
+    if _LONG_KEY.search(text):
+        raise ConfigError(path, f"is not TOML that is read here: a key of {LONGEST_KEY} parts or more")
     try:
         return tomllib.loads(text)
     except RecursionError as error:

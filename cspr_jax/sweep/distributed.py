@@ -98,7 +98,8 @@ class Scheduler:
         def submit(index: int) -> Any:
             return self._client.submit(compute_tile, self._pickled, index, pure=False)
 
-        running = as_completed([submit(index) for _, index in zip(range(room), waiting, strict=False)])
+        first = [submit(index) for _, index in zip(range(room), waiting, strict=False)]
+        running = as_completed(first, loop=self._client.loop)
         try:
             for future in running:
                 yield future.result()

@@ -1,0 +1,158 @@
+"""Several processes and a dask scheduler give the bytes of one process; a lost worker's tile is computed again."""
+
+import contextlib
+import io
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+from distributed import LocalCluster
+
+from cspr_jax.cli import main
+from cspr_jax.sweep.definition import read_sweep
+from reliability.support import check_prefix, check_same, content
+
+SWEEP = """schema = 1
+map = "minimum-arcs"
+robot = "prototype"
+[axes]
+x = { start = -1.2, stop = 1.2, count = 8 }
+y = [-0.9, 0.1, 0.8]
+z = [0.8, 1.9]
+z0 = [1.7]
+[trajectory]
+from = { position = [0.7, 0.7, 3.0] }
+[run]
+tile = [1, 3, 2, 1]
+"""
+
+
+def cspr(*arguments):
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        code = main([str(argument) for argument in arguments])
+    return code, out.getvalue(), err.getvalue()
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    """A sweep file of eight tiles, and what one process makes of it."""
+    folder = tmp_path_factory.mktemp("job")
+    path = folder / "eight.toml"
+    path.write_text(SWEEP)
+    code, _, err = cspr("run", path, "-o", folder / "run")
+    assert (code, err) == (0, "")
+    return path, content(folder / "run")
+
+
+def kill_one_when(directory, shards, victims):
+    """Kill one of the victims as soon as so many shards are there."""
+
+    def work():
+        end = time.monotonic() + 60
+        while time.monotonic() < end and len(list((directory / "shards").glob("0*.h5"))) < shards:
+            time.sleep(0.005)
+        for process in victims()[:1]:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                process.kill()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    return thread
+
+
+def spawned():
+    """Worker processes that a run started below this process."""
+    found = psutil.Process().children(recursive=True)
+    return [p for p in found if "spawn_main" in " ".join(p.cmdline()) and p.memory_info().rss > 1 << 27]
+
+
+def test_worker_processes(job, tmp_path):
+    path, reference = job
+    thread = kill_one_when(tmp_path / "run", 2, spawned)
+    code, _, err = cspr("run", path, "-o", tmp_path / "run", "--workers", 2)
+    thread.join()
+    assert (code, err) == (0, "")
+    check_same(tmp_path / "run", reference)
+
+
+def workers_of(cluster):
+    return [psutil.Process(worker.pid) for worker in cluster.workers.values()]
+
+
+def test_a_dask_scheduler(job, tmp_path):
+    path, reference = job
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster:
+        thread = kill_one_when(tmp_path / "run", 2, lambda: workers_of(cluster))
+        code, _, err = cspr("run", path, "-o", tmp_path / "run", "--scheduler", cluster.scheduler_address)
+        thread.join()
+        assert (code, err) == (0, "")
+        check_same(tmp_path / "run", reference)
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (("--workers", "0"), 2, "must be an integer from 1"),
+        (("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), 2, "must be absent beside --scheduler"),
+        (("--scheduler", "not an address"), 2, "must be an address"),
+    ],
+)
+def test_wrong_workers(job, tmp_path, options, code, words):
+    found, out, err = cspr("run", job[0], "-o", tmp_path / "run", *options)
+    assert (found, out, len(err.splitlines())) == (code, "", 1) and words in err
+    assert not (tmp_path / "run").exists()
+
+
+def real_kills(job, tmp_path, count, longest):
+    """The real command line, its whole process group killed while it compiles, computes or writes."""
+    path, reference = job
+    rng, directory, killed = np.random.default_rng(5), tmp_path / "run", 0
+    command = [sys.executable, "-m", "cspr_jax", "run", str(path), "-o", str(directory)]
+    root = Path(__file__).parents[2]
+    while killed < count:
+        process = subprocess.Popen(
+            command, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root
+        )
+        try:
+            process.communicate(timeout=rng.uniform(0.5, longest))
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+            killed += 1
+            check_prefix(directory, reference)
+            continue
+        assert process.returncode == 0
+        check_same(directory, reference)
+        shutil.rmtree(directory)
+    assert cspr("run", path, "-o", directory)[0] == 0
+    check_same(directory, reference)
+
+
+def test_kills_of_the_real_command(job, tmp_path):
+    real_kills(job, tmp_path, 2, 7.0)
+
+
+@pytest.mark.soak
+def test_kills_of_the_real_command_all(job, tmp_path):
+    real_kills(job, tmp_path, 200, 8.0)
+
+
+def test_the_sweep_travels_whole(job):
+    """Workers get the sweep by pickle; errors come back with their exit codes."""
+    import pickle
+
+    from cspr_jax.errors import ConfigError, InputError, ResourceError, SelfCheckError
+
+    sweep = pickle.loads(pickle.dumps(read_sweep(job[0])))
+    assert sweep.identity == read_sweep(job[0]).identity
+    for error in (ConfigError("f", "m"), InputError("k", 1, "2"), ResourceError("r"), SelfCheckError("s")):
+        again = pickle.loads(pickle.dumps(error))
+        assert (type(again), str(again), again.exit_code) == (type(error), str(error), error.exit_code)
