@@ -156,3 +156,48 @@ def test_the_sweep_travels_whole(job):
     for error in (ConfigError("f", "m"), InputError("k", 1, "2"), ResourceError("r"), SelfCheckError("s")):
         again = pickle.loads(pickle.dumps(error))
         assert (type(again), str(again), again.exit_code) == (type(error), str(error), error.exit_code)
+
+
+LONG = """schema = 1
+map = "minimum-arcs"
+robot = "prototype"
+[axes]
+x = { start = -1.5, stop = 1.5, count = 128 }
+y = { start = -1.5, stop = 1.5, count = 128 }
+z = { start = 0.3, stop = 3.2, count = 64 }
+z0 = [1.5, 1.6, 1.7, 1.8]
+[trajectory]
+from = { position = [0.7, 0.7, 3.0] }
+[run]
+tile = [1, 128, 64, 1]
+"""
+
+
+@pytest.mark.soak
+def test_a_long_sweep_that_is_killed_all_the_time(tmp_path):
+    """Four million cells; every 5 to 60 s all processes of the run are killed, for half an hour and until it ends."""
+    path = tmp_path / "long.toml"
+    path.write_text(LONG)
+    assert cspr("run", path, "-o", tmp_path / "whole")[0] == 0
+    reference = content(tmp_path / "whole")
+    command = [sys.executable, "-m", "cspr_jax", "run", str(path), "-o", str(tmp_path / "run")]
+    rng, begin, kills, ends = np.random.default_rng(18), time.monotonic(), 0, 0
+    while time.monotonic() < begin + 1800 or (tmp_path / "run").exists():
+        process = subprocess.Popen(
+            [*command, *(["--workers", "2"] if kills % 4 == 3 else [])],
+            **{"start_new_session": True, "stderr": subprocess.PIPE, "stdout": subprocess.PIPE},
+            cwd=Path(__file__).parents[2],
+        )
+        try:
+            _, err = process.communicate(timeout=rng.uniform(5.0, 60.0))
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+            kills += 1
+            continue
+        assert (process.returncode, err) == (0, b"")
+        check_same(tmp_path / "run", reference)
+        shutil.rmtree(tmp_path / "run")
+        ends += 1
+    sys.stderr.write(f"{kills} kills, {ends} runs to the end\n")
+    assert kills > 20 and ends >= 1
