@@ -165,7 +165,8 @@ def _executor(options: argparse.Namespace, sweep: Any) -> Iterator[Any]:
     if options.scheduler is not None:
         from cspr_jax.sweep.distributed import Scheduler
 
-        workers = Scheduler(sweep, options.scheduler, accept_environment_change=options.accept_environment_change)
+        accept = options.accept_environment_change
+        workers = Scheduler(sweep, options.scheduler, accept_environment_change=accept, warn=_warn)
         try:
             yield workers
         finally:

@@ -2,7 +2,7 @@
 
 import contextlib
 import pickle
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from cspr_jax.errors import ConfigError, RefusedError, ResourceError
@@ -14,6 +14,8 @@ from cspr_jax.sweep.tile import compute_tile
 from cspr_jax.sweep.work import Computed
 
 SECONDS_TO_CONNECT = 20
+# A cluster's queue may let workers wait; people are told after the first of these.
+SECONDS_FOR_WORKERS = (5, 900)
 # Tiles in flight for each thread of a worker: one computes while another travels.
 AHEAD = 2
 
@@ -25,13 +27,21 @@ class Scheduler:
         sweep: the sweep.
         address: of the scheduler, such as tcp://host:8786.
         accept_environment_change: whether workers may differ from one another.
+        warn: called with a line for people.
 
     Raises:
         ConfigError: dask.distributed is not installed, or the address is wrong.
         ResourceError: no scheduler or no worker there.
     """
 
-    def __init__(self, sweep: Sweep, address: str, *, accept_environment_change: bool = False) -> None:
+    def __init__(
+        self,
+        sweep: Sweep,
+        address: str,
+        *,
+        accept_environment_change: bool = False,
+        warn: Callable[[str], None] = lambda line: None,
+    ) -> None:
         """Connect, and wait for the first worker."""
         try:
             import distributed
@@ -48,11 +58,18 @@ class Scheduler:
             raise ResourceError(
                 f"--scheduler {address}: no scheduler answers: start one, or mend the address"
             ) from error
+        if not self._has_workers(SECONDS_FOR_WORKERS[0]):
+            warn(f"--scheduler {address}: has no workers yet; waiting for {SECONDS_FOR_WORKERS[1] // 60} minutes")
+            if not self._has_workers(SECONDS_FOR_WORKERS[1]):
+                self.close()
+                raise ResourceError(f"--scheduler {address}: has no workers: start some")
+
+    def _has_workers(self, seconds: float) -> bool:
         try:
-            self._client.wait_for_workers(1, timeout=SECONDS_TO_CONNECT)
-        except TimeoutError as error:
-            self.close()
-            raise ResourceError(f"--scheduler {address}: has no workers: start some") from error
+            self._client.wait_for_workers(1, timeout=seconds)
+        except TimeoutError:
+            return False
+        return True
 
     def environment(self) -> dict[str, Any]:
         """What all workers have in common.

@@ -90,7 +90,7 @@ def stops(job, tmp_path, count):
         if i % 3 == 2:
             time.sleep(0.1)
             process.send_signal(number)
-        code, err = finish(process, timeout=2)
+        code, err = finish(process, timeout=10)
         assert code == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
         assert len(err.splitlines()) == 1 and err.startswith("cspr: stopped") and "run it again" in err
         check_prefix(directory, reference)
@@ -114,7 +114,7 @@ def second_writers(job, tmp_path, count):
         environment = os.environ | ({"HDF5_USE_FILE_LOCKING": "FALSE"} if i % 2 else {})
         holder = start(sweep, directory, seconds=0.3, env=environment)
         wait_for(directory / "log.jsonl", holder)
-        code, err = finish(start(sweep, directory, env=environment), timeout=2)
+        code, err = finish(start(sweep, directory, env=environment), timeout=10)
         assert (code, len(err.splitlines())) == (3, 1)
         assert f"is being written by process {holder.pid} on " in err
         os.kill(holder.pid, signal.SIGKILL)
