@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from cspr_jax.errors import StoreError
-from cspr_jax.store.netcdf import UNREADABLE, plain, refuse_foreign
+from cspr_jax.store.netcdf import UNREADABLE, plain, reason, refuse_foreign
 
 # A result is read into memory as a whole: bytes of its data.
 LARGEST_DATA = 8e9
@@ -65,8 +65,7 @@ def open_result(path: Path) -> Result:
             attributes = {name: plain(value) for name, value in file.attrs.items()}
             settings = json.loads(attributes.get("settings", "{}"))
     except (*UNREADABLE, MemoryError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise StoreError(f"{path}: cannot be read as a result: {reason}") from error
+        raise StoreError(f"{path}: cannot be read as a result: {reason(error)}") from error
     data = {name: array for name, array in found.items() if name not in scales}
     axes = {name: found[name] for name in order}
     if not _is_ours(axes, data, attributes) or not isinstance(settings, dict):

@@ -21,6 +21,7 @@ from cspr_jax.store.netcdf import (
     make_datasets,
     open_hdf5,
     plain,
+    reason,
     refuse_foreign,
     set_attributes,
 )
@@ -142,7 +143,7 @@ def read_content(path: Path) -> Content:
                 raise DamagedError("its content has changed")
             near_zero, mixed = int(file.attrs["cells_near_zero"]), bool(file.attrs["mixed"])
     except (StoreError, *UNREADABLE, MemoryError) as error:
-        raise DamagedError(f"it cannot be read: {str(error).splitlines()[0] if str(error) else error!r}") from error
+        raise DamagedError(f"it cannot be read: {reason(error)}") from error
     tiles = sum(1 for _ in grid.places())
     return Content(identity(settings), settings, grid.size, tiles, near_zero, mixed)
 

@@ -230,6 +230,18 @@ def refuse_foreign(path: Path, file: h5py.File, largest: float) -> None:
         raise StoreError(f"{path}: holds {total / 1e9:.3g} GB of data: must be at most {largest / 1e9:.3g} GB")
 
 
+def reason(error: BaseException) -> str:
+    """The first line of what a library says.
+
+    Args:
+        error: what it raised.
+
+    Returns:
+        the line, or the error's name where it says nothing.
+    """
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
+
+
 def file_size(path: Path) -> int:
     """Size of a regular file.
 

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 
 from cspr_jax.identity import canonical_json
-from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, file_size, new_dataset
+from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, file_size, new_dataset, reason
 
 BLOCK = 512
 LARGEST_SHARD = 64 << 20
@@ -141,7 +141,7 @@ def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -
             values = {name: np.asarray(file[name]) for name in layout.store}
             written = file.attrs["content_sha256"]
         except UNREADABLE as error:
-            raise DamagedError(f"HDF5 cannot read it: {_reason(error)}") from error
+            raise DamagedError(f"HDF5 cannot read it: {reason(error)}") from error
     shard = Shard(index, str(header["environment"]), int(header["near_zero"]), values)
     if shard.digest != written:
         raise DamagedError("its content has changed")
@@ -184,9 +184,5 @@ def _opened(path: Path) -> tuple[h5py.File, dict[str, Any]]:
         if not {"identity", "tile", "environment", "near_zero"} <= header.keys():
             raise DamagedError("its header is not whole")
     except UNREADABLE as error:
-        raise DamagedError(f"HDF5 cannot read it: {_reason(error)}") from error
+        raise DamagedError(f"HDF5 cannot read it: {reason(error)}") from error
     return file, header
-
-
-def _reason(error: BaseException) -> str:
-    return str(error).splitlines()[0] if str(error) else type(error).__name__

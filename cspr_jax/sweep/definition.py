@@ -20,7 +20,7 @@ from cspr_jax.store.shards import Layout
 from cspr_jax.tiles import LARGEST_TILE, Grid, tile_shape
 
 # Each tile is a file.
-LARGEST_TILES = 1_000_000
+LARGEST_TILES = 100_000
 _START = ("from_x", "from_y", "from_z")
 
 
