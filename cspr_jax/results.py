@@ -10,6 +10,7 @@ import numpy as np
 
 from cspr_jax.errors import StoreError
 from cspr_jax.store.netcdf import UNREADABLE, plain, reason, refuse_foreign
+from cspr_jax.store.seal import DamagedError, check_file
 
 # A result is read into memory as a whole: bytes of its data.
 LARGEST_DATA = 8e9
@@ -54,21 +55,23 @@ def open_result(path: Path) -> Result:
         StoreError: no such file, not HDF5, damaged, or not written by this program.
     """
     try:
+        check_file(path)
         with h5py.File(path, "r") as file:
             refuse_foreign(path, file, LARGEST_DATA)
             everything = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset)}
             scales = {name for name, item in everything.items() if item.is_scale}
-            order = _dimensions(everything, scales)
             found = {name: np.asarray(item) for name, item in everything.items()}
             units = {name: str(plain(item.attrs.get("units", ""))) for name, item in everything.items()}
             names = {name: str(plain(item.attrs.get("long_name", name))) for name, item in everything.items()}
             attributes = {name: plain(value) for name, value in file.attrs.items()}
             settings = json.loads(attributes.get("settings", "{}"))
-    except (*UNREADABLE, MemoryError) as error:
+    except (DamagedError, *UNREADABLE, MemoryError) as error:
         raise StoreError(f"{path}: cannot be read as a result: {reason(error)}") from error
     data = {name: array for name, array in found.items() if name not in scales}
-    axes = {name: found[name] for name in order}
-    if not _is_ours(axes, data, attributes) or not isinstance(settings, dict):
+    # HDF5's own record of dimensions is not asked: damaged, it keeps the library busy for ever.
+    order = settings.get("dimensions") if isinstance(settings, dict) and "map" in attributes else ["t"]
+    axes = {str(name): found[name] for name in order if name in scales} if isinstance(order, list) else {}
+    if not _is_ours(axes, data, attributes):
         raise StoreError(f"{path}: is not a result of cspr: it has no quantities with named axes")
     return Result(axes, data, units, names, attributes, settings)
 
@@ -86,12 +89,3 @@ def _is_ours(axes: dict[str, np.ndarray], data: dict[str, np.ndarray], attribute
     shape = (axes["t"].size, 3)
     found = [data.get(name) for name in ("position", "tension")]
     return all(array is not None and array.dtype.kind == "f" and array.shape == shape for array in found)
-
-
-def _dimensions(everything: dict[str, h5py.Dataset], scales: set[str]) -> list[str]:
-    order: list[str] = []
-    for name, item in everything.items():
-        if name not in scales:
-            names = [Path(dim[0].name).name for dim in item.dims]
-            order += [n for n in names if n not in order]
-    return order

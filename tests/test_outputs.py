@@ -103,7 +103,7 @@ def made(path: Path, sizes: dict[str, int] = SHAPE, **attributes: object) -> Pat
     index = np.indices(tuple(sizes.values()))
     arcs = sum(i * w for i, w in zip(index, (10, 1, 1, 0), strict=True))
     known = {"map": "minimum-arcs", "robot": "prototype", "z_axis": "down", "base_points": np.eye(3) * 0.3}
-    known["settings"] = json.dumps({"trajectory": {"from": {"position": [0.7, 0.7, 3.0]}}})
+    known["settings"] = json.dumps({"dimensions": list(sizes), "trajectory": {"from": {"position": [0.7, 0.7, 3.0]}}})
     store, tile = ["arcs", "margin"], tuple(sizes.values())
     with new_hdf5(path, known | attributes) as file:
         make_datasets(file, axes, store, dtype="float64", tile=tile)

@@ -12,12 +12,11 @@ import h5py
 import numpy as np
 
 from cspr_jax.errors import StoreError
-from cspr_jax.identity import digest, identity
+from cspr_jax.identity import identity
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import (
     UNREADABLE,
     file_size,
-    labels,
     make_datasets,
     open_hdf5,
     plain,
@@ -26,7 +25,8 @@ from cspr_jax.store.netcdf import (
     set_attributes,
 )
 from cspr_jax.store.publishing import new_file
-from cspr_jax.store.shards import DamagedError, Layout, Shard, digest_of
+from cspr_jax.store.seal import DamagedError, check_file
+from cspr_jax.store.shards import Layout, Shard, digest_of
 from cspr_jax.tiles import Grid
 
 LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES = 1 << 30, 1 << 28
@@ -91,16 +91,15 @@ def consolidate(
             mixed = int(environments != {attributes["environment"]})
             found = {"cells_near_zero": near_zero, "mixed": mixed, "environments": " ".join(sorted(environments))}
             set_attributes(file, found)
-            set_attributes(file, {"content_sha256": _fold(file, grid.axes, digests)})
+            set_attributes(file, {"content_sha256": _fold(grid.axes, digests)})
         with os.fdopen(os.dup(descriptor), "rb") as again, h5py.File(again, "r") as file:
             again_digests = _digests(file, grid, layout.store, between)
-            if again_digests != digests or _fold(file, grid.axes, digests) != plain(file.attrs["content_sha256"]):
+            if again_digests != digests or _fold(grid.axes, digests) != plain(file.attrs["content_sha256"]):
                 raise StoreError(f"{path}: the disk does not give back what was written: check the disk")
 
 
-def _fold(file: h5py.File, axes: dict[str, np.ndarray], digests: list[str]) -> str:
-    # Of labels, axes and tiles.
-    return hashlib.sha256("\n".join([digest(labels(file)), digest_of(axes), *digests]).encode()).hexdigest()
+def _fold(axes: dict[str, np.ndarray], digests: list[str]) -> str:
+    return hashlib.sha256("\n".join([digest_of(axes), *digests]).encode()).hexdigest()
 
 
 def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[], None]) -> list[str]:
@@ -125,6 +124,7 @@ def read_content(path: Path) -> Content:
     """
     if file_size(path) < 0:
         raise DamagedError("it is not a file")
+    check_file(path)
     try:
         with h5py.File(path, "r") as file:
             settings = json.loads(plain(file.attrs["settings"]))
@@ -139,7 +139,7 @@ def read_content(path: Path) -> Content:
             grid = Grid({name: np.asarray(file[name]).reshape(-1) for name in settings["dimensions"]}, tile)
             _check_shapes(file, grid, store)
             digests = _digests(file, grid, store, lambda: None)
-            if _fold(file, grid.axes, digests) != plain(file.attrs["content_sha256"]):
+            if _fold(grid.axes, digests) != plain(file.attrs["content_sha256"]):
                 raise DamagedError("its content has changed")
             near_zero, mixed = int(file.attrs["cells_near_zero"]), bool(file.attrs["mixed"])
     except (StoreError, *UNREADABLE, MemoryError) as error:

@@ -13,6 +13,7 @@ from cspr_jax.errors import StoreError
 from cspr_jax.quantities import AXES, QUANTITIES, Quantity, flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import new_file
+from cspr_jax.store.seal import seal_file
 from cspr_jax.store.stream import DiskFile
 
 # The format whose metadata carry checksums.
@@ -43,7 +44,7 @@ def new_hdf5(path: Path, attributes: dict[str, Any], *, disk: Disk | None = None
 
 @contextlib.contextmanager
 def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterator[h5py.File]:
-    """An HDF5 file in an empty file that is open; what the disk refuses is raised when HDF5 has closed it.
+    """An HDF5 file in an empty file that is open; it is sealed when HDF5 has closed it.
 
     Args:
         disk: what to write with.
@@ -65,6 +66,7 @@ def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterat
         through.raise_failure()  # HDF5's complaint follows from it
         raise
     through.raise_failure()
+    seal_file(disk, descriptor, through.size)
 
 
 def make_datasets(
@@ -164,32 +166,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, bytes):
         return value.decode()
     return value.item() if isinstance(value, np.generic) else value
-
-
-def labels(file: h5py.File) -> dict[str, Any]:
-    """Everything that a file says of its data: attributes, and names of dimensions.
-
-    Args:
-        file: open.
-
-    Returns:
-        plain values, by name of the dataset; "/" for the file.
-    """
-    found = {"/": _attributes(file)}
-    for name, item in file.items():
-        names = [[scale.name for scale in dimension.values()] for dimension in item.dims]
-        found[name] = {"attributes": _attributes(item), "dimensions": names}
-    return found
-
-
-def _attributes(item: h5py.HLObject) -> dict[str, Any]:
-    # References are how dimensions are kept; checksums are checked on their own.
-    hidden = ("content_sha256", "DIMENSION_LIST", "REFERENCE_LIST")
-    return {name: _listed(plain(value)) for name, value in item.attrs.items() if name not in hidden}
-
-
-def _listed(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:

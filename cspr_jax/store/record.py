@@ -9,7 +9,7 @@ from cspr_jax.identity import digest
 from cspr_jax.store.disk import READ_ONLY, Disk
 from cspr_jax.store.netcdf import file_size
 from cspr_jax.store.publishing import publish
-from cspr_jax.store.shards import DamagedError
+from cspr_jax.store.seal import DamagedError
 
 LARGEST_RECORD = 64 << 20
 _KEYS = {"identity", "settings", "environment", "source"}

@@ -1,8 +1,4 @@
-"""Shards: the file of one tile, immutable once it has its name.
-
-A shard is HDF5 behind a user block of 512 bytes that holds the SHA-256 of everything after it. So a
-flipped bit is found before HDF5 reads the file, and any HDF5 tool still opens it.
-"""
+"""Shards: the file of one tile, immutable once it has its name. HDF5, with a seal."""
 
 import dataclasses
 import hashlib
@@ -17,14 +13,9 @@ import numpy as np
 
 from cspr_jax.identity import canonical_json
 from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, file_size, new_dataset, reason
+from cspr_jax.store.seal import DamagedError, sealed, unsealed
 
-BLOCK = 512
 LARGEST_SHARD = 64 << 20
-_MAGIC = b"cspr shard 1, sha256 of the rest: "
-
-
-class DamagedError(Exception):
-    """A shard or a result that is not what was written."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,18 +83,13 @@ def encode(layout: Layout, shard: Shard) -> bytes:
         the file's content.
     """
     memory = io.BytesIO()
-    with h5py.File(memory, "w", libver=LAYOUT, userblock_size=BLOCK) as file:
+    with h5py.File(memory, "w", libver=LAYOUT) as file:
         file.attrs["header"] = canonical_json(_header(layout, shard.index, shard.environment, shard.near_zero))
         file.attrs["content_sha256"] = shard.digest
         for name in layout.store:
             array = shard.values[name]
             new_dataset(file, name, array.shape, dtype_of(name, layout.dtype), array.shape)[...] = array
-    data = memory.getvalue()
-    return _block(data[BLOCK:]) + data[BLOCK:]
-
-
-def _block(rest: bytes) -> bytes:
-    return (_MAGIC + hashlib.sha256(rest).hexdigest().encode() + b"\n").ljust(BLOCK, b"\0")
+    return sealed(memory.getvalue())
 
 
 def _header(layout: Layout, index: int, environment: str, near_zero: int) -> dict[str, Any]:
@@ -169,15 +155,12 @@ def owners(paths: Iterable[Path]) -> set[tuple[str, str]]:
 
 
 def _opened(path: Path) -> tuple[h5py.File, dict[str, Any]]:
-    size = file_size(path)
-    if not BLOCK < size <= LARGEST_SHARD:
+    if not 0 <= file_size(path) <= LARGEST_SHARD:
         raise DamagedError("it is not a file of a fitting size")
     try:
-        data = path.read_bytes()
+        data = unsealed(path.read_bytes())
     except OSError as error:
         raise DamagedError(f"it cannot be read: {error.strerror}") from error
-    if data[:BLOCK] != _block(data[BLOCK:]):
-        raise DamagedError("its bytes have changed")
     try:
         file = h5py.File(io.BytesIO(data), "r")
         header = json.loads(file.attrs["header"])

@@ -22,6 +22,11 @@ class DiskFile(io.RawIOBase):
         self._disk, self._file, self._at, self._size = disk, file, 0, 0
         self._failure: BaseException | None = None
 
+    @property
+    def size(self) -> int:
+        """Bytes that the file has."""
+        return self._size
+
     def raise_failure(self) -> None:
         """Raise what the disk first refused, if it did."""
         if self._failure is not None:

@@ -7,7 +7,8 @@ from cspr_jax.errors import RefusedError, one_line
 from cspr_jax.identity import differences, digest
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.record import Record, read_record, write_record
-from cspr_jax.store.shards import DamagedError, owners
+from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.shards import owners
 from cspr_jax.sweep.definition import Sweep
 
 

@@ -17,7 +17,8 @@ from cspr_jax.store.disk import Disk
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.publishing import make_folders, publish, refusal
 from cspr_jax.store.record import Record
-from cspr_jax.store.shards import DamagedError, Shard, encode, read_shard
+from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.shards import Shard, encode, read_shard
 from cspr_jax.sweep import claims
 from cspr_jax.sweep.definition import Sweep, attributes, check_room
 from cspr_jax.sweep.signals import Stop

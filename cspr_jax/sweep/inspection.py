@@ -9,7 +9,8 @@ from cspr_jax.store.consolidation import Content, read_content
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.record import Record, read_record
-from cspr_jax.store.shards import DamagedError, Layout, read_shard
+from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.shards import Layout, read_shard
 from cspr_jax.tiles import place_shape, tile_places
 
 LOG_TAIL = 1 << 16

@@ -57,24 +57,15 @@ def flips(finished, tmp_path, count):
             flip(directory / "run.json", rng)
             os.unlink(directory / "small.h5")
         paper = Paper(sweep)
-        before = content(directory)
         go(sweep, directory, paper=paper)
-        aside = without_quarantine(directory)
-        if kind == "result" and not aside:
-            # A bit that no content depends on: the file was left as it is.
-            assert content(directory) == before
-            shutil.copy(source / "small.h5", directory / "small.h5")
-        else:
-            noticed[kind] += 1
-            assert len(aside) == 1
-            assert len(paper.computed) == (kind == "shard")
+        noticed[kind] += len(without_quarantine(directory))
+        assert len(paper.computed) == (kind == "shard")
         check_same(directory, reference)
     return noticed
 
 
 def check_flips(noticed, count):
-    assert noticed["shard"] == noticed["run.json"] * 2 == 2 * count // 5
-    assert noticed["result"] > 0.5 * 2 * count / 5
+    assert noticed == {"shard": 2 * count // 5, "result": 2 * count // 5, "run.json": count // 5}
 
 
 def test_flipped_bits(finished, tmp_path):
@@ -84,26 +75,6 @@ def test_flipped_bits(finished, tmp_path):
 @pytest.mark.soak
 def test_flipped_bits_all(finished, tmp_path):
     check_flips(flips(finished, tmp_path, 1000), 1000)
-
-
-def test_no_flip_of_the_result_changes_what_is_read(finished, tmp_path):
-    """Whatever bit of the result is flipped: verify tells, or every value and label is the old one."""
-    from cspr_jax.results import open_result
-
-    _, source, _ = finished
-    wanted, rng, silent = open_result(source / "small.h5"), np.random.default_rng(8), 0
-    for i in range(60):
-        path = tmp_path / f"{i}.h5"
-        shutil.copy(source / "small.h5", path)
-        flip(path, rng)
-        if verify(path)["faults"]:
-            continue
-        silent += 1
-        found = open_result(path)
-        for name, array in wanted.data.items():
-            np.testing.assert_array_equal(found.data[name], array)
-        assert (found.units, found.labels, list(found.axes)) == (wanted.units, wanted.labels, list(wanted.axes))
-    assert silent < 40
 
 
 def cut(path, rng):

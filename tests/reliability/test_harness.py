@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from cspr_jax.errors import RefusedError
-from cspr_jax.store import folder, publishing, record, shards
+from cspr_jax.store import folder, publishing, record, seal, shards
 from cspr_jax.store.disk import Disk
 from cspr_jax.sweep import engine
 from reliability import support, test_crashes, test_damage
@@ -47,23 +47,23 @@ def test_power_loss_shows_it_too(job, tmp_path, monkeypatch):
     sweep, reference, _ = job
     disk = support.FaultyDisk()
     go(sweep, tmp_path / "whole", disk=disk)
-    with pytest.raises((AssertionError, shards.DamagedError)):
+    with pytest.raises((AssertionError, seal.DamagedError)):
         test_crashes.every_crash((sweep, reference, disk.count), tmp_path, lambda k: ["power"])
 
 
 def test_without_renaming(job, tmp_path, monkeypatch):
     without_replace(monkeypatch)
-    with pytest.raises((AssertionError, shards.DamagedError)):
+    with pytest.raises((AssertionError, seal.DamagedError)):
         test_crashes.every_crash(job, tmp_path, lambda k: test_crashes.CRASHES)
 
 
 def test_without_checksums(tmp_path, monkeypatch):
-    """Neither the user block nor the content is compared."""
+    """Neither the seal nor the content is compared."""
     sweep = sweep_of(tmp_path, tiles=4)
     go(sweep, tmp_path / "run")
     finished = sweep, tmp_path / "run", content(tmp_path / "run")
     monkeypatch.setattr(shards.Shard, "digest", property(lambda self: Anything()))
-    monkeypatch.setattr(shards, "_block", lambda rest: Anything())
+    monkeypatch.setattr(seal, "_check", lambda line, digest: None)
     with pytest.raises((AssertionError, TypeError, ValueError)):
         test_damage.test_flipped_bits(finished, tmp_path / "copy")
 

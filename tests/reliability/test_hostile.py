@@ -18,6 +18,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import CsprError
+from cspr_jax.store.seal import sealed
 from cspr_jax.sweep.definition import read_sweep
 from reliability.support import SWEEP, content, go, sweep_of
 
@@ -86,7 +87,7 @@ def foreign(folder):
     with h5py.File(small, "w") as file:
         file["a"] = np.zeros(3)
 
-    def grid(file, settings="{}", shape=(2, 3), scales=(2, 3), **attributes):
+    def grid(file, settings='{"dimensions": ["x", "y"]}', shape=(2, 3), scales=(2, 3), **attributes):
         file.attrs.update({"map": "minimum-arcs", "robot": "r", "settings": settings} | attributes)
         data = file.create_dataset("arcs", shape, "i2")
         for i, n in enumerate(scales):
@@ -132,6 +133,8 @@ def test_foreign_hdf5(finished, tmp_path):
         path = tmp_path / "foreign.h5"
         with h5py.File(path, "w") as file:
             fill(file)
+        refused("plot", path)  # it was not written by this program
+        path.write_bytes(sealed(path.read_bytes()))  # and if it had been
         refused("plot", path)
         refused("verify", path)
         directory = tmp_path / "run"
