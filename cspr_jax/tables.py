@@ -5,7 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from cspr_jax import transition_tables
 from cspr_jax.planning import plan
+from cspr_jax.transition_tables import Key
 
 SCHEMA = 1
 
@@ -19,12 +21,14 @@ class Cell:
         column: as printed, or its name.
         computed: by this program; None where nothing was found.
         published: in the source; None where the project does not know it.
+        variant: the reading of the source, where there are several.
     """
 
     row: str
     column: str
     computed: float | None
     published: float | None
+    variant: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -33,22 +37,22 @@ class Source:
 
     Fields:
         title: of the table, with its source.
-        published: known cells, by row and column.
-        compute: () -> computed cells, by row and column.
+        published: known cells, by row, column and variant.
+        compute: () -> computed cells, by row, column and variant.
     """
 
     title: str
-    published: dict[tuple[str, str], float]
-    compute: Callable[[], dict[tuple[str, str], float | None]]
+    published: dict[Key, float]
+    compute: Callable[[], dict[Key, float | None]]
 
 
-def _table_2_1() -> dict[tuple[str, str], float | None]:
+def _table_2_1() -> dict[Key, float | None]:
     answers = plan(Path(__file__).parent / "published" / "table_2_1.toml").answers
     columns = {"feasible_at_infinity": answers.feasible_at_infinity, "p": answers.arcs, "T": answers.duration}
-    found: dict[tuple[str, str], float | None] = {}
+    found: dict[Key, float | None] = {}
     for i, arcs in enumerate(answers.arcs):
         for name, values in columns.items():
-            found[str(i + 1), name] = float(values[i]) if name == "feasible_at_infinity" or arcs > 0 else None
+            found[str(i + 1), name, ""] = float(values[i]) if name == "feasible_at_infinity" or arcs > 0 else None
     return found
 
 
@@ -59,9 +63,24 @@ _PUBLISHED_2_1 = {
 }
 
 TABLES = {
+    "1.1": Source(
+        "Dion-Gauvin thesis, Table 1.1: oscillations needed at a distance of four radii, horizontal, A1",
+        transition_tables.PUBLISHED["1.1"],
+        transition_tables.table_1_1,
+    ),
+    "1.2": Source(
+        "Dion-Gauvin thesis, Table 1.2: oscillations needed at various inclinations, sigma R = 1, xi = 1",
+        transition_tables.PUBLISHED["1.2"],
+        transition_tables.table_1_2,
+    ),
+    "1.3": Source(
+        "Dion-Gauvin thesis, Table 1.3: oscillations needed with various amplitude functions, horizontal",
+        transition_tables.PUBLISHED["1.3"],
+        transition_tables.table_1_3,
+    ),
     "2.1": Source(
         "Dion-Gauvin thesis, Table 2.1: feasibility at infinity, smallest number of arcs, duration (s)",
-        {(row, column): value for row, cells in _PUBLISHED_2_1.items() for column, value in cells.items()},
+        {(row, column, ""): value for row, cells in _PUBLISHED_2_1.items() for column, value in cells.items()},
         _table_2_1,
     ),
 }
@@ -77,7 +96,10 @@ def table_cells(name: str) -> list[Cell]:
         its cells, row by row.
     """
     source = TABLES[name]
-    return [Cell(*place, value, source.published.get(place)) for place, value in source.compute().items()]
+    return [
+        Cell(row, column, value, source.published.get((row, column, variant)), variant)
+        for (row, column, variant), value in source.compute().items()
+    ]
 
 
 def table_object(name: str, cells: list[Cell]) -> dict[str, Any]:
@@ -90,7 +112,13 @@ def table_object(name: str, cells: list[Cell]) -> dict[str, Any]:
     Returns:
         plain values.
     """
-    return {"schema": SCHEMA, "table": name, "cells": [dataclasses.asdict(cell) for cell in cells]}
+    return {"schema": SCHEMA, "table": name, "cells": [_plain(cell) for cell in cells]}
+
+
+def _plain(cell: Cell) -> dict[str, Any]:
+    found = dataclasses.asdict(cell)
+    variant = found.pop("variant")
+    return found | ({"variant": {"reading": variant}} if variant else {})
 
 
 def table_for_people(name: str, cells: list[Cell]):
@@ -107,12 +135,14 @@ def table_for_people(name: str, cells: list[Cell]):
 
     note = "- : the project does not know the published value"
     table = Table(title=TABLES[name].title, title_justify="left", caption=note, caption_justify="left")
-    for head in ("row", "column", "published", "computed", "difference"):
-        table.add_column(head, justify="left" if head == "column" else "right")
+    several = any(cell.variant for cell in cells)
+    for head in ("row", "column", *(["reading"] if several else []), "published", "computed", "difference"):
+        table.add_column(head, justify="left" if head in ("column", "reading") else "right")
     for cell in cells:
         known = cell.published is not None and cell.computed is not None
         difference = f"{cell.computed - cell.published:+.4f}" if known else "-"  # type: ignore[operator]
-        table.add_row(cell.row, cell.column, _number(cell.published), _number(cell.computed), difference)
+        numbers = _number(cell.published), _number(cell.computed), difference
+        table.add_row(cell.row, cell.column, *([cell.variant] if several else []), *numbers)
     return table
 
 

@@ -83,7 +83,7 @@ PLANS = {
     "polynomial": (Z0, f"{Z0}\namplitude = {{ polynomial = [0, 1] }}", "amplitude", "(2.49)", "A'(0) = 1, must be 0"),
     "overflow": (Z0, f"{Z0}\namplitude = {{ polynomial = [0.0, 1e308, 1e308] }}", "amplitude", "1000000000"),
     "no robot of that name": (ROBOT, 'robot = "prototyp"', 'robot = "prototyp"', "did you mean prototype?"),
-    "no robot file": (ROBOT, 'robot = "no/such.toml"', "no/such.toml", "cannot be read"),
+    "no robot file": (ROBOT, 'robot = "no/such.toml"', 'robot = "no/such.toml"', "no such file"),
     "zero byte in a path": (ROBOT, 'robot = "a\\u0000b.toml"', "b.toml"),
     "robot = 3": (ROBOT, "robot = 3", "robot = 3", "catalogue name"),
 }

@@ -64,9 +64,9 @@ def test_table_2_1(capsys):
     people = cspr(capsys, "table", "2.1")
     assert all(word in people for word in ("published", "computed", "difference", "-0.1557", "6.5400", "6.5381"))
     assert len([line for line in people.splitlines() if " p " in line]) == 6
-    assert cspr(capsys, "table", "--list").startswith("2.1  ")
-    assert "must be one of 2.1" in cspr(capsys, "table", "9.9", code=2)
-    assert "must be one of 2.1" in cspr(capsys, "table", code=2)
+    assert "\n2.1  Dion-Gauvin" in cspr(capsys, "table", "--list")
+    assert "must be one of 1.1, " in cspr(capsys, "table", "9.9", code=2)
+    assert "must be one of 1.1, " in cspr(capsys, "table", code=2)
 
 
 def test_robots(capsys):

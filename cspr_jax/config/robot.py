@@ -82,7 +82,10 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
     if not isinstance(reference, str):
         raise ConfigError(file, f"robot = {shown(reference)}: must be a catalogue name, a path, or a [robot] table")
     if reference.endswith(".toml") or "/" in reference:
-        return read_robot(directory / reference)
+        path = directory / reference
+        if not path.is_file():
+            raise ConfigError(file, f"robot = {shown(reference)}: no such file: must be a catalogue name, or a path")
+        return read_robot(path)
     if reference in catalogue_names():
         return read_robot(CATALOGUE / f"{reference}.toml")
     near = difflib.get_close_matches(reference, catalogue_names(), n=1)

@@ -26,6 +26,7 @@ from cspr_jax import robots
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.numerics import sincospi
 from cspr_jax.robots import PointMassRobot
+from cspr_jax.trajectories.couplings import couplings
 
 # Relative to z0 or to a radius: below this a point is at p0, or on the line through p0.
 COINCIDENT = 1e-12
@@ -81,7 +82,7 @@ def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: 
     hub = centre + jnp.stack([jnp.zeros_like(z0), jnp.zeros_like(z0), z0])
     q1, q2, r1, r2, precession = _plane(start - hub, end - hub, z0, robots.plane_normal(robot), odd)
     plane = jnp.stack([q1, q2], axis=1)
-    tilt, pull, twist = _couplings(robot, hub - centre, plane)
+    tilt, pull, twist = couplings(robot, hub - centre, plane)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
     return Segment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, tilt, pull, twist)
 
@@ -110,18 +111,6 @@ def _least_inclined(normal: Array, q1: Array, x_axis: Array) -> Array:
     upright = size < COINCIDENT
     fallback = x_axis - q1 * jnp.dot(q1, x_axis)
     return jnp.where(upright, fallback / jnp.linalg.norm(fallback), level / jnp.where(upright, 1.0, size))
-
-
-def _couplings(robot: PointMassRobot, hub: Array, plane: Array) -> tuple[Array, Array, Array]:
-    # From (2.12)-(2.14) with p'' - g = -lambda (p - centroid) + lambda Q d, divided by their value at rest in p0.
-    a = robot.base_points - robots.centroid(robot)
-    area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
-    scale = 3.0 / (area[2] * hub[2])
-    opposite = jnp.roll(a, -1, axis=0) - jnp.roll(a, -2, axis=0)  # a2 - a3, a3 - a1, a1 - a2
-    tilt = robots.plane_normal(robot) @ plane / hub[2]
-    pull = -scale * (jnp.cross(hub, opposite) + area / 3.0) @ plane
-    twist = scale * (opposite @ jnp.cross(plane[:, 0], plane[:, 1]))
-    return tilt, pull, twist
 
 
 def oscillation(segment: Segment, arcs: Array) -> tuple[Array, Array]:

@@ -1,0 +1,166 @@
+"""How many oscillations a transition needs, from the envelopes of its pseudotensions, thesis chapter 1.
+
+With Omega = 4 pi^2 N - A''(1), N = n^2, the normalised pseudotension of cable k is, (1.32),
+
+    1 - C cos(2 pi n tau) + S sin(2 pi n tau),  C = (v + w) c / Omega - v A,  S = 4 pi n (v + w) A' / Omega,
+
+c = A'' - A A''(1). It is positive whatever the phase if C^2 + S^2 < 1, (1.39): a quadratic in
+Omega. Its largest root, the largest over tau and over the cables, is what N must exceed. That
+is enough for taut cables and not necessary. n is a real number here: a motion takes the next integer.
+"""
+
+import itertools
+import math
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.amplitudes import SMALLEST_EPSILON, Amplitude, derivatives, named
+
+# Samples of each piece of the amplitude function; between them the maximum is refined.
+SAMPLES = 64
+CANDIDATES = 3
+# Golden section: the bracket ends at 4e-9 of where it began.
+GOLDEN, STEPS = (math.sqrt(5.0) - 1.0) / 2.0, 40
+EPSILONS = 50
+LARGEST_INCLINATION = 1.0 - 1e-9
+
+
+def squared_oscillations_at(amplitude: Amplitude, weight: Array, inclination: Array, tau: Array) -> Array:
+    """N_k(v, tau) of (1.44): what keeps one cable taut at one instant, whatever the phase.
+
+    Args:
+        amplitude: A.
+        weight: () w_k.
+        inclination: () v, |v| < 1.
+        tau: ().
+
+    Returns:
+        () N; that of Omega = 0 where every Omega will do.
+    """
+    end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
+    size, slope, bend = derivatives(amplitude, tau, order=2)
+    load, c = inclination + weight, bend - size * end
+    d = 1.0 - (inclination * size) ** 2
+    half = inclination * size * load * c - 2.0 * (load * slope) ** 2
+    rest = load**2 * (c**2 + 4.0 * end * slope**2)
+    squared = half**2 + d * rest
+    # Without a real root the envelope is positive for every Omega.
+    omega = jnp.where(squared < 0.0, 0.0, jnp.maximum((-half + jnp.sqrt(jnp.maximum(squared, 0.0))) / d, 0.0))
+    return (omega + end) / (4.0 * math.pi**2)
+
+
+def _samples(amplitude: Amplitude) -> np.ndarray:
+    # Every knot among them; dense towards the ends of each piece, where steep inclinations have their maximum.
+    ends = [0.0, *np.asarray(amplitude.knots).tolist(), 1.0]
+    part = 0.5 * (1.0 - np.cos(math.pi * np.arange(SAMPLES) / SAMPLES))
+    return np.concatenate([*(a + (b - a) * part for a, b in itertools.pairwise(ends)), [1.0]])
+
+
+def _golden(function: Callable[[Array], Array], low: Array, high: Array, steps: int) -> Array:
+    # Where a function that falls and then rises is smallest, by golden section.
+    def narrow(_, state):
+        low, high, left, right, at_left, at_right = state
+        down = at_left <= at_right
+        low, high = jnp.where(down, low, left), jnp.where(down, right, high)
+        step = GOLDEN * (high - low)
+        fresh = jnp.where(down, high - step, low + step)
+        at_fresh = function(fresh)
+        left, right = jnp.where(down, fresh, right), jnp.where(down, left, fresh)
+        at_left, at_right = jnp.where(down, at_fresh, at_right), jnp.where(down, at_left, at_fresh)
+        return low, high, left, right, at_left, at_right
+
+    step = GOLDEN * (high - low)
+    first = (low, high, high - step, low + step, function(high - step), function(low + step))
+    low, high, *_ = lax.fori_loop(0, steps, narrow, first)
+    return 0.5 * (low + high)
+
+
+@jax.jit
+def _least(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array) -> Array:
+    def one(weight):
+        def fall(t):
+            return -squared_oscillations_at(amplitude, weight, inclination, t)
+
+        values = -jax.vmap(fall)(tau)
+        beside = jnp.pad(values, 1, constant_values=-jnp.inf)
+        peaks = jnp.where((values >= beside[:-2]) & (values >= beside[2:]), values, -jnp.inf)
+        places = lax.top_k(peaks, CANDIDATES)[1]
+        low, high = tau[jnp.maximum(places - 1, 0)], tau[jnp.minimum(places + 1, len(tau) - 1)]
+        found = -jax.vmap(lambda a, b: fall(_golden(fall, a, b, STEPS)))(low, high)
+        return jnp.maximum(jnp.max(values), jnp.max(found))
+
+    return jnp.max(jax.vmap(one)(weights))
+
+
+def least_oscillations(amplitude: Amplitude, weights: Array, inclination: Array) -> Array:
+    """Oscillations that the envelopes ask for, a real number: (1.48), (1.94); (1.53) for v = 0.
+
+    Args:
+        amplitude: A, which meets (1.27) and (1.28).
+        weights: (n_cables,) w_k.
+        inclination: () v, |v| < 1.
+
+    Returns:
+        () n.
+    """
+    return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), weights, inclination), 0.0))
+
+
+def best_inclination(amplitude: Amplitude, weights: Array) -> tuple[Array, Array]:
+    """The inclination that needs the fewest oscillations, by golden section.
+
+    Args:
+        amplitude: A, which meets (1.27) and (1.28).
+        weights: (n_cables,) w_k.
+
+    Returns:
+        v and n, () each.
+    """
+    return _best(amplitude, _samples(amplitude), weights)
+
+
+@jax.jit
+def _best(amplitude: Amplitude, samples: Array, weights: Array) -> tuple[Array, Array]:
+    high = jnp.full_like(weights[0], LARGEST_INCLINATION)
+    v = _golden(lambda v: _least(amplitude, samples, weights, v), -high, high, STEPS)
+    return v, jnp.sqrt(jnp.maximum(_least(amplitude, samples, weights, v), 0.0))
+
+
+def best_epsilon(weights: Array) -> tuple[float, float]:
+    """The epsilon of A_eff, (1.110), that needs the fewest oscillations on a horizontal transition.
+
+    Args:
+        weights: (n_cables,) w_k.
+
+    Returns:
+        epsilon and n.
+    """
+    level = jnp.asarray(0.0)
+
+    def needed(epsilon: float) -> float:
+        return float(least_oscillations(named("effective", epsilon), weights, level))
+
+    # A coarse look finds the valley; golden section goes down in it.
+    trial = np.linspace(SMALLEST_EPSILON, 0.5, EPSILONS)
+    place = int(np.argmin([needed(float(epsilon)) for epsilon in trial]))
+    low, high = float(trial[max(place - 1, 0)]), float(trial[min(place + 1, EPSILONS - 1)])
+    while high - low > 1e-9:
+        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        low, high = (low, right) if needed(left) <= needed(right) else (left, high)
+    return 0.5 * (low + high), needed(0.5 * (low + high))
+
+
+def lower_bound(weights: Array) -> Array:
+    """Oscillations below which no amplitude function keeps a horizontal transition taut: n_idl of (1.104).
+
+    Args:
+        weights: (n_cables,) w_k.
+
+    Returns:
+        () n.
+    """
+    return jnp.max(jnp.abs(weights)) / math.pi

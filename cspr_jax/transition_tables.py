@@ -1,0 +1,115 @@
+"""Tables 1.1 to 1.3 of the thesis: real numbers of oscillations that the envelopes ask for."""
+
+import math
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.amplitudes import Amplitude, named
+from cspr_jax.config.robot import CATALOGUE, read_robot
+from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.feasibility.oscillations import best_epsilon, best_inclination, least_oscillations, lower_bound
+from cspr_jax.problem import build_robot
+from cspr_jax.trajectories.transition import planar_weights, transition
+
+Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one
+DISTANCE = 4.0  # of Table 1.1, in radii of the spools
+_ROBOT = "transition-prototype"
+_READINGS = {"w_max = 5 sqrt(3)": 5.0 * math.sqrt(3.0), "w_max = 10": 10.0}
+
+
+def _horizontal(amplitude: Amplitude, weights: Array) -> float:
+    return float(least_oscillations(amplitude, weights, jnp.asarray(0.0)))
+
+
+def _spatial_weights(direction: list[float]) -> Array:
+    # Of the robot of the experiment, for a target on the level of p0, whatever z0.
+    path = CATALOGUE / f"{_ROBOT}.toml"
+    robot = build_robot(read_robot(path), TrajectoryKeys(), path)
+    radius = np.linalg.norm(np.asarray(robot.base_points)[0, :2])
+    z0 = jnp.asarray(2.0)
+    target = jnp.asarray([DISTANCE * radius * direction[0], DISTANCE * radius * direction[1], 2.0])
+    return transition(robot, target, z0).weights
+
+
+def table_1_1() -> dict[Key, float | None]:
+    """Planar and spatial robots, a target at a distance of four radii on the level of p0, with A1.
+
+    Returns:
+        cells.
+    """
+    cases = {
+        "Planar": planar_weights(jnp.asarray(DISTANCE)),
+        "H_0": _spatial_weights([1.0, 0.0]),  # between two spools
+        "H_1": _spatial_weights([0.0, 1.0]),  # under a spool
+    }
+    found: dict[Key, float | None] = {}
+    for name, weights in cases.items():
+        found["w_max", name, ""] = float(jnp.max(jnp.abs(weights)))
+        found["n", name, ""] = _horizontal(named("A1"), weights)
+    return found
+
+
+def table_1_2() -> dict[Key, float | None]:
+    """Inclinations, for the target that gains most by them: sigma R = 1, xi = 1 of (1.114).
+
+    Returns:
+        cells; columns name the inclination and hold the number of oscillations, but for "optimal inclination".
+    """
+    weights = jnp.array([1.0, 1.0, -2.0])
+    found: dict[Key, float | None] = {}
+    for name in ("A1", "A2", "A3"):
+        amplitude = named(name)
+        best, least = best_inclination(amplitude, weights)
+        found[name, "optimal inclination", ""] = float(best)
+        for column, v in (
+            ("-v_opt", -best),
+            ("0", 0.0),
+            ("v_opt", best),
+            ("0.8", 0.8),
+            ("0.999", 0.999),
+        ):
+            found[name, column, ""] = float(least_oscillations(amplitude, weights, jnp.asarray(v)))
+        found[name, "v_opt", ""] = float(least)
+    return found
+
+
+def table_1_3() -> dict[Key, float | None]:
+    """Amplitude functions, for a far target, in both readings of where it is.
+
+    Returns:
+        cells.
+    """
+    found: dict[Key, float | None] = {}
+    for reading, largest in _READINGS.items():
+        weights = jnp.array([largest, -largest, 0.0])
+        found["n", "A_idl", reading] = float(lower_bound(weights))
+        for name in ("A1", "A2", "A3"):
+            found["n", name, reading] = _horizontal(named(name), weights)
+        epsilon, least = best_epsilon(weights)
+        found["n", "A_eff", reading], found["epsilon", "A_eff", reading] = least, epsilon
+    return found
+
+
+PUBLISHED: dict[str, dict[Key, float]] = {
+    "1.1": {("n", "Planar", ""): 2.15, ("n", "H_0", ""): 3.86, ("n", "H_1", ""): 4.47},
+    "1.2": {
+        (row, column, ""): value
+        for row, values in {
+            "A1": (0.5681, 1.21, 0.85, 0.69, 0.76, 2.82),
+            "A2": (0.48798, 1.54, 1.1, 0.93, 1.29, 8.25),
+        }.items()
+        for column, value in zip(("optimal inclination", "-v_opt", "0", "v_opt", "0.8", "0.999"), values, strict=True)
+    },
+    "1.3": {
+        (row, column, reading): value
+        for reading in _READINGS
+        for row, column, value in (
+            ("n", "A_idl", 2.76),
+            ("n", "A1", 4.85),
+            ("n", "A_eff", 2.94),
+            ("epsilon", "A_eff", 0.0399),
+        )
+    },
+}
