@@ -2,8 +2,10 @@
 
 import argparse
 import contextlib
+import io
 import json
 import math
+import os
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -37,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         the exit code.
     """
+    _mend_streams()
     options = _parser().parse_args(arguments)
     try:
         return int(options.command(options))
@@ -59,6 +62,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         traceback.print_exc()
         sys.stderr.write(f"cspr {__version__}: internal error; please report it with the lines above and your file\n")
         return int(ExitCode.INTERNAL)
+
+
+def _mend_streams() -> None:
+    # A closed stream would be an error at the end of the work, and its number the next file's.
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            with contextlib.suppress(OSError):
+                os.open(os.devnull, os.O_RDWR)
+            setattr(sys, name, open(os.devnull, "r" if number == 0 else "w", encoding="utf-8"))  # noqa: SIM115
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="surrogateescape")  # a path is printed as it is
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -137,5 +137,8 @@ def shown(value: object) -> str:
         return str(value).lower()
     if isinstance(value, datetime.date | datetime.time):
         return str(value)
-    text = f'"{value}"' if isinstance(value, str) else _SHORT.repr(value)
+    try:
+        text = f'"{value}"' if isinstance(value, str) else _SHORT.repr(value)
+    except ValueError:  # Python writes out no integer of more than some thousand digits
+        return "a very large integer"
     return text if len(text) <= 60 else text[:57] + "..."

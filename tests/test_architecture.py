@@ -193,7 +193,7 @@ def _missing_parts(function: ast.FunctionDef, is_method: bool) -> list[str]:
     text = ast.get_docstring(function) or ""
     given = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs][is_method:]
     missing = [arg.arg for arg in given if not re.search(rf"^Args:\n(.*\n)*? +{arg.arg}: ", text, re.M)]
-    is_property = any(isinstance(d, ast.Name) and d.id == "property" for d in function.decorator_list)
+    is_property = any(ast.unparse(d).endswith("property") for d in function.decorator_list)
     if _answers(function) and not is_property and not re.search(r"^(Returns|Yields):", text, re.M):
         missing.append("Returns")
     return missing

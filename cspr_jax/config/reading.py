@@ -14,7 +14,8 @@ from cspr_jax.errors import ConfigError, shown
 LARGEST_FILE = 1 << 20
 # The time that tomllib takes grows with the square of a key's parts.
 LONGEST_KEY = 64
-_LONG_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){{{LONGEST_KEY - 1}}}""")
+_PART = r"""(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[\w-]++)"""
+_LONG_KEY = re.compile(rf"""(?<![\w"'-])(?:{_PART}[ \t]*+\.[ \t]*+){{{LONGEST_KEY - 1}}}""")
 # Names of the variants of a union; they are part of pydantic's location of an error, not of the user's key.
 VARIANT = "~"
 

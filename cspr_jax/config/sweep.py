@@ -8,6 +8,7 @@ from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Coordinate, LimitKeys, Point
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.quantities import STORABLE
+from cspr_jax.tiles import LARGEST_TILE
 
 LARGEST_COUNT = 10_000_000
 
@@ -80,7 +81,7 @@ class Run(Table):
     dtype: Literal["float64", "float32"] = Field(
         "float64", description="of stored numbers, and of the sieve; verdicts are float64's in both"
     )
-    tile: Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=1)] | None = Field(
+    tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1)] | None = Field(
         None, description="shape of the block computed at a time, one number an axis"
     )
     store: Annotated[list[Literal[STORABLE]], Field(min_length=1)] | None = Field(  # type: ignore[valid-type]

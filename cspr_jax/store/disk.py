@@ -96,8 +96,12 @@ class Disk:
             path: its name.
             data: what to add.
         """
-        with open(path, "ab") as file:
-            file.write(data)
+        how = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+        file = os.open(path, how, USUAL)
+        try:
+            os.write(file, data)
+        finally:
+            os.close(file)
 
 
 def write_all(disk: Disk, file: int, data: bytes, offset: int = 0) -> None:

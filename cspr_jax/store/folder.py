@@ -4,7 +4,9 @@ import contextlib
 import fcntl
 import json
 import os
+import re
 import socket
+import stat
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +15,9 @@ from typing import Any
 from cspr_jax.errors import RefusedError, StoreError
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import make_folders, refusal
+
+# What a lock says; empty when it is new.
+_HOLDER = re.compile(rb"(?:process \d+ on [^\n]*\n)?")
 
 
 class RunFolder:
@@ -65,7 +70,7 @@ class RunFolder:
         """
         path = self.path / "LOCK"
         try:
-            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644)
         except OSError as error:
             raise refusal(path, error) from error
         try:
@@ -76,6 +81,8 @@ class RunFolder:
                 raise RefusedError(f"{self.path}: is being written by {holder}; wait for it or stop it") from error
             except OSError as error:
                 raise StoreError(f"{path}: cannot be locked: {error.strerror}") from error
+            if not stat.S_ISREG(os.fstat(file).st_mode) or not _HOLDER.fullmatch(os.pread(file, 400, 0)):
+                raise RefusedError(f"{path}: is somebody's file, not a lock of cspr: choose another -o")
             with contextlib.suppress(OSError):  # it only serves the message of others
                 os.ftruncate(file, 0)
                 os.pwrite(file, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
@@ -89,8 +96,11 @@ class RunFolder:
         Raises:
             StoreError: the disk or the folder refuses.
         """
+        own = rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5)\.\d+\.part"
         for folder in (self.path, self.shards):
             for part in sorted(folder.glob(".*.part")):
+                if not re.fullmatch(own, part.name) or not part.is_file():
+                    continue
                 try:
                     self.disk.unlink(part)
                 except OSError as error:

@@ -9,7 +9,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from cspr_jax.errors import StoreError
+from cspr_jax.errors import StoreError, one_line
 from cspr_jax.store.disk import USUAL, Disk, write_all
 
 
@@ -100,7 +100,7 @@ def make_folders(disk: Disk, path: Path) -> None:
         if not path.is_dir():
             raise NotADirectoryError(20, "Not a directory")
     except OSError as error:
-        raise StoreError(f"{path}: cannot be made: {error.strerror or error}") from error
+        raise StoreError(one_line(f"{path}: cannot be made: {error.strerror or error}")) from error
 
 
 def refusal(path: Path, error: OSError) -> StoreError:
@@ -113,4 +113,4 @@ def refusal(path: Path, error: OSError) -> StoreError:
     Returns:
         the error to raise.
     """
-    return StoreError(f"{path}: cannot be written: {error.strerror or error}; make room or choose another -o")
+    return StoreError(one_line(f"{path}: cannot be written: {error.strerror or error}; make room or choose another -o"))

@@ -5,6 +5,7 @@ from typing import Any
 
 from cspr_jax.errors import RefusedError, one_line
 from cspr_jax.identity import differences, digest
+from cspr_jax.store.consolidation import read_content
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.record import Record, read_record, write_record
 from cspr_jax.store.seal import DamagedError
@@ -27,7 +28,14 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder) -> None:
         if record.identity != sweep.identity:
             raise RefusedError(differing(sweep, folder, record.settings))
         return
-    # Without a record that can be believed, the shards say whose they are.
+    # Without a record that can be believed, shards and results say whose they are.
+    for path in sorted(folder.path.glob("*.h5")):
+        try:
+            content = read_content(path)
+        except DamagedError:
+            continue
+        if content.identity != sweep.identity:
+            raise RefusedError(differing(sweep, folder, content.settings))
     if {identity for identity, _ in owners(folder.shards.glob("*.h5"))} - {sweep.identity}:
         raise RefusedError(one_line(f"{folder.path}: holds shards of another sweep: choose another -o"))
 

@@ -1,7 +1,9 @@
 """A sweep: its file, checked, with everything that decides its result."""
 
 import dataclasses
+import functools
 import math
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,8 @@ from cspr_jax.tiles import LARGEST_TILE, Grid, tile_shape
 
 # Each tile is a file.
 LARGEST_TILES = 100_000
+LARGEST_RESULT = 1 << 46  # bytes; what is free on the disk is looked at when a run starts
+LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
 _START = ("from_x", "from_y", "from_z")
 
 
@@ -46,7 +50,7 @@ class Sweep:
     settings: dict[str, Any]
     text: str
 
-    @property
+    @functools.cached_property
     def identity(self) -> str:
         """Hash of the settings."""
         return identity(self.settings)
@@ -56,7 +60,7 @@ class Sweep:
         """The file's name, without its ending."""
         return self.file.stem
 
-    @property
+    @functools.cached_property
     def layout(self) -> Layout:
         """What its shards have in common."""
         return Layout(self.identity, self.store, self.keys.run.dtype)
@@ -74,6 +78,8 @@ def read_sweep(path: Path) -> Sweep:
     Raises:
         ConfigError: a mistake in it.
     """
+    if len(os.fsencode(path.stem)) > LONGEST_NAME:
+        raise ConfigError(path, f"a name of {len(os.fsencode(path.stem))} bytes: must be at most {LONGEST_NAME}")
     text = read_text(path)
     data = parse_toml(text, path)
     keys = checked(SweepFile, data, path)
@@ -127,9 +133,9 @@ def _tile(keys: SweepFile, shape: tuple[int, ...], path: Path) -> tuple[int, ...
 
 def _check_size(counts: dict[str, int], tile: tuple[int, ...], store: list[str], dtype: str, path: Path) -> None:
     # Before any memory is taken; `check_room` looks at what is free when the run starts.
-    needed, whole = bytes_needed(tuple(counts.values()), store, dtype), shutil.disk_usage(Path.cwd()).total
-    if needed > whole:
-        raise ConfigError(path, _too_large(counts, needed, whole))
+    needed = bytes_needed(tuple(counts.values()), store, dtype)
+    if needed > LARGEST_RESULT:
+        raise ConfigError(path, _too_large(counts, needed, LARGEST_RESULT))
     tiles = math.prod(-(-n // t) for n, t in zip(counts.values(), tile, strict=True))
     if tiles > LARGEST_TILES:
         raise ConfigError(path, f"run.tile = {shown(list(tile))}: {tiles} tiles: must be at most {LARGEST_TILES}")
@@ -146,7 +152,7 @@ def check_room(sweep: Sweep, directory: Path, done: float) -> None:
     Raises:
         ConfigError: too little room.
     """
-    folder = next(place for place in (directory, *directory.resolve().parents) if place.is_dir())
+    folder = next(place for place in (directory, *Path(os.path.abspath(directory)).parents) if place.is_dir())
     needed = bytes_needed(sweep.grid.shape, sweep.store, sweep.keys.run.dtype) * (1.0 - 0.5 * done)
     free = shutil.disk_usage(folder).free
     if needed > free:

@@ -3,6 +3,7 @@
 import contextlib
 import pickle
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError
 from typing import Any
 
 from cspr_jax.errors import ConfigError, RefusedError, ResourceError
@@ -110,19 +111,24 @@ class Scheduler:
         from distributed import KilledWorker, as_completed
 
         waiting = iter(list(indices))
-        room = AHEAD * max(1, sum(self._client.nthreads().values()))
 
         def submit(index: int) -> Any:
             return self._client.submit(compute_tile, self._pickled, index, pure=False)
 
-        first = [submit(index) for _, index in zip(range(room), waiting, strict=False)]
-        running = as_completed(first, loop=self._client.loop)
+        def top_up() -> None:
+            # Workers come and go: as many as there are now decide how much is in flight.
+            room = AHEAD * max(1, sum(self._client.nthreads().values())) - running.count()
+            for _, index in zip(range(0 if stop else room), waiting, strict=False):
+                running.add(submit(index))
+
+        running = as_completed([], loop=self._client.loop)
         try:
+            top_up()
             for future in running:
                 yield future.result()
-                following = None if stop else next(waiting, None)
-                if following is not None:
-                    running.add(submit(following))
+                top_up()
+        except (CancelledError, OSError) as error:
+            raise ResourceError("the scheduler is gone: start it, then run again to go on") from error
         except KilledWorker as error:
             raise ResourceError(
                 "workers died again and again at one tile, perhaps for want of memory: run.tile must be smaller"

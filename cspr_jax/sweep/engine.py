@@ -148,6 +148,8 @@ class Run:
             claims.refuse_other_environment(self._folder, environment, accept)
             self._folder.sweep_leftovers()
             record = claims.own_record(self._sweep, self._folder, environment, self._options.command)
+            if self._is_whole():  # another process finished it meanwhile
+                return Outcome(self._folder.result, 0, len(self._places))
             make_folders(self._disk, self._folder.shards)
             kept = self._verified(digest(environment))
             self._folder.note("started", command=list(self._options.command), kept=len(kept))
@@ -243,10 +245,17 @@ class Run:
                 f"{self._folder.shards}: a shard changed while it was read: {error}; run it again"
             ) from error
 
+    def _is_whole(self) -> bool:
+        try:
+            return read_content(self._folder.result).identity == self._sweep.identity
+        except DamagedError:
+            return False
+
     def _prune(self) -> None:
-        for path in sorted(self._folder.shards.glob("*.h5")):
+        for path in [self._folder.shard(index) for index in range(len(self._places))]:
             try:
-                self._disk.unlink(path)
+                if path.is_file():
+                    self._disk.unlink(path)
             except OSError as error:
                 raise refusal(path, error) from error
 

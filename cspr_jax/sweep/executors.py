@@ -130,7 +130,8 @@ class Processes:
         try:
             while running or (waiting and not stop):
                 while waiting and not stop and len(running) < self._count:
-                    running.add(pool.submit(compute_tile, self._pickled, waiting.pop(0)))
+                    with _signals_blocked():  # workers inherit that, from their first moment on
+                        running.add(pool.submit(compute_tile, self._pickled, waiting.pop(0)))
                 done, running = concurrent.futures.wait(
                     running, timeout=0.1, return_when=concurrent.futures.FIRST_COMPLETED
                 )
@@ -141,6 +142,15 @@ class Processes:
                 _kill(pool)
             pool.shutdown(wait=True, cancel_futures=True)
             stop.at_once = lambda: None
+
+
+@contextlib.contextmanager
+def _signals_blocked() -> Iterator[None]:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, CODES)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _kill(pool: concurrent.futures.ProcessPoolExecutor) -> None:

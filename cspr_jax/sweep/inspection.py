@@ -58,7 +58,8 @@ def verify(path: Path) -> dict[str, Any]:
         StoreError: neither a run directory nor a file.
     """
     if path.is_file():
-        return _verify_result(path, None, {"schema": 1, "path": str(path), "faults": []})
+        # A link that a user names is followed.
+        return _verify_result(path.resolve(), None, {"schema": 1, "path": str(path), "faults": []})
     record = _record(path)
     folder = _folder(path, record)
     found: dict[str, Any] = {"schema": 1, "path": str(path), "tiles": 0, "shards": 0, "missing": 0, "faults": []}

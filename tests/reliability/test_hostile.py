@@ -3,6 +3,7 @@
 import contextlib
 import io
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -298,3 +299,67 @@ def test_records_that_nobody_wrote(finished, tmp_path):
         refused("verify", tmp_path / "run")
         assert go(sweep, tmp_path / "run").computed == 0
         shutil.rmtree(tmp_path / "run")
+
+
+def test_other_people_s_files_in_a_run_directory(tmp_path):
+    """A file named LOCK, a link of that name, odd .part files and shards that are not the run's: none is lost."""
+    sweep = sweep_of(tmp_path / "s", tiles=4)
+    for name in ("file", "link"):
+        directory = tmp_path / name
+        directory.mkdir()
+        (tmp_path / "precious").write_text("mine")
+        if name == "file":
+            (directory / "LOCK").write_text("mine")
+        else:
+            (directory / "LOCK").symlink_to(tmp_path / "precious")
+        with pytest.raises(CsprError):
+            go(sweep, directory)
+        assert (directory / "LOCK").read_text() == "mine" == (tmp_path / "precious").read_text()
+    directory = tmp_path / "run"
+    directory.mkdir()
+    (directory / ".download.part").write_text("mine")
+    (directory / ".folder.part").mkdir()
+    go(sweep, directory)
+    (directory / "shards" / "mine.h5").write_text("mine")
+    go(sweep, directory, prune=True)
+    assert [path.name for path in (directory / "shards").iterdir()] == ["mine.h5"]
+    assert (directory / ".download.part").read_text() == "mine" and (directory / ".folder.part").is_dir()
+
+
+def test_a_log_that_is_a_pipe(tmp_path):
+    sweep = sweep_of(tmp_path / "s", tiles=4)
+    (tmp_path / "run").mkdir()
+    os.mkfifo(tmp_path / "run" / "log.jsonl")
+    with pytest.raises(CsprError, match=r"log\.jsonl"):
+        go(sweep, tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("schema = 1", "schema = 0x" + "f" * 5000),
+        ("count = 4", "count = 0x" + "f" * 5000),
+        ("[1, 3, 1, 1]", "[1, 3, 1, 0x" + "f" * 400 + "]"),
+        ("schema = 1", '"!".' * 200_000 + "a = 1"),
+        ("schema = 1", "'!' . " * 100_000 + "a = 1"),
+    ],
+)
+def test_more_bombs(tmp_path, old, new):
+    path = tmp_path / "bomb.toml"
+    path.write_text(FILES["sweep"].replace(old, new))
+    refused("run", path, code=2)
+
+
+def test_odd_names(tmp_path):
+    text = FILES["sweep"]
+    long = tmp_path / f"{'n' * 230}.toml"
+    long.write_text(text)
+    refused("run", long, code=2)
+    (tmp_path / "loop").symlink_to("loop")
+    path = tmp_path / "s.toml"
+    path.write_text(text)
+    code, _, err = cspr("run", path, "-o", tmp_path / "loop")
+    assert (code, len(err.splitlines())) == (4, 1)
+    (tmp_path / "two\nlines").write_text("x")
+    code, _, err = cspr("run", path, "-o", tmp_path / "two\nlines")
+    assert (code, len(err.splitlines())) == (4, 1)
