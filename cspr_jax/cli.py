@@ -158,7 +158,7 @@ def _run(options: argparse.Namespace) -> int:
         work = engine.Run(sweep, directory, choices, hooks)
         path = work.finished()
         if path is None:
-            with _executor(options, sweep) as executor:
+            with _executor(options, sweep, stop) as executor:
                 path = work.go(executor).result
         else:
             sys.stdout.write("already finished; nothing was computed\n")
@@ -171,7 +171,7 @@ def _warn(line: str) -> None:
 
 
 @contextlib.contextmanager
-def _executor(options: argparse.Namespace, sweep: Any) -> Iterator[Any]:
+def _executor(options: argparse.Namespace, sweep: Any, stop: Any) -> Iterator[Any]:
     from cspr_jax.sweep import executors
     from cspr_jax.sweep.tile import TileMap
 
@@ -180,7 +180,7 @@ def _executor(options: argparse.Namespace, sweep: Any) -> Iterator[Any]:
         from cspr_jax.sweep.distributed import Scheduler
 
         accept = options.accept_environment_change
-        workers = Scheduler(sweep, options.scheduler, accept_environment_change=accept, warn=_warn)
+        workers = Scheduler(sweep, options.scheduler, accept_environment_change=accept, stop=stop, warn=_warn)
         try:
             yield workers
         finally:

@@ -81,6 +81,8 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
     """
     if rate is not None and rate * plan.answers.duration.sum() > LARGEST_ROWS:
         raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
+    if rate is None and plan.keys.samples * len(plan.answers.duration) > LARGEST_ROWS:
+        raise ConfigError("samples", f"{plan.keys.samples}: must give at most {LARGEST_ROWS} rows in all")
     found = rows(plan, rate=rate)
     if path.suffix == ".csv":
         publish(Disk(), path, _csv(found).encode())

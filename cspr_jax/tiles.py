@@ -1,7 +1,6 @@
 """Tiles of a grid: blocks of one shape, computed one at a time."""
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Iterator
 
@@ -26,31 +25,51 @@ def tile_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(reversed(tile))
 
 
-def tile_places(shape: tuple[int, ...], tile: tuple[int, ...]) -> Iterator[tuple[slice, ...]]:
-    """Where each tile of a grid lies; those at the border may be smaller.
+@dataclasses.dataclass(frozen=True)
+class Tiling:
+    """Tiles that cover a grid, in order, the last axis fastest; those at the border may be smaller.
 
-    Args:
+    Fields:
         shape: of the grid.
         tile: shape of a tile.
-
-    Yields:
-        one slice an axis.
     """
-    starts = [range(0, n, step) for n, step in zip(shape, tile, strict=True)]
-    for corner in itertools.product(*starts):
-        yield tuple(slice(a, min(a + t, n)) for a, t, n in zip(corner, tile, shape, strict=True))
 
+    shape: tuple[int, ...]
+    tile: tuple[int, ...]
 
-def place_shape(place: tuple[slice, ...]) -> tuple[int, ...]:
-    """Shape of a tile.
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """Number of tiles along each axis."""
+        return tuple(-(-n // t) for n, t in zip(self.shape, self.tile, strict=True))
 
-    Args:
-        place: where it lies.
+    def __len__(self) -> int:
+        return math.prod(self.counts)
 
-    Returns:
-        the shape.
-    """
-    return tuple(part.stop - part.start for part in place)
+    def __iter__(self) -> Iterator[tuple[slice, ...]]:
+        return (self.place(index) for index in range(len(self)))
+
+    def place(self, index: int) -> tuple[slice, ...]:
+        """Where a tile lies.
+
+        Args:
+            index: of the tile.
+
+        Returns:
+            one slice an axis.
+        """
+        corner = [int(i) * t for i, t in zip(np.unravel_index(index, self.counts), self.tile, strict=True)]
+        return tuple(slice(a, min(a + t, n)) for a, t, n in zip(corner, self.tile, self.shape, strict=True))
+
+    def extent(self, index: int) -> tuple[int, ...]:
+        """Shape of one tile.
+
+        Args:
+            index: of the tile.
+
+        Returns:
+            its lengths.
+        """
+        return tuple(part.stop - part.start for part in self.place(index))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,13 +94,10 @@ class Grid:
         """Number of cells."""
         return math.prod(self.shape)
 
-    def places(self) -> Iterator[tuple[slice, ...]]:
-        """Where each tile lies; see `tile_places`.
-
-        Returns:
-            one slice an axis, of each tile.
-        """
-        return tile_places(self.shape, self.tile)
+    @property
+    def tiling(self) -> Tiling:
+        """Its tiles."""
+        return Tiling(self.shape, self.tile)
 
     def cells(self, place: tuple[slice, ...]) -> dict[str, np.ndarray]:
         """Coordinates of the cells of a tile.

@@ -81,7 +81,7 @@ def consolidate(
     with new_file(disk, path) as descriptor:
         with open_hdf5(disk, descriptor, attributes) as file:
             make_datasets(file, grid.axes, layout.store, dtype=layout.dtype, tile=grid.tile)
-            for place, shard in zip(grid.places(), shards, strict=True):
+            for place, shard in zip(grid.tiling, shards, strict=True):
                 between()
                 for name in layout.store:
                     file[name][place] = shard.values[name]
@@ -104,7 +104,7 @@ def _fold(axes: dict[str, np.ndarray], digests: list[str]) -> str:
 
 def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[], None]) -> list[str]:
     found = []
-    for place in grid.places():
+    for place in grid.tiling:
         between()
         found.append(digest_of({name: np.asarray(file[name][place]) for name in store}))
     return found
@@ -144,8 +144,7 @@ def read_content(path: Path) -> Content:
             near_zero, mixed = int(file.attrs["cells_near_zero"]), bool(file.attrs["mixed"])
     except (StoreError, *UNREADABLE, MemoryError) as error:
         raise DamagedError(f"it cannot be read: {reason(error)}") from error
-    tiles = sum(1 for _ in grid.places())
-    return Content(identity(settings), settings, grid.size, tiles, near_zero, mixed)
+    return Content(identity(settings), settings, grid.size, len(grid.tiling), near_zero, mixed)
 
 
 def _check_shapes(file: h5py.File, grid: Grid, store: list[str]) -> None:

@@ -16,6 +16,7 @@ from cspr_jax.errors import RefusedError, StoreError
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import make_folders, refusal
 
+_SHARD = re.compile(r"(\d{5,})\.h5")
 # What a lock says; empty when it is new.
 _HOLDER = re.compile(rb"(?:process \d+ on [^\n]*\n)?")
 
@@ -37,6 +38,7 @@ class RunFolder:
         self.shards = path / "shards"
         self.quarantine = path / "quarantine"
         self.log = path / "log.jsonl"
+        self.lock = path / "LOCK"
 
     def shard(self, index: int) -> Path:
         """Where the shard of a tile lies.
@@ -48,6 +50,15 @@ class RunFolder:
             its path.
         """
         return self.shards / f"{index:05d}.h5"
+
+    def shard_names(self) -> dict[Path, int]:
+        """What lies under names of shards; other names in their folder are nobody's business.
+
+        Returns:
+            the index that each name says, sorted.
+        """
+        found = {path: _SHARD.fullmatch(path.name) for path in sorted(self.shards.glob("*"))}
+        return {path: int(match[1]) for path, match in found.items() if match}
 
     def make(self) -> None:
         """Make the directory; its parents too.
@@ -68,7 +79,7 @@ class RunFolder:
             RefusedError: another process holds it.
             StoreError: the disk or the folder refuses.
         """
-        path = self.path / "LOCK"
+        path = self.lock
         try:
             file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644)
         except OSError as error:

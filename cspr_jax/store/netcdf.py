@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,13 +24,12 @@ UNREADABLE = (OSError, KeyError, ValueError, RuntimeError, IndexError, TypeError
 
 
 @contextlib.contextmanager
-def new_hdf5(path: Path, attributes: dict[str, Any], *, disk: Disk | None = None) -> Iterator[h5py.File]:
+def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
     """An HDF5 file that appears under its name only when it is whole.
 
     Args:
         path: final name.
         attributes: of the whole file.
-        disk: what to write with.
 
     Yields:
         the open file.
@@ -37,7 +37,7 @@ def new_hdf5(path: Path, attributes: dict[str, Any], *, disk: Disk | None = None
     Raises:
         StoreError: the disk or the folder refuses.
     """
-    disk = disk or Disk()
+    disk = Disk()
     with new_file(disk, path) as descriptor, open_hdf5(disk, descriptor, attributes) as file:
         yield file
 
@@ -231,4 +231,4 @@ def file_size(path: Path) -> int:
         found = os.lstat(path)
     except OSError:
         return -1
-    return found.st_size if (found.st_mode & 0o170000) == 0o100000 else -1
+    return found.st_size if stat.S_ISREG(found.st_mode) else -1

@@ -9,7 +9,7 @@ from cspr_jax.identity import digest
 from cspr_jax.store.disk import READ_ONLY, Disk
 from cspr_jax.store.netcdf import file_size
 from cspr_jax.store.publishing import publish
-from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.seal import DamagedError, unreadable
 
 LARGEST_RECORD = 64 << 20
 _KEYS = {"identity", "settings", "environment", "source"}
@@ -59,12 +59,15 @@ def read_record(path: Path) -> Record:
 
     Raises:
         DamagedError: it is not what was written, or was not written by this program.
+        StoreError: the system refuses to read anything at the moment.
     """
     if not 0 <= file_size(path) <= LARGEST_RECORD:
         raise DamagedError("it is not a file of a fitting size")
     try:
         content = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except (ValueError, RecursionError) as error:
         raise DamagedError(f"it cannot be read: {error}") from error
     if not isinstance(content, dict) or content.keys() != _KEYS | {"checksum"}:
         raise DamagedError("it is not a record of cspr")

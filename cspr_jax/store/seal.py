@@ -4,10 +4,12 @@ HDF5 and netCDF take no notice of it. It is checked before HDF5 reads a file: a 
 give wrong values without an error, or keep the library busy for ever.
 """
 
+import errno
 import hashlib
 import os
 from pathlib import Path
 
+from cspr_jax.errors import StoreError, one_line
 from cspr_jax.store.disk import Disk, write_all
 
 _MARK = b"\ncspr_jax, sha256 of all before this line: "
@@ -15,8 +17,27 @@ LENGTH = len(_MARK) + 64 + 1
 _STEP = 1 << 20
 
 
+# What a process or system lacks at the moment, or may not do: it says nothing about the file.
+_PASSING = {errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EACCES, errno.EPERM, errno.ESTALE, errno.ETIMEDOUT}
+
+
 class DamagedError(Exception):
     """A file that is not what was written."""
+
+
+def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
+    """What a file is that cannot be read.
+
+    Args:
+        path: the file.
+        error: the system's.
+
+    Returns:
+        the error to raise: damage, or a refusal that may pass.
+    """
+    if error.errno in _PASSING:
+        return StoreError(one_line(f"{path}: cannot be read: {error.strerror}; mend that and run again"))
+    return DamagedError(f"it cannot be read: {error.strerror or error}")
 
 
 def sealed(data: bytes) -> bytes:
@@ -70,18 +91,19 @@ def check_file(path: Path) -> None:
 
     Raises:
         DamagedError: it is no regular file, cannot be read, has no seal, or one that does not fit.
+        StoreError: the system refuses to read anything at the moment.
     """
     try:
         file = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     except OSError as error:
-        raise DamagedError(f"it cannot be read: {error.strerror}") from error
+        raise unreadable(path, error) from error
     try:
         size = os.fstat(file).st_size - LENGTH
         line = os.pread(file, LENGTH, max(size, 0))
         # Files of others need not be read whole.
         _check(line, _hash(file, size) if line.startswith(_MARK) else "")
     except OSError as error:
-        raise DamagedError(f"it cannot be read: {error.strerror}") from error
+        raise unreadable(path, error) from error
     finally:
         os.close(file)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from cspr_jax.identity import canonical_json
 from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, file_size, new_dataset, reason
-from cspr_jax.store.seal import DamagedError, sealed, unsealed
+from cspr_jax.store.seal import DamagedError, sealed, unreadable, unsealed
 
 LARGEST_SHARD = 64 << 20
 
@@ -110,6 +110,7 @@ def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -
 
     Raises:
         DamagedError: it is anything else.
+        StoreError: the system refuses to read anything at the moment.
     """
     file, header = _opened(path)
     with file:
@@ -160,7 +161,7 @@ def _opened(path: Path) -> tuple[h5py.File, dict[str, Any]]:
     try:
         data = unsealed(path.read_bytes())
     except OSError as error:
-        raise DamagedError(f"it cannot be read: {error.strerror}") from error
+        raise unreadable(path, error) from error
     try:
         file = h5py.File(io.BytesIO(data), "r")
         header = json.loads(file.attrs["header"])

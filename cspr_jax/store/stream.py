@@ -54,7 +54,7 @@ class DiskFile(io.RawIOBase):
         return self._at
 
     def readinto(self, buffer, /) -> int:
-        """Read what has been written.
+        """Read what has been written, or keep the reason why not.
 
         Args:
             buffer: filled from its start.
@@ -63,7 +63,10 @@ class DiskFile(io.RawIOBase):
             how many bytes.
         """
         view = memoryview(buffer).cast("B")
-        data = os.pread(self._file, len(view), self._at)
+        try:
+            data = os.pread(self._file, len(view), self._at)
+        except OSError as failure:
+            self._failure, data = self._failure or failure, b""
         view[: len(data)] = data
         self._at += len(data)
         return len(data)

@@ -1,5 +1,6 @@
 """Whose a run directory is, and what may go on in it."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +37,26 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder) -> None:
             continue
         if content.identity != sweep.identity:
             raise RefusedError(differing(sweep, folder, content.settings))
-    if {identity for identity, _ in owners(folder.shards.glob("*.h5"))} - {sweep.identity}:
+    if {identity for identity, _ in owners(folder.shard_names())} - {sweep.identity}:
         raise RefusedError(one_line(f"{folder.path}: holds shards of another sweep: choose another -o"))
+
+
+def refuse_strangers(folder: RunFolder) -> None:
+    """Refuse a directory where somebody else keeps files under the names of a run.
+
+    A run makes its lock before anything else, so that where it is, a file that is not whole is a damaged one.
+
+    Args:
+        folder: the directory.
+
+    Raises:
+        RefusedError: names the file.
+    """
+    if folder.lock.exists() or _record(folder.record) is not None or owners(folder.shard_names()):
+        return
+    inside = sorted(folder.shards.iterdir()) if folder.shards.is_dir() else [folder.shards]
+    if strangers := [path for path in (folder.record, *inside) if os.path.lexists(path)]:
+        raise RefusedError(one_line(f"{strangers[0]}: is somebody's file, not of a run of cspr: choose another -o"))
 
 
 def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> str:
@@ -71,7 +90,7 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
         return
     advice = "--accept-environment-change mixes them, another -o starts anew"
     if record is None:
-        if {theirs for _, theirs in owners(folder.shards.glob("*.h5"))} - {digest(environment)}:
+        if {theirs for _, theirs in owners(folder.shard_names())} - {digest(environment)}:
             raise RefusedError(one_line(f"{folder.path}: its shards were computed in another environment: {advice}"))
         return
     lines = differences(environment, record.environment)

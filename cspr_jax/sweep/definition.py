@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-import math
 import os
 import shutil
 from pathlib import Path
@@ -19,7 +18,7 @@ from cspr_jax.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.quantities import DEFAULT_STORE
 from cspr_jax.store.netcdf import bytes_needed
 from cspr_jax.store.shards import Layout
-from cspr_jax.tiles import LARGEST_TILE, Grid, tile_shape
+from cspr_jax.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 
 # Each tile is a file.
 LARGEST_TILES = 100_000
@@ -136,7 +135,7 @@ def _check_size(counts: dict[str, int], tile: tuple[int, ...], store: list[str],
     needed = bytes_needed(tuple(counts.values()), store, dtype)
     if needed > LARGEST_RESULT:
         raise ConfigError(path, _too_large(counts, needed, LARGEST_RESULT))
-    tiles = math.prod(-(-n // t) for n, t in zip(counts.values(), tile, strict=True))
+    tiles = len(Tiling(tuple(counts.values()), tile))
     if tiles > LARGEST_TILES:
         raise ConfigError(path, f"run.tile = {shown(list(tile))}: {tiles} tiles: must be at most {LARGEST_TILES}")
 

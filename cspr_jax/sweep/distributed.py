@@ -1,13 +1,16 @@
 """Tiles on the workers of a dask.distributed scheduler, on this machine or on many."""
 
+import collections
 import contextlib
 import pickle
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from typing import Any
 
-from cspr_jax.errors import ConfigError, RefusedError, ResourceError
+from cspr_jax.errors import ConfigError, RefusedError, ResourceError, StoppedError
 from cspr_jax.identity import differences
+from cspr_jax.store.netcdf import reason
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
 from cspr_jax.sweep.signals import Stop
@@ -17,6 +20,8 @@ from cspr_jax.sweep.work import Computed
 SECONDS_TO_CONNECT = 20
 # A cluster's queue may let workers wait; people are told after the first of these.
 SECONDS_FOR_WORKERS = (5, 900)
+# How long a wish to stop may go unseen.
+POLL_SECONDS = 0.5
 # Tiles in flight for each thread of a worker: one computes while another travels.
 AHEAD = 2
 
@@ -28,11 +33,13 @@ class Scheduler:
         sweep: the sweep.
         address: of the scheduler, such as tcp://host:8786.
         accept_environment_change: whether workers may differ from one another.
+        stop: when it is set, nobody waits for workers any longer.
         warn: called with a line for people.
 
     Raises:
         ConfigError: dask.distributed is not installed, or the address is wrong.
         ResourceError: no scheduler or no worker there.
+        StoppedError: asked to stop before a worker came.
     """
 
     def __init__(
@@ -41,6 +48,7 @@ class Scheduler:
         address: str,
         *,
         accept_environment_change: bool = False,
+        stop: Stop | None = None,
         warn: Callable[[str], None] = lambda line: None,
     ) -> None:
         """Connect, and wait for the first worker."""
@@ -50,27 +58,36 @@ class Scheduler:
             raise ConfigError(
                 "--scheduler", f"{address}: needs dask.distributed: pip install 'cspr_jax[dask]'"
             ) from error
-        self._pickled, self._accept = pickle.dumps(sweep), accept_environment_change
+        self._address, self._accept, self._warn = address, accept_environment_change, warn
         try:
-            self._client = distributed.Client(address, timeout=SECONDS_TO_CONNECT, set_as_default=False)
+            self._client = distributed.Client(address, timeout=SECONDS_TO_CONNECT)
         except ValueError as error:
             raise ConfigError("--scheduler", f"{address}: must be an address such as tcp://host:8786") from error
         except OSError as error:
             raise ResourceError(
                 f"--scheduler {address}: no scheduler answers: start one, or mend the address"
             ) from error
-        if not self._has_workers(SECONDS_FOR_WORKERS[0]):
-            warn(f"--scheduler {address}: has no workers yet; waiting for {SECONDS_FOR_WORKERS[1] // 60} minutes")
-            if not self._has_workers(SECONDS_FOR_WORKERS[1]):
-                self.close()
-                raise ResourceError(f"--scheduler {address}: has no workers: start some")
-
-    def _has_workers(self, seconds: float) -> bool:
         try:
-            self._client.wait_for_workers(1, timeout=seconds)
-        except TimeoutError:
-            return False
-        return True
+            self._wait_for_workers(Stop() if stop is None else stop)  # an unset one is false
+        except BaseException:
+            self.close()
+            raise
+        # Like a tile, it is made again where its worker was lost.
+        self._sweep = self._client.submit(bytes, pickle.dumps(sweep), pure=False)
+
+    def _wait_for_workers(self, stop: Stop) -> None:
+        begin, told = time.monotonic(), False
+        while not self._client.nthreads():
+            waited = time.monotonic() - begin
+            if stop.code is not None:
+                raise StoppedError("stopped: no worker came; nothing was computed", stop.code)
+            if waited > SECONDS_FOR_WORKERS[1]:
+                raise ResourceError(f"--scheduler {self._address}: has no workers: start some")
+            if waited > SECONDS_FOR_WORKERS[0] and not told:
+                minutes = SECONDS_FOR_WORKERS[1] // 60
+                self._warn(f"--scheduler {self._address}: has no workers yet; waiting for {minutes} minutes")
+                told = True
+            time.sleep(POLL_SECONDS)
 
     def environment(self) -> dict[str, Any]:
         """What all workers have in common.
@@ -80,8 +97,14 @@ class Scheduler:
 
         Raises:
             RefusedError: workers that differ, or another version of the program than here.
+            ResourceError: no worker there, or one that has no cspr_jax.
         """
-        found = list(self._client.run(environment).values())
+        try:
+            found = list(self._client.run(environment).values())
+        except (ImportError, AttributeError) as error:
+            raise ResourceError(f"--scheduler {self._address}: a worker has no cspr_jax: {reason(error)}") from error
+        if not found:
+            raise ResourceError(f"--scheduler {self._address}: has lost its workers: start some")
         for other in found[1:]:
             lines = differences(found[0], other)
             if lines and not self._accept:
@@ -108,25 +131,29 @@ class Scheduler:
         Raises:
             ResourceError: a tile whose workers keep dying.
         """
-        from distributed import KilledWorker, as_completed
+        from distributed import KilledWorker, wait
 
-        waiting = iter(list(indices))
-
-        def submit(index: int) -> Any:
-            return self._client.submit(compute_tile, self._pickled, index, pure=False)
-
-        def top_up() -> None:
-            # Workers come and go: as many as there are now decide how much is in flight.
-            room = AHEAD * max(1, sum(self._client.nthreads().values())) - running.count()
-            for _, index in zip(range(0 if stop else room), waiting, strict=False):
-                running.add(submit(index))
-
-        running = as_completed([], loop=self._client.loop)
+        waiting, running, told = collections.deque(indices), set[Any](), False
         try:
-            top_up()
-            for future in running:
-                yield future.result()
-                top_up()
+            while running or (waiting and not stop):
+                # Workers come and go: as many as there are now decide how much is in flight.
+                threads = sum(self._client.nthreads().values())
+                if not threads and stop:
+                    return
+                if not threads and not told:
+                    self._warn(f"--scheduler {self._address}: has lost its workers; waiting for others")
+                told = not threads
+                while waiting and not stop and len(running) < AHEAD * threads:
+                    running.add(self._client.submit(compute_tile, self._sweep, waiting.popleft(), pure=False))
+                if not running:
+                    time.sleep(POLL_SECONDS)
+                    continue
+                try:
+                    done, running = wait(running, timeout=POLL_SECONDS, return_when="FIRST_COMPLETED")
+                except TimeoutError:
+                    continue
+                for future in done:
+                    yield future.result()
         except (CancelledError, OSError) as error:
             raise ResourceError("the scheduler is gone: start it, then run again to go on") from error
         except KilledWorker as error:

@@ -7,6 +7,7 @@ process dies at, the next one finds verified shards, computes the rest, and ends
 import contextlib
 import dataclasses
 import math
+import os
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
@@ -23,7 +24,6 @@ from cspr_jax.sweep import claims
 from cspr_jax.sweep.definition import Sweep, attributes, check_room
 from cspr_jax.sweep.signals import Stop
 from cspr_jax.sweep.work import Computed, Executor
-from cspr_jax.tiles import place_shape
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Run:
         self._sweep, self._disk = sweep, disk or Disk()
         self._options, self._hooks = options or Options(), hooks or Hooks()
         self._folder = RunFolder(directory, sweep.name, self._disk)
-        self._places = list(sweep.grid.places())
+        self._tiling = sweep.grid.tiling
 
     def finished(self) -> Path | None:
         """The result, if it is complete and holds what was written; nothing is computed and jax is not needed.
@@ -137,7 +137,8 @@ class Run:
             StoreError: the disk or the folder refuses.
             StoppedError: asked to stop; what was finished is kept.
         """
-        check_room(self._sweep, self._folder.path, len(list(self._folder.shards.glob("*.h5"))) / len(self._places))
+        claims.refuse_strangers(self._folder)
+        check_room(self._sweep, self._folder.path, len(self._folder.shard_names()) / len(self._tiling))
         environment, accept = executor.environment(), self._options.accept_environment_change
         claims.refuse_other_environment(self._folder, environment, accept)  # before anything is made
         self._folder.make()
@@ -149,7 +150,9 @@ class Run:
             self._folder.sweep_leftovers()
             record = claims.own_record(self._sweep, self._folder, environment, self._options.command)
             if self._is_whole():  # another process finished it meanwhile
-                return Outcome(self._folder.result, 0, len(self._places))
+                if self._options.prune:
+                    self._prune()
+                return Outcome(self._folder.result, 0, len(self._tiling))
             make_folders(self._disk, self._folder.shards)
             kept = self._verified(digest(environment))
             self._folder.note("started", command=list(self._options.command), kept=len(kept))
@@ -168,30 +171,29 @@ class Run:
         self._hooks.warn(one_line(f"{path}: {reason}: moved to {target} and made again"))
 
     def _read(self, index: int) -> Shard:
-        return read_shard(self._folder.shard(index), self._sweep.layout, index, place_shape(self._places[index]))
+        return read_shard(self._folder.shard(index), self._sweep.layout, index, self._tiling.extent(index))
 
     def _verified(self, environment: str) -> list[int]:
         # Tiles whose shard is there and is what was written; anything else under their names is set aside.
         kept = []
-        known = {self._folder.shard(index): index for index in range(len(self._places))}
-        for path in sorted(self._folder.shards.iterdir()):
+        for path, index in self._folder.shard_names().items():
             try:
-                if path not in known:
+                if index >= len(self._tiling) or path != self._folder.shard(index):
                     raise DamagedError("it is no tile of this sweep")
-                shard = self._read(known[path])
+                shard = self._read(index)
             except DamagedError as error:
                 self._quarantine(path, str(error))
                 continue
             if shard.environment != environment and not self._options.accept_environment_change:
                 raise RefusedError(f"{path}: was computed in another environment: --accept-environment-change keeps it")
-            kept.append(known[path])
+            kept.append(index)
         return kept
 
     def _compute(self, executor: Executor, kept: list[int], record: Record) -> int:
         done = sum(self._cells(index) for index in kept)
         self._hooks.on_tile(done, self._sweep.grid.size)
         finished = set(kept)
-        missing = [index for index in range(len(self._places)) if index not in finished]
+        missing = [index for index in range(len(self._tiling)) if index not in finished]
         with contextlib.closing(_as_generator(executor.tiles(missing, self._hooks.stop))) as tiles:
             for computed in tiles:
                 if not self._options.accept_environment_change:
@@ -202,16 +204,16 @@ class Run:
                 done += self._cells(index)
                 self._folder.note("tile", index=index)
                 self._hooks.on_tile(done, self._sweep.grid.size)
-        if len(finished) < len(self._places):
+        if len(finished) < len(self._tiling):
             self._stopped(len(finished))
         return len(missing)
 
     def _cells(self, index: int) -> int:
-        return math.prod(place_shape(self._places[index]))
+        return math.prod(self._tiling.extent(index))
 
     def _stopped(self, finished: int) -> None:
         code = self._hooks.stop.code
-        line = f"{self._folder.path}: {finished} of {len(self._places)} tiles are kept; run it again to go on"
+        line = f"{self._folder.path}: {finished} of {len(self._tiling)} tiles are kept; run it again to go on"
         if code is None:
             raise StoreError(line)
         raise StoppedError(f"stopped: {line}", code)
@@ -220,23 +222,18 @@ class Run:
 
     def _consolidate(self, record: Record) -> None:
         path = self._folder.result
-        if path.exists() or path.is_symlink():
-            try:
-                if read_content(path).identity == self._sweep.identity:
-                    return
-                raise DamagedError("it belongs to another sweep")
-            except DamagedError as error:
-                self._quarantine(path, str(error))
+        if os.path.lexists(path):
+            self._quarantine(path, "it was not whole when the run began")
         facts = {
             **attributes(self._sweep),
             "environment": digest(record.environment),
             "environment_settings": canonical_json(record.environment),
         }
-        shards = (self._read(index) for index in range(len(self._places)))
+        shards = (self._read(index) for index in range(len(self._tiling)))
 
         def between() -> None:
             if self._hooks.stop:
-                self._stopped(len(self._places))
+                self._stopped(len(self._tiling))
 
         try:
             consolidate(self._disk, path, self._sweep.layout, self._sweep.grid, shards, facts, between=between)
@@ -252,7 +249,7 @@ class Run:
             return False
 
     def _prune(self) -> None:
-        for path in [self._folder.shard(index) for index in range(len(self._places))]:
+        for path in self._folder.shard_names():
             try:
                 if path.is_file():
                     self._disk.unlink(path)

@@ -60,7 +60,7 @@ def _git() -> dict[str, Any]:
     # Of the checkout that holds the package, if it is one.
     def ask(*words: str) -> str | None:
         try:
-            done = subprocess.run(("git", "-C", str(PACKAGE), *words), capture_output=True, text=True, timeout=10)
+            done = subprocess.run(("git", "-C", str(PACKAGE), *words), capture_output=True, text=True, timeout=60)
         except (OSError, subprocess.TimeoutExpired):
             return None
         return done.stdout.strip() if done.returncode == 0 else None

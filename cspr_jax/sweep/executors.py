@@ -1,11 +1,13 @@
 """Who computes the tiles: this process, or several on this machine. One process publishes."""
 
+import collections
 import concurrent.futures
 import contextlib
 import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import time
 from collections.abc import Generator, Iterable, Iterator
@@ -21,6 +23,7 @@ from cspr_jax.sweep.work import Computed
 
 # Times that the workers may die, one after another, without a tile between.
 DEATHS = 3
+_NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
 
 
 class ThisProcess:
@@ -58,8 +61,17 @@ class ThisProcess:
             yield self._tile_map(index)
 
 
-def _start_worker(parent: int) -> None:
+# The sweep of a worker process: it is sent once, not with each tile.
+_sweep: list[bytes] = []
+
+
+def _worker_tile(index: int) -> Computed:
+    return compute_tile(_sweep[0], index)
+
+
+def _start_worker(parent: int, pickled: bytes) -> None:
     # Signals reach the whole group: the parent decides. And no worker outlives it.
+    _sweep[:] = [pickled]
     for number in CODES:
         signal.signal(number, signal.SIG_IGN)
 
@@ -104,12 +116,12 @@ class Processes:
         Raises:
             ResourceError: workers that keep dying.
         """
-        waiting, deaths = list(indices), 0
+        waiting, deaths = dict.fromkeys(indices), 0
         while waiting and not stop:
             try:
-                with contextlib.closing(self._pool_tiles(list(waiting), stop)) as tiles:
+                with contextlib.closing(self._pool_tiles(collections.deque(waiting), stop)) as tiles:
                     for computed in tiles:
-                        waiting.remove(computed.shard.index)
+                        del waiting[computed.shard.index]
                         deaths = 0
                         yield computed
             except BrokenProcessPool as error:
@@ -120,10 +132,13 @@ class Processes:
                         "--workers or run.tile must be smaller"
                     ) from error
 
-    def _pool_tiles(self, waiting: list[int], stop: Stop) -> Generator[Computed, None, None]:
+    def _pool_tiles(self, waiting: collections.deque[int], stop: Stop) -> Generator[Computed, None, None]:
+        # A second Ctrl-C ends everything at once; what then cleans up behind Python need not complain about it.
+        if _NO_COMPLAINT not in sys.warnoptions:
+            sys.warnoptions.append(_NO_COMPLAINT)
         context = multiprocessing.get_context("spawn")
         pool = concurrent.futures.ProcessPoolExecutor(
-            self._count, mp_context=context, initializer=_start_worker, initargs=(os.getpid(),)
+            self._count, mp_context=context, initializer=_start_worker, initargs=(os.getpid(), self._pickled)
         )
         stop.at_once = lambda: _kill(pool)
         running: set[concurrent.futures.Future[Computed]] = set()
@@ -131,7 +146,7 @@ class Processes:
             while running or (waiting and not stop):
                 while waiting and not stop and len(running) < self._count:
                     with _signals_blocked():  # workers inherit that, from their first moment on
-                        running.add(pool.submit(compute_tile, self._pickled, waiting.pop(0)))
+                        running.add(pool.submit(_worker_tile, waiting.popleft()))
                 done, running = concurrent.futures.wait(
                     running, timeout=0.1, return_when=concurrent.futures.FIRST_COMPLETED
                 )

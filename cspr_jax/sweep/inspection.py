@@ -11,7 +11,7 @@ from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.record import Record, read_record
 from cspr_jax.store.seal import DamagedError
 from cspr_jax.store.shards import Layout, read_shard
-from cspr_jax.tiles import place_shape, tile_places
+from cspr_jax.tiles import Tiling
 
 LOG_TAIL = 1 << 16
 
@@ -30,14 +30,14 @@ def status(directory: Path) -> dict[str, Any]:
     """
     record = _record(directory)
     folder = _folder(directory, record)
-    shapes = _shapes(record)
+    tiles = len(_tiling(record))
     return {
         "schema": 1,
         "directory": str(directory),
         "sweep": record.source.get("file"),
         "identity": record.identity,
-        "tiles": len(shapes),
-        "shards": sum(1 for index in range(len(shapes)) if folder.shard(index).is_file()),
+        "tiles": tiles,
+        "shards": sum(1 for index in range(tiles) if folder.shard(index).is_file()),
         "quarantined": len(list(folder.quarantine.glob("*"))),
         "unfinished": len(list(directory.glob(".*.part"))) + len(list(folder.shards.glob(".*.part"))),
         "result": str(folder.result) if folder.result.is_file() else None,
@@ -63,17 +63,17 @@ def verify(path: Path) -> dict[str, Any]:
     record = _record(path)
     folder = _folder(path, record)
     found: dict[str, Any] = {"schema": 1, "path": str(path), "tiles": 0, "shards": 0, "missing": 0, "faults": []}
-    shapes = _shapes(record)
+    tiling = _tiling(record)
     run = record.settings["run"]
     layout = Layout(record.identity, list(run["store"]), run["dtype"])
-    found["tiles"] = len(shapes)
-    for index, shape in enumerate(shapes):
+    found["tiles"] = len(tiling)
+    for index in range(len(tiling)):
         place = folder.shard(index)
         if not place.exists():
             found["missing"] += 1
             continue
         try:
-            read_shard(place, layout, index, shape)
+            read_shard(place, layout, index, tiling.extent(index))
             found["shards"] += 1
         except DamagedError as error:
             found["faults"].append(one_line(f"{place}: {error}"))
@@ -113,11 +113,11 @@ def _folder(directory: Path, record: Record) -> RunFolder:
     return RunFolder(directory, Path(str(record.source.get("file", "result.toml"))).stem, Disk())
 
 
-def _shapes(record: Record) -> list[tuple[int, ...]]:
-    # Shape of each tile, from the settings alone: an axis is a range with a count, or a list.
+def _tiling(record: Record) -> Tiling:
+    # From the settings alone: an axis is a range with a count, or a list.
     axes = record.settings["axes"]
     counts = [len(a) if isinstance(a, list) else a["count"] for a in (axes[d] for d in record.settings["dimensions"])]
-    return [place_shape(place) for place in tile_places(tuple(counts), tuple(record.settings["run"]["tile"]))]
+    return Tiling(tuple(counts), tuple(record.settings["run"]["tile"]))
 
 
 def _last(log: Path) -> dict[str, Any] | None:

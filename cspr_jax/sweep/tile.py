@@ -14,7 +14,6 @@ from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
 from cspr_jax.sweep.work import Computed
-from cspr_jax.tiles import place_shape
 
 # Margins so near zero can change sign with the processor; how many there are stands in the result.
 NEAR_ZERO = 1e-9
@@ -35,7 +34,6 @@ class TileMap:
     def __init__(self, sweep: Sweep) -> None:
         """Refuse what cannot be computed."""
         self._sweep = sweep
-        self._places = list(sweep.grid.places())
         with jax.enable_x64(True):
             self._cells = CellMap(sweep.robot, sweep.keys, sweep.file)
             self._cells.refuse_hopeless(sweep.grid)
@@ -53,11 +51,10 @@ class TileMap:
             SelfCheckError: numbers that contradict each other.
             ResourceError: the tile does not fit into memory.
         """
-        place = self._places[index]
-        shape = place_shape(place)
+        tiling = self._sweep.grid.tiling
         try:
             with jax.enable_x64(True):
-                answers = self._cells(self._sweep.grid.cells(place))
+                answers = self._cells(self._sweep.grid.cells(tiling.place(index)))
         except (MemoryError, jax.errors.JaxRuntimeError) as error:
             if isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error):
                 raise ResourceError(
@@ -67,7 +64,7 @@ class TileMap:
             raise
         check_answers(index, answers)
         dtype = self._sweep.keys.run.dtype
-        values = {name: _stored(answers[name], dtype).reshape(shape) for name in self._sweep.store}
+        values = {name: _stored(answers[name], dtype).reshape(tiling.extent(index)) for name in self._sweep.store}
         now = environment()
         return Computed(Shard(index, digest(now), _near_zero(answers), values), now)
 

@@ -42,7 +42,7 @@ class Slow(Paper):
 
 
 @contextlib.contextmanager
-def paper(options, sweep):
+def paper(options, sweep, stop):
     if "PAPER_USER" in os.environ and os.getuid() == 0:  # root may write everywhere
         os.setgroups([])
         os.setgid(int(os.environ["PAPER_USER"]))

@@ -17,7 +17,6 @@ from cspr_jax.sweep.definition import Sweep, read_sweep
 from cspr_jax.sweep.engine import Hooks, Options, Outcome, Run
 from cspr_jax.sweep.signals import Stop
 from cspr_jax.sweep.work import Computed
-from cspr_jax.tiles import place_shape
 
 ENVIRONMENT = {"package": "0" * 64, "jax": "0.0", "cpu_model": "paper"}
 SWEEP = """schema = 1
@@ -51,7 +50,7 @@ def sweep_of(folder: Path, *, tiles: int = 12, trajectory: str = "", run: str = 
 def values_of(sweep: Sweep, index: int) -> dict[str, np.ndarray]:
     """What a tile holds: numbers that follow from its index and the sweep."""
     rng = np.random.default_rng([index, int(sweep.identity[:8], 16)])
-    shape = place_shape(list(sweep.grid.places())[index])
+    shape = sweep.grid.tiling.extent(index)
     kind = sweep.keys.run.dtype
     found = {
         "arcs": rng.integers(0, 30, shape).astype(np.int16),
@@ -93,7 +92,7 @@ def go(
     run = Run(sweep, directory, Options(**options), Hooks(on_tile=lambda done, total: acknowledged.append(done)), disk)
     path = run.finished()
     if path is not None:
-        return Outcome(path, 0, len(list(sweep.grid.places())))
+        return Outcome(path, 0, len(sweep.grid.tiling))
     return run.go(paper or Paper(sweep))
 
 

@@ -1,14 +1,16 @@
 """Flipped bits, cut files, files that are not what their name says: each is found, kept aside, and made again."""
 
+import errno
 import json
 import os
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cspr_jax.cli import main
-from cspr_jax.errors import CsprError, RefusedError
+from cspr_jax.errors import CsprError, RefusedError, StoreError
 from cspr_jax.sweep.inspection import verify
 from reliability.support import Paper, check_same, content, go, sweep_of
 
@@ -106,7 +108,6 @@ def replacements(finished, tmp_path):
         "link": link,
         "broken link": lambda path: (path.unlink(), path.symlink_to("nowhere")),
         "stray": lambda path: shutil.copy(path, path.with_name("00099.h5")),
-        "foreign": lambda path: path.with_name("notes.txt").write_text("mine"),
     }
 
 
@@ -122,7 +123,7 @@ def test_replaced_shards(finished, tmp_path):
         paper = Paper(sweep)
         go(sweep, directory, paper=paper)
         assert len(without_quarantine(directory)) == 1, name
-        assert paper.computed == ([] if name in ("stray", "foreign") else [2]), name
+        assert paper.computed == ([] if name == "stray" else [2]), name
         check_same(directory, reference)
         shutil.rmtree(directory)
 
@@ -159,6 +160,53 @@ def test_somebodys_file_under_the_name_of_the_result(finished, tmp_path):
     with pytest.raises(CsprError, match="choose another -o"):
         go(sweep, tmp_path / "run")
     assert content(tmp_path / "run") == {"small.h5": b"mine"}
+
+
+@pytest.mark.parametrize("name", ["run.json", "shards/00001.h5", "shards/photo.png", "shards"])
+def test_somebodys_files_under_the_names_of_a_run(finished, tmp_path, name):
+    """Where no run of ours ever was, nothing is moved: not even to quarantine."""
+    sweep, _, _ = finished
+    path = tmp_path / "run" / name
+    path.parent.mkdir(parents=True)
+    path.write_text("mine")
+    before = content(tmp_path / "run")
+    with pytest.raises(RefusedError, match="somebody's file"):
+        go(sweep, tmp_path / "run")
+    assert content(tmp_path / "run") == before
+
+
+def test_other_names_among_the_shards_are_left_alone(finished, tmp_path):
+    sweep, source, reference = finished
+    shutil.copytree(source, tmp_path / "run")
+    (tmp_path / "run" / "small.h5").unlink()
+    (tmp_path / "run" / "shards" / "notes.txt").write_text("mine")
+    paper = Paper(sweep)
+    go(sweep, tmp_path / "run", paper=paper)
+    assert paper.computed == [] and (tmp_path / "run" / "shards" / "notes.txt").read_text() == "mine"
+    (tmp_path / "run" / "shards" / "notes.txt").unlink()
+    check_same(tmp_path / "run", reference)
+
+
+def test_a_refusal_to_read_is_no_damage(finished, tmp_path, monkeypatch):
+    """Too many open files, say: nothing is set aside, and the next run goes on."""
+    sweep, source, reference = finished
+    shutil.copytree(source, tmp_path / "run")
+    (tmp_path / "run" / "small.h5").unlink()
+    before = content(tmp_path / "run")
+    read_bytes = Path.read_bytes
+
+    def refuse(path):
+        if path.name == "00002.h5":
+            raise OSError(errno.EMFILE, "Too many open files", str(path))
+        return read_bytes(path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "read_bytes", refuse)
+        with pytest.raises(StoreError, match=r"00002\.h5: cannot be read: Too many open files"):
+            go(sweep, tmp_path / "run")
+    assert content(tmp_path / "run").keys() >= before.keys() and not (tmp_path / "run" / "quarantine").exists()
+    go(sweep, tmp_path / "run")
+    check_same(tmp_path / "run", reference)
 
 
 def test_verify_and_status_tell_without_touching(finished, tmp_path, capsys):

@@ -18,6 +18,8 @@ from distributed import LocalCluster
 
 from cspr_jax.cli import main
 from cspr_jax.sweep.definition import read_sweep
+from cspr_jax.sweep.distributed import Scheduler
+from cspr_jax.sweep.signals import Stop
 from reliability.support import check_prefix, check_same, content
 
 SWEEP = """schema = 1
@@ -95,6 +97,37 @@ def test_a_dask_scheduler(job, tmp_path):
         thread.join()
         assert (code, err) == (0, "")
         check_same(tmp_path / "run", reference)
+
+
+def test_ctrl_c_while_no_worker_is_there(job, tmp_path):
+    """Before the first worker comes, and after the last one has gone."""
+    command = [sys.executable, "-m", "cspr_jax", "run", str(job[0]), "-o", str(tmp_path / "run"), "--scheduler"]
+    with LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster:
+        process = subprocess.Popen(
+            [*command, cluster.scheduler_address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        try:
+            assert "has no workers yet" in process.stderr.readline()
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=20)
+        finally:
+            process.kill()
+        assert process.returncode == 130 and err.splitlines() == ["cspr: stopped: no worker came; nothing was computed"]
+        assert not (tmp_path / "run").exists()
+
+        asked = Stop()
+
+        def ask_when_gone(line):
+            assert "has lost its workers" in line
+            asked.ask(signal.SIGTERM)
+
+        cluster.scale(1)
+        scheduler = Scheduler(read_sweep(job[0]), cluster.scheduler_address, warn=ask_when_gone)
+        tiles = scheduler.tiles(range(8), asked)
+        next(tiles)
+        cluster.scale(0)
+        assert len(list(tiles)) < 7
+        scheduler.close()
 
 
 @pytest.mark.parametrize(
