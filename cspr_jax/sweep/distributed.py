@@ -101,8 +101,10 @@ class Scheduler:
         """
         try:
             found = list(self._client.run(environment).values())
-        except (ImportError, AttributeError) as error:
-            raise ResourceError(f"--scheduler {self._address}: a worker has no cspr_jax: {reason(error)}") from error
+        except Exception as error:  # noqa: BLE001 - dask raises it for whatever a worker cannot import
+            raise ResourceError(
+                f"--scheduler {self._address}: a worker cannot run cspr_jax: {reason(error)}: install the same one there"
+            ) from error
         if not found:
             raise ResourceError(f"--scheduler {self._address}: has lost its workers: start some")
         for other in found[1:]:
