@@ -101,9 +101,9 @@ class Scheduler:
         """
         try:
             found = list(self._client.run(environment).values())
-        except Exception as error:  # noqa: BLE001 - dask raises it for whatever a worker cannot import
+        except Exception as error:  # dask raises it for whatever a worker cannot import
             raise ResourceError(
-                f"--scheduler {self._address}: a worker cannot run cspr_jax: {reason(error)}: install the same one there"
+                f"--scheduler {self._address}: a worker cannot run cspr_jax: {reason(error)}: install the same there"
             ) from error
         if not found:
             raise ResourceError(f"--scheduler {self._address}: has lost its workers: start some")
