@@ -62,3 +62,20 @@ def leaf(value) -> Array:
         the array.
     """
     return cast(Array, np.asarray(value, float))
+
+
+def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
+    """Where the parabola through three equidistant values is smallest, and its value there.
+
+    Args:
+        left: () value one step before.
+        middle: () value.
+        right: () value one step after.
+
+    Returns:
+        steps from the middle one, () in [-1, 1]; the value, (). An end where there is no minimum inside.
+    """
+    bend = left - 2.0 * middle + right
+    move = 0.5 * (left - right) / jnp.where(bend > 0.0, bend, 1.0)
+    move = jnp.clip(jnp.where(bend > 0.0, move, jnp.sign(left - right)), -1.0, 1.0)
+    return move, middle + 0.5 * move * (right - left) + 0.5 * move**2 * bend

@@ -56,7 +56,8 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
     """
     try:
         points = np.asarray(spec.base_points) * axis_signs(spec)
-        return robots.point_mass_robot(points, mass=spec.mass, gravity=gravity_of(spec, keys), name=spec.name)
+        make = robots.planar_robot if spec.planar else robots.point_mass_robot
+        return make(points, mass=spec.mass, gravity=gravity_of(spec, keys), name=spec.name)
     except InputError as error:
         raise ConfigError(file, f"robot.{error}") from error
 
@@ -105,12 +106,16 @@ def build_limits(spec: RobotFile, keys: LimitKeys, floor: float | None, file: ob
         the limits.
 
     Raises:
-        ConfigError: a smallest tension that is not below the largest.
+        ConfigError: a smallest tension that is not below the largest, or a list of another length.
     """
     found = {}
     for name in LimitKeys.model_fields:
         value = getattr(keys, name) if getattr(keys, name) is not None else getattr(spec, name)
-        found[name] = None if value is None else leaf(np.broadcast_to(np.asarray(value, float), (3,)))
+        if isinstance(value, list) and len(value) != len(spec.base_points):
+            raise ConfigError(
+                file, f"{name} = {shown(value)}: must be one number, or {len(spec.base_points)}: one a cable"
+            )
+        found[name] = None if value is None else leaf(np.broadcast_to(np.asarray(value, float), len(spec.base_points)))
     low, high = found["tension_min"], found["tension_max"]
     if low is not None and high is not None and not (np.asarray(low) < np.asarray(high)).all():
         raise ConfigError(file, f"tension_min = {np.asarray(low).tolist()}: must be below tension_max for every cable")

@@ -15,14 +15,16 @@ STANDARD_GRAVITY = 9.81
 SMALLEST_AREA_RATIO = 1e-6
 LARGEST_LENGTH = 1e6  # m; beyond, products of lengths lose their meaning
 SMALLEST_LEVEL_RATIO = 1e-3
+# Two spools count as level if their heights differ by less than this part of their distance.
+LEVEL = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
 class PointMassRobot:
-    """A point mass on three cables.
+    """A point mass on three cables, or on two in the plane y = 0.
 
     Fields:
-        base_points: (3, 3) where the cables leave their spools, one a row, in cable order; z down, m.
+        base_points: (n_cables, 3) where the cables leave their spools, one a row, in cable order; z down, m.
         mass: () of the effector, kg.
         gravity: () along +z, m/s^2.
         name: for people.
@@ -58,9 +60,7 @@ def point_mass_robot(
     points = np.asarray(base_points, float)
     if points.shape != (3, 3) or not (np.abs(points) <= LARGEST_LENGTH).all():
         raise InputError("base_points", base_points, "three points of three coordinates, at most 1e6 m")
-    for key, value in (("mass", mass), ("gravity", gravity)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise InputError(key, value, "a finite number > 0")
+    _check_numbers(mass, gravity)
     sides = np.roll(points, -1, 0) - points
     normal = np.cross(sides[0], sides[1])
     size = np.linalg.norm(normal)
@@ -71,8 +71,53 @@ def point_mass_robot(
     return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), name)
 
 
+def planar_robot(base_points, *, mass: float, gravity: float = STANDARD_GRAVITY, name: str = "robot") -> PointMassRobot:
+    """A point mass on two cables, moving in the plane y = 0, its geometry checked.
+
+    Args:
+        base_points: (2, 3) spool points on a level line, y = 0; z down, m.
+        mass: kg, positive.
+        gravity: m/s^2, positive.
+        name: for people.
+
+    Returns:
+        the robot, float64 NumPy leaves.
+
+    Raises:
+        InputError: wrong shape, not finite, y not 0, spools at one place or not on a level line, mass or gravity.
+    """
+    points = np.asarray(base_points, float)
+    if points.shape != (2, 3) or not (np.abs(points) <= LARGEST_LENGTH).all():
+        raise InputError("base_points", base_points, "two points of three coordinates, at most 1e6 m")
+    _check_numbers(mass, gravity)
+    if (points[:, 1] != 0.0).any():
+        raise InputError("base_points", points.tolist(), "points with y = 0: the plane of a planar robot")
+    gap = np.abs(points[1] - points[0])
+    if not gap[2] <= LEVEL * gap[0]:
+        raise InputError("base_points", points.tolist(), "two spools apart from each other on a level line")
+    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), name)
+
+
+def _check_numbers(mass: float, gravity: float) -> None:
+    for key, value in (("mass", mass), ("gravity", gravity)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError(key, value, "a finite number > 0")
+
+
+def is_planar(robot: PointMassRobot) -> bool:
+    """Whether the robot has two cables and moves in the plane y = 0.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        the claim; a matter of shapes, so that compiled functions can ask.
+    """
+    return robot.base_points.shape[0] == 2
+
+
 def centroid(robot: PointMassRobot) -> Array:
-    """Centroid of the spools, thesis (1.75).
+    """Centroid of the spools, thesis (1.75); of a planar robot the middle between them.
 
     Args:
         robot: the robot.
@@ -94,6 +139,8 @@ def plane_normal(robot: PointMassRobot) -> Array:
     Returns:
         (3,) the third component is 1; (0, 0, 1) for level spools.
     """
+    if is_planar(robot):
+        return jnp.zeros_like(robot.base_points[0]).at[2].set(1.0)
     a = robot.base_points
     area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
     return area / area[2]

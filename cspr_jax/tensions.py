@@ -1,25 +1,29 @@
-"""The force balance of a point mass on three cables, at one instant."""
+"""The force balance of a point mass on three cables, or on two in a plane, at one instant."""
 
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.robots import PointMassRobot
+from cspr_jax.robots import PointMassRobot, is_planar
 
 
 def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
-    """Pseudotensions kappa, thesis (2.12) to (2.14): Adj(M) (p'' - g).
+    """Pseudotensions kappa, thesis (2.12) to (2.14), of a planar robot (1.15) and (1.16): Adj(M) (p'' - g).
 
     They have the sign of the tensions below the spools, and need no division. The sign is
     corrected for spools numbered the other way round, so that it never depends on the labels.
 
     Args:
-        robot: a point mass on three cables.
+        robot: a point mass on three cables, or on two in a plane.
         position: (3,) of the mass, z down, m.
         acceleration: (3,) m/s^2.
 
     Returns:
-        (3,) in cable order, m^3/s^2; positive pulls, as long as the mass is below the spool plane.
+        (n_cables,) in cable order, m^3/s^2 (planar: m^2/s^2); positive pulls, as long as the mass is below the spools.
     """
+    if is_planar(robot):
+        adjugate = _planar_adjugate(robot.base_points - position)
+        side = jnp.sign(robot.base_points[1, 0] - robot.base_points[0, 0])
+        return side * (adjugate @ _relative_acceleration(robot, acceleration))
     a = robot.base_points
     following, preceding = jnp.roll(a, -1, axis=0), jnp.roll(a, -2, axis=0)
     adjugate = jnp.cross(position, following - preceding) + jnp.cross(following, preceding)
@@ -31,17 +35,21 @@ def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Arr
     """Cable tensions, thesis (2.2) to (2.7), as kappa / det(M) times mass and length.
 
     Args:
-        robot: a point mass on three cables.
+        robot: a point mass on three cables, or on two in a plane.
         position: (3,) of the mass, z down, m.
         acceleration: (3,) m/s^2.
 
     Returns:
-        (3,) in cable order, N. Not clipped: a negative entry is the push that a cable cannot give.
+        (n_cables,) in cable order, N. Not clipped: a negative entry is the push that a cable cannot give.
         Infinite or NaN in the spool plane, where M is singular.
     """
     rays = robot.base_points - position  # (2.6)
-    adjugate = jnp.stack([jnp.cross(rays[1], rays[2]), jnp.cross(rays[2], rays[0]), jnp.cross(rays[0], rays[1])])
-    determinant = jnp.dot(adjugate[2], rays[2])  # (2.9)
+    if is_planar(robot):
+        adjugate = _planar_adjugate(rays)
+        determinant = jnp.dot(adjugate[1], rays[1])
+    else:
+        adjugate = jnp.stack([jnp.cross(rays[1], rays[2]), jnp.cross(rays[2], rays[0]), jnp.cross(rays[0], rays[1])])
+        determinant = jnp.dot(adjugate[2], rays[2])  # (2.9)
     per_length = adjugate @ _relative_acceleration(robot, acceleration) / determinant  # (2.7), (2.11)
     return robot.mass * per_length * jnp.linalg.norm(rays, axis=1)  # (2.4)
 
@@ -50,18 +58,24 @@ def cable_motion(robot: PointMassRobot, position: Array, velocity: Array, accele
     """Lengths of the cables, (2.1), and their first two derivatives in time.
 
     Args:
-        robot: a point mass on three cables.
+        robot: a point mass on three cables, or on two in a plane.
         position: (3,) m.
         velocity: (3,) m/s.
         acceleration: (3,) m/s^2.
 
     Returns:
-        lengths (3,) m, rates (3,) m/s (positive pays out), accelerations (3,) m/s^2, in cable order.
+        lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2.
     """
     rays = position - robot.base_points
     lengths = jnp.linalg.norm(rays, axis=1)
     rates = rays @ velocity / lengths
     return lengths, rates, (jnp.dot(velocity, velocity) + rays @ acceleration - rates**2) / lengths
+
+
+def _planar_adjugate(rays: Array) -> Array:
+    # Rows whose product with p'' - g are the two unknowns' numerators by Cramer's rule, in the plane y = 0.
+    turned = jnp.stack([rays[:, 2], jnp.zeros_like(rays[:, 0]), -rays[:, 0]], axis=1)
+    return jnp.stack([turned[1], -turned[0]])
 
 
 def _relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:

@@ -11,26 +11,25 @@ from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility.oscillations import best_epsilon, best_inclination, least_oscillations, lower_bound
 from cspr_jax.problem import build_robot
-from cspr_jax.trajectories.transition import planar_weights, transition
+from cspr_jax.trajectories.transition import transition, weights
 
 Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one
 DISTANCE = 4.0  # of Table 1.1, in radii of the spools
-_ROBOT = "transition-prototype"
 _READINGS = {"w_max = 5 sqrt(3)": 5.0 * math.sqrt(3.0), "w_max = 10": 10.0}
 
 
-def _horizontal(amplitude: Amplitude, weights: Array) -> float:
-    return float(least_oscillations(amplitude, weights, jnp.asarray(0.0)))
+def _horizontal(amplitude: Amplitude, w: Array) -> float:
+    return float(least_oscillations(amplitude, w, jnp.asarray(0.0)))
 
 
-def _spatial_weights(direction: list[float]) -> Array:
-    # Of the robot of the experiment, for a target on the level of p0, whatever z0.
-    path = CATALOGUE / f"{_ROBOT}.toml"
+def _weights(name: str, direction: list[float]) -> Array:
+    # Of a robot of the catalogue, for a target on the level of p0, whatever z0.
+    path = CATALOGUE / f"{name}.toml"
     robot = build_robot(read_robot(path), TrajectoryKeys(), path)
     radius = np.linalg.norm(np.asarray(robot.base_points)[0, :2])
     z0 = jnp.asarray(2.0)
     target = jnp.asarray([DISTANCE * radius * direction[0], DISTANCE * radius * direction[1], 2.0])
-    return transition(robot, target, z0).weights
+    return weights(transition(robot, named("A1"), target, z0))
 
 
 def table_1_1() -> dict[Key, float | None]:
@@ -40,14 +39,14 @@ def table_1_1() -> dict[Key, float | None]:
         cells.
     """
     cases = {
-        "Planar": planar_weights(jnp.asarray(DISTANCE)),
-        "H_0": _spatial_weights([1.0, 0.0]),  # between two spools
-        "H_1": _spatial_weights([0.0, 1.0]),  # under a spool
+        "Planar": _weights("transition-planar", [1.0, 0.0]),
+        "H_0": _weights("transition-prototype", [1.0, 0.0]),  # between two spools
+        "H_1": _weights("transition-prototype", [0.0, 1.0]),  # under a spool
     }
     found: dict[Key, float | None] = {}
-    for name, weights in cases.items():
-        found["w_max", name, ""] = float(jnp.max(jnp.abs(weights)))
-        found["n", name, ""] = _horizontal(named("A1"), weights)
+    for name, w in cases.items():
+        found["w_max", name, ""] = float(jnp.max(jnp.abs(w)))
+        found["n", name, ""] = _horizontal(named("A1"), w)
     return found
 
 
@@ -57,11 +56,11 @@ def table_1_2() -> dict[Key, float | None]:
     Returns:
         cells; columns name the inclination and hold the number of oscillations, but for "optimal inclination".
     """
-    weights = jnp.array([1.0, 1.0, -2.0])
+    w = jnp.array([1.0, 1.0, -2.0])
     found: dict[Key, float | None] = {}
     for name in ("A1", "A2", "A3"):
         amplitude = named(name)
-        best, least = best_inclination(amplitude, weights)
+        best, least = best_inclination(amplitude, w)
         found[name, "optimal inclination", ""] = float(best)
         for column, v in (
             ("-v_opt", -best),
@@ -70,7 +69,7 @@ def table_1_2() -> dict[Key, float | None]:
             ("0.8", 0.8),
             ("0.999", 0.999),
         ):
-            found[name, column, ""] = float(least_oscillations(amplitude, weights, jnp.asarray(v)))
+            found[name, column, ""] = float(least_oscillations(amplitude, w, jnp.asarray(v)))
         found[name, "v_opt", ""] = float(least)
     return found
 
@@ -83,11 +82,11 @@ def table_1_3() -> dict[Key, float | None]:
     """
     found: dict[Key, float | None] = {}
     for reading, largest in _READINGS.items():
-        weights = jnp.array([largest, -largest, 0.0])
-        found["n", "A_idl", reading] = float(lower_bound(weights))
+        w = jnp.array([largest, -largest, 0.0])
+        found["n", "A_idl", reading] = float(lower_bound(w))
         for name in ("A1", "A2", "A3"):
-            found["n", name, reading] = _horizontal(named(name), weights)
-        epsilon, least = best_epsilon(weights)
+            found["n", name, reading] = _horizontal(named(name), w)
+        epsilon, least = best_epsilon(w)
         found["n", "A_eff", reading], found["epsilon", "A_eff", reading] = least, epsilon
     return found
 

@@ -15,7 +15,8 @@ from cspr_jax import tensions
 from cspr_jax.amplitudes import derivatives, named
 from cspr_jax.cli import main
 from cspr_jax.feasibility import oscillations as counts
-from cspr_jax.robots import centroid, point_mass_robot
+from cspr_jax.robots import centroid, planar_robot, point_mass_robot
+from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories import transition as transitions
 
 FUNCTIONS = {
@@ -69,15 +70,15 @@ def test_weights_make_the_pseudotensions(tilted, name):
     """(1.32) with the weights of a general triangle, against the force balance along the motion."""
     amplitude, z0, n = FUNCTIONS[name], 1.4, 5.0
     target = np.asarray(centroid(tilted)) + np.array([1.1, -0.7, 1.9])
-    one = transitions.transition(tilted, jnp.asarray(target), jnp.asarray(z0))
+    one = transitions.transition(tilted, amplitude, jnp.asarray(target), jnp.asarray(z0))
     at_rest = tensions.pseudotensions(tilted, one.hub, jnp.zeros(3))
-    omega = float(transitions.squared_duration(amplitude, jnp.asarray(n)))
     end = float(derivatives(amplitude, jnp.asarray(1.0), order=2)[2])
     for tau in np.linspace(0.0, 1.0, 41):
-        position, _, acceleration = transitions.motion(one, amplitude, jnp.asarray(n), jnp.asarray(tau))
+        position, _, acceleration = hypocycloid.motion(one, amplitude, jnp.asarray(2.0 * n), jnp.asarray(tau))
         kappa = np.asarray(tensions.pseudotensions(tilted, position, acceleration) / at_rest)
         a, a1, a2 = (float(x) for x in derivatives(amplitude, jnp.asarray(tau), order=2))
-        v, w = float(one.inclination), np.asarray(one.weights)
+        v, w = float(transitions.inclination(one)), np.asarray(transitions.weights(one))
+        omega = (2.0 * np.pi * n) ** 2 - end  # (1.29)
         cosine = (v + w) * (a2 - a * end) / omega - v * a
         sine = 4.0 * np.pi * n * (v + w) * a1 / omega
         phase = 2.0 * np.pi * n * tau
@@ -89,21 +90,24 @@ def test_the_weights_of_the_equilateral_robot():
     a, z0 = 0.693, 2.0
     robot = point_mass_robot(equilateral(a), mass=0.129)
     for x, y, v in ((1.3, -0.4, 0.0), (-0.2, 0.9, 0.3), (0.0, 2.0, -0.6)):
-        one = transitions.transition(robot, jnp.array([x, y, z0 * (1.0 + v)]), jnp.asarray(z0))
+        one = transitions.transition(robot, FUNCTIONS["A2"], jnp.array([x, y, z0 * (1.0 + v)]), jnp.asarray(z0))
         wanted = np.array([y - math.sqrt(3.0) * x, y + math.sqrt(3.0) * x, -2.0 * y]) / a
-        np.testing.assert_allclose(one.weights, wanted, atol=1e-12)
-        assert float(one.inclination) == pytest.approx(v)
-    np.testing.assert_allclose(transitions.planar_weights(jnp.asarray(2.5)), [-2.5, 2.5])
+        np.testing.assert_allclose(transitions.weights(one), wanted, atol=1e-12)
+        assert float(transitions.inclination(one)) == pytest.approx(v)
+    for half, sign in ((0.5, 1.0), (-0.5, -1.0)):  # (1.37), with the cables numbered either way
+        robot = planar_robot([[half, 0.0, 0.0], [-half, 0.0, 0.0]], mass=0.129)
+        one = transitions.transition(robot, FUNCTIONS["A2"], jnp.array([1.25, 0.0, 2.2]), jnp.asarray(z0))
+        np.testing.assert_allclose(transitions.weights(one), [-2.5 * sign, 2.5 * sign], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_motion_starts_at_rest_and_ends_like_a_pendulum(tilted, name):
     amplitude, z0, n = FUNCTIONS[name], jnp.asarray(1.4), jnp.asarray(3.0)
     target = jnp.asarray(centroid(tilted)) + jnp.array([0.6, 0.5, 1.1])
-    one = transitions.transition(tilted, target, z0)
+    one = transitions.transition(tilted, amplitude, target, z0)
 
     def at(tau):
-        return [np.asarray(x) for x in transitions.motion(one, amplitude, n, jnp.asarray(tau))]
+        return [np.asarray(x) for x in hypocycloid.motion(one, amplitude, 2.0 * n, jnp.asarray(tau))]
 
     start, end = at(0.0), at(1.0)
     np.testing.assert_allclose(start[0], one.hub, atol=1e-14)
@@ -112,8 +116,10 @@ def test_motion_starts_at_rest_and_ends_like_a_pendulum(tilted, name):
     np.testing.assert_allclose(end[1], np.zeros(3), atol=1e-11)
     pendulum = -float(one.rate) * (np.asarray(target) - np.asarray(one.hub))  # (1.88) along the line
     np.testing.assert_allclose(end[2], pendulum, atol=1e-10)
-    time, h = float(transitions.duration(one, amplitude, n)), 1e-5
+    time, h = float(hypocycloid.duration(one, 2.0 * n)), 1e-5
     for tau in (0.21, 0.5, 0.83):
+        swing = float(derivatives(amplitude, jnp.asarray(tau), order=0)[0]) * math.cos(6.0 * math.pi * tau)
+        np.testing.assert_allclose(at(tau)[0], one.hub + (target - one.hub) * swing, atol=1e-12)  # (1.20)
         before, now, after = at(tau - h), at(tau), at(tau + h)
         for k in (0, 1):
             np.testing.assert_allclose((after[k] - before[k]) / (2.0 * h * time), now[k + 1], rtol=2e-6, atol=1e-6)

@@ -17,14 +17,14 @@ Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 PerCable = Annotated[
-    Annotated[Positive, Tag("~one")] | Annotated[list[Positive], Field(min_length=3, max_length=3), Tag("~each")],
+    Annotated[Positive, Tag("~one")] | Annotated[list[Positive], Field(min_length=2, max_length=3), Tag("~each")],
     Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
 ]
 
 
 NotNegative = Annotated[float, Field(ge=0, le=1e9)]
 NotNegativePerCable = Annotated[
-    Annotated[NotNegative, Tag("~one")] | Annotated[list[NotNegative], Field(min_length=3, max_length=3), Tag("~each")],
+    Annotated[NotNegative, Tag("~one")] | Annotated[list[NotNegative], Field(min_length=2, max_length=3), Tag("~each")],
     Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
 ]
 
@@ -42,12 +42,13 @@ class LimitKeys(Table):
 
 
 class RobotFile(LimitKeys):
-    """A point mass on three cables."""
+    """A point mass on three cables, or on two in the plane y = 0."""
 
     name: str = Field(description="name of the robot", min_length=1)
-    base_points: Annotated[list[Point], Field(min_length=3, max_length=3)] = Field(
-        description="where the cables leave their spools: three points [x, y, z] in cable order, m"
+    base_points: Annotated[list[Point], Field(min_length=2, max_length=3)] = Field(
+        description="where the cables leave their spools: three points [x, y, z] in cable order, m; two if planar"
     )
+    planar: bool = Field(False, description="true: two cables, everything in the plane y = 0")
     mass: Positive = Field(description="mass of the effector, kg")
     gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
     z_axis: Literal["down", "up"] = Field("down", description='direction of the z axis, "down" or "up"')

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.amplitudes import Amplitude
-from cspr_jax.feasibility.limits import COUNTS, FLAGS, Limits, given, limit_curvatures, limit_slacks
+from cspr_jax.feasibility.limits import FLAGS, Limits, count, given, limit_curvatures, limit_slacks
 from cspr_jax.feasibility.slacks import instant, row_bounds, stretch, taut_bounds
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.robots import PointMassRobot
@@ -26,16 +26,18 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
     return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(FLAGS[name] for name in given(limits)))
 
 
-def counts(limits: Limits) -> tuple[int, ...]:
+def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
     """How many smooth functions each criterion is the smallest of.
 
     Args:
+        robot: a point mass on cables.
         limits: which limits are given.
 
     Returns:
         n_criteria numbers.
     """
-    return (3, 1, *(COUNTS[name] for name in given(limits)))
+    n_cables = robot.base_points.shape[0]
+    return (n_cables, 1, *(count(name, n_cables) for name in given(limits)))
 
 
 def smooth_slacks(
@@ -78,7 +80,7 @@ def slacks(
         n_criteria numbers ().
     """
     every = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
-    return tuple(functools.reduce(jnp.minimum, itertools.islice(every, count)) for count in counts(limits))
+    return tuple(functools.reduce(jnp.minimum, itertools.islice(every, n)) for n in counts(robot, limits))
 
 
 def curvatures(

@@ -1,9 +1,9 @@
 """Limits of tension, height, cable length, speed and acceleration, as slacks.
 
-In the notation of `slacks`, with rho_k the length of cable k, F = f / (m g), and rates with respect
-to tau; w_k = (p - a_k) . p'. The tension of cable k is m g kappa_k rho_k / (3 z0 eta).
+In the notation of `slacks`, with m the number of cables, rho_k the length of cable k, F the tension over
+the weight, and rates with respect to tau; w_k = (p - a_k) . p'. F of cable k is kappa_k rho_k / (m z0 eta).
 
-    tension        kappa_k rho_k / (3 z0) - F_min eta,   F_max eta - kappa_k rho_k / (3 z0)
+    tension        kappa_k rho_k / (m z0) - F_min eta,   F_max eta - kappa_k rho_k / (m z0)
     floor          (floor - z) / z0
     length         (rho_max^2 - rho_k^2) / (2 z0^2)
     speed          (rho_k^2 - (w_k / (T v_max))^2) / (2 z0^2)
@@ -33,12 +33,12 @@ class Limits:
     """Limits beyond taut cables; None where there is none.
 
     Fields:
-        tension_min: (3,) N.
-        tension_max: (3,) N.
+        tension_min: (n_cables,) N.
+        tension_max: (n_cables,) N.
         floor: () z of the floor, z down, m.
-        cable_length_max: (3,) m.
-        cable_speed_max: (3,) m/s, of paying out and of winding in.
-        cable_acceleration_max: (3,) m/s^2, of either sign.
+        cable_length_max: (n_cables,) m.
+        cable_speed_max: (n_cables,) m/s, of paying out and of winding in.
+        cable_acceleration_max: (n_cables,) m/s^2, of either sign.
     """
 
     tension_min: Array | None = None
@@ -59,8 +59,17 @@ FLAGS = {
 }
 
 
-# Smooth functions of each: one a cable, one of the height, two a cable for an absolute value.
-COUNTS = {name: {"floor": 1, "cable_acceleration_max": 6}.get(name, 3) for name in FLAGS}
+def count(name: str, n_cables: int) -> int:
+    """How many smooth functions the slack of a limit is the smallest of.
+
+    Args:
+        name: of the limit.
+        n_cables: of the robot.
+
+    Returns:
+        one of the height, one a cable, or two a cable for an absolute value.
+    """
+    return {"floor": 1, "cable_acceleration_max": 2 * n_cables}.get(name, n_cables)
 
 
 def given(limits: Limits) -> tuple[str, ...]:
@@ -89,7 +98,7 @@ def limit_slacks(
         now: the state at `tau`.
 
     Returns:
-        a list of () for each limit of `given`, as long as `COUNTS` says.
+        a list of () for each limit of `given`, as long as `count` says.
     """
     if not given(limits):
         return ()
@@ -99,7 +108,7 @@ def limit_slacks(
     rate = rays @ slope
     rate_slope = jnp.dot(slope, slope) + rays @ curvature
     z0, time, weight = segment.hub[2] - _centre_depth(robot), duration(segment, arcs), robot.mass * robot.gravity
-    lift = jnp.stack(now.kappa) * length / (3.0 * z0)
+    lift = jnp.stack(now.kappa) * length / (len(now.kappa) * z0)
     found = []
     for name in given(limits):
         limit = getattr(limits, name)
@@ -126,12 +135,12 @@ def _centre_depth(robot: PointMassRobot) -> Array:
 
 def _path(segment: Segment, arcs: Array, tau: Array, now: Instant) -> tuple[Array, Array, Array]:
     # Position and its first two derivatives in tau.
-    period, ratio = oscillation(segment, arcs)
+    ratio, steady, period = oscillation(segment, arcs)
     span = segment.end_radius - segment.start_radius
     r, r1 = segment.start_radius + span * now.amplitude_values[0], span * now.amplitude_values[1]
     sine, cosine = sincospi(segment.sense * arcs * tau)
     lateral, axial = sincospi(segment.sense * segment.precession * tau)
-    slope_r = r1 * cosine - r * segment.sense * period / (math.pi * arcs) * sine
+    slope_r = r1 * cosine - r * segment.sense * steady / (math.pi * arcs) * sine
     slope_t = r1 * ratio * sine
     slope = jnp.stack([axial * slope_r + lateral * slope_t, axial * slope_t - lateral * slope_r])
     return segment.hub + segment.plane @ now.c, segment.plane @ slope, segment.plane @ (period * (now.d - now.c))
@@ -148,7 +157,7 @@ def limit_curvatures(
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
         over: the interval.
-        kappa: bounds of the variable part of the pseudotensions over it, leaves (3,).
+        kappa: bounds of the variable part of the pseudotensions over it, leaves (n_cables,).
 
     Returns:
         one () for each limit of `given`, the largest over the cables.
@@ -165,7 +174,9 @@ def limit_curvatures(
         limit = getattr(limits, name)
         if name in ("tension_min", "tension_max"):
             whole = kappa._replace(value=1.0 + kappa.value)
-            bound = ((whole * length).times(1.0 / (3.0 * z0)) + eta.times(limit / weight)).curvature
+            bound = (
+                (whole * length).times(1.0 / (robot.base_points.shape[0] * z0)) + eta.times(limit / weight)
+            ).curvature
         elif name == "floor":
             bound = row_bounds(segment, arcs, over, segment.plane[2]).curvature / z0
         elif name == "cable_length_max":
@@ -182,20 +193,20 @@ def limit_curvatures(
 
 def _pace(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]:
     # Bounds of the length of c and of its first two derivatives; the same of its second derivative.
-    period, ratio = oscillation(segment, arcs)
-    omega = math.pi * arcs
+    ratio, steady, period = oscillation(segment, arcs)
+    omega, gain = math.pi * arcs, steady / period
     turn = math.pi * segment.precession
     one = jnp.ones_like(omega)
     wave = Bounds(one, omega, omega**2)
-    rho = over.bend.times(1.0 / period)
+    rho = (over.bend + over.size.times(jnp.abs(segment.end_bend))).times(1.0 / period)
     c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(turn)
-    d_r = rho * wave + (over.growth * wave).times(2.0 / omega)
-    d_t = ((rho + over.size.times(2.0)) * wave).times(ratio)
+    d_r = rho * wave + (over.growth * wave).times(2.0 * gain / omega)
+    d_t = ((rho + over.size.times(2.0 * gain)) * wave).times(ratio)
     return c, (d_r.combined(d_t).turned(turn) + c).times(period)  # c'' = T^2 lambda (d - c)
 
 
 def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Bounds:
-    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (3,). No cable is shorter than
+    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (n_cables,). No cable is shorter than
     # the distance from the spool plane.
     at_middle = jnp.linalg.norm(segment.hub + segment.plane @ over.place - robot.base_points, axis=1)
     change = over.radius * pace.slope

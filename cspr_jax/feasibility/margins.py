@@ -17,28 +17,12 @@ from cspr_jax.feasibility.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.feasibility.certificate import BATCH, Shared
 from cspr_jax.feasibility.criteria import counts, smooth_slacks
 from cspr_jax.grids import in_batches
+from cspr_jax.numerics import vertex
 from cspr_jax.trajectories.hypocycloid import Segment
 
 CANDIDATES = 3
 # Distance of the points of the first refining parabola, in steps between samples, and of the next ones.
 FIRST_WIDTH, NARROWER = 1.0 / 4.0, 1.0 / 16.0
-
-
-def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
-    """Where the parabola through three equidistant values is smallest, and its value there.
-
-    Args:
-        left: () value one step before.
-        middle: () value.
-        right: () value one step after.
-
-    Returns:
-        steps from the middle one, () in [-1, 1]; the value, (). An end where there is no minimum inside.
-    """
-    bend = left - 2.0 * middle + right
-    move = 0.5 * (left - right) / jnp.where(bend > 0.0, bend, 1.0)
-    move = jnp.clip(jnp.where(bend > 0.0, move, jnp.sign(left - right)), -1.0, 1.0)
-    return move, middle + 0.5 * move * (right - left) + 0.5 * move**2 * bend
 
 
 def _block_estimates(function, shared: Shared, segment: Segment, arcs: Array, start: Array, stop: Array):
@@ -167,7 +151,7 @@ def margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> np.ndarray:
         (n, n_criteria) in the order of `criteria.flags`; NaN where the motion is not finite.
     """
     table = blocks(shared.amplitude, int(np.max(arcs)))
-    groups = counts(shared.limits)
+    groups = counts(shared.robot, shared.limits)
     # The smallest over the cables has kinks, each cable's own slack has none: they are refined apart.
     # Limits are many: their slacks stay estimates.
     functions = Functions(smooth_slacks, sum(groups), sum(groups[:2]))

@@ -57,7 +57,8 @@ def instant(segment: Segment, amplitude: Amplitude, arcs: Array, tau: Array) -> 
     c, d = swing(segment, values, arcs, tau)
     cross = c[0] * d[1] - c[1] * d[0]
     eta = 1.0 + segment.tilt[0] * c[0] + segment.tilt[1] * c[1]
-    kappa = [eta + segment.pull[k, 0] * d[0] + segment.pull[k, 1] * d[1] + segment.twist[k] * cross for k in range(3)]
+    pulls = [segment.pull[k, 0] * d[0] + segment.pull[k, 1] * d[1] for k in range(segment.pull.shape[0])]
+    kappa = [eta + pull + segment.twist[k] * cross for k, pull in enumerate(pulls)]
     return Instant(kappa, eta, c, d, values)
 
 
@@ -71,7 +72,7 @@ def normalised_pseudotensions(segment: Segment, amplitude: Amplitude, arcs: Arra
         tau: () normalised time.
 
     Returns:
-        (3,) in cable order; all 1 at rest in p0.
+        (n_cables,) in cable order; all 1 at rest in p0.
     """
     return jnp.stack(instant(segment, amplitude, arcs, tau).kappa)
 
@@ -87,11 +88,12 @@ def largest_term(amplitude: Amplitude, segment: Segment, arcs: Array) -> Array:
     Returns:
         () at least 1.
     """
-    period, ratio = oscillation(segment, arcs)
+    ratio, steady, period = oscillation(segment, arcs)
     span = jnp.abs(segment.end_radius - segment.start_radius)
     largest = amplitude.largest.astype(span.dtype)
     radius = jnp.maximum(segment.start_radius, segment.end_radius) + span * (largest[0] - 1.0)
-    force = span * (largest[2] / period + largest[1] / arcs) + 2.0 * ratio * radius
+    gain, bend = steady / period, jnp.abs(segment.end_bend)
+    force = (span * largest[2] + bend * radius) / period + gain * (span * largest[1] / arcs + 2.0 * ratio * radius)
     pull = jnp.max(jnp.sum(jnp.abs(segment.pull), axis=-1))
     twist = jnp.max(jnp.abs(segment.twist))
     return 1.0 + radius * jnp.sum(jnp.abs(segment.tilt)) + force * (pull + radius * twist)
@@ -173,19 +175,20 @@ def row_bounds(
     Returns:
         the bounds.
     """
-    period, ratio = oscillation(segment, arcs)
-    omega = math.pi * arcs
+    ratio, steady, period = oscillation(segment, arcs)
+    omega, gain = math.pi * arcs, steady / period
     tilt_r, tilt_t = _components(segment, tilt, over)
     x, y = tilt_r * over.size, (tilt_t * over.size).times(ratio)
     if pull is not None:
         pull_r, pull_t = _components(segment, pull, over)
-        rho = over.bend.times(1.0 / period)
+        rho = (over.bend + over.size.times(jnp.abs(segment.end_bend))).times(1.0 / period)
         x = x + pull_r * rho
-        y = y + (pull_t * (rho + over.size.times(2.0))).times(ratio) + (pull_r * over.growth).times(2.0 / omega)
+        y = y + (pull_t * (rho + over.size.times(2.0 * gain))).times(ratio)
+        y = y + (pull_r * over.growth).times(2.0 * gain / omega)
     total = _oscillating(x, y, omega)
     if twist is not None:
-        e = (over.size * over.growth).times(twist * ratio / omega)
-        total = total + _oscillating(e, (over.size * over.size).times(twist * ratio), 2.0 * omega) + e
+        e = (over.size * over.growth).times(gain * twist * ratio / omega)
+        total = total + _oscillating(e, (over.size * over.size).times(gain * twist * ratio), 2.0 * omega) + e
     return total
 
 
@@ -210,7 +213,7 @@ def taut_bounds(segment: Segment, arcs: Array, over: Stretch) -> Bounds:
         over: the interval.
 
     Returns:
-        bounds with leaves (3,), in cable order.
+        bounds with leaves (n_cables,), in cable order.
     """
     return jax.vmap(lambda pull, twist: row_bounds(segment, arcs, over, segment.tilt, pull, twist))(
         segment.pull, segment.twist

@@ -73,7 +73,7 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
 
     def one(candidate):
         p, table = candidate
-        period, ratio = oscillation(segments, p)
+        ratio, _, period = oscillation(segments, p)
         exists = period > SMALLEST_PERIOD
         bend, growth = span / jnp.where(exists, period, 1.0), span * ((2.0 / math.pi) / p)
 

@@ -17,6 +17,7 @@ least inclined to the spool plane. psi = 0 with p = 1 has no duration: see `dura
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -48,9 +49,10 @@ class Segment:
         precession: () delta, in half turns, in [0, 1].
         sense: () +1 (p odd) or -1 (p even): sign of theta_h, (2.34).
         rate: () lambda of (2.26), 1/s^2.
+        end_bend: () A''(1) of a transition of chapter 1; 0 for the functions of chapter 2, which meet (2.49).
         tilt: (2,) slope of the plane: depth below the spools over z0 is 1 + tilt . c; 1/m.
-        pull: (3, 2) one row a cable, 1/m.
-        twist: (3,) one a cable, 1/m^2.
+        pull: (n_cables, 2) one row a cable, 1/m.
+        twist: (n_cables,) one a cable, 1/m^2.
     """
 
     plane: Array
@@ -60,6 +62,7 @@ class Segment:
     precession: Array
     sense: Array
     rate: Array
+    end_bend: Array
     tilt: Array
     pull: Array
     twist: Array
@@ -84,7 +87,7 @@ def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: 
     plane = jnp.stack([q1, q2], axis=1)
     tilt, pull, twist = couplings(robot, hub - centre, plane)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
-    return Segment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, tilt, pull, twist)
+    return Segment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, jnp.zeros_like(r1), tilt, pull, twist)
 
 
 def _plane(v1: Array, v2: Array, z0: Array, normal: Array, odd: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -113,23 +116,38 @@ def _least_inclined(normal: Array, q1: Array, x_axis: Array) -> Array:
     return jnp.where(upright, fallback / jnp.linalg.norm(fallback), level / jnp.where(upright, 1.0, size))
 
 
-def oscillation(segment: Segment, arcs: Array) -> tuple[Array, Array]:
-    """T^2 lambda, and the ratio nu of the axes of the ellipse.
+class Oscillation(NamedTuple):
+    """The fast part of a motion.
+
+    Fields:
+        ratio: () nu = delta / (pi p) of the axes of the ellipse.
+        steady: () theta_h^2 (n_h - 1) of (2.47): T^2 times the square of the frequency at constant size.
+        period: () T^2 lambda: the same, less A''(1) of a transition, (1.29).
+    """
+
+    ratio: Array
+    steady: Array
+    period: Array
+
+
+def oscillation(segment: Segment, arcs: Array) -> Oscillation:
+    """The fast part of a segment.
 
     Args:
         segment: of the parity of `arcs`.
         arcs: () number of arcs p, a float.
 
     Returns:
-        T^2 lambda: () equal to theta_h^2 (n_h - 1) of (2.47), and nu = delta / (pi p): ().
+        its numbers.
     """
     ratio = segment.precession / arcs
     # 1 - ratio first: it is what vanishes for p = 1 and psi -> 0.
-    return (math.pi * arcs) ** 2 * (1.0 - ratio) * (1.0 + ratio), ratio
+    steady = (math.pi * arcs) ** 2 * (1.0 - ratio) * (1.0 + ratio)
+    return Oscillation(ratio, steady, steady - segment.end_bend)
 
 
 def duration(segment: Segment, arcs: Array) -> Array:
-    """Duration T of a segment, (2.47).
+    """Duration T of a segment, (2.47); of a transition (1.29).
 
     Args:
         segment: of the parity of `arcs`.
@@ -138,7 +156,7 @@ def duration(segment: Segment, arcs: Array) -> Array:
     Returns:
         () seconds; 0 for p = 1 between points on one ray from p0, which is no trajectory.
     """
-    return jnp.sqrt(oscillation(segment, arcs)[0] / segment.rate)
+    return jnp.sqrt(oscillation(segment, arcs).period / segment.rate)
 
 
 def swing(segment: Segment, amplitude_values: tuple[Array, ...], arcs: Array, tau: Array) -> tuple[Array, Array]:
@@ -148,9 +166,10 @@ def swing(segment: Segment, amplitude_values: tuple[Array, ...], arcs: Array, ta
     phase sense pi p tau and ' = d / dtau,
 
         c = r (C e_r + nu S e_t)
-        d = c + c'' / lambda = [rho C - 2 sense r' S / (pi p)] e_r + nu (rho + 2 r) S e_t,
+        d = c + c'' / lambda = [rho C - 2 g sense r' S / (pi p)] e_r + nu (rho + 2 g r) S e_t,
 
-    rho = r'' / (T^2 lambda); c'' here is the second derivative in time.
+    rho = (r'' - A''(1) r) / (T^2 lambda) and g = (T^2 lambda + A''(1)) / (T^2 lambda), which is 1 in
+    chapter 2; c'' here is the second derivative in time.
 
     Args:
         segment: of the parity of `arcs`.
@@ -163,13 +182,13 @@ def swing(segment: Segment, amplitude_values: tuple[Array, ...], arcs: Array, ta
     """
     span = segment.end_radius - segment.start_radius
     r = segment.start_radius + span * amplitude_values[0]  # (2.48)
-    period, ratio = oscillation(segment, arcs)
-    rho = span * amplitude_values[2] / period
+    ratio, steady, period = oscillation(segment, arcs)
+    rho, gain = (span * amplitude_values[2] - segment.end_bend * r) / period, steady / period
     sine, cosine = sincospi(segment.sense * arcs * tau)
     lateral, axial = sincospi(segment.sense * segment.precession * tau)
     c_r, c_t = r * cosine, ratio * r * sine
-    d_r = rho * cosine - 2.0 * segment.sense * span * amplitude_values[1] * sine / (math.pi * arcs)
-    d_t = ratio * (rho + 2.0 * r) * sine
+    d_r = rho * cosine - 2.0 * gain * segment.sense * span * amplitude_values[1] * sine / (math.pi * arcs)
+    d_t = ratio * (rho + 2.0 * gain * r) * sine
     c = jnp.stack([axial * c_r + lateral * c_t, axial * c_t - lateral * c_r])
     d = jnp.stack([axial * d_r + lateral * d_t, axial * d_t - lateral * d_r])
     return c, d
