@@ -18,7 +18,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.numerics import leaf, polynomial
 
 HIGHEST_DERIVATIVE = 5
-NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3")
+NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3", "ideal")
 BOUNDARY_TOLERANCE = 1e-9
 # Shorter ends ask for accelerations that no robot has, and lose the digits of A'' to rounding.
 SMALLEST_EPSILON = 1e-3
@@ -140,7 +140,8 @@ def named(name: str, epsilon: float | None = None) -> Amplitude:
 
     "A1", "quintic" (also "A2"), "A3": thesis (1.101) and (2.50). "effective": (1.110), a cubic-like
     start, a straight middle and the mirrored end. "effective-c3": the same idea with
-    A'' = k tau (epsilon - tau)^2 at the start, whose third derivative does not jump.
+    A'' = k tau (epsilon - tau)^2 at the start, whose third derivative does not jump. "ideal": (1.103), A = tau,
+    which meets no boundary condition and serves for bounds.
 
     Args:
         name: one of `NAMES`.
@@ -157,6 +158,7 @@ def named(name: str, epsilon: float | None = None) -> Amplitude:
         "quintic": (0, 0, 0, 10, -15, 6),
         "A2": (0, 0, 0, 10, -15, 6),
         "A3": (0, 0, 0, 6, -7, 2),
+        "ideal": (0, 1),
     }
     if name in polynomials:
         if epsilon is not None:
@@ -203,11 +205,12 @@ def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
     return from_pieces("polynomial", (), (0.0,), (tuple(coefficients),))
 
 
-def boundary_errors(amplitude: Amplitude) -> list[str]:
+def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str]:
     """The conditions of thesis (2.49) that a function breaks: A(0) = 0, A(1) = 1, A' and A'' zero at both ends.
 
     Args:
         amplitude: the function.
+        free_end: whether A''(1) may be anything: then they are (1.27) and (1.28), of a transition.
 
     Returns:
         one text such as "A''(1) = -12, must be 0" for each broken condition.
@@ -216,7 +219,8 @@ def boundary_errors(amplitude: Amplitude) -> list[str]:
     errors = []
     for tau, row, origin in ((0, first, amplitude.origins[0]), (1, last, amplitude.origins[-1])):
         curve = np.polynomial.Polynomial(row)
-        for order, mark in enumerate(("", "'", "''")):
+        marks = ("", "'") if free_end and tau == 1 else ("", "'", "''")
+        for order, mark in enumerate(marks):
             value = float((curve.deriv(order) if order else curve)(tau - float(origin)))
             wanted = float(tau if order == 0 else 0)
             if not abs(value - wanted) <= BOUNDARY_TOLERANCE * float(amplitude.largest[order]):

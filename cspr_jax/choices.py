@@ -10,7 +10,8 @@ from cspr_jax.config.plan import Choice, PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.maps.minimum_arcs import Answers, minimum_arcs
+from cspr_jax.maps.answers import Answers
+from cspr_jax.maps.minimum_arcs import minimum_arcs
 from cspr_jax.robots import PointMassRobot, centroid
 from cspr_jax.trajectories import depths
 
@@ -83,6 +84,8 @@ def chosen_depth(shared: Shared, spec: RobotFile, keys: PlanFile, path: Path) ->
         if pose.position is None and not pose.rest:
             raise ConfigError(path, f"pose[{i}].position is missing: [x, y, z] in m, or rest = true")
     targets = _targets(spec, keys)
+    if keys.z0 is None:
+        raise ConfigError(path, 'z0 is missing: depth of P0, m, or { choose = "mean" | "conservative" | "fastest" }')
     if not isinstance(keys.z0, Choice):
         _check_rest(shared.robot, spec, keys, keys.z0, path)
         return keys.z0

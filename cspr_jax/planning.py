@@ -11,9 +11,11 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
+from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.extremes import Extremes, extremes
-from cspr_jax.maps.minimum_arcs import Answers, pick, segments_between
+from cspr_jax.maps.answers import Answers, pick
+from cspr_jax.maps.minimum_arcs import segments_between
 from cspr_jax.trajectories.hypocycloid import Segment
 
 # Where a search for z0 takes "best" epsilon to be, until it is chosen.
@@ -59,6 +61,10 @@ def plan(path: Path) -> Plan:
     """
     keys = checked(PlanFile, read_toml(path), path)
     spec = resolve_robot(keys.robot, path, path.parent)
+    if spec.planar:
+        raise ConfigError(path, f'robot "{spec.name}" is planar: plans need three cables, maps of transitions take two')
+    if keys.family == "transition" or keys.inclination is not None:
+        raise ConfigError(path, 'family = "transition": must be "hypocycloid-standard" in a plan, without inclination')
     robot = problem.build_robot(spec, keys, path)
     limits = problem.build_limits(spec, keys, keys.floor, path)
     amplitude = problem.build_amplitude(keys, path, epsilon=FIRST_EPSILON)

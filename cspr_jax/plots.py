@@ -44,7 +44,8 @@ def plot(path: Path, output: Path, *, quantity: str | None = None, at: dict[str,
 
 
 def _map_figure(result: Result, quantity: str | None, at: dict[str, float]) -> Figure:
-    name = quantity or ("arcs" if "arcs" in result.data else next(iter(result.data)))
+    first = [name for name in ("arcs", "oscillations") if name in result.data]
+    name = quantity or (first[0] if first else next(iter(result.data)))
     if name not in result.data:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
     data, axes, notes = _fix(result, result.data[name], at)
@@ -85,11 +86,13 @@ def _sections(
     size = (3.1 * columns + 1.3, 3.2 * lines + 0.8) if len(shown) > 1 else (7.0, 5.6)
     figure = Figure(figsize=size, layout="constrained")
     grid = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
-    colours, norm = _colours(name, data[:, :, shown])
+    colours, norm = _colours(data[:, :, shown])
     for panel in grid.flat[len(shown) :]:
         panel.set_visible(False)
     for panel, i in zip(grid.flat, shown, strict=False):
         image = _section(panel, result, data[:, :, i], across, colours, norm)
+        if name == "least_oscillations":
+            _loci(panel, result, data[:, :, i], across)
         if panels is not None:
             panel.set_title(f"{panels} = {result.axes[panels][i]:.3g} {result.units[panels]}", fontsize=10)
     for panel in grid[-1]:
@@ -97,7 +100,7 @@ def _sections(
     for panel in grid[:, 0]:
         panel.set_ylabel(f"{across[1]} ({result.units[across[1]]})")
     bar = figure.colorbar(image, ax=grid, shrink=0.9, label=_label(result, name))
-    if name in ("arcs", "tried_arcs"):
+    if data.dtype.kind == "i":
         _count_ticks(bar, int(data[:, :, shown].max()))
     handles, labels = grid[0, 0].get_legend_handles_labels()
     if handles:
@@ -147,13 +150,22 @@ def _section(panel: Axes, result: Result, values: np.ndarray, across: list[str],
     return image
 
 
+def _loci(panel: Axes, result: Result, values: np.ndarray, across: list[str]) -> None:
+    # Where a whole number of oscillations is just too few: the hexagons of thesis Fig. 1.6 on horizontal transitions.
+    x, y = (result.axes[axis] for axis in across)
+    levels = np.arange(1.0, np.nanmax(values, initial=1.0))
+    if min(values.shape) > 1 and len(levels):
+        lines = panel.contour(x, y, values.T, levels=levels, colors="white", linewidths=0.8)
+        panel.clabel(lines, fmt="%d", fontsize=8)
+
+
 def _edges(points: np.ndarray) -> np.ndarray:
     middles = 0.5 * (points[1:] + points[:-1])
     return np.concatenate([[1.5 * points[0] - 0.5 * points[1]], middles, [1.5 * points[-1] - 0.5 * points[-2]]])
 
 
-def _colours(name: str, data: np.ndarray):
-    if name in ("arcs", "tried_arcs"):
+def _colours(data: np.ndarray):
+    if data.dtype.kind == "i":
         most = max(int(data.max()), 1)
         colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, most))
         return ListedColormap([NONE_COLOUR, *colours]), BoundaryNorm(np.arange(-0.5, most + 1), most + 1)

@@ -62,7 +62,9 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
         raise ConfigError(file, f"robot.{error}") from error
 
 
-def build_amplitude(keys: TrajectoryKeys, file: object, *, epsilon: float | None = None, at: str = "") -> Amplitude:
+def build_amplitude(
+    keys: TrajectoryKeys, file: object, *, epsilon: float | None = None, at: str = "", for_bounds: bool = False
+) -> Amplitude:
     """The amplitude function, its boundary conditions checked.
 
     Args:
@@ -70,12 +72,13 @@ def build_amplitude(keys: TrajectoryKeys, file: object, *, epsilon: float | None
         file: named in errors.
         epsilon: stands in for "best".
         at: prefix of the key in errors.
+        for_bounds: whether "ideal" will do, which is no motion.
 
     Returns:
         the function.
 
     Raises:
-        ConfigError: it breaks (2.49), or epsilon = "best" where one value must be given.
+        ConfigError: it breaks (2.49), of a transition (1.27) or (1.28); epsilon = "best" where a value must be given.
     """
     key = keys.amplitude
     if isinstance(key, PolynomialAmplitude):
@@ -87,9 +90,11 @@ def build_amplitude(keys: TrajectoryKeys, file: object, *, epsilon: float | None
         amplitude, given = amplitudes.named(key.name, value), shown(key.name)
     else:
         amplitude, given = amplitudes.named(key), shown(key)
-    broken = boundary_errors(amplitude)
+    free_end = keys.family == "transition"
+    broken = [] if key == "ideal" and for_bounds else boundary_errors(amplitude, free_end=free_end)
     if broken:
-        raise ConfigError(file, f"{at}amplitude = {given}: must meet (2.49), but " + "; ".join(broken))
+        conditions = "(1.27) and (1.28)" if free_end else "(2.49)"
+        raise ConfigError(file, f"{at}amplitude = {given}: must meet {conditions}, but " + "; ".join(broken))
     return amplitude
 
 

@@ -34,6 +34,12 @@ AXES = {
         Quantity("y", "m", "y of the target", "Horizontal coordinate of the target."),
         Quantity("z", "m", "z of the target", "Vertical coordinate of the target; see z_axis."),
         Quantity("z0", "m", "depth of P0 below the centroid", "The point P0 about which the effector swings."),
+        Quantity(
+            "inclination",
+            "1",
+            "inclination",
+            "How much deeper below the spools the target is than P0, over z0: v of thesis (1.31).",
+        ),
         Quantity("from_x", "m", "x of the start point", "Horizontal coordinate of the start point."),
         Quantity("from_y", "m", "y of the start point", "Horizontal coordinate of the start point."),
         Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
@@ -79,7 +85,57 @@ QUANTITIES = {
             "smallest slack of the limits",
             "Smallest dimensionless slack of the limits given (docs/theory.md); infinite where there is none.",
         ),
+        Quantity(
+            "oscillations",
+            "1",
+            "smallest number of oscillations",
+            "Smallest number of oscillations proved feasible from the pseudotensions themselves; 0: none.",
+            "int16",
+        ),
+        Quantity(
+            "tried_oscillations",
+            "1",
+            "number of oscillations of the best candidate",
+            "Equal to `oscillations` where it is positive, else the number with the largest margin.",
+            "int16",
+        ),
+        Quantity(
+            "envelope_oscillations",
+            "1",
+            "number of oscillations that the envelopes allow",
+            "Smallest integer that keeps the envelopes (1.39) positive: sufficient, not necessary; 0: none.",
+            "int16",
+        ),
+        Quantity(
+            "least_oscillations",
+            "1",
+            "number of oscillations n, a real number",
+            "What the envelopes ask for, (1.48) and (1.94); NaN where no number will do (|v| >= 1).",
+        ),
+        Quantity(
+            "inclination_gain",
+            "1",
+            "oscillations saved by the inclination",
+            "Real number of oscillations of the horizontal transition less that at this inclination.",
+        ),
+        Quantity("used_inclination", "1", "inclination v", "Inclination of the transition, v of (1.31)."),
+        Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination asks for."),
     )
+}
+_COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
+_OF_OSCILLATIONS = (
+    "oscillations",
+    "tried_oscillations",
+    "envelope_oscillations",
+    "least_oscillations",
+    "inclination_gain",
+    "used_inclination",
+    "used_z0",
+)
+# What each kind of map can store.
+OF_MAP = {
+    "minimum-arcs": ("arcs", "tried_arcs", *_COMMON),
+    "minimum-oscillations": (*_OF_OSCILLATIONS, *_COMMON),
 }
 TRAJECTORY = {
     q.name: q
@@ -94,7 +150,21 @@ TRAJECTORY = {
     )
 }
 STORABLE = tuple(QUANTITIES)
-DEFAULT_STORE = ("arcs", "verdict", "duration", "margin", "feasible_at_infinity")
+DEFAULT_STORE = {
+    "minimum-arcs": ("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
+    "minimum-oscillations": (
+        "oscillations",
+        "envelope_oscillations",
+        "least_oscillations",
+        "verdict",
+        "duration",
+        "margin",
+        "inclination_gain",
+        "used_inclination",
+        "used_z0",
+    ),
+}
+TITLES = {"minimum-arcs": "Smallest number of arcs", "minimum-oscillations": "Smallest number of oscillations"}
 
 
 def flag_attributes() -> dict[str, object]:

@@ -29,7 +29,7 @@ class Pose(Table):
     position: Point | None = Field(None, description="target [x, y, z], m; a rest pose may leave it out")
     rest: bool = Field(False, description="true: at rest in P0, below the centroid of the spools")
     arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] | None = Field(
-        None, description="fixes the number of arcs of the segment that ends here"
+        None, description="fixes the number of arcs of the segment that ends here; 2 n for n oscillations"
     )
 
 
@@ -38,8 +38,10 @@ class PlanFile(TrajectoryKeys, LimitKeys):
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
-    z0: Depth = Field(
-        description='depth of P0 below the centroid, m, or { choose = "mean" | "conservative" | "fastest" }'
+    z0: Depth | None = Field(
+        None,
+        description='depth of P0 below the centroid, m, or { choose = "mean" | "conservative" | "fastest" }; '
+        "transitions may give the inclination instead",
     )
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
     floor: Coordinate | None = Field(None, description="z of the floor, m")

@@ -42,7 +42,8 @@ class Axes(Table):
     x: Axis = Field(description=_OF_TARGETS.format("x"))
     y: Axis = Field(description=_OF_TARGETS.format("y"))
     z: Axis = Field(description=_OF_TARGETS.format("z"))
-    z0: Axis = Field(description="depth of P0 below the centroid of the spools, m: a list or a range; all > 0")
+    z0: Axis | None = Field(None, description="depth of P0 below the centroid of the spools, m; all > 0")
+    inclination: Axis | None = Field(None, description="inclination v of transitions, in place of z0; all in ]-1, 1[")
     from_x: Axis | None = Field(None, description=_OF_STARTS.format("x"))
     from_y: Axis | None = Field(None, description=_OF_STARTS.format("y"))
     from_z: Axis | None = Field(None, description=_OF_STARTS.format("z"))
@@ -100,9 +101,11 @@ class SweepFile(Table):
     """A sweep."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
-    map: Literal["minimum-arcs"] = Field(description='kind of map: "minimum-arcs"')
+    map: Literal["minimum-arcs", "minimum-oscillations"] = Field(
+        description='kind of map: "minimum-arcs" or "minimum-oscillations" (of transitions)'
+    )
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
-    axes: Axes = Field(description="[axes] x, y, z and z0, each { start, stop, count } or a list")
+    axes: Axes = Field(description="[axes] x, y, z and z0 (or inclination), each { start, stop, count } or a list")
     trajectory: SweepTrajectory = Field(description="[trajectory] with family, amplitude, max_arcs and from")
     limits: SweepLimits = Field(default_factory=SweepLimits, description="[limits]")
     run: Run = Field(default_factory=Run, description="[run] dtype, tile, store")

@@ -39,23 +39,36 @@ def _kind(value: Any) -> str:
 
 
 AmplitudeKey = Annotated[
-    Annotated[Literal["A1", "quintic", "A2", "A3"], Tag("~plain")]
+    Annotated[Literal["A1", "quintic", "A2", "A3", "ideal"], Tag("~plain")]
     | Annotated[NamedAmplitude, Tag("~named")]
     | Annotated[PolynomialAmplitude, Tag("~polynomial")],
     Discriminator(_kind),
 ]
 
 
+Inclination = Annotated[
+    Annotated[float, Field(gt=-1.0, lt=1.0), Tag("~number")] | Annotated[Literal["best"], Tag("~best")],
+    Discriminator(lambda value: "~best" if isinstance(value, str) else "~number"),
+]
+
+
 class TrajectoryKeys(Table):
     """What both a plan and a sweep say of the trajectory."""
 
-    family: Literal["hypocycloid-standard"] = Field(
-        "hypocycloid-standard", description='trajectory family: "hypocycloid-standard" (thesis chapter 2)'
+    family: Literal["hypocycloid-standard", "transition"] = Field(
+        "hypocycloid-standard",
+        description='trajectory family: "hypocycloid-standard" (thesis chapter 2) or, in maps, "transition" (1)',
     )
     amplitude: AmplitudeKey = Field(
         "quintic",
         description='"quintic" (A2), { name = "effective" or "effective-c3", epsilon = ... }, { polynomial = [...] }; '
-        "must meet (2.49), which A1 and A3 do not",
+        'must meet (2.49), which A1 and A3 do not; for transitions (1.27) and (1.28), which they do; "ideal" (A = tau) '
+        "serves for bounds in maps of transitions",
     )
-    max_arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] = Field(30, description="largest number of arcs tried")
+    inclination: Inclination | None = Field(
+        None, description='transitions: inclination v, a number in ]-1, 1[, or "best"; in place of z0'
+    )
+    max_arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] = Field(
+        30, description="largest number of arcs tried; two arcs are an oscillation"
+    )
     gravity: Positive | None = Field(None, description="gravity, m/s^2; stands over the robot file's (default 9.81)")

@@ -9,7 +9,6 @@ Omega. Its largest root, the largest over tau and over the cables, is what N mus
 is enough for taut cables and not necessary. n is a real number here: a motion takes the next integer.
 """
 
-import itertools
 import math
 from collections.abc import Callable
 from functools import partial
@@ -58,11 +57,12 @@ def squared_oscillations_at(amplitude: Amplitude, weight: Array, inclination: Ar
     return (omega + end) / (4.0 * math.pi**2)
 
 
-def _samples(amplitude: Amplitude) -> np.ndarray:
+def _samples(amplitude: Amplitude) -> Array:
     # Every knot among them; dense towards the ends of each piece, where steep inclinations have their maximum.
-    ends = [0.0, *np.asarray(amplitude.knots).tolist(), 1.0]
+    ends = jnp.concatenate([jnp.zeros(1), jnp.asarray(amplitude.knots), jnp.ones(1)])
     part = 0.5 * (1.0 - np.cos(math.pi * np.arange(SAMPLES) / SAMPLES))
-    return np.concatenate([*(a + (b - a) * part for a, b in itertools.pairwise(ends)), [1.0]])
+    inside = ends[:-1, None] + (ends[1:] - ends[:-1])[:, None] * part
+    return jnp.concatenate([inside.ravel(), jnp.ones(1)])
 
 
 def _golden(function: Callable[[Array], Array], low: Array, high: Array, steps: int) -> Array:

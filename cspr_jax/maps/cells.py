@@ -27,6 +27,8 @@ class CellMap:
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Build what all tiles share."""
         self._keys, self._file, self._signs = keys, file, problem.axis_signs(spec)
+        if spec.planar:
+            raise ConfigError(file, f'robot "{spec.name}" is planar: must have three cables in this map')
         robot = problem.build_robot(spec, keys.trajectory, file)
         amplitude = problem.build_amplitude(keys.trajectory, file, at="trajectory.")
         limits = problem.build_limits(spec, keys.limits, keys.limits.floor, file)

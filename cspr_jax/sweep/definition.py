@@ -15,7 +15,7 @@ from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, SweepFile
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.identity import FORMAT_VERSION, canonical_json, identity
-from cspr_jax.quantities import DEFAULT_STORE
+from cspr_jax.quantities import DEFAULT_STORE, OF_MAP, TITLES
 from cspr_jax.store.netcdf import bytes_needed
 from cspr_jax.store.shards import Layout
 from cspr_jax.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
@@ -83,14 +83,19 @@ def read_sweep(path: Path) -> Sweep:
     data = parse_toml(text, path)
     keys = checked(SweepFile, data, path)
     robot = resolve_robot(keys.robot, path, path.parent)
-    _check_start(keys, path)
+    (_check_start if keys.map == "minimum-arcs" else _check_transitions)(keys, path)
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
-    store = list(keys.run.store or DEFAULT_STORE)
+    store = list(keys.run.store or DEFAULT_STORE[keys.map])
+    for name in store:
+        if name not in OF_MAP[keys.map]:
+            raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(OF_MAP[keys.map])} in this map")
     tile = _tile(keys, tuple(counts.values()), path)
     _check_size(counts, tile, store, keys.run.dtype, path)
     axes = {name: _points(getattr(keys.axes, name)) for name in data["axes"]}
-    if not (axes["z0"] > 0.0).all():
+    if "z0" in axes and not (axes["z0"] > 0.0).all():
         raise ConfigError(path, f"axes.z0 = {shown(float(axes['z0'].min()))}: must be a number > 0")
+    if "inclination" in axes and not (np.abs(axes["inclination"]) < 1.0).all():
+        raise ConfigError(path, "axes.inclination: must be numbers in ]-1, 1[")
     settings = keys.model_dump(mode="json", by_alias=True)
     settings |= {"robot": robot.model_dump(mode="json"), "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
@@ -107,7 +112,27 @@ def _points(axis: AxisRange | list[float]) -> np.ndarray:
     return np.asarray(axis, float)
 
 
+def _check_transitions(keys: SweepFile, path: Path) -> None:
+    axes, trajectory = keys.axes, keys.trajectory
+    if trajectory.family != "transition":
+        raise ConfigError(path, f'trajectory.family = "{trajectory.family}": must be "transition" in this map')
+    if trajectory.start is not None and not trajectory.start.rest:
+        raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
+    for name in _START:
+        if getattr(axes, name) is not None:
+            raise ConfigError(path, f"axes.{name}: must be absent in this map: transitions start at rest")
+    given = [axes.z0, axes.inclination, trajectory.inclination]
+    if sum(key is not None for key in given) != 1:
+        raise ConfigError(path, "axes.z0, axes.inclination, trajectory.inclination: must be one of them in this map")
+
+
 def _check_start(keys: SweepFile, path: Path) -> None:
+    if keys.trajectory.family != "hypocycloid-standard":
+        raise ConfigError(path, 'trajectory.family: must be "hypocycloid-standard" in this map')
+    if keys.axes.z0 is None:
+        raise ConfigError(path, "axes.z0 is missing: depth of P0 below the centroid of the spools, m")
+    if keys.axes.inclination is not None or keys.trajectory.inclination is not None:
+        raise ConfigError(path, 'inclination: must be absent in this map; it is for map = "minimum-oscillations"')
     given = [name for name in _START if getattr(keys.axes, name) is not None]
     start = keys.trajectory.start
     if start is None and len(given) < 3:
@@ -186,7 +211,7 @@ def attributes(sweep: Sweep) -> dict[str, Any]:
         attributes of the whole file.
     """
     robot = sweep.robot
-    title = f"Smallest number of arcs, robot {robot.name}, amplitude {sweep.settings['trajectory']['amplitude']}"
+    title = f"{TITLES[sweep.keys.map]}, robot {robot.name}, amplitude {sweep.settings['trajectory']['amplitude']}"
     return {
         "Conventions": "CF-1.11",
         "title": title,

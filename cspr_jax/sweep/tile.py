@@ -10,11 +10,16 @@ from cspr_jax.errors import ResourceError, SelfCheckError
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.identity import digest
 from cspr_jax.maps.cells import CellMap
+from cspr_jax.maps.oscillation_cells import OscillationMap
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
 from cspr_jax.sweep.work import Computed
 
+MAPS: dict[str, type[CellMap] | type[OscillationMap]] = {
+    "minimum-arcs": CellMap,
+    "minimum-oscillations": OscillationMap,
+}
 # Margins so near zero can change sign with the processor; how many there are stands in the result.
 NEAR_ZERO = 1e-9
 # How far a refined margin may lie below the bound proved for it.
@@ -35,7 +40,7 @@ class TileMap:
         """Refuse what cannot be computed."""
         self._sweep = sweep
         with jax.enable_x64(True):
-            self._cells = CellMap(sweep.robot, sweep.keys, sweep.file)
+            self._cells = MAPS[sweep.keys.map](sweep.robot, sweep.keys, sweep.file)
             self._cells.refuse_hopeless(sweep.grid)
 
     def __call__(self, index: int) -> Computed:

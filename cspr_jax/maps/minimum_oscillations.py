@@ -1,0 +1,179 @@
+"""Smallest number of oscillations of many transitions: by the envelopes, and by the true pseudotensions.
+
+The envelopes (1.39) are sufficient, not necessary: a motion may be taut with one oscillation fewer. So the
+smallest integer that they allow stands beside the smallest that is proved from the pseudotensions themselves.
+"""
+
+import dataclasses
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+
+from cspr_jax.amplitudes import Amplitude, derivatives
+from cspr_jax.feasibility import oscillations as counts
+from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
+from cspr_jax.grids import in_batches
+from cspr_jax.maps.answers import BATCH, Answers, decided, end_slacks, only
+from cspr_jax.maps.minimum_arcs import check_numbers
+from cspr_jax.trajectories import transition
+from cspr_jax.trajectories.hypocycloid import Segment
+
+# Instants of the sieve; odd, so that they do not fall on the zeros of an oscillation.
+SAMPLES = 61
+ROUNDING = 1e-12
+
+
+@dataclasses.dataclass(frozen=True)
+class OscillationAnswers(Answers):
+    """One answer a transition; arcs are two an oscillation.
+
+    Fields:
+        oscillations: (n,) smallest number of oscillations proved feasible; 0: none.
+        tried_oscillations: (n,) the number that duration and margins belong to.
+        envelope_oscillations: (n,) smallest integer that keeps the envelopes positive; 0: none up to the largest tried.
+        least_oscillations: (n,) the real number that they ask for; NaN where |v| >= 1.
+        inclination_gain: (n,) oscillations, a real number, that the inclination saves over a horizontal transition.
+        used_inclination: (n,) v.
+        used_z0: (n,) depth of p0 below the centroid of the spools, m.
+    """
+
+    oscillations: np.ndarray
+    tried_oscillations: np.ndarray
+    envelope_oscillations: np.ndarray
+    least_oscillations: np.ndarray
+    inclination_gain: np.ndarray
+    used_inclination: np.ndarray
+    used_z0: np.ndarray
+
+
+@jax.jit
+def _transitions(shared: Shared, arguments) -> Segment:
+    return jax.vmap(partial(transition.transition, shared.robot, shared.amplitude))(*arguments)
+
+
+def transitions_to(shared: Shared, targets: np.ndarray, z0: np.ndarray) -> Segment:
+    """Transitions from rest to many targets.
+
+    Args:
+        shared: gives the robot and the amplitude function.
+        targets: (n, 3) m, z down.
+        z0: (n,) m.
+
+    Returns:
+        the segments, leaves (n, ...).
+    """
+    return in_batches(partial(_transitions, shared), (targets, z0), size=BATCH)
+
+
+@jax.jit
+def _best_inclinations(amplitude: Amplitude, weights: jax.Array) -> jax.Array:
+    return jax.vmap(lambda w: counts.best_inclination(amplitude, w)[0])(weights)
+
+
+def best_inclinations(shared: Shared, targets: np.ndarray) -> np.ndarray:
+    """The inclination of each target that asks for the fewest oscillations.
+
+    Args:
+        shared: gives the robot and the amplitude function.
+        targets: (n, 3) m, z down.
+
+    Returns:
+        (n,) v.
+    """
+    # The weights depend on neither the depth of p0 nor that of the target.
+    weights = transition.weights(transitions_to(shared, targets, np.ones(len(targets))))
+    return in_batches(partial(_best_inclinations, shared.amplitude), np.asarray(weights), size=BATCH)
+
+
+@jax.jit
+def _envelopes(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
+    def one(weights, v):
+        inside = jnp.abs(v) < 1.0
+        here = counts.least_oscillations(amplitude, weights, jnp.where(inside, v, 0.0))
+        level = counts.least_oscillations(amplitude, weights, jnp.zeros_like(v))
+        return jnp.where(inside, here, jnp.nan), level - here
+
+    return jax.vmap(one)(*arguments)
+
+
+@jax.jit
+def _level(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
+    # Of horizontal transitions: half of the work.
+    weights, _ = arguments
+    here = jax.vmap(lambda w: counts.least_oscillations(amplitude, w, jnp.zeros_like(w[0])))(weights)
+    return here, jnp.zeros_like(here)
+
+
+@partial(jax.jit, static_argnames="largest")
+def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.Array], *, largest: int) -> jax.Array:
+    # Of 1 + v A cos - L h, the pseudotension under a load L = v + w_k, and of the depth: L = 0.
+    high, low, v = loads
+    tau = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    size, slope, bend = derivatives(amplitude, jnp.asarray(tau), order=2)
+    end = derivatives(amplitude, jnp.ones(()), order=2)[2]
+
+    def one(n):
+        omega = 2.0 * jnp.pi * n
+        period = omega**2 - end
+        cosine, sine = jnp.cos(omega * tau), jnp.sin(omega * tau)
+        h = ((bend - size * end) * cosine - 2.0 * omega * slope * sine) / period
+        worst = jnp.maximum(high[:, None] * h, low[:, None] * h)
+        found = jnp.min(1.0 + v[:, None] * size * cosine - worst, axis=1)
+        guard = ROUNDING * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * jnp.max(jnp.abs(h)))
+        return jnp.where(period > 0.0, found + guard, -jnp.inf)
+
+    return lax.map(one, jnp.arange(1.0, largest + 1.0)).T
+
+
+def minimum_oscillations(
+    shared: Shared, segments: Segment, z0: np.ndarray, *, max_arcs: int = 30, arcs=None, steady=None
+) -> OscillationAnswers:
+    """Smallest number of oscillations of transitions.
+
+    Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
+
+    Args:
+        shared: robot, limits and amplitude, which meets (1.27) and (1.28).
+        segments: as `transitions_to` gives them, leaves (n, ...).
+        z0: (n,) depth of p0 below the centroid of the spools, m; positive.
+        max_arcs: twice the largest number of oscillations tried, at least 2.
+        arcs: (n,) a fixed, even number of arcs for each transition, 0 where free; None: all free.
+        steady: (n,) whether it is no transition but the swing of one size that it ends in; None: nowhere.
+
+    Returns:
+        the answers.
+
+    Raises:
+        InputError: max_arcs below 1; z0 not positive; jax without 64 bits.
+    """
+    check_numbers(z0, max_arcs)
+    largest = max(max_arcs // 2, 1)
+    v, weights = np.asarray(transition.inclination(segments)), np.asarray(transition.weights(segments))
+    envelopes = _level if (v == 0.0).all() else _envelopes
+    look = in_batches(partial(envelopes, shared.amplitude), (weights, v), size=BATCH)
+    real, gain = (np.array(found) for found in look)
+    loads = v[:, None] + weights
+    extreme = (np.maximum(loads.max(1), 0.0), np.minimum(loads.min(1), 0.0), v)
+    kernel = partial(_upper_bounds, shared.amplitude, largest=largest)
+    upper = np.full((len(v), 2 * largest), -np.inf)
+    upper[:, 1::2] = in_batches(kernel, extreme, size=BATCH)
+    at_ends = in_batches(partial(end_slacks, shared, 4.0), segments, size=BATCH)
+    if steady is not None:
+        upper[steady, 1::2], real[steady], gain[steady] = np.inf, 0.0, 0.0
+    upper = np.minimum(upper, at_ends[:, None] + SMALLEST_MARGIN)
+    infinity = 1.0 - np.abs(v) * max(abs(float(shared.amplitude.lowest)), float(shared.amplitude.highest))
+    answers = decided(shared, {0: segments, 1: segments}, only(upper, arcs), infinity)
+    allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
+    return OscillationAnswers(
+        **vars(answers),
+        oscillations=answers.arcs // 2,
+        tried_oscillations=answers.tried_arcs // 2,
+        envelope_oscillations=np.where(allowed <= largest, allowed, 0).astype(int),
+        least_oscillations=real,
+        inclination_gain=np.where(np.isnan(real), np.nan, gain),
+        used_inclination=v,
+        used_z0=np.asarray(z0, float),
+    )

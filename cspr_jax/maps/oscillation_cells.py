@@ -1,0 +1,92 @@
+"""Cells of a sweep of transitions: coordinates of a grid to the quantities of a result file."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax import problem
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.maps.minimum_oscillations import best_inclinations, minimum_oscillations, transitions_to
+from cspr_jax.robots import centroid, is_planar, plane_normal
+from cspr_jax.tiles import Grid
+from cspr_jax.trajectories.transition import depth_for
+
+# Where a target above the spools has no p0 below it: its verdict does not depend on it.
+_ANY_DEPTH = 1.0
+
+
+class OscillationMap:
+    """The map of a sweep of transitions, ready to compute tiles.
+
+    Args:
+        spec: the robot.
+        keys: the sweep.
+        file: named in errors.
+
+    Raises:
+        ConfigError: the robot, the amplitude function or the limits cannot be used.
+    """
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Build what all tiles share."""
+        self._keys, self._file, self._signs = keys, file, problem.axis_signs(spec)
+        robot = problem.build_robot(spec, keys.trajectory, file)
+        amplitude = problem.build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=True)
+        limits = problem.build_limits(spec, keys.limits, keys.limits.floor, file)
+        self._shared = Shared(robot, limits, amplitude)
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile.
+
+        Args:
+            cells: (n,) coordinates for each axis, in the file's axes.
+
+        Returns:
+            (n,) for each quantity.
+        """
+        targets = np.stack([cells["x"], cells["y"], cells["z"]], axis=1) * self._signs
+        z0 = self._depths(cells, targets)
+        segments = transitions_to(self._shared, targets, z0)
+        return vars(minimum_oscillations(self._shared, segments, z0, max_arcs=self._keys.trajectory.max_arcs))
+
+    def _depths(self, cells: dict[str, np.ndarray], targets: np.ndarray) -> np.ndarray:
+        if "z0" in cells:
+            return cells["z0"]
+        given = self._keys.trajectory.inclination
+        if "inclination" in cells:
+            inclination = cells["inclination"]
+        elif isinstance(given, float):
+            inclination = np.full(len(targets), given)
+        else:
+            inclination = best_inclinations(self._shared, targets)
+        points = (jnp.asarray(targets), jnp.asarray(inclination))
+        z0 = np.asarray(jax.vmap(partial(depth_for, self._shared.robot))(*points))
+        return np.where(z0 > 0.0, z0, _ANY_DEPTH)
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse a grid without a target below the spools and above the floor, or out of a planar robot's plane.
+
+        Args:
+            grid: the grid.
+
+        Raises:
+            ConfigError: what is wrong with all of them.
+        """
+        if is_planar(self._shared.robot) and (grid.axes["y"] != 0.0).any():
+            raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
+        corners = Grid(
+            {name: np.array([p.min(), p.max()]) for name, p in grid.axes.items() if name in "xyz"}, (2, 2, 2)
+        )
+        ends = corners.cells((slice(0, 2),) * 3)
+        points = np.stack([ends[name] for name in "xyz"], axis=1) * self._signs
+        depth = (points - np.asarray(centroid(self._shared.robot))) @ np.asarray(plane_normal(self._shared.robot))
+        floor = self._shared.limits.floor
+        if not (depth > 0.0).any():
+            raise ConfigError(self._file, "axes: every point is above the spool plane: must be some below it")
+        if floor is not None and not (points[:, 2] <= np.asarray(floor)).any():
+            raise ConfigError(self._file, "axes: every point is below the floor: must be some above it")
