@@ -22,7 +22,7 @@ LAYERS = (
     ("maps", "maps.minimum_arcs", "maps.sieve"),
     ("config", "identity", "quantities", "tiles"),
     ("problem", "store", "results"),
-    ("maps.cells",),
+    ("maps.cells", "maps.oscillation_cells"),
     ("sweep.definition", "sweep.signals", "sweep.environment"),
     ("sweep.work", "sweep.claims", "sweep.inspection", "sweep.tile"),
     ("sweep", "planning", "choices", "api"),

@@ -17,7 +17,8 @@ import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import SelfCheckError
 from cspr_jax.maps.cells import CellMap
-from cspr_jax.quantities import QUANTITIES
+from cspr_jax.quantities import OF_MAP
+from cspr_jax.quantities import QUANTITIES as EVERY
 from cspr_jax.sweep.definition import read_sweep
 
 ROOT = Path(__file__).parent.parent
@@ -29,6 +30,7 @@ z = { start = 0.5, stop = 2.5, count = 3 }
 """
 FROM = "from = { position = [0.7, 0.7, 3.0] }"
 TILT = [[0.3, 0.05, -0.02], [-0.2, 0.25, 0.06], [-0.1, -0.3, 0.01]]
+QUANTITIES = {name: EVERY[name] for name in OF_MAP["minimum-arcs"]}
 FLOATS = [name for name, quantity in QUANTITIES.items() if quantity.kind == "float"]
 COUNTS = [name for name in QUANTITIES if name not in FLOATS]
 
