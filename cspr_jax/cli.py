@@ -106,10 +106,11 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the motion to FILE.csv or FILE.h5")
     plan.add_argument("--rate", type=float, metavar="HZ", help="rows a second (default: `samples` rows a segment)")
-    plot = add("plot", _plot, "draw a result file")
-    plot.add_argument("result", type=Path, help="result of `cspr run`, or motion of `cspr plan -o FILE.h5`")
+    plot = add("plot", _plot, "draw a result file, or several maps as lines")
+    plot.add_argument("result", type=Path, nargs="+", help="result of `cspr run`, or motion of `cspr plan -o FILE.h5`")
     plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
-    plot.add_argument("--quantity", help="quantity of a map (default arcs); see `cspr quantities`")
+    plot.add_argument("--quantity", help="quantity of a map (default arcs or oscillations); see `cspr quantities`")
+    plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
     plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
@@ -274,12 +275,12 @@ def _plot(options: argparse.Namespace) -> int:
             raise ConfigError("--at", f"{shown(text)}: must be AXIS=VALUE, such as z=1.7") from error
         if not math.isfinite(at[axis]):
             raise ConfigError("--at", f"{shown(text)}: must be a finite number")
-    from cspr_jax.plots import plot
+    from cspr_jax.plots.draw import plot
 
-    output = options.output or options.result.with_suffix(".png")
+    output = options.output or options.result[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
-    plot(options.result, output, quantity=options.quantity, at=at)
+    plot(options.result, output, quantity=options.quantity, at=at, lines=options.lines)
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE
 

@@ -18,14 +18,9 @@ from cspr_jax.store.netcdf import new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
 from cspr_jax.trajectories import hypocycloid
 
-_COMPONENTS = {
-    "position": "xyz",
-    "velocity": "xyz",
-    "acceleration": "xyz",
-    "length": "123",
-    "rate": "123",
-    "tension": "123",
-}
+# Those of the states that change sign when time runs backwards: velocity and rates.
+_RATES = (1, 4)
+_OF_EFFECTOR = ("position", "velocity", "acceleration")
 LARGEST_ROWS = 20_000_000
 
 
@@ -47,7 +42,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         rate: rows a second over the whole plan, Hz; None: `samples` rows a segment, ends included.
 
     Returns:
-        "t" (n,) s and the other names of `quantities.TRAJECTORY`, (n, 3), in the plan's axes.
+        "t" (n,) s and the other names of `quantities.TRAJECTORY`, (n, 3) or (n, n_cables), in the plan's axes.
     """
     duration = plan.answers.duration
     starts = np.concatenate([[0.0], np.cumsum(duration)])
@@ -59,10 +54,12 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
             ticks = np.arange(np.ceil(starts[i] * rate - 1e-9), np.ceil(starts[i + 1] * rate - 1e-9))
             tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
         segment = jax.tree.map(lambda x, i=i: x[i], plan.segments)
-        states = _states(plan.shared, segment, float(plan.answers.tried_arcs[i]), tau)
-        parts.append((starts[i] + tau * length, *(np.asarray(s) for s in states)))
+        back = bool(plan.backwards[i])
+        states = _states(plan.shared, segment, float(plan.answers.tried_arcs[i]), 1.0 - tau if back else tau)
+        states = (-np.asarray(s) if back and k in _RATES else np.asarray(s) for k, s in enumerate(states))
+        parts.append((starts[i] + tau * length, *states))
     found = {name: np.concatenate(column) for name, column in zip(TRAJECTORY, zip(*parts, strict=True), strict=True)}
-    for name in ("position", "velocity", "acceleration"):
+    for name in _OF_EFFECTOR:
         found[name] = found[name] * axis_signs(plan.spec)
     return found
 
@@ -91,8 +88,11 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
 
 
 def _csv(found: dict[str, np.ndarray]) -> str:
-    heads = ["t", *(f"{name}_{part}" for name, parts in _COMPONENTS.items() for part in parts)]
-    table = np.column_stack([found["t"], *(found[name] for name in _COMPONENTS)])
+    heads = ["t"]
+    for name in list(TRAJECTORY)[1:]:
+        parts = "xyz" if name in _OF_EFFECTOR else range(1, found[name].shape[1] + 1)
+        heads += [f"{name}_{part}" for part in parts]
+    table = np.column_stack([found[name] for name in TRAJECTORY])
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(heads)
@@ -101,9 +101,11 @@ def _csv(found: dict[str, np.ndarray]) -> str:
 
 
 def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
-    attributes = {"Conventions": "CF-1.11", "robot": plan.spec.name, "z_axis": plan.spec.z_axis, "z0": plan.z0}
+    spec = plan.spec
+    attributes = {"Conventions": "CF-1.11", "robot": spec.name, "mass": spec.mass, "z_axis": spec.z_axis, "z0": plan.z0}
+    cables = list(range(1, found["tension"].shape[1] + 1))
     with new_hdf5(path, attributes) as file:
-        for name, labels in (("t", found["t"]), ("axis", list("xyz")), ("cable", [1, 2, 3])):
+        for name, labels in (("t", found["t"]), ("axis", list("xyz")), ("cable", cables)):
             file[name] = labels
             file[name].make_scale(name)
         for name, quantity in TRAJECTORY.items():
@@ -111,4 +113,4 @@ def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
             set_attributes(data, {"units": quantity.units, "long_name": quantity.long_name})
             if name != "t":
                 data.dims[0].attach_scale(file["t"])
-                data.dims[1].attach_scale(file["axis" if _COMPONENTS[name] == "xyz" else "cable"])
+                data.dims[1].attach_scale(file["axis" if name in _OF_EFFECTOR else "cable"])

@@ -6,16 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax import problem
-from cspr_jax.choices import answers_along, best_amplitude, chosen_depth, pose_points
+from cspr_jax.choices import best_amplitude, chosen_depth
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
-from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.extremes import Extremes, extremes
-from cspr_jax.maps.answers import Answers, pick
-from cspr_jax.maps.minimum_arcs import segments_between
+from cspr_jax.maps.answers import Answers
+from cspr_jax.sequences import sequence_of
 from cspr_jax.trajectories.hypocycloid import Segment
 
 # Where a search for z0 takes "best" epsilon to be, until it is chosen.
@@ -35,6 +34,7 @@ class Plan:
         answers: of the n segments.
         extremes: of the n segments.
         segments: of the n segments, each of the parity of its number of arcs.
+        backwards: (n,) whether a segment runs against its normalised time, from its target back to rest.
     """
 
     spec: RobotFile
@@ -45,6 +45,7 @@ class Plan:
     answers: Answers
     extremes: Extremes
     segments: Segment
+    backwards: np.ndarray
 
 
 def plan(path: Path) -> Plan:
@@ -61,21 +62,18 @@ def plan(path: Path) -> Plan:
     """
     keys = checked(PlanFile, read_toml(path), path)
     spec = resolve_robot(keys.robot, path, path.parent)
-    if spec.planar:
-        raise ConfigError(path, f'robot "{spec.name}" is planar: plans need three cables, maps of transitions take two')
-    if keys.family == "transition" or keys.inclination is not None:
-        raise ConfigError(path, 'family = "transition": must be "hypocycloid-standard" in a plan, without inclination')
+    sequence = sequence_of(spec, keys, path)
     robot = problem.build_robot(spec, keys, path)
     limits = problem.build_limits(spec, keys, keys.floor, path)
     amplitude = problem.build_amplitude(keys, path, epsilon=FIRST_EPSILON)
     shared = Shared(robot, limits, amplitude)
-    z0 = chosen_depth(shared, spec, keys, path)
+    z0 = chosen_depth(shared, sequence)
     if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
-        shared = shared._replace(amplitude=best_amplitude(shared, spec, keys, z0, path))
-    points = pose_points(robot, spec, keys, z0)
-    depth = np.full(len(points) - 1, z0)
-    answers = answers_along(shared, keys, points, depth)
-    parities, _ = segments_between(shared, points[:-1], points[1:], depth)
-    segments = pick(parities, np.arange(len(depth)), answers.tried_arcs)
+        amplitude, z0 = best_amplitude(shared, sequence, z0)
+        shared = shared._replace(amplitude=amplitude)
+    points = sequence.points(robot, z0)
+    depth = np.full(len(sequence), z0)
+    answers = sequence.answers(shared, points, depth)
+    segments = sequence.segments(shared, points, depth, answers.tried_arcs)
     asked = extremes(shared, segments, answers.tried_arcs, keys.samples)
-    return Plan(spec, keys, shared, z0, points, answers, asked, segments)
+    return Plan(spec, keys, shared, z0, points, answers, asked, segments, sequence.backwards)

@@ -32,6 +32,8 @@ AXES = {
     for q in (
         Quantity("x", "m", "x of the target", "Horizontal coordinate of the target."),
         Quantity("y", "m", "y of the target", "Horizontal coordinate of the target."),
+        Quantity("radius", "m", "distance from the central vertical", "From the vertical through the centroid."),
+        Quantity("azimuth", "rad", "azimuth", "Direction of the target from the central vertical, from x to y."),
         Quantity("z", "m", "z of the target", "Vertical coordinate of the target; see z_axis."),
         Quantity("z0", "m", "depth of P0 below the centroid", "The point P0 about which the effector swings."),
         Quantity(
@@ -40,6 +42,8 @@ AXES = {
             "inclination",
             "How much deeper below the spools the target is than P0, over z0: v of thesis (1.31).",
         ),
+        Quantity("tau", "1", "normalised time", "Time since the start of the segment over its duration."),
+        Quantity("cable", "1", "cable", "Number of a cable, in cable order from 1 on."),
         Quantity("from_x", "m", "x of the start point", "Horizontal coordinate of the start point."),
         Quantity("from_y", "m", "y of the start point", "Horizontal coordinate of the start point."),
         Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
@@ -118,6 +122,18 @@ QUANTITIES = {
             "oscillations saved by the inclination",
             "Real number of oscillations of the horizontal transition less that at this inclination.",
         ),
+        Quantity(
+            "squared_oscillations",
+            "1",
+            "squared oscillations N of the instant",
+            "N of (1.44) of the cable, or the largest over the cables; at least A''(1) / (4 pi^2), so maybe negative.",
+        ),
+        Quantity(
+            "lower_envelope",
+            "1",
+            "lower envelope of the normalised pseudotension",
+            "(1.39) of the cable, or the lowest over the cables, with the real number `least_oscillations`.",
+        ),
         Quantity("used_inclination", "1", "inclination v", "Inclination of the transition, v of (1.31)."),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination asks for."),
     )
@@ -132,10 +148,12 @@ _OF_OSCILLATIONS = (
     "used_inclination",
     "used_z0",
 )
+_OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
 # What each kind of map can store.
 OF_MAP = {
     "minimum-arcs": ("arcs", "tried_arcs", *_COMMON),
     "minimum-oscillations": (*_OF_OSCILLATIONS, *_COMMON),
+    "transition-envelopes": _OF_INSTANTS,
 }
 TRAJECTORY = {
     q.name: q
@@ -163,8 +181,13 @@ DEFAULT_STORE = {
         "used_inclination",
         "used_z0",
     ),
+    "transition-envelopes": _OF_INSTANTS,
 }
-TITLES = {"minimum-arcs": "Smallest number of arcs", "minimum-oscillations": "Smallest number of oscillations"}
+TITLES = {
+    "minimum-arcs": "Smallest number of arcs",
+    "minimum-oscillations": "Smallest number of oscillations",
+    "transition-envelopes": "Envelopes of the pseudotensions along transitions",
+}
 
 
 def flag_attributes() -> dict[str, object]:

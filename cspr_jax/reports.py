@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.maps.minimum_oscillations import OscillationAnswers
 from cspr_jax.planning import Plan
 from cspr_jax.problem import axis_signs
 
@@ -63,12 +64,16 @@ def verdict_text(verdict: int, arcs: int) -> str:
 def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
     answers, asked = plan.answers, plan.extremes
     arcs = int(answers.arcs[i])
+    swings = answers if isinstance(answers, OscillationAnswers) else None
     return {
         "from": i,
         "to": i + 1,
         "arcs": arcs or None,
         "tried_arcs": int(answers.tried_arcs[i]),
-        "oscillations": None,
+        "oscillations": int(swings.oscillations[i]) or None if swings else None,
+        "envelope_oscillations": int(swings.envelope_oscillations[i]) or None if swings else None,
+        "least_oscillations": float(swings.least_oscillations[i]) if swings else None,
+        "inclination": float(swings.used_inclination[i]) if swings else None,
         "duration": float(answers.duration[i]),
         "tension_min": float(asked.tension_min[i]),
         "tension_max": float(asked.tension_max[i]),
@@ -112,16 +117,21 @@ def plan_table(plan: Plan):
 
     title = f"{plan.spec.name}: {plan.keys.family}, {plan.shared.amplitude.name}, z0 = {plan.z0:.6g} m"
     table = Table(title=title, caption=_caption(plan), title_justify="left", caption_justify="left")
-    heads = ("to", "position (m)", "arcs", "T (s)", "margin", "tension (N)", "p → ∞", "verdict")
+    swings = isinstance(plan.answers, OscillationAnswers)
+    count = ("oscillations", "v") if swings else ("arcs",)
+    heads = ("to", "position (m)", *count, "T (s)", "margin", "tension (N)", "p → ∞", "verdict")
     for head in heads:
         table.add_column(head, justify="left" if head in ("position (m)", "verdict") else "right")
     signs = axis_signs(plan.spec)
     for i, segment in enumerate(plan_object(plan)["segments"]):
         position = ", ".join(f"{value:.4g}" for value in plan.points[i + 1] * signs)
+        found = segment["oscillations" if swings else "arcs"]
+        tried = segment["tried_arcs"] // (2 if swings else 1)
         table.add_row(
             str(i + 1),
             f"({position})",
-            str(segment["arcs"] or f"- ({segment['tried_arcs']})"),
+            str(found or f"- ({tried})"),
+            *([_number(segment["inclination"], ".4f")] if swings else []),
             _number(segment["duration"], ".2f"),
             _number(segment["margin"], ".4f"),
             f"{_number(segment['tension_min'], '.3f')} .. {_number(segment['tension_max'], '.3f')}",
@@ -133,9 +143,9 @@ def plan_table(plan: Plan):
 
 def _caption(plan: Plan) -> str:
     total = f"total {plan.answers.duration.sum():.2f} s; z {plan.spec.z_axis}"
-    note = "" if is_feasible(plan) else "; - (p): none found, the numbers are those of the best candidate p"
+    note = "" if is_feasible(plan) else "; in brackets: none found, the numbers are those of the best candidate"
     return f"{total}{note}"
 
 
 def _number(value: float | None, form: str) -> str:
-    return "-" if value is None else format(value, form)
+    return "-" if value is None else format(float(format(value, form)) + 0.0, form)  # no -0

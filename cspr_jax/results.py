@@ -14,6 +14,8 @@ from cspr_jax.store.seal import DamagedError, check_file
 
 # A result is read into memory as a whole: bytes of its data.
 LARGEST_DATA = 8e9
+# Shapes of what a motion holds for each cable, at one instant.
+CABLES = [(n,) for n in range(2, 7)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,6 +88,7 @@ def _is_ours(axes: dict[str, np.ndarray], data: dict[str, np.ndarray], attribute
         return all(array.dtype.kind in "fiu" for array in numbers) and all(a.shape == shape for a in data.values())
     if "t" not in axes or not isinstance(attributes.get("z0"), float):
         return False
-    shape = (axes["t"].size, 3)
-    found = [data.get(name) for name in ("position", "tension")]
-    return all(array is not None and array.dtype.kind == "f" and array.shape == shape for array in found)
+    count, position, tension = axes["t"].size, data.get("position"), data.get("tension")
+    if position is None or tension is None or {position.dtype.kind, tension.dtype.kind} != {"f"}:
+        return False
+    return position.shape == (count, 3) and tension.shape[:1] == (count,) and tension.shape[1:] in CABLES

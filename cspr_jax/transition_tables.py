@@ -9,7 +9,13 @@ from jax import Array
 from cspr_jax.amplitudes import Amplitude, named
 from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.feasibility.oscillations import best_epsilon, best_inclination, least_oscillations, lower_bound
+from cspr_jax.feasibility import zero_tension
+from cspr_jax.feasibility.oscillations import (
+    best_epsilon,
+    best_inclination,
+    least_oscillations,
+    many_oscillations,
+)
 from cspr_jax.problem import build_robot
 from cspr_jax.trajectories.transition import transition, weights
 
@@ -83,11 +89,13 @@ def table_1_3() -> dict[Key, float | None]:
     found: dict[Key, float | None] = {}
     for reading, largest in _READINGS.items():
         w = jnp.array([largest, -largest, 0.0])
-        found["n", "A_idl", reading] = float(lower_bound(w))
+        found["n", "A_idl", reading] = float(zero_tension.least_oscillations(w, jnp.asarray(0.0)))
         for name in ("A1", "A2", "A3"):
             found["n", name, reading] = _horizontal(named(name), w)
+            found["n of (1.55)", name, reading] = float(many_oscillations(named(name), w))
         epsilon, least = best_epsilon(w)
         found["n", "A_eff", reading], found["epsilon", "A_eff", reading] = least, epsilon
+        found["n of (1.55)", "A_eff", reading] = float(many_oscillations(named("effective", epsilon), w))
     return found
 
 

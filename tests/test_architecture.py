@@ -22,10 +22,10 @@ LAYERS = (
     ("maps", "maps.minimum_arcs", "maps.sieve"),
     ("config", "identity", "quantities", "tiles"),
     ("problem", "store", "results"),
-    ("maps.cells", "maps.oscillation_cells"),
-    ("sweep.definition", "sweep.signals", "sweep.environment"),
+    ("maps.cells", "maps.envelope_cells", "maps.grid_map", "maps.oscillation_cells"),
+    ("sweep.checks", "sweep.definition", "sweep.signals", "sweep.environment"),
     ("sweep.work", "sweep.claims", "sweep.inspection", "sweep.tile"),
-    ("sweep", "planning", "choices", "api"),
+    ("sweep", "planning", "choices", "sequences", "api"),
     ("bench", "transition_tables", "tables", "reports", "motions", "plots"),
     ("cli", "__main__"),
 )
@@ -51,6 +51,7 @@ WITHOUT_JAX = (
     "store.shards",
     "store.stream",
     "results",
+    "sweep.checks",
     "sweep.claims",
     "sweep.definition",
     "sweep.engine",
@@ -58,7 +59,7 @@ WITHOUT_JAX = (
     "sweep.inspection",
     "sweep.signals",
     "sweep.work",
-    "plots",
+    "plots.draw",
 )
 LEVELS = {name: level for level, layer in enumerate(LAYERS) for name in layer}
 

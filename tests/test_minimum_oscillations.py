@@ -107,6 +107,24 @@ def test_symmetries():
             np.testing.assert_allclose(v, second, atol=1e-6)
 
 
+def test_symmetries_at_a_fixed_inclination():
+    """Six-fold, and the opposite target at the opposite inclination."""
+    z0, radius, angle = 2.0, np.linspace(0.4, 3.0, 12), 0.23
+    for v in (-0.7, -0.2, 0.5):
+
+        def at(bearing, v):
+            level = np.stack([radius * np.cos(bearing), radius * np.sin(bearing)], 1)
+            return real(SPATIAL, np.column_stack([level, np.full(12, z0 * (1.0 + v))]), z0, "A1").least_oscillations
+
+        first = at(np.pi / 2.0 + angle, v)
+        for turn in range(3):
+            for mirror in (1.0, -1.0):
+                bearing = np.pi / 2.0 + mirror * angle + turn * 2.0 * np.pi / 3.0
+                np.testing.assert_allclose(at(bearing, v), first, rtol=1e-9)
+                np.testing.assert_allclose(at(bearing + np.pi, -v), first, rtol=1e-9)
+        assert np.abs(at(np.pi / 2.0 + angle + np.pi, v) - first).max() > 0.01
+
+
 def cspr(*arguments):
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as err:
         code = main([str(argument) for argument in arguments])

@@ -16,7 +16,7 @@ from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.feasibility.verdicts import SENTENCES
 from cspr_jax.maps import sieve
-from cspr_jax.plots import NONE_COLOUR
+from cspr_jax.plots.sections import NONE_COLOUR
 from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY, flag_attributes
 from cspr_jax.reports import plan_object
 from cspr_jax.store.netcdf import make_datasets, new_hdf5
@@ -115,7 +115,7 @@ def made(path: Path, sizes: dict[str, int] = SHAPE, **attributes: object) -> Pat
 def figures(monkeypatch):
     """Every figure that is drawn, instead of its file."""
     drawn = []
-    monkeypatch.setattr("cspr_jax.plots.Figure.savefig", lambda self, *args, **kwargs: drawn.append(self))
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, *args, **kwargs: drawn.append(self))
     return drawn
 
 
@@ -165,9 +165,38 @@ def test_a_map_over_one_axis_is_a_line(capsys, tmp_path, figures):
     (panel,) = panels(figures[0])
     assert (panel.get_xlabel(), panel.get_ylabel()) == ("z (m)", "smallest number of arcs")
     np.testing.assert_array_equal(panel.lines[0].get_ydata(), 40 + np.arange(8))
-    assert "x = 1.5 m, y = 0.5 m" in panel.get_title()
+    assert "x = 1.5 m, y = 0.5 m" in figures[0].get_suptitle()
     line = cspr(capsys, "plot", made(tmp_path / "dot.h5", dict.fromkeys(SHAPE, 1)), code=2)
     assert "more than one point" in line and not figures[1:]
+
+
+def test_lines(capsys, tmp_path, figures):
+    """One line for each point of an axis, a panel for each of the next; several results in one picture."""
+    path = made(tmp_path / "map.h5")
+    cspr(capsys, "plot", path, "--at", "z=0.5", "--lines", "y")
+    (panel,) = panels(figures[0])
+    assert [line.get_label() for line in panel.lines] == [f"y = {y:.3g} m" for y in np.linspace(0.5, 1.5, 4)]
+    for k, line in enumerate(panel.lines):
+        np.testing.assert_array_equal(line.get_ydata(), 10 * np.arange(5) + k)
+    assert len({(line.get_color(), line.get_linestyle()) for line in panel.lines}) == 4
+    cspr(capsys, "plot", path, "--lines", "x")
+    assert [p.get_title() for p in panels(figures[1])] == [
+        f"z = {z:.3g} m" for z in np.linspace(0.5, 1.5, 8)[[0, 1, 3, 4, 6, 7]]
+    ]
+    other = made(tmp_path / "other.h5")
+    cspr(capsys, "plot", path, other, "--at", "x=1.5", "--at", "y=0.5", "--quantity", "margin")
+    (panel,) = panels(figures[2])
+    assert [line.get_label() for line in panel.lines] == ["map", "other"]
+    np.testing.assert_array_equal(panel.lines[1].get_ydata(), (40 + np.arange(8)) / 4.0 - 2.0)
+    for arguments, words in (
+        ((path, "--lines", "z0"), "--lines"),
+        ((path, "--lines", "w"), "--lines"),
+        ((path, other), "maps over one axis"),
+        ((path, other, "--lines", "y"), "--lines"),
+        ((path,) * 7 + ("--at", "x=1", "--at", "y=1"), "at most 6"),
+    ):
+        assert words in cspr(capsys, "plot", *arguments, code=2)
+    assert len(figures) == 3
 
 
 def test_a_map_over_five_axes_says_which_section_it_is(capsys, tmp_path, figures):

@@ -15,6 +15,7 @@ from cspr_jax import tensions
 from cspr_jax.amplitudes import derivatives, named
 from cspr_jax.cli import main
 from cspr_jax.feasibility import oscillations as counts
+from cspr_jax.feasibility import zero_tension
 from cspr_jax.robots import centroid, planar_robot, point_mass_robot
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories import transition as transitions
@@ -159,7 +160,8 @@ def test_far_targets_need_oscillations_in_proportion(name):
         weights = jnp.array([w, -w, 0.0])
         n = float(counts.least_oscillations(amplitude, weights, jnp.asarray(0.0)))
         if name not in ("A1", "A3") or w > 1.0:
-            assert n >= float(counts.lower_bound(weights)) * (1.0 - 1e-12)
+            assert n >= float(zero_tension.least_oscillations(weights, jnp.asarray(0.0))) * (1.0 - 1e-12)
+    assert n == pytest.approx(float(counts.many_oscillations(amplitude, weights)), rel=1e-5)
     assert n == pytest.approx(3000.0 * float(amplitude.largest[1]) / math.pi, rel=1e-5)
 
 

@@ -39,11 +39,19 @@ _OF_STARTS = "{} of the start points, m, in place of that in trajectory.from"
 class Axes(Table):
     """The grid is the product of its axes; their order in the file is the order of the result's dimensions."""
 
-    x: Axis = Field(description=_OF_TARGETS.format("x"))
-    y: Axis = Field(description=_OF_TARGETS.format("y"))
+    x: Axis | None = Field(None, description=_OF_TARGETS.format("x"))
+    y: Axis | None = Field(None, description=_OF_TARGETS.format("y"))
+    radius: Axis | None = Field(
+        None, description="distance of the targets from the vertical through the centroid, m; with azimuth, for x and y"
+    )
+    azimuth: Axis | None = Field(None, description="direction of the targets from that vertical, from x to y, rad")
     z: Axis = Field(description=_OF_TARGETS.format("z"))
     z0: Axis | None = Field(None, description="depth of P0 below the centroid of the spools, m; all > 0")
     inclination: Axis | None = Field(None, description="inclination v of transitions, in place of z0; all in ]-1, 1[")
+    tau: Axis | None = Field(None, description="instants of transition-envelopes, normalised time in [0, 1]")
+    cable: Axis | None = Field(
+        None, description="cables of transition-envelopes, from 1 on; absent: the worst of them at each instant"
+    )
     from_x: Axis | None = Field(None, description=_OF_STARTS.format("x"))
     from_y: Axis | None = Field(None, description=_OF_STARTS.format("y"))
     from_z: Axis | None = Field(None, description=_OF_STARTS.format("z"))
@@ -101,11 +109,14 @@ class SweepFile(Table):
     """A sweep."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
-    map: Literal["minimum-arcs", "minimum-oscillations"] = Field(
-        description='kind of map: "minimum-arcs" or "minimum-oscillations" (of transitions)'
+    map: Literal["minimum-arcs", "minimum-oscillations", "transition-envelopes"] = Field(
+        description='kind of map: "minimum-arcs"; of transitions "minimum-oscillations", or "transition-envelopes": '
+        "what each instant asks for"
     )
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
-    axes: Axes = Field(description="[axes] x, y, z and z0 (or inclination), each { start, stop, count } or a list")
+    axes: Axes = Field(
+        description="[axes] x, y (or radius, azimuth), z and z0 (or inclination), each { start, stop, count } or a list"
+    )
     trajectory: SweepTrajectory = Field(description="[trajectory] with family, amplitude, max_arcs and from")
     limits: SweepLimits = Field(default_factory=SweepLimits, description="[limits]")
     run: Run = Field(default_factory=Run, description="[run] dtype, tile, store")

@@ -175,13 +175,35 @@ def best_epsilon(weights: Array) -> tuple[float, float]:
     return 0.5 * (low + high), needed(0.5 * (low + high))
 
 
-def lower_bound(weights: Array) -> Array:
-    """Oscillations below which no amplitude function keeps a horizontal transition taut: n_idl of (1.104).
+def many_oscillations(amplitude: Amplitude, weights: Array) -> Array:
+    """What `least_oscillations` tends to on a horizontal transition as the weights grow, (1.55).
 
     Args:
+        amplitude: A.
         weights: (n_cables,) w_k.
 
     Returns:
         () n.
     """
-    return jnp.max(jnp.abs(weights)) / math.pi
+    return jnp.max(jnp.abs(weights)) / math.pi * amplitude.largest[1]
+
+
+def lower_envelope(amplitude: Amplitude, weight: Array, inclination: Array, n: Array, tau: Array) -> Array:
+    """Lower envelope of the normalised pseudotension of one cable at one instant, (1.39); (1.50) for v = 0.
+
+    Args:
+        amplitude: A.
+        weight: () w_k.
+        inclination: () v.
+        n: () number of oscillations, a real number.
+        tau: ().
+
+    Returns:
+        () the smallest pseudotension of any phase; NaN where n is too small to have a duration.
+    """
+    end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
+    size, slope, bend = derivatives(amplitude, tau, order=2)
+    load, omega = inclination + weight, (2.0 * math.pi * n) ** 2 - end
+    cosine = load * (bend - size * end) / omega - inclination * size  # (1.33)
+    sine = 4.0 * math.pi * n * load * slope / omega  # (1.34)
+    return jnp.where(omega > 0.0, 1.0 - jnp.hypot(cosine, sine), jnp.nan)

@@ -1,39 +1,25 @@
-"""Cells of a sweep: coordinates of a grid to the quantities of a result file."""
+"""Cells of a sweep of smallest numbers of arcs: coordinates of a grid to the quantities of a result file."""
 
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
 from cspr_jax.maps.minimum_arcs import minimum_arcs
-from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.tiles import Grid
 
+_OF_STARTS = ("from_x", "from_y", "from_z", "z0")
 
-class CellMap:
-    """The map of a sweep, ready to compute tiles.
 
-    Args:
-        spec: the robot.
-        keys: the sweep.
-        file: named in errors.
-
-    Raises:
-        ConfigError: the robot, the amplitude function or the limits cannot be used.
-    """
+class CellMap(GridMap):
+    """The map of a sweep of smallest numbers of arcs; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
-        """Build what all tiles share."""
-        self._keys, self._file, self._signs = keys, file, problem.axis_signs(spec)
+        """Refuse a planar robot; build what all tiles share."""
         if spec.planar:
             raise ConfigError(file, f'robot "{spec.name}" is planar: must have three cables in this map')
-        robot = problem.build_robot(spec, keys.trajectory, file)
-        amplitude = problem.build_amplitude(keys.trajectory, file, at="trajectory.")
-        limits = problem.build_limits(spec, keys.limits, keys.limits.floor, file)
-        self._shared = Shared(robot, limits, amplitude)
-        self._centre = np.asarray(centroid(robot))
+        super().__init__(spec, keys, file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile.
@@ -44,23 +30,22 @@ class CellMap:
         Returns:
             (n,) for each quantity.
         """
-        starts, ends = self._points(cells)
+        starts, ends = self._starts(cells), self._targets(cells)
         answers = minimum_arcs(
             self._shared, starts, ends, cells["z0"], max_arcs=self._keys.trajectory.max_arcs, dtype=self._keys.run.dtype
         )
         return vars(answers)
 
-    def _points(self, cells: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        # Start and end of each cell, in the kernels' axes.
-        ends = np.stack([cells["x"], cells["y"], cells["z"]], axis=1) * self._signs
-        start = self._keys.trajectory.start
+    def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
+        # In the kernels' axes.
+        start, count = self._keys.trajectory.start, len(cells["z0"])
         if start is not None and start.rest:
-            starts = np.tile(self._centre, (len(ends), 1))
+            starts = np.tile(self._centre, (count, 1))
             starts[:, 2] += cells["z0"]
-            return starts, ends
+            return starts
         fixed = start.position if start is not None and start.position is not None else [0.0, 0.0, 0.0]
-        columns = [cells.get(f"from_{name}", np.full(len(ends), fixed[i])) for i, name in enumerate("xyz")]
-        return np.stack(columns, axis=1) * self._signs, ends
+        columns = [cells.get(f"from_{name}", np.full(count, fixed[i])) for i, name in enumerate("xyz")]
+        return np.stack(columns, axis=1) * self._signs
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse a grid in which no cell has both ends below the spools and within the limits.
@@ -71,25 +56,17 @@ class CellMap:
         Raises:
             ConfigError: what is wrong with all of them.
         """
-        lows = {name: np.array([points.min(), points.max()]) for name, points in grid.axes.items()}
-        corners = Grid(lows, tuple(2 for _ in lows))
-        starts, ends = self._points(corners.cells(tuple(slice(0, 2) for _ in lows)))
-        normal = np.asarray(plane_normal(self._shared.robot))
-        floor = self._shared.limits.floor
-        for points, key in ((ends, "axes"), (starts, "trajectory.from")):
-            if not ((points - self._centre) @ normal > 0.0).any():
-                raise ConfigError(self._file, f"{key}: every point is above the spool plane: must be some below it")
-            if floor is not None and not (points[:, 2] <= np.asarray(floor)).any():
-                raise ConfigError(self._file, f"{key}: every point is below the floor: must be some above it")
+        self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")
+        self._refuse_out_of_reach(self._starts(self._corners(grid, _OF_STARTS)), "trajectory.from")
         self._refuse_long(grid)
 
     def _refuse_long(self, grid: Grid) -> None:
         # The nearest point of a product grid to a spool is nearest in each coordinate.
         longest = self._shared.limits.cable_length_max
-        if longest is None:
+        if longest is None or "radius" in grid.axes:
             return
         base = np.asarray(self._shared.robot.base_points) * self._signs
-        for cable in range(3):
+        for cable in range(len(base)):
             gaps = [np.abs(grid.axes[name] - base[cable, i]).min() for i, name in enumerate("xyz")]
             if np.linalg.norm(gaps) > np.asarray(longest)[cable]:
                 raise ConfigError(

@@ -14,6 +14,7 @@ from jax import lax
 
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.feasibility import oscillations as counts
+from cspr_jax.feasibility import zero_tension
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
 from cspr_jax.grids import in_batches
 from cspr_jax.maps.answers import BATCH, Answers, decided, end_slacks, only
@@ -85,6 +86,8 @@ def best_inclinations(shared: Shared, targets: np.ndarray) -> np.ndarray:
     """
     # The weights depend on neither the depth of p0 nor that of the target.
     weights = transition.weights(transitions_to(shared, targets, np.ones(len(targets))))
+    if not np.any(shared.amplitude.largest[2]):  # A = tau
+        return np.asarray(jax.vmap(lambda w: zero_tension.best_inclination(w)[0])(weights))
     return in_batches(partial(_best_inclinations, shared.amplitude), np.asarray(weights), size=BATCH)
 
 

@@ -6,13 +6,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
 from cspr_jax.maps.minimum_oscillations import best_inclinations, minimum_oscillations, transitions_to
-from cspr_jax.robots import centroid, is_planar, plane_normal
+from cspr_jax.robots import is_planar
 from cspr_jax.tiles import Grid
 from cspr_jax.trajectories.transition import depth_for
 
@@ -20,25 +19,12 @@ from cspr_jax.trajectories.transition import depth_for
 _ANY_DEPTH = 1.0
 
 
-class OscillationMap:
-    """The map of a sweep of transitions, ready to compute tiles.
-
-    Args:
-        spec: the robot.
-        keys: the sweep.
-        file: named in errors.
-
-    Raises:
-        ConfigError: the robot, the amplitude function or the limits cannot be used.
-    """
+class OscillationMap(GridMap):
+    """The map of a sweep of transitions; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
-        """Build what all tiles share."""
-        self._keys, self._file, self._signs = keys, file, problem.axis_signs(spec)
-        robot = problem.build_robot(spec, keys.trajectory, file)
-        amplitude = problem.build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=True)
-        limits = problem.build_limits(spec, keys.limits, keys.limits.floor, file)
-        self._shared = Shared(robot, limits, amplitude)
+        """Build what all tiles share; bounds may be asked for."""
+        super().__init__(spec, keys, file, for_bounds=True)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile.
@@ -49,7 +35,7 @@ class OscillationMap:
         Returns:
             (n,) for each quantity.
         """
-        targets = np.stack([cells["x"], cells["y"], cells["z"]], axis=1) * self._signs
+        targets = self._targets(cells)
         z0 = self._depths(cells, targets)
         segments = transitions_to(self._shared, targets, z0)
         return vars(minimum_oscillations(self._shared, segments, z0, max_arcs=self._keys.trajectory.max_arcs))
@@ -77,16 +63,6 @@ class OscillationMap:
         Raises:
             ConfigError: what is wrong with all of them.
         """
-        if is_planar(self._shared.robot) and (grid.axes["y"] != 0.0).any():
+        if is_planar(self._shared.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
             raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
-        corners = Grid(
-            {name: np.array([p.min(), p.max()]) for name, p in grid.axes.items() if name in "xyz"}, (2, 2, 2)
-        )
-        ends = corners.cells((slice(0, 2),) * 3)
-        points = np.stack([ends[name] for name in "xyz"], axis=1) * self._signs
-        depth = (points - np.asarray(centroid(self._shared.robot))) @ np.asarray(plane_normal(self._shared.robot))
-        floor = self._shared.limits.floor
-        if not (depth > 0.0).any():
-            raise ConfigError(self._file, "axes: every point is above the spool plane: must be some below it")
-        if floor is not None and not (points[:, 2] <= np.asarray(floor)).any():
-            raise ConfigError(self._file, "axes: every point is below the floor: must be some above it")
+        self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")

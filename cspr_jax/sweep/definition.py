@@ -18,13 +18,13 @@ from cspr_jax.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.quantities import DEFAULT_STORE, OF_MAP, TITLES
 from cspr_jax.store.netcdf import bytes_needed
 from cspr_jax.store.shards import Layout
+from cspr_jax.sweep.checks import check_map, check_points
 from cspr_jax.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 
 # Each tile is a file.
 LARGEST_TILES = 100_000
 LARGEST_RESULT = 1 << 46  # bytes; what is free on the disk is looked at when a run starts
 LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
-_START = ("from_x", "from_y", "from_z")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +83,7 @@ def read_sweep(path: Path) -> Sweep:
     data = parse_toml(text, path)
     keys = checked(SweepFile, data, path)
     robot = resolve_robot(keys.robot, path, path.parent)
-    (_check_start if keys.map == "minimum-arcs" else _check_transitions)(keys, path)
+    check_map(keys, path)
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
     store = list(keys.run.store or DEFAULT_STORE[keys.map])
     for name in store:
@@ -92,12 +92,10 @@ def read_sweep(path: Path) -> Sweep:
     tile = _tile(keys, tuple(counts.values()), path)
     _check_size(counts, tile, store, keys.run.dtype, path)
     axes = {name: _points(getattr(keys.axes, name)) for name in data["axes"]}
-    if "z0" in axes and not (axes["z0"] > 0.0).all():
-        raise ConfigError(path, f"axes.z0 = {shown(float(axes['z0'].min()))}: must be a number > 0")
-    if "inclination" in axes and not (np.abs(axes["inclination"]) < 1.0).all():
-        raise ConfigError(path, "axes.inclination: must be numbers in ]-1, 1[")
-    settings = keys.model_dump(mode="json", by_alias=True)
-    settings |= {"robot": robot.model_dump(mode="json"), "dimensions": list(axes)}
+    check_points(axes, path)
+    # What is not given decides nothing: a key that a later version adds leaves old identities as they are.
+    settings = keys.model_dump(mode="json", by_alias=True, exclude_none=True)
+    settings |= {"robot": robot.model_dump(mode="json", exclude_none=True), "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
     return Sweep(path, keys, robot, Grid(axes, tile), store, settings, text)
 
@@ -110,38 +108,6 @@ def _points(axis: AxisRange | list[float]) -> np.ndarray:
     if isinstance(axis, AxisRange):
         return np.linspace(axis.start, axis.stop, axis.count)
     return np.asarray(axis, float)
-
-
-def _check_transitions(keys: SweepFile, path: Path) -> None:
-    axes, trajectory = keys.axes, keys.trajectory
-    if trajectory.family != "transition":
-        raise ConfigError(path, f'trajectory.family = "{trajectory.family}": must be "transition" in this map')
-    if trajectory.start is not None and not trajectory.start.rest:
-        raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
-    for name in _START:
-        if getattr(axes, name) is not None:
-            raise ConfigError(path, f"axes.{name}: must be absent in this map: transitions start at rest")
-    given = [axes.z0, axes.inclination, trajectory.inclination]
-    if sum(key is not None for key in given) != 1:
-        raise ConfigError(path, "axes.z0, axes.inclination, trajectory.inclination: must be one of them in this map")
-
-
-def _check_start(keys: SweepFile, path: Path) -> None:
-    if keys.trajectory.family != "hypocycloid-standard":
-        raise ConfigError(path, 'trajectory.family: must be "hypocycloid-standard" in this map')
-    if keys.axes.z0 is None:
-        raise ConfigError(path, "axes.z0 is missing: depth of P0 below the centroid of the spools, m")
-    if keys.axes.inclination is not None or keys.trajectory.inclination is not None:
-        raise ConfigError(path, 'inclination: must be absent in this map; it is for map = "minimum-oscillations"')
-    given = [name for name in _START if getattr(keys.axes, name) is not None]
-    start = keys.trajectory.start
-    if start is None and len(given) < 3:
-        raise ConfigError(
-            path,
-            "trajectory.from is missing: { position = [x, y, z] }, { rest = true }, or axes from_x, from_y, from_z",
-        )
-    if start is not None and start.rest and given:
-        raise ConfigError(path, f"axes.{given[0]}: must be absent where trajectory.from.rest = true")
 
 
 def _tile(keys: SweepFile, shape: tuple[int, ...], path: Path) -> tuple[int, ...]:

@@ -2,28 +2,31 @@
 
 import functools
 import pickle
+from collections.abc import Callable
 
 import jax
 import numpy as np
 
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ResourceError, SelfCheckError
-from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.identity import digest
 from cspr_jax.maps.cells import CellMap
+from cspr_jax.maps.envelope_cells import EnvelopeMap
+from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.maps.oscillation_cells import OscillationMap
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
 from cspr_jax.sweep.work import Computed
 
-MAPS: dict[str, type[CellMap] | type[OscillationMap]] = {
+MAPS: dict[str, Callable[[RobotFile, SweepFile, object], GridMap]] = {
     "minimum-arcs": CellMap,
     "minimum-oscillations": OscillationMap,
+    "transition-envelopes": EnvelopeMap,
 }
 # Margins so near zero can change sign with the processor; how many there are stands in the result.
 NEAR_ZERO = 1e-9
-# How far a refined margin may lie below the bound proved for it.
-ROUNDING = 1e-8
 
 
 class TileMap:
@@ -67,7 +70,7 @@ class TileMap:
                     "must be smaller"
                 ) from error
             raise
-        check_answers(index, answers)
+        _refuse(index, self._cells.contradictions(answers))
         dtype = self._sweep.keys.run.dtype
         values = {name: _stored(answers[name], dtype).reshape(tiling.extent(index)) for name in self._sweep.store}
         now = environment()
@@ -82,30 +85,12 @@ def _stored(values: np.ndarray, dtype: str) -> np.ndarray:
 
 
 def _near_zero(answers: dict[str, np.ndarray]) -> int:
-    return int((np.abs(answers["margin"]) < NEAR_ZERO).sum())
+    return int((np.abs(answers["margin"]) < NEAR_ZERO).sum()) if "margin" in answers else 0
 
 
-def check_answers(index: int, answers: dict[str, np.ndarray]) -> None:
-    """Refuse numbers that contradict each other, as a broken processor, driver or compiler gives them.
-
-    Args:
-        index: of the tile.
-        answers: (n,) each.
-
-    Raises:
-        SelfCheckError: which contradiction.
-    """
-    found, margin = answers["arcs"] > 0, answers["margin"]
-    verdict = answers["verdict"]
-    unsure = Verdict.FEWER_ARCS_UNDECIDED.value
-    faults = {
-        "a feasible cell with a margin below zero": found & ~(margin > -ROUNDING),
-        "a feasible cell whose verdict is not": found & ((verdict & ~np.uint16(unsure)) != 0),
-        "an infeasible cell whose verdict is 0": ~found & (verdict == 0),
-        "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
-        "a feasible cell without a duration": found & ~(np.isfinite(answers["duration"]) & (answers["duration"] > 0)),
-    }
-    for fault, cells in faults.items():
+def _refuse(index: int, contradictions: dict[str, np.ndarray]) -> None:
+    # Of a broken processor, driver or compiler.
+    for fault, cells in contradictions.items():
         if cells.any():
             raise SelfCheckError(
                 f"tile {index}: {int(cells.sum())} of {cells.size} cells: {fault}; nothing of it was kept; "

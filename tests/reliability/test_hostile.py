@@ -42,7 +42,7 @@ def finished(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def no_pictures(monkeypatch):
     """Figures are laid out, not written: that takes longer than all the rest."""
-    monkeypatch.setattr("cspr_jax.plots.Figure.savefig", lambda self, *args, **kwargs: None)
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, *args, **kwargs: None)
 
 
 def cspr(*arguments):

@@ -1,0 +1,93 @@
+"""Cells of a sweep of envelopes: what each instant of a transition asks for."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.amplitudes import Amplitude
+from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility import oscillations as counts
+from cspr_jax.grids import in_batches
+from cspr_jax.maps.answers import BATCH
+from cspr_jax.maps.minimum_oscillations import transitions_to
+from cspr_jax.maps.oscillation_cells import OscillationMap
+from cspr_jax.tiles import Grid
+from cspr_jax.trajectories.transition import inclination, weights
+
+# How far an envelope may lie below zero at the number of oscillations that keeps it above.
+_ROUNDING = 1e-7
+
+
+@jax.jit
+def _instants(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
+    def one(w, v, tau, cable):
+        inside = jnp.abs(v) < 1.0
+        v = jnp.where(inside, v, 0.0)
+        n = counts.least_oscillations(amplitude, w, v)
+        squared = jax.vmap(lambda k: counts.squared_oscillations_at(amplitude, k, v, tau))(w)
+        envelope = jax.vmap(lambda k: counts.lower_envelope(amplitude, k, v, n, tau))(w)
+        # Cable 0 stands for all of them.
+        place = jnp.maximum(cable - 1, 0)
+        found = (
+            n,
+            jnp.where(cable > 0, squared[place], jnp.max(squared)),
+            jnp.where(cable > 0, envelope[place], jnp.min(envelope)),
+        )
+        return tuple(jnp.where(inside, value, jnp.nan) for value in found)
+
+    return jax.vmap(one)(*arguments)
+
+
+class EnvelopeMap(OscillationMap):
+    """The map of instants of transitions; see `GridMap`."""
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile.
+
+        Args:
+            cells: (n,) coordinates for each axis, in the file's axes.
+
+        Returns:
+            (n,) for each quantity.
+        """
+        targets = self._targets(cells)
+        z0 = self._depths(cells, targets)
+        segments = transitions_to(self._shared, targets, z0)
+        v, w = np.asarray(inclination(segments)), np.asarray(weights(segments))
+        cable = np.asarray(cells.get("cable", np.zeros(len(v)))).astype(int)
+        kernel = partial(_instants, self._shared.amplitude)
+        n, squared, envelope = in_batches(kernel, (w, v, cells["tau"], cable), size=BATCH)
+        return {
+            "least_oscillations": n,
+            "squared_oscillations": squared,
+            "lower_envelope": envelope,
+            "used_inclination": v,
+            "used_z0": z0,
+        }
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse what a map of transitions refuses, and cables that the robot has not.
+
+        Args:
+            grid: the grid.
+
+        Raises:
+            ConfigError: what is wrong.
+        """
+        n_cables = self._shared.robot.base_points.shape[0]
+        if "cable" in grid.axes and not np.isin(grid.axes["cable"], np.arange(1, n_cables + 1)).all():
+            raise ConfigError(self._file, f"axes.cable: must be numbers of cables, from 1 to {n_cables}")
+        super().refuse_hopeless(grid)
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other.
+
+        Args:
+            answers: (n,) each.
+
+        Returns:
+            for each kind of contradiction, (n,) where it is.
+        """
+        return {"an envelope below zero at its own number of oscillations": answers["lower_envelope"] < -_ROUNDING}

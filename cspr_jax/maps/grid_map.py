@@ -1,0 +1,111 @@
+"""What all maps of a sweep share: robot, limits, amplitude function, and the targets of a grid."""
+
+import abc
+
+import numpy as np
+
+from cspr_jax import problem
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.robots import centroid, plane_normal
+from cspr_jax.tiles import Grid
+
+# How far a refined margin may lie below the bound proved for it.
+ROUNDING = 1e-8
+OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
+
+
+class GridMap(abc.ABC):
+    """The map of a sweep, ready to compute tiles.
+
+    Args:
+        spec: the robot.
+        keys: the sweep.
+        file: named in errors.
+        for_bounds: whether the amplitude function may be "ideal", which is no motion.
+
+    Raises:
+        ConfigError: the robot, the amplitude function or the limits cannot be used.
+    """
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
+        """Build what all tiles share."""
+        self._keys, self._file, self._signs = keys, file, problem.axis_signs(spec)
+        robot = problem.build_robot(spec, keys.trajectory, file)
+        amplitude = problem.build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=for_bounds)
+        limits = problem.build_limits(spec, keys.limits, keys.limits.floor, file)
+        self._shared = Shared(robot, limits, amplitude)
+        self._centre = np.asarray(centroid(robot))
+
+    @abc.abstractmethod
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile.
+
+        Args:
+            cells: (n,) coordinates for each axis, in the file's axes.
+
+        Returns:
+            (n,) for each quantity.
+        """
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other, as a broken processor, driver or compiler gives them.
+
+        Args:
+            answers: (n,) each.
+
+        Returns:
+            for each kind of contradiction, (n,) where it is.
+        """
+        found, margin, verdict = answers["arcs"] > 0, answers["margin"], answers["verdict"]
+        unsure = np.uint16(Verdict.FEWER_ARCS_UNDECIDED.value)
+        lasts = np.isfinite(answers["duration"]) & (answers["duration"] > 0.0)
+        return {
+            "a feasible cell with a margin below zero": found & ~(margin > -ROUNDING),
+            "a feasible cell whose verdict is not": found & ((verdict & ~unsure) != 0),
+            "an infeasible cell whose verdict is 0": ~found & (verdict == 0),
+            "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
+            "a feasible cell without a duration": found & ~lasts,
+        }
+
+    @abc.abstractmethod
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse a grid in which no cell can have an answer.
+
+        Args:
+            grid: the grid.
+
+        Raises:
+            ConfigError: what is wrong with all of them.
+        """
+
+    def _targets(self, cells: dict[str, np.ndarray]) -> np.ndarray:
+        # In the kernels' axes. Radius and azimuth are about the vertical through the centroid of the spools.
+        if "radius" not in cells:
+            return np.stack([cells["x"], cells["y"], cells["z"]], axis=1) * self._signs
+        middle, radius, azimuth = self._centre * self._signs, cells["radius"], cells["azimuth"]
+        level = [middle[0] + radius * np.cos(azimuth), middle[1] + radius * np.sin(azimuth)]
+        return np.stack([*level, cells["z"]], axis=1) * self._signs
+
+    def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+        # Cells among which depths and heights have their extremes. Of azimuths the one down the slope of the spool
+        # plane stands for all: no other target is deeper below it.
+        slope = np.asarray(plane_normal(self._shared.robot)) * self._signs
+        axes = {
+            name: np.array([points.min(), points.max()]) if name != "azimuth" else np.arctan2(slope[1:2], slope[:1])
+            for name, points in grid.axes.items()
+            if name in names
+        }
+        shape = tuple(len(points) for points in axes.values())
+        return Grid(axes, shape).cells(tuple(slice(0, n) for n in shape))
+
+    def _refuse_out_of_reach(self, points: np.ndarray, key: str) -> None:
+        depth = (points - self._centre) @ np.asarray(plane_normal(self._shared.robot))
+        floor = self._shared.limits.floor
+        if not (depth > 0.0).any():
+            raise ConfigError(self._file, f"{key}: every point is above the spool plane: must be some below it")
+        if floor is not None and not (points[:, 2] <= np.asarray(floor)).any():
+            raise ConfigError(self._file, f"{key}: every point is below the floor: must be some above it")

@@ -1,0 +1,153 @@
+"""From result files to a picture: which kind it is, and which part of the data it shows."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cspr_jax.errors import ConfigError, InputError, StoreError
+from cspr_jax.plots.labels import PANELS, chosen, value
+from cspr_jax.plots.lines import Line, line_figure, lines_of, overlaid
+from cspr_jax.plots.motion import motion_figure
+from cspr_jax.plots.sections import section_figure
+from cspr_jax.results import Result, open_result
+
+# What a map is asked for first.
+FIRST = ("arcs", "oscillations", "lower_envelope")
+
+
+class View(NamedTuple):
+    """A part of a map.
+
+    Fields:
+        name: of the quantity.
+        data: it, one dimension for each of `across`.
+        across: axes that vary.
+        fixed: what was fixed, in words.
+    """
+
+    name: str
+    data: np.ndarray
+    across: list[str]
+    fixed: list[str]
+
+
+def plot(
+    paths: list[Path],
+    output: Path,
+    *,
+    quantity: str | None = None,
+    at: dict[str, float] | None = None,
+    lines: str | None = None,
+) -> None:
+    """Draw one result file, or several maps as lines in one picture.
+
+    Args:
+        paths: results of `cspr run`, or one motion of `cspr plan -o`.
+        output: picture to write; its ending is the format.
+        quantity: which one of a map; None: "arcs", or the first there is.
+        at: fixed values of axes, the nearest point is taken.
+        lines: axis whose points become lines; None: sections, or one line.
+
+    Raises:
+        StoreError: a file cannot be read, or the picture cannot be written.
+        ConfigError: no such quantity or axis, nothing to draw, or an unknown picture format.
+    """
+    results = [open_result(path) for path in paths]
+    try:
+        if len(results) > 1:
+            figure = _overlay(paths, results, quantity, at or {}, lines)
+        elif results[0].is_map:
+            figure = _map_figure(results[0], quantity, at or {}, lines)
+        else:
+            _refuse_choices(quantity, at, lines)
+            figure = motion_figure(results[0])
+        figure.savefig(output, dpi=160, metadata={"Software": None} if output.suffix == ".png" else None)
+    except InputError as error:
+        raise ConfigError(paths[0], str(error)) from error
+    except ValueError as error:
+        raise ConfigError(output, str(error).splitlines()[0]) from error
+    except OSError as error:
+        raise StoreError(f"{output}: cannot be written: {error.strerror or error}") from error
+
+
+def _refuse_choices(quantity: str | None, at: dict[str, float] | None, lines: str | None) -> None:
+    for key, given in (("--quantity", quantity), ("--at", at), ("--lines", lines)):
+        if given:
+            raise InputError(key, given, "absent for a motion")
+
+
+def _overlay(
+    paths: list[Path], results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None
+) -> Figure:
+    found: list[tuple[str, Result, np.ndarray, str]] = []
+    if lines is not None:
+        raise InputError("--lines", lines, "absent where several results are drawn")
+    for path, result in zip(paths, results, strict=True):
+        if not result.is_map:
+            raise InputError("results", str(path), "maps, where several are drawn")
+        view = _view(result, quantity, at)
+        if len(view.across) != 1:
+            raise InputError("results", f"{path} over {view.across}", "maps over one axis; --at fixes the others")
+        name = path.stem if [other.stem for other in paths].count(path.stem) == 1 else str(path)
+        found.append((name, result, view.data, view.across[0]))
+    across, drawn = overlaid(found)
+    return line_figure(results[0], view.name, {"": drawn}, across, view.fixed, [across])
+
+
+def _map_figure(result: Result, quantity: str | None, at: dict[str, float], lines: str | None) -> Figure:
+    view = _view(result, quantity, at)
+    if lines is not None:
+        return _lines_figure(result, view, lines)
+    if len(view.across) == 1:
+        axis = view.across[0]
+        return line_figure(result, view.name, {"": [Line(result.axes[axis], view.data)]}, axis, view.fixed, view.across)
+    name, data, across, fixed = _panelled(result, view, view.across)
+    panels = across[2] if len(across) > 2 else None
+    return section_figure(result, name, data if panels else data[..., None], across[:2], panels, fixed)
+
+
+def _lines_figure(result: Result, view: View, by: str) -> Figure:
+    if by not in view.across or len(view.across) < 2:
+        raise InputError("--lines", by, "one of two or more axes that vary: " + ", ".join(view.across))
+    along = next(axis for axis in view.across if axis != by)
+    order = [along, by, *(axis for axis in view.across if axis not in (along, by))]
+    name, data, across, fixed = _panelled(result, view, order)
+    if len(across) == 2:
+        groups = {"": lines_of(result, data, along, by)}
+    else:
+        points = result.axes[across[2]]
+        shown = chosen(len(points), PANELS)
+        groups = {
+            value(result, across[2], points[i], digits=3): lines_of(result, data[:, :, i], along, by) for i in shown
+        }
+    return line_figure(result, name, groups, along, fixed, across)
+
+
+def _panelled(result: Result, view: View, order: list[str]) -> View:
+    # At most three axes, in this order; the others at their first point.
+    data, fixed = view.data.transpose([view.across.index(axis) for axis in order]), list(view.fixed)
+    for extra in order[3:]:
+        data = data[:, :, :, 0]
+        fixed.append(value(result, extra, result.axes[extra][0]))
+    return View(view.name, data, order[:3], fixed)
+
+
+def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
+    first = [name for name in FIRST if name in result.data]
+    name = quantity or (first[0] if first else next(iter(result.data)))
+    if name not in result.data:
+        raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
+    data, fixed, place = result.data[name], [], {}
+    for axis, wanted in at.items():
+        if axis not in result.axes:
+            raise InputError("--at", axis, "one of " + ", ".join(result.axes))
+        place[axis] = int(np.argmin(np.abs(result.axes[axis] - wanted)))
+        fixed.append(value(result, axis, result.axes[axis][place[axis]]))
+    across = [axis for axis, points in result.axes.items() if len(points) > 1 and axis not in place]
+    if not across:
+        counts = {axis: 1 if axis in place else len(points) for axis, points in result.axes.items()}
+        raise InputError("axes", counts, "one with more than one point")
+    data = data[tuple(slice(None) if axis in across else place.get(axis, 0) for axis in result.axes)]
+    return View(name, data, across, fixed)

@@ -1,0 +1,58 @@
+"""A motion over time: its path and the tensions of the cables."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cspr_jax.plots.labels import COLOURS, STYLES
+from cspr_jax.results import Result
+
+
+def motion_figure(result: Result) -> Figure:
+    """Path and tensions of a motion.
+
+    Args:
+        result: of `cspr plan -o FILE.h5`.
+
+    Returns:
+        the figure.
+    """
+    time, position, tension = result.axes["t"], result.data["position"], result.data["tension"]
+    planar = tension.shape[1] == 2
+    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
+    places: Any = [["xz", "xz"] if planar else ["xy", "xz"], ["tension", "tension"]]
+    drawn = figure.subplot_mosaic(places, height_ratios=[1.2, 1.0])
+    for name, j in (("xy", 1), ("xz", 2)):
+        if name in drawn:
+            _path(drawn[name], position, j)
+    if result.attributes.get("z_axis", "down") == "down":
+        drawn["xz"].invert_yaxis()
+    _tensions(drawn["tension"], time, tension, result.attributes.get("mass"))
+    z_axis, z0 = result.attributes.get("z_axis", "down"), float(result.attributes["z0"])
+    figure.suptitle(f"{result.attributes['robot']}: z0 = {z0:.4g} m, z axis {z_axis}", fontsize=11)
+    return figure
+
+
+def _path(panel: Axes, position: np.ndarray, j: int) -> None:
+    panel.plot(position[:, 0], position[:, j], color="black", linewidth=0.9)
+    panel.set_xlabel("x (m)")
+    panel.set_ylabel(f"{'xyz'[j]} (m)")
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.grid(alpha=0.3)
+
+
+def _tensions(panel: Axes, time: np.ndarray, tension: np.ndarray, mass: object) -> None:
+    for k in range(tension.shape[1]):
+        panel.plot(time, tension[:, k], linestyle=STYLES[k], color=COLOURS[k], linewidth=1.0, label=f"cable {k + 1}")
+    panel.axhline(0.0, color="black", linewidth=0.8)
+    panel.set_xlabel("time (s)")
+    panel.set_ylabel("tension (N)")
+    panel.legend(ncols=tension.shape[1], loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    panel.margins(x=0.01)
+    if isinstance(mass, float) and mass > 0.0:
+        second = panel.secondary_yaxis(
+            "right", functions=(lambda f: np.asarray(f) / mass, lambda a: np.asarray(a) * mass)
+        )
+        second.set_ylabel("tension per mass (N/kg)")

@@ -1,0 +1,172 @@
+"""Envelopes of transitions along time, the closed forms of A = tau, and polar axes."""
+
+import contextlib
+import io
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cspr_jax.amplitudes import named
+from cspr_jax.cli import main
+from cspr_jax.feasibility import oscillations as counts
+from cspr_jax.feasibility import zero_tension
+from cspr_jax.results import open_result
+
+CURVES = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}
+SWEEP = """schema = 1
+map = "transition-envelopes"
+robot = "transition-planar"
+[axes]
+inclination = [-0.6, -0.2, 0.0, 0.2, 0.6]
+tau = { start = 0.0, stop = 1.0, count = 201 }
+cable = [1, 2]
+x = [2.772]
+y = [0.0]
+z = [2.0]
+[trajectory]
+family = "transition"
+amplitude = "A1"
+"""
+
+
+def cspr(*arguments):
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as err:
+        code = main([str(argument) for argument in arguments])
+    return code, err.getvalue()
+
+
+def run(folder, text, name="sweep"):
+    (folder / f"{name}.toml").write_text(text)
+    assert cspr("run", folder / f"{name}.toml", "-o", folder / name) == (0, "")
+    return open_result(folder / name / f"{name}.h5")
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_horizontal_transitions_as_printed(name):
+    """(1.53), from its own letters, on 20,001 instants; and no envelope below zero at that number, (1.50)."""
+    curve, tau = np.polynomial.Polynomial(CURVES[name]), np.linspace(0.0, 1.0, 20_001)
+    a, s, end = curve(tau), curve.deriv()(tau), curve.deriv(2)(1.0)
+    c = curve.deriv(2)(tau) - a * end
+    for w in (0.5, 2.0, 4.0, 12.0):
+        printed = (2 * w**2 * s**2 + end + w * np.sqrt(4 * w**2 * s**4 + 4 * end * s**2 + c**2 + 0j).real) / (
+            4 * np.pi**2
+        )
+        weights = jnp.array([w, -w, 0.3 * w])
+        found = float(counts.least_oscillations(named(name), weights, jnp.asarray(0.0)))
+        assert found == pytest.approx(math.sqrt(max(printed.max(), 0.0)), rel=1e-7, abs=1e-4)
+        at = [
+            float(
+                counts.lower_envelope(named(name), jnp.asarray(w), jnp.asarray(0.0), jnp.asarray(found), jnp.asarray(t))
+            )
+            for t in np.linspace(0.0, 1.0, 101)
+        ]
+        assert min(at) > -1e-9 and (found == 0.0 or min(at) < 0.01)
+
+
+def test_the_envelope_is_the_worst_phase():
+    """Of 1 - C cos + S sin as the phase runs through everything."""
+    rng = np.random.default_rng(3)
+    for w, v, n, tau in rng.uniform([-2.0, -0.9, 1.0, 0.0], [2.0, 0.9, 5.0, 1.0], (20, 4)):
+        curve = np.polynomial.Polynomial(CURVES["A1"])
+        a, s, b, end = curve(tau), curve.deriv()(tau), curve.deriv(2)(tau), curve.deriv(2)(1.0)
+        omega, phase = 4 * np.pi**2 * n**2 - end, np.linspace(0.0, 2 * np.pi, 40_001)
+        worst = (
+            1
+            - ((v + w) * (b - a * end) / omega - v * a) * np.cos(phase)
+            + 4 * np.pi * n * (v + w) * s / omega * np.sin(phase)
+        )
+        found = counts.lower_envelope(named("A1"), *(jnp.asarray(x) for x in (w, v, n, tau)))
+        assert float(found) == pytest.approx(worst.min(), abs=1e-7)
+
+
+def test_a_sweep_of_envelopes(tmp_path):
+    """N_1(v) = N_2(-v), (1.49); the largest N is the number squared; without names the worst cable."""
+    result = run(tmp_path, SWEEP)
+    squared, envelope, least = (
+        result.data[key][..., 0, 0, 0] for key in ("squared_oscillations", "lower_envelope", "least_oscillations")
+    )
+    np.testing.assert_allclose(squared[:, :, 0], squared[::-1, :, 1], rtol=1e-9, atol=1e-12)
+    highest = squared.max((1, 2))
+    np.testing.assert_allclose(least[:, 0, 0] ** 2, highest, rtol=2e-3)
+    assert (least[:, 0, 0] ** 2 >= highest * (1.0 - 1e-12)).all()
+    assert (envelope > -1e-9).all() and (envelope.min((1, 2)) < 0.01).all()
+    np.testing.assert_allclose(envelope[:, 0], 1.0, atol=1e-12)
+    whole = run(tmp_path, SWEEP.replace("cable = [1, 2]\n", ""), "whole")
+    np.testing.assert_allclose(whole.data["squared_oscillations"][..., 0, 0, 0], squared.max(2), rtol=1e-12)
+    np.testing.assert_allclose(whole.data["lower_envelope"][..., 0, 0, 0], envelope.min(2), rtol=1e-12, atol=1e-12)
+    assert cspr("verify", tmp_path / "whole")[0] == 0
+    output = tmp_path / "lines.png"
+    chosen = ("--quantity", "squared_oscillations", "--lines", "tau")
+    assert cspr("plot", tmp_path / "sweep" / "sweep.h5", *chosen, "-o", output)[0] == 0 and output.exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("tau = { start = 0.0, stop = 1.0, count = 201 }\n", ""), "axes.tau is missing"),
+        (("stop = 1.0, count", "stop = 1.5, count"), "axes.tau = 1.005: must be a number in [0, 1]"),
+        (("[1, 2]", "[1, 3]"), "axes.cable: must be numbers of cables, from 1 to 2"),
+        (("[1, 2]", "[1.5]"), "axes.cable = 1.5: must be a whole number"),
+        (("x = [2.772]\ny = [0.0]", "radius = [2.772]\nazimuth = [0.0]"), "axes.y: must be [0]"),
+        (("x = [2.772]\n", ""), "axes: y: must be x and y, or radius and azimuth"),
+        (("x = [2.772]\n", "x = [2.772]\nradius = [1.0]\n"), "axes: x, y, radius: must be"),
+        (('"transition-envelopes"', '"minimum-oscillations"'), "axes.tau: must be absent"),
+        (("[trajectory]", '[run]\nstore = ["margin"]\n[trajectory]'), "run.store: margin: must be one of"),
+    ],
+)
+def test_mistakes(tmp_path, change, words):
+    assert change[0] in SWEEP
+    (tmp_path / "wrong.toml").write_text(SWEEP.replace(*change))
+    code, err = cspr("run", tmp_path / "wrong.toml", "-o", tmp_path / "run")
+    assert code == 2 and words in err and len(err.splitlines()) == 1
+    assert not (tmp_path / "run").exists()
+
+
+@given(st.floats(0.05, 6.0), st.floats(0.0, 1.0), st.sampled_from([-1.0, 1.0]), st.floats(-0.95, 0.95))
+def test_closed_forms_of_the_zero_tension_function(r, xi, sigma, v):
+    """(1.115) to (1.118) as printed, and the search that knows nothing of them."""
+    w = jnp.array([2 * sigma * r - sigma * r * xi, sigma * r * xi, -2 * sigma * r])  # (1.114)
+    found = float(zero_tension.least_oscillations(w, jnp.asarray(v)))
+    assert found == pytest.approx(float(counts.least_oscillations(named("ideal"), w, jnp.asarray(v))), rel=1e-9)
+    best, least = (float(x) for x in zero_tension.best_inclination(w))
+    near = r**2 * xi <= 1.0
+    assert best == pytest.approx(sigma * r * xi / 2 if near else sigma / (2 * r), abs=1e-12)  # (1.117)
+    printed = (4 - xi) * r / math.sqrt(4 - r**2 * xi**2) if near else math.sqrt(4 * r**2 - 1)
+    assert least == pytest.approx(printed / math.pi, rel=1e-12)  # (1.118)
+    searched = jax.vmap(lambda i: zero_tension.least_oscillations(w, i))(jnp.linspace(-0.99, 0.99, 199))
+    assert least <= float(searched.min()) * (1.0 + 1e-12)
+    assert float(counts.best_inclination(named("ideal"), w)[1]) == pytest.approx(least, rel=1e-8)  # a kink
+
+
+def test_polar_axes(tmp_path):
+    """The same targets by x and y and by radius and azimuth; the map of A = tau has the closed forms' numbers."""
+    head = """schema = 1
+map = "minimum-oscillations"
+[robot]
+name = "aside"
+mass = 1.0
+z_axis = "AXIS"
+base_points = [[1.0, -0.3, 0.1], [-0.2, -0.4, 0.0], [0.3, 1.0, -0.1]]
+[axes]
+z = [DEPTH]
+z0 = [1.3]
+TARGETS
+[trajectory]
+family = "transition"
+"""
+    radius, azimuth = np.array([0.4, 1.5]), np.array([-2.0, 0.3, 1.6])
+    middle = np.array([1.1 / 3.0, 0.1])
+    for axis, depth in (("down", 1.6), ("up", -1.6)):
+        text = head.replace("AXIS", axis).replace("DEPTH", str(depth))
+        polar = f"radius = {radius.tolist()}\nazimuth = {azimuth.tolist()}"
+        found = run(tmp_path, text.replace("TARGETS", polar), f"polar_{axis}").data["least_oscillations"][0, 0]
+        for i, r in enumerate(radius):
+            for j, angle in enumerate(azimuth):
+                x, y = middle + r * np.array([np.cos(angle), np.sin(angle)])
+                one = run(tmp_path, text.replace("TARGETS", f"x = [{x}]\ny = [{y}]"), f"{axis}_{i}{j}")
+                assert one.data["least_oscillations"].item() == pytest.approx(found[i, j], rel=1e-9)
