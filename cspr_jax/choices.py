@@ -8,11 +8,11 @@ from cspr_jax.amplitudes import Amplitude
 from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.maps.minimum_oscillations import best_inclinations
+from cspr_jax.feasibility.oscillations import best_inclination
 from cspr_jax.robots import PointMassRobot, centroid
 from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories import depths
-from cspr_jax.trajectories.transition import depth_for
+from cspr_jax.trajectories.transition import depth_for, transition, weights
 
 REST_TOLERANCE = 1e-9  # m
 # A conservative z0 must lie above its bound: by this part of it.
@@ -80,7 +80,9 @@ def _depth_of_inclination(shared: Shared, sequence: Sequence) -> float:
     if inclination == "best":
         if (targets != targets[0]).any():
             raise ConfigError(path, 'inclination = "best": must be a number in a plan with more than one target')
-        v = float(best_inclinations(shared, targets[:1])[0])
+        # The weights do not depend on the depth of P0.
+        one = transition(shared.robot, shared.amplitude, jnp.asarray(targets[0]), jnp.asarray(1.0))
+        v = float(best_inclination(shared.amplitude, weights(one))[0])
     else:
         v = float(inclination or 0.0)
     found = [float(depth_for(shared.robot, jnp.asarray(target), jnp.asarray(v))) for target in targets]

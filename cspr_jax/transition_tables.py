@@ -13,6 +13,7 @@ from cspr_jax.feasibility import zero_tension
 from cspr_jax.feasibility.oscillations import (
     best_epsilon,
     best_inclination,
+    horizontal_oscillations,
     least_oscillations,
     many_oscillations,
 )
@@ -25,7 +26,7 @@ _READINGS = {"w_max = 5 sqrt(3)": 5.0 * math.sqrt(3.0), "w_max = 10": 10.0}
 
 
 def _horizontal(amplitude: Amplitude, w: Array) -> float:
-    return float(least_oscillations(amplitude, w, jnp.asarray(0.0)))
+    return float(horizontal_oscillations(amplitude, w))
 
 
 def _weights(name: str, direction: list[float]) -> Array:

@@ -11,11 +11,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cspr_jax.amplitudes import named
+from cspr_jax.amplitudes import derivatives, named
 from cspr_jax.cli import main
 from cspr_jax.feasibility import oscillations as counts
 from cspr_jax.feasibility import zero_tension
+from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.envelopes import lower_envelope, proved_envelope
+from cspr_jax.feasibility.limits import Limits
+from cspr_jax.feasibility.margins import margins
+from cspr_jax.feasibility.transition_margins import transition_margins
+from cspr_jax.maps.minimum_oscillations import transitions_to
 from cspr_jax.results import open_result
+from cspr_jax.robots import centroid
 
 CURVES = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}
 SWEEP = """schema = 1
@@ -60,9 +67,7 @@ def test_horizontal_transitions_as_printed(name):
         found = float(counts.least_oscillations(named(name), weights, jnp.asarray(0.0)))
         assert found == pytest.approx(math.sqrt(max(printed.max(), 0.0)), rel=1e-7, abs=1e-4)
         at = [
-            float(
-                counts.lower_envelope(named(name), jnp.asarray(w), jnp.asarray(0.0), jnp.asarray(found), jnp.asarray(t))
-            )
+            float(lower_envelope(named(name), jnp.asarray(w), jnp.asarray(0.0), jnp.asarray(found), jnp.asarray(t)))
             for t in np.linspace(0.0, 1.0, 101)
         ]
         assert min(at) > -1e-9 and (found == 0.0 or min(at) < 0.01)
@@ -80,7 +85,7 @@ def test_the_envelope_is_the_worst_phase():
             - ((v + w) * (b - a * end) / omega - v * a) * np.cos(phase)
             + 4 * np.pi * n * (v + w) * s / omega * np.sin(phase)
         )
-        found = counts.lower_envelope(named("A1"), *(jnp.asarray(x) for x in (w, v, n, tau)))
+        found = lower_envelope(named("A1"), *(jnp.asarray(x) for x in (w, v, n, tau)))
         assert float(found) == pytest.approx(worst.min(), abs=1e-7)
 
 
@@ -140,7 +145,7 @@ def test_closed_forms_of_the_zero_tension_function(r, xi, sigma, v):
     assert least == pytest.approx(printed / math.pi, rel=1e-12)  # (1.118)
     searched = jax.vmap(lambda i: zero_tension.least_oscillations(w, i))(jnp.linspace(-0.99, 0.99, 199))
     assert least <= float(searched.min()) * (1.0 + 1e-12)
-    assert float(counts.best_inclination(named("ideal"), w)[1]) == pytest.approx(least, rel=1e-8)  # a kink
+    assert float(counts.best_inclination(named("ideal"), w)[1]) == pytest.approx(least, rel=3e-8)  # a kink
 
 
 def test_polar_axes(tmp_path):
@@ -170,3 +175,36 @@ family = "transition"
                 x, y = middle + r * np.array([np.cos(angle), np.sin(angle)])
                 one = run(tmp_path, text.replace("TARGETS", f"x = [{x}]\ny = [{y}]"), f"{axis}_{i}{j}")
                 assert one.data["least_oscillations"].item() == pytest.approx(found[i, j], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["A1", "A2", "A3", "effective", "effective-c3"])
+def test_what_envelopes_prove(name):
+    """No envelope of 20,001 instants goes below the bound, which is close to it; nor does the depth."""
+    amplitude = named(name, 0.08 if name.startswith("effective") else None)
+    rng, close, prove = np.random.default_rng(6), [], jax.jit(proved_envelope)
+    a, s, b = (np.asarray(x) for x in derivatives(amplitude, jnp.linspace(0.0, 1.0, 20_001), order=2))
+    least = jax.jit(counts.least_oscillations)
+    for _ in range(25):
+        w = rng.normal(size=2) * rng.choice([0.5, 2.0, 6.0])
+        w, v = np.array([*w, -w.sum()]), rng.uniform(-0.95, 0.95)
+        n = float(least(amplitude, jnp.asarray(w), jnp.asarray(v))) * rng.uniform(0.9, 1.5) + 0.2
+        omega, load = (2.0 * np.pi * n) ** 2 - b[-1], v + np.array([*w, -v])[:, None]
+        envelope = 1.0 - np.hypot(load * (b - a * b[-1]) / omega - v * a, 4.0 * np.pi * n * load * s / omega)
+        bound = float(prove(amplitude, jnp.asarray(w), jnp.asarray(v), jnp.asarray(n)))
+        assert bound <= envelope.min() + 1e-12
+        close.append(envelope.min() - bound)
+    assert np.median(close) < 0.01
+
+
+@pytest.mark.parametrize("name", ["A1", "quintic", "effective"])
+def test_margins_of_transitions_from_two_functions(name, tilted):
+    """The same as from the slack of each cable and the depth, where feasible and where not."""
+    shared = Shared(tilted, Limits(), named(name, 0.1 if name == "effective" else None))
+    rng = np.random.default_rng(7)
+    targets = np.asarray(centroid(tilted)) + rng.uniform([-4.0, -4.0, 0.2], [4.0, 4.0, 3.4], (300, 3))
+    segments, arcs = transitions_to(shared, targets, np.full(300, 1.6)), 2 * rng.integers(1, 9, 300)
+    found, wanted = transition_margins(shared, segments, arcs), margins(shared, segments, arcs)
+    assert 50 < (wanted.min(1) > 0.0).sum() < 250
+    np.testing.assert_allclose(found.min(1), wanted.min(1), atol=1e-9, rtol=1e-9)
+    negative = wanted.min(1) <= 0.0
+    np.testing.assert_array_equal(found[negative], wanted[negative])

@@ -23,9 +23,9 @@ from cspr_jax.numerics import vertex
 
 # Samples of each piece of the amplitude function; between them the maximum is refined.
 SAMPLES = 64
-CANDIDATES = 2
-# Golden section narrows the bracket to a hundredth, two parabolas then find the place to rounding.
-GOLDEN, STEPS = (math.sqrt(5.0) - 1.0) / 2.0, 10
+UNROLL = 4
+# Golden section narrows the bracket to a twentieth, parabolas then find the place to rounding.
+GOLDEN, STEPS = (math.sqrt(5.0) - 1.0) / 2.0, 6
 PARABOLAS = 3
 # Of a best inclination: the bracket ends at 4e-9 of where it began.
 INCLINATION_STEPS = 40
@@ -46,9 +46,13 @@ def squared_oscillations_at(amplitude: Amplitude, weight: Array, inclination: Ar
         () N; that of Omega = 0 where every Omega will do.
     """
     end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
-    size, slope, bend = derivatives(amplitude, tau, order=2)
-    load, c = inclination + weight, bend - size * end
-    d = 1.0 - (inclination * size) ** 2
+    return _root(inclination + weight, inclination, end, derivatives(amplitude, tau, order=2))
+
+
+def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]) -> Array:
+    # The largest root N of the envelope, for A, A', A'' at an instant.
+    size, slope, bend = values
+    c, d = bend - size * end, 1.0 - (inclination * size) ** 2
     half = inclination * size * load * c - 2.0 * (load * slope) ** 2
     rest = load**2 * (c**2 + 4.0 * end * slope**2)
     squared = half**2 + d * rest
@@ -86,21 +90,43 @@ def _golden(function: Callable[[Array], Array], low: Array, high: Array, steps: 
 
 @jax.jit
 def _least(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array) -> Array:
-    # What a load may be, for a given N, is an interval about zero: only the extreme cables count.
-    extreme = jnp.stack([jnp.max(weights), jnp.min(weights)])
+    end = derivatives(amplitude, jnp.ones_like(inclination), order=2)[2]
+    values = derivatives(amplitude, tau, order=2)
 
     def one(weight):
         def at(t):
             return squared_oscillations_at(amplitude, weight, inclination, t)
 
-        values = jax.vmap(at)(tau)
-        beside = jnp.pad(values, 1, constant_values=-jnp.inf)
-        peaks = jnp.where((values >= beside[:-2]) & (values >= beside[2:]), values, -jnp.inf)
-        places = lax.top_k(peaks, CANDIDATES)[1]
+        places, highest = _peaks(lambda now: _root(inclination + weight, inclination, end, now), values)
         low, high = tau[jnp.maximum(places - 1, 0)], tau[jnp.minimum(places + 1, len(tau) - 1)]
-        return jnp.maximum(jnp.max(values), jnp.max(jax.vmap(partial(_peak, at))(low, high)))
+        return jnp.maximum(highest, jnp.max(jax.vmap(partial(_peak, at))(low, high)))
 
-    return jnp.max(jax.vmap(one)(extreme))
+    return jnp.max(jax.vmap(one)(weights))
+
+
+def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, ...]) -> tuple[Array, Array]:
+    # Where the two highest peaks of a sampled function lie, and the height of the first; one sample after the other,
+    # since sorting them would cost five times as much.
+    none = -jnp.inf * jnp.ones_like(function(tuple(p[0] for p in points)))
+    nowhere = jnp.zeros((), jnp.int32)
+
+    def take(found, value, place):
+        (first, at_first), (second, at_second) = found
+        leads, follows = value > first, value > second
+        next_one = jnp.where(leads, first, jnp.where(follows, value, second))
+        at_next = jnp.where(leads, at_first, jnp.where(follows, place, at_second))
+        return (jnp.where(leads, value, first), jnp.where(leads, place, at_first)), (next_one, at_next)
+
+    def step(state, point):
+        before, here, place, found = state
+        after = function(point)
+        is_peak = (here >= before) & (here >= after)
+        return (here, after, place + 1, take(found, jnp.where(is_peak, here, -jnp.inf), place)), None
+
+    start = (none, none, nowhere - 1, ((none, nowhere), (none, nowhere)))
+    (before, here, place, found), _ = lax.scan(step, start, points, unroll=UNROLL)
+    found = take(found, jnp.where(here >= before, here, -jnp.inf), place)
+    return jnp.stack([found[0][1], found[1][1]]), found[0][0]
 
 
 def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
@@ -118,7 +144,7 @@ def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
 
 
 def least_oscillations(amplitude: Amplitude, weights: Array, inclination: Array) -> Array:
-    """Oscillations that the envelopes ask for, a real number: (1.48), (1.94); (1.53) for v = 0.
+    """Oscillations that the envelopes ask for, a real number: (1.48), (1.94).
 
     Args:
         amplitude: A, which meets (1.27) and (1.28).
@@ -128,7 +154,26 @@ def least_oscillations(amplitude: Amplitude, weights: Array, inclination: Array)
     Returns:
         () n.
     """
-    return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), weights, inclination), 0.0))
+    return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), _extreme(weights), inclination), 0.0))
+
+
+def _extreme(weights: Array) -> Array:
+    # What a load may be, for a given N, is an interval about zero: only the extreme cables count.
+    return jnp.stack([jnp.max(weights), jnp.min(weights)])
+
+
+def horizontal_oscillations(amplitude: Amplitude, weights: Array) -> Array:
+    """Oscillations that the envelopes ask for on a horizontal transition, a real number: (1.53).
+
+    Args:
+        amplitude: A, which meets (1.27) and (1.28).
+        weights: (n_cables,) w_k; only the largest size counts.
+
+    Returns:
+        () n.
+    """
+    largest = jnp.max(jnp.abs(weights), keepdims=True)
+    return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), largest, jnp.zeros_like(largest[0])), 0.0))
 
 
 def best_inclination(amplitude: Amplitude, weights: Array) -> tuple[Array, Array]:
@@ -141,7 +186,7 @@ def best_inclination(amplitude: Amplitude, weights: Array) -> tuple[Array, Array
     Returns:
         v and n, () each.
     """
-    return _best(amplitude, _samples(amplitude), weights)
+    return _best(amplitude, _samples(amplitude), _extreme(weights))
 
 
 @jax.jit
@@ -160,10 +205,9 @@ def best_epsilon(weights: Array) -> tuple[float, float]:
     Returns:
         epsilon and n.
     """
-    level = jnp.asarray(0.0)
 
     def needed(epsilon: float) -> float:
-        return float(least_oscillations(named("effective", epsilon), weights, level))
+        return float(horizontal_oscillations(named("effective", epsilon), weights))
 
     # A coarse look finds the valley; golden section goes down in it.
     trial = np.linspace(SMALLEST_EPSILON, 0.5, EPSILONS)
@@ -186,24 +230,3 @@ def many_oscillations(amplitude: Amplitude, weights: Array) -> Array:
         () n.
     """
     return jnp.max(jnp.abs(weights)) / math.pi * amplitude.largest[1]
-
-
-def lower_envelope(amplitude: Amplitude, weight: Array, inclination: Array, n: Array, tau: Array) -> Array:
-    """Lower envelope of the normalised pseudotension of one cable at one instant, (1.39); (1.50) for v = 0.
-
-    Args:
-        amplitude: A.
-        weight: () w_k.
-        inclination: () v.
-        n: () number of oscillations, a real number.
-        tau: ().
-
-    Returns:
-        () the smallest pseudotension of any phase; NaN where n is too small to have a duration.
-    """
-    end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
-    size, slope, bend = derivatives(amplitude, tau, order=2)
-    load, omega = inclination + weight, (2.0 * math.pi * n) ** 2 - end
-    cosine = load * (bend - size * end) / omega - inclination * size  # (1.33)
-    sine = 4.0 * math.pi * n * load * slope / omega  # (1.34)
-    return jnp.where(omega > 0.0, 1.0 - jnp.hypot(cosine, sine), jnp.nan)

@@ -6,6 +6,8 @@ candidate with the largest margin is reported.
 """
 
 import dataclasses
+from collections.abc import Callable
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -55,7 +57,27 @@ def _durations(arguments) -> jax.Array:
     return jax.vmap(hypocycloid.duration)(*arguments)
 
 
-def decided(shared: Shared, parities: dict[int, Segment], upper: np.ndarray, infinity: np.ndarray) -> Answers:
+class Known(NamedTuple):
+    """Numbers of arcs proved feasible by other means than the certificate.
+
+    Fields:
+        arcs: (n,) one for each segment; 0: none.
+        bound: (n,) proved lower bound of its margin.
+    """
+
+    arcs: np.ndarray
+    bound: np.ndarray
+
+
+def decided(
+    shared: Shared,
+    parities: dict[int, Segment],
+    upper: np.ndarray,
+    infinity: np.ndarray,
+    *,
+    known: Known | None = None,
+    measure: Callable[[Shared, Segment, np.ndarray], np.ndarray] = margins,
+) -> Answers:
     """Answers from upper bounds.
 
     Args:
@@ -63,12 +85,15 @@ def decided(shared: Shared, parities: dict[int, Segment], upper: np.ndarray, inf
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
         upper: (n, max_arcs) upper bounds of the margin, column p - 1 for p arcs; -inf where it is out of the question.
         infinity: (n,) left-hand side of (2.55).
+        known: what is proved already; None: nothing.
+        measure: finds the margins, as `margins` does.
 
     Returns:
         the answers.
     """
-    found, doubtful, bound = _search(shared, parities, upper)
-    tried, slack = _best(shared, parities, upper, found)
+    known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
+    found, doubtful, bound = _search(shared, parities, upper, known)
+    tried, slack = _best(shared, parities, upper, found, measure)
     chosen = pick(parities, np.arange(len(found)), tried)
     duration = in_batches(_durations, (chosen, tried.astype(float)), size=BATCH)
     none = np.flatnonzero(found == 0)
@@ -137,6 +162,8 @@ def pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Se
     Returns:
         leaves (m, ...).
     """
+    if parities[0] is parities[1]:
+        return jax.tree.map(lambda leaf: np.asarray(leaf)[rows], parities[0])
     is_odd = arcs % 2 == 1
 
     def choose(even, odd):
@@ -146,7 +173,7 @@ def pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Se
 
 
 def _search(
-    shared: Shared, parities: dict[int, Segment], upper: np.ndarray
+    shared: Shared, parities: dict[int, Segment], upper: np.ndarray, known: Known
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, and the proved margin.
     found, doubtful, bound = np.zeros(len(upper), int), np.zeros(len(upper), bool), np.full(len(upper), -np.inf)
@@ -156,6 +183,11 @@ def _search(
         if not len(rows):
             return found, doubtful, bound
         arcs = np.argmax(alive[rows], axis=1) + 1
+        given = arcs == known.arcs[rows]
+        found[rows[given]], bound[rows[given]] = arcs[given], known.bound[rows[given]]
+        rows, arcs = rows[~given], arcs[~given]
+        if not len(rows):
+            continue
         proof = prove(shared, pick(parities, rows, arcs), arcs)
         found[rows[proof.feasible]] = arcs[proof.feasible]
         bound[rows] = proof.bound[:, :2].min(1)
@@ -164,11 +196,11 @@ def _search(
 
 
 def _best(
-    shared: Shared, parities: dict[int, Segment], upper: np.ndarray, found: np.ndarray
+    shared: Shared, parities: dict[int, Segment], upper: np.ndarray, found: np.ndarray, measure: Callable
 ) -> tuple[np.ndarray, np.ndarray]:
     # Margins at the number of arcs found, else at the candidate with the largest; upper bounds say where to look next.
     tried = np.where(found > 0, found, np.argmax(upper, axis=1) + 1)
-    slack = margins(shared, pick(parities, np.arange(len(found)), tried), tried)
+    slack = measure(shared, pick(parities, np.arange(len(found)), tried), tried)
     best = slack.min(1)
     rest = np.where(found[:, None] > 0, -np.inf, upper)
     rest[np.arange(len(rest)), tried - 1] = -np.inf
@@ -177,7 +209,7 @@ def _best(
         if not len(rows):
             return tried, slack
         arcs = np.argmax(rest[rows], axis=1) + 1
-        candidate = margins(shared, pick(parities, rows, arcs), arcs)
+        candidate = measure(shared, pick(parities, rows, arcs), arcs)
         rest[rows, arcs - 1] = -np.inf
         better = candidate.min(1) > best[rows]
         tried[rows[better]], slack[rows[better]] = arcs[better], candidate[better]

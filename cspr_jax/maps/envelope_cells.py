@@ -9,6 +9,7 @@ import numpy as np
 from cspr_jax.amplitudes import Amplitude
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility import oscillations as counts
+from cspr_jax.feasibility.envelopes import lower_envelope
 from cspr_jax.grids import in_batches
 from cspr_jax.maps.answers import BATCH
 from cspr_jax.maps.minimum_oscillations import transitions_to
@@ -27,7 +28,7 @@ def _instants(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
         v = jnp.where(inside, v, 0.0)
         n = counts.least_oscillations(amplitude, w, v)
         squared = jax.vmap(lambda k: counts.squared_oscillations_at(amplitude, k, v, tau))(w)
-        envelope = jax.vmap(lambda k: counts.lower_envelope(amplitude, k, v, n, tau))(w)
+        envelope = jax.vmap(lambda k: lower_envelope(amplitude, k, v, n, tau))(w)
         # Cable 0 stands for all of them.
         place = jnp.maximum(cable - 1, 0)
         found = (

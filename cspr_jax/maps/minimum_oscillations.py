@@ -15,9 +15,12 @@ from jax import lax
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.feasibility import oscillations as counts
 from cspr_jax.feasibility import zero_tension
-from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
+from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared, tolerance
+from cspr_jax.feasibility.envelopes import proved_envelope
+from cspr_jax.feasibility.limits import given
+from cspr_jax.feasibility.transition_margins import transition_margins
 from cspr_jax.grids import in_batches
-from cspr_jax.maps.answers import BATCH, Answers, decided, end_slacks, only
+from cspr_jax.maps.answers import BATCH, Answers, Known, decided, end_slacks, only
 from cspr_jax.maps.minimum_arcs import check_numbers
 from cspr_jax.trajectories import transition
 from cspr_jax.trajectories.hypocycloid import Segment
@@ -96,7 +99,7 @@ def _envelopes(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
     def one(weights, v):
         inside = jnp.abs(v) < 1.0
         here = counts.least_oscillations(amplitude, weights, jnp.where(inside, v, 0.0))
-        level = counts.least_oscillations(amplitude, weights, jnp.zeros_like(v))
+        level = counts.horizontal_oscillations(amplitude, weights)
         return jnp.where(inside, here, jnp.nan), level - here
 
     return jax.vmap(one)(*arguments)
@@ -104,9 +107,9 @@ def _envelopes(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
 
 @jax.jit
 def _level(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
-    # Of horizontal transitions: half of the work.
+    # Of horizontal transitions: a third of the work.
     weights, _ = arguments
-    here = jax.vmap(lambda w: counts.least_oscillations(amplitude, w, jnp.zeros_like(w[0])))(weights)
+    here = jax.vmap(partial(counts.horizontal_oscillations, amplitude))(weights)
     return here, jnp.zeros_like(here)
 
 
@@ -129,6 +132,22 @@ def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.A
         return jnp.where(period > 0.0, found + guard, -jnp.inf)
 
     return lax.map(one, jnp.arange(1.0, largest + 1.0)).T
+
+
+@jax.jit
+def _proofs(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
+    def one(segment, weights, v, n):
+        return proved_envelope(amplitude, weights, v, n), tolerance(amplitude, segment, 2.0 * n)
+
+    return jax.vmap(one)(*arguments)
+
+
+def _known(shared: Shared, segments: Segment, of_targets: tuple[np.ndarray, np.ndarray], allowed: np.ndarray) -> Known:
+    # Whole numbers of oscillations that the envelopes prove.
+    n = np.where(np.isfinite(allowed), allowed, 1.0)
+    kernel = partial(_proofs, shared.amplitude)
+    bound, near = in_batches(kernel, (segments, *of_targets, n), size=BATCH)
+    return Known(np.where(np.isfinite(allowed) & (bound > near), 2 * n, 0).astype(int), bound)
 
 
 def minimum_oscillations(
@@ -168,8 +187,13 @@ def minimum_oscillations(
         upper[steady, 1::2], real[steady], gain[steady] = np.inf, 0.0, 0.0
     upper = np.minimum(upper, at_ends[:, None] + SMALLEST_MARGIN)
     infinity = 1.0 - np.abs(v) * max(abs(float(shared.amplitude.lowest)), float(shared.amplitude.highest))
-    answers = decided(shared, {0: segments, 1: segments}, only(upper, arcs), infinity)
     allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
+    parities, wanted = {0: segments, 1: segments}, only(upper, arcs)
+    if steady is None:
+        known = None if given(shared.limits) else _known(shared, segments, (weights, v), allowed)
+        answers = decided(shared, parities, wanted, infinity, known=known, measure=transition_margins)
+    else:
+        answers = decided(shared, parities, wanted, infinity)
     return OscillationAnswers(
         **vars(answers),
         oscillations=answers.arcs // 2,
