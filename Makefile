@@ -26,6 +26,7 @@ check: $(STAMP)
 bench: $(STAMP)
 	$(BIN)/cspr bench
 	$(BIN)/python benchmarks/million_targets.py
+	$(BIN)/python benchmarks/million_transitions.py
 	$(BIN)/python benchmarks/store_cost.py
 
 docs: $(STAMP)
