@@ -32,7 +32,9 @@ def main() -> None:
     seconds = time.perf_counter() - began
     feasible = int((answers.oscillations > 0).sum())
     fewer = int(((answers.oscillations > 0) & (answers.oscillations < answers.envelope_oscillations)).sum())
-    print(f"{seconds:.1f} s, {options.count / seconds:,.0f} targets a second; {feasible:,} feasible, {fewer:,} with fewer")
+    print(
+        f"{seconds:.1f} s, {options.count / seconds:,.0f} targets a second; {feasible:,} feasible, {fewer:,} with fewer"
+    )
 
 
 if __name__ == "__main__":
