@@ -170,9 +170,7 @@ def tilt_torsion_matrix(phi: float, theta: float, sigma: float) -> Array:
     def about_z(x: float) -> Array:
         return np.array([[math.cos(x), -math.sin(x), 0], [math.sin(x), math.cos(x), 0], [0, 0, 1.0]])
 
-    about_x = np.array(
-        [[1.0, 0, 0], [0, math.cos(theta), -math.sin(theta)], [0, math.sin(theta), math.cos(theta)]]
-    )
+    about_x = np.array([[1.0, 0, 0], [0, math.cos(theta), -math.sin(theta)], [0, math.sin(theta), math.cos(theta)]])
     return about_z(phi) @ about_x @ about_z(sigma - phi)
 
 
@@ -365,7 +363,9 @@ def motion(
         dp, ddp = _difference(places, step)
         spins = [x @ np.swapaxes(turns[3], 1, 2) for x in _difference(turns, step)]
         omega, omega_dot = (np.stack([x[:, 2, 1], x[:, 0, 2], x[:, 1, 0]], axis=-1) for x in _skew(spins))
-    return Motion(duration, p, dp / duration, ddp / duration**2, q, matrix(q), omega / duration, omega_dot / duration**2)
+    return Motion(
+        duration, p, dp / duration, ddp / duration**2, q, matrix(q), omega / duration, omega_dot / duration**2
+    )
 
 
 def _difference(values: list[Array], step: float) -> tuple[Array, Array]:
@@ -445,7 +445,9 @@ def ideal_wrench(robot: Robot, position: ArrayLike, rotation: ArrayLike) -> Arra
     return -np.concatenate([p + c_a - c_b, moment])
 
 
-def deviations(robot: Robot, position: ArrayLike, q: ArrayLike, z0: float, gravity: float = 9.81) -> tuple[Array, Array]:
+def deviations(
+    robot: Robot, position: ArrayLike, q: ArrayLike, z0: float, gravity: float = 9.81
+) -> tuple[Array, Array]:
     """u and v (6,) of mu = eta/6 + u + beta_hat v at an end pose (3.82), (3.89), by solving (3.69) twice.
 
     The acceleration is (3.70) with (3.77), the angular one beta_hat (g/z0) gamma e, that is (3.71) without its 2.
