@@ -13,7 +13,7 @@ demo: $(STAMP)
 	@echo "Look at results/demo/demo.png; the data are in results/demo/demo.h5."
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -m "not soak"
+	$(BIN)/python -m pytest -m "not soak" -n 2 --dist loadfile
 
 soak: $(STAMP)
 	$(BIN)/python -m pytest -m soak

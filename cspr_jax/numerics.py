@@ -50,6 +50,19 @@ def sincospi(x: Array) -> tuple[Array, Array]:
     return sign * (math.pi * angle) * sine, sign * cosine
 
 
+def length(vector: Array) -> Array:
+    """Length of a vector, with a gradient of zero where it is zero.
+
+    Args:
+        vector: (n,).
+
+    Returns:
+        ().
+    """
+    square = jnp.sum(vector * vector)
+    return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), 0.0)
+
+
 def leaf(value) -> Array:
     """A float64 NumPy array, as a leaf of a pytree that compiled functions take.
 

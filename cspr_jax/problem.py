@@ -9,6 +9,7 @@ from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, Traj
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.feasibility.limits import Limits
 from cspr_jax.numerics import leaf
+from cspr_jax.platforms import PlatformRobot, platform_robot
 from cspr_jax.robots import STANDARD_GRAVITY, PointMassRobot
 
 # A z-up file is turned by half a turn about x: a rotation, so that nothing is mirrored.
@@ -41,7 +42,7 @@ def gravity_of(spec: RobotFile, keys: TrajectoryKeys) -> float:
 
 
 def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot:
-    """The robot, in the kernels' axes.
+    """A point-mass robot, in the kernels' axes.
 
     Args:
         spec: the robot file's content.
@@ -52,12 +53,43 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
         the robot.
 
     Raises:
-        ConfigError: its geometry cannot be used.
+        ConfigError: its geometry cannot be used, or it is a rigid platform.
     """
+    if spec.is_platform:
+        raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass here')
     try:
         points = np.asarray(spec.base_points) * axis_signs(spec)
         make = robots.planar_robot if spec.planar else robots.point_mass_robot
         return make(points, mass=spec.mass, gravity=gravity_of(spec, keys), name=spec.name)
+    except InputError as error:
+        raise ConfigError(file, f"robot.{error}") from error
+
+
+def build_platform(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PlatformRobot:
+    """A six-cable robot, in the kernels' axes; its platform axes are still those of the file.
+
+    Args:
+        spec: the robot file's content.
+        keys: of the plan or sweep.
+        file: named in errors.
+
+    Returns:
+        the robot.
+
+    Raises:
+        ConfigError: its geometry or inertia cannot be used.
+    """
+    signs = axis_signs(spec)
+    try:
+        return platform_robot(
+            np.asarray(spec.base_points) * signs,
+            np.asarray(spec.platform_points) * signs,
+            mass=spec.mass,
+            inertia=np.asarray(spec.inertia) * np.outer(signs, signs),
+            centre_of_mass=np.asarray(spec.centre_of_mass or [0.0, 0.0, 0.0]) * signs,
+            gravity=gravity_of(spec, keys),
+            name=spec.name,
+        )
     except InputError as error:
         raise ConfigError(file, f"robot.{error}") from error
 

@@ -60,7 +60,7 @@ def point_mass_robot(
     points = np.asarray(base_points, float)
     if points.shape != (3, 3) or not (np.abs(points) <= LARGEST_LENGTH).all():
         raise InputError("base_points", base_points, "three points of three coordinates, at most 1e6 m")
-    _check_numbers(mass, gravity)
+    check_numbers(mass, gravity)
     sides = np.roll(points, -1, 0) - points
     normal = np.cross(sides[0], sides[1])
     size = np.linalg.norm(normal)
@@ -89,7 +89,7 @@ def planar_robot(base_points, *, mass: float, gravity: float = STANDARD_GRAVITY,
     points = np.asarray(base_points, float)
     if points.shape != (2, 3) or not (np.abs(points) <= LARGEST_LENGTH).all():
         raise InputError("base_points", base_points, "two points of three coordinates, at most 1e6 m")
-    _check_numbers(mass, gravity)
+    check_numbers(mass, gravity)
     if (points[:, 1] != 0.0).any():
         raise InputError("base_points", points.tolist(), "points with y = 0: the plane of a planar robot")
     gap = np.abs(points[1] - points[0])
@@ -98,7 +98,16 @@ def planar_robot(base_points, *, mass: float, gravity: float = STANDARD_GRAVITY,
     return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), name)
 
 
-def _check_numbers(mass: float, gravity: float) -> None:
+def check_numbers(mass: float, gravity: float) -> None:
+    """Refuse a mass or a gravity that is none.
+
+    Args:
+        mass: kg.
+        gravity: m/s^2.
+
+    Raises:
+        InputError: not finite, or not positive.
+    """
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(key, value, "a finite number > 0")

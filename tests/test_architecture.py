@@ -15,8 +15,8 @@ PACKAGE = ROOT / "cspr_jax"
 # From the bottom up, as docs/architecture.md draws them; a package stands for its modules, a longer name goes first.
 LAYERS = (
     ("errors", "numerics", "bounds", "grids"),
-    ("amplitudes", "robots"),
-    ("tensions",),
+    ("amplitudes", "robots", "platforms", "rotations"),
+    ("tensions", "wrenches", "reference_pose"),
     ("trajectories",),
     ("feasibility",),
     ("maps", "maps.minimum_arcs", "maps.sieve"),

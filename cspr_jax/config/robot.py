@@ -4,7 +4,7 @@ import difflib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from cspr_jax.config.reading import Table, checked, read_toml
 from cspr_jax.errors import ConfigError, shown
@@ -15,16 +15,17 @@ CATALOGUE = Path(__file__).parent.parent / "catalogue"
 LARGEST_LENGTH = 1e6
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Row = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 PerCable = Annotated[
-    Annotated[Positive, Tag("~one")] | Annotated[list[Positive], Field(min_length=2, max_length=3), Tag("~each")],
+    Annotated[Positive, Tag("~one")] | Annotated[list[Positive], Field(min_length=2, max_length=6), Tag("~each")],
     Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
 ]
 
 
 NotNegative = Annotated[float, Field(ge=0, le=1e9)]
 NotNegativePerCable = Annotated[
-    Annotated[NotNegative, Tag("~one")] | Annotated[list[NotNegative], Field(min_length=2, max_length=3), Tag("~each")],
+    Annotated[NotNegative, Tag("~one")] | Annotated[list[NotNegative], Field(min_length=2, max_length=6), Tag("~each")],
     Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
 ]
 
@@ -42,17 +43,46 @@ class LimitKeys(Table):
 
 
 class RobotFile(LimitKeys):
-    """A point mass on three cables, or on two in the plane y = 0."""
+    """A point mass on three cables, or on two in the plane y = 0; or a rigid platform on six."""
 
     name: str = Field(description="name of the robot", min_length=1)
-    base_points: Annotated[list[Point], Field(min_length=2, max_length=3)] = Field(
-        description="where the cables leave their spools: three points [x, y, z] in cable order, m; two if planar"
+    base_points: Annotated[list[Point], Field(min_length=2, max_length=6)] = Field(
+        description="where the cables leave their spools: three points [x, y, z] in cable order, m; two if planar, "
+        "six with a rigid platform"
+    )
+    platform_points: Annotated[list[Point], Field(min_length=6, max_length=6)] | None = Field(
+        None, description="rigid platform: where the cables are attached, six points in platform axes, m"
+    )
+    inertia: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = Field(
+        None, description="rigid platform: inertia tensor about the mass centre, platform axes, kg m^2"
+    )
+    centre_of_mass: Point | None = Field(
+        None, description="rigid platform: mass centre in platform axes, m (default [0, 0, 0])"
     )
     planar: bool = Field(False, description="true: two cables, everything in the plane y = 0")
     mass: Positive = Field(description="mass of the effector, kg")
     gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
     z_axis: Literal["down", "up"] = Field("down", description='direction of the z axis, "down" or "up"')
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
+
+    @property
+    def is_platform(self) -> bool:
+        """Whether it is a rigid platform on six cables."""
+        return self.platform_points is not None
+
+    @model_validator(mode="after")
+    def _kind(self) -> "RobotFile":
+        if (self.platform_points is None) != (self.inertia is None):
+            raise ValueError("with both platform_points and inertia (a rigid platform), or neither (a point mass)")
+        if self.centre_of_mass is not None and not self.is_platform:
+            raise ValueError("without centre_of_mass, unless it has platform_points and inertia")
+        if self.is_platform and self.planar:
+            raise ValueError("planar, or a rigid platform, not both")
+        wanted = 6 if self.is_platform else 2 if self.planar else 3
+        if len(self.base_points) != wanted:
+            kind = "rigid platform" if self.is_platform else "planar robot" if self.planar else "point mass"
+            raise ValueError(f"a robot with {wanted} base_points: a {kind}")
+        return self
 
 
 def catalogue_names() -> list[str]:

@@ -28,9 +28,7 @@ from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.numerics import sincospi
 from cspr_jax.robots import PointMassRobot
 from cspr_jax.trajectories.couplings import couplings
-
-# Relative to z0 or to a radius: below this a point is at p0, or on the line through p0.
-COINCIDENT = 1e-12
+from cspr_jax.trajectories.swing_plane import swing_plane
 
 
 @jax.tree_util.register_dataclass
@@ -83,37 +81,10 @@ def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: 
     """
     centre = robots.centroid(robot)
     hub = centre + jnp.stack([jnp.zeros_like(z0), jnp.zeros_like(z0), z0])
-    q1, q2, r1, r2, precession = _plane(start - hub, end - hub, z0, robots.plane_normal(robot), odd)
-    plane = jnp.stack([q1, q2], axis=1)
+    plane, r1, r2, precession = swing_plane(start - hub, end - hub, z0, robots.plane_normal(robot), odd)
     tilt, pull, twist = couplings(robot, hub - centre, plane)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
     return Segment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, jnp.zeros_like(r1), tilt, pull, twist)
-
-
-def _plane(v1: Array, v2: Array, z0: Array, normal: Array, odd: Array) -> tuple[Array, Array, Array, Array, Array]:
-    r1, r2 = jnp.linalg.norm(v1), jnp.linalg.norm(v2)  # (2.39)
-    from_rest, to_rest = r1 < COINCIDENT * z0, r2 < COINCIDENT * z0
-    toward_end = v2 / jnp.where(to_rest, 1.0, r2)
-    x_axis = jnp.zeros_like(v1).at[0].set(1.0)
-    q1 = jnp.where(from_rest, jnp.where(odd, -1.0, 1.0) * toward_end, v1 / jnp.where(from_rest, 1.0, r1))
-    q1 = jnp.where(from_rest & to_rest, x_axis, q1)
-    along = jnp.dot(q1, v2)
-    across = v2 - q1 * along  # (2.30)
-    distance = jnp.linalg.norm(across)
-    in_line = from_rest | to_rest | (distance < COINCIDENT * r2)
-    q2 = jnp.where(in_line, _least_inclined(normal, q1, x_axis), across / jnp.where(in_line, 1.0, distance))
-    # delta, not psi: its arctangent keeps its digits where psi is close to pi.
-    delta = jnp.arctan2(jnp.where(in_line, 0.0, distance), jnp.where(odd, -along, along)) / math.pi
-    delta = jnp.where(from_rest | to_rest, 0.0, delta)
-    return q1, q2, jnp.where(from_rest, 0.0, r1), jnp.where(to_rest, 0.0, r2), delta
-
-
-def _least_inclined(normal: Array, q1: Array, x_axis: Array) -> Array:
-    level = jnp.cross(normal, q1)
-    size = jnp.linalg.norm(level)
-    upright = size < COINCIDENT
-    fallback = x_axis - q1 * jnp.dot(q1, x_axis)
-    return jnp.where(upright, fallback / jnp.linalg.norm(fallback), level / jnp.where(upright, 1.0, size))
 
 
 class Oscillation(NamedTuple):

@@ -1,0 +1,86 @@
+"""The angular acceleration of a platform at the end of a segment, beta-hat, thesis section 3.8.
+
+There the platform stands still, p'' = -(g / z0) (p - p0), and omega' = beta-hat (g / z0) gamma e: (3.71) without its
+factor 2, since the angle of the rotation is gamma beta. The tensions are linear in beta-hat.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax import rotations
+from cspr_jax.numerics import length
+from cspr_jax.platforms import PlatformRobot
+from cspr_jax.wrenches import jacobian, rays
+
+# At rest the reference orientation makes beta-hat free; this value swings like a pendulum.
+AT_REST = -1.0
+# Tensions that change less than this, relative to the mean one, do not depend on beta-hat.
+FLAT = 1e-12
+
+
+class Endpoint(NamedTuple):
+    """Tensions per mass and length at an end, offset + beta-hat slope, and what follows.
+
+    Fields:
+        offset: (6,) 1/s^2.
+        slope: (6,) 1/s^2.
+        preferred: () beta-hat of (3.91), which makes the tensions as equal as it can.
+        lowest: () of the interval (3.92) in which every cable is taut; above `highest` if it is empty.
+        highest: ().
+    """
+
+    offset: Array
+    slope: Array
+    preferred: Array
+    lowest: Array
+    highest: Array
+
+
+def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array) -> Endpoint:
+    """What beta-hat does at one end of a segment.
+
+    Args:
+        robot: the robot.
+        position: (3,) m.
+        quaternion: (4,) unit.
+        z0: () depth of p0 below the centroid of the spools, m.
+
+    Returns:
+        the endpoint; in the reference orientation beta-hat has no effect, `preferred` is -1 and the interval endless.
+    """
+    rotation = rotations.matrix(quaternion)
+    matrix = -jacobian(robot, position, rotation).T
+    eta = robot.gravity / z0  # (3.78)
+    from_centroid = position - jnp.mean(robot.base_points, axis=0)
+    spin = eta * rotation @ robot.inertia @ _angle_vector(quaternion) / robot.mass  # (3.80)
+    still = jnp.zeros(3)
+    right = jnp.stack([jnp.concatenate([-eta * from_centroid, still]), jnp.concatenate([still, spin])], axis=1)
+    offset, slope = jnp.linalg.solve(matrix, right).T  # (3.79)
+    # Of (3.13): the combined tension that the translation asks for; eta where both centroids are at the origin.
+    cables, _ = rays(robot, position, rotation)
+    pull = jnp.mean(cables, axis=0)
+    even = eta * jnp.dot(from_centroid, pull) / jnp.dot(pull, pull) / 6.0
+    size = jnp.dot(slope, slope)
+    is_flat = size <= (FLAT * even) ** 2
+    preferred = -jnp.dot(offset - even, slope) / jnp.where(is_flat, 1.0, size)  # (3.91)
+    where_slack = -offset / jnp.where(slope == 0.0, 1.0, slope)
+    lowest = jnp.max(jnp.where(slope > 0.0, where_slack, -jnp.inf))
+    highest = jnp.min(jnp.where(slope < 0.0, where_slack, jnp.inf))
+    taut = jnp.where(jnp.all(offset > 0.0), jnp.inf, -jnp.inf)
+    return Endpoint(
+        offset,
+        slope,
+        jnp.where(is_flat, AT_REST, preferred),
+        jnp.where(is_flat, -taut, lowest),  # (3.92)
+        jnp.where(is_flat, taut, highest),
+    )
+
+
+def _angle_vector(quaternion: Array) -> Array:
+    # gamma e, gamma in [-pi, pi]; near 0 twice the vector part.
+    q = rotations.upper(quaternion)
+    sine = length(q[1:])
+    ratio = 2.0 * jnp.arctan2(sine, q[0]) / jnp.where(sine > 0.0, sine, 1.0)
+    return jnp.where(sine > 0.0, ratio, 2.0) * q[1:]

@@ -1,0 +1,139 @@
+"""The six-cable robot as the kernels see it: geometry, mass and inertia in the product's axes (z down)."""
+
+import dataclasses
+import itertools
+
+import jax
+import numpy as np
+from jax import Array
+
+from cspr_jax.errors import InputError
+from cspr_jax.numerics import leaf
+from cspr_jax.robots import LARGEST_LENGTH, SMALLEST_AREA_RATIO, STANDARD_GRAVITY, check_numbers
+
+CABLES = 6
+# Points nearer to each other than this part of the largest distance are one point.
+SAME = 1e-9
+# Rounding that is allowed to an inertia tensor: of its symmetry, and of a flat body's I1 + I2 = I3.
+INERTIA_TOLERANCE = 1e-9
+
+
+@dataclasses.dataclass(frozen=True)
+class PlatformRobot:
+    """A rigid platform on six cables.
+
+    Fields:
+        base_points: (6, 3) where the cables leave their spools, in cable order; z down, m.
+        platform_points: (6, 3) where they are attached, from the mass centre, in platform axes, which are
+            parallel to the fixed ones in the reference orientation; m.
+        mass: () kg.
+        inertia: (3, 3) about the mass centre, platform axes, kg m^2.
+        gravity: () along +z, m/s^2.
+        name: for people.
+    """
+
+    base_points: Array
+    platform_points: Array
+    mass: Array
+    inertia: Array
+    gravity: Array
+    name: str = ""
+
+
+_FIELDS = [field.name for field in dataclasses.fields(PlatformRobot)]
+jax.tree_util.register_dataclass(PlatformRobot, _FIELDS[:-1], [], drop_fields=["name"])
+
+
+def platform_robot(
+    base_points,
+    platform_points,
+    *,
+    mass: float,
+    inertia,
+    centre_of_mass=(0.0, 0.0, 0.0),
+    gravity: float = STANDARD_GRAVITY,
+    name: str = "robot",
+) -> PlatformRobot:
+    """A six-cable robot, its geometry and inertia checked.
+
+    Args:
+        base_points: (6, 3) spool points, z down, m.
+        platform_points: (6, 3) attachment points in platform axes, m.
+        mass: kg, positive.
+        inertia: (3, 3) about the mass centre, platform axes, kg m^2; symmetric, positive definite, of a real body.
+        centre_of_mass: (3,) in platform axes, m.
+        gravity: m/s^2, positive.
+        name: for people.
+
+    Returns:
+        the robot, float64 NumPy leaves.
+
+    Raises:
+        InputError: wrong shape, not finite, points on a line, two cables between the same two points, an inertia
+            tensor that no body has, mass or gravity not positive.
+    """
+    base, platform = _points("base_points", base_points), _points("platform_points", platform_points)
+    centre = np.asarray(centre_of_mass, float)
+    if centre.shape != (3,) or not (np.abs(centre) <= LARGEST_LENGTH).all():
+        raise InputError("centre_of_mass", centre_of_mass, "three coordinates, at most 1e6 m")
+    check_numbers(mass, gravity)
+    tensor = _inertia(inertia)
+    for first, second in itertools.combinations(range(CABLES), 2):
+        if _is_same(base, first, second) and _is_same(platform, first, second):
+            raise InputError(
+                "platform_points",
+                platform.tolist(),
+                f"no cables {first + 1} and {second + 1} between the same two points",
+            )
+    return PlatformRobot(leaf(base), leaf(platform - centre), leaf(mass), leaf(tensor), leaf(gravity), name)
+
+
+def _points(key: str, given) -> np.ndarray:
+    points = np.asarray(given, float)
+    if points.shape != (CABLES, 3) or not (np.abs(points) <= LARGEST_LENGTH).all():
+        raise InputError(key, given, "six points of three coordinates, at most 1e6 m")
+    centred = points - points.mean(0)
+    sizes = np.linalg.svd(centred, compute_uv=False)
+    if not sizes[1] > SMALLEST_AREA_RATIO * sizes[0]:
+        raise InputError(key, points.tolist(), "six points that are not all on one line, or coincident")
+    return points
+
+
+def _is_same(points: np.ndarray, first: int, second: int) -> bool:
+    span = np.ptp(points, axis=0).max()
+    return bool(np.linalg.norm(points[first] - points[second]) <= SAME * span)
+
+
+def _inertia(given) -> np.ndarray:
+    tensor = np.asarray(given, float)
+    if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
+        raise InputError("inertia", given, "three rows of three finite numbers, kg m^2")
+    scale = np.abs(tensor).max()
+    if np.abs(tensor - tensor.T).max() > INERTIA_TOLERANCE * scale:
+        raise InputError("inertia", tensor.tolist(), "a symmetric tensor")
+    tensor = 0.5 * (tensor + tensor.T)
+    low, middle, high = np.linalg.eigvalsh(tensor)
+    if not low > 0.0:
+        raise InputError("inertia", tensor.tolist(), "a positive definite tensor")
+    if high > (low + middle) * (1.0 + INERTIA_TOLERANCE):
+        raise InputError(
+            "inertia", tensor.tolist(), "a tensor of a real body: no principal moment above the sum of the other two"
+        )
+    return tensor
+
+
+def pairs_apart(robot: PlatformRobot) -> tuple[tuple[int, int], ...]:
+    """Pairs of cables that can meet: those that share neither spool nor platform point.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        pairs of indices from 0 on.
+    """
+    base, platform = np.asarray(robot.base_points), np.asarray(robot.platform_points)
+    return tuple(
+        (i, j)
+        for i, j in itertools.combinations(range(CABLES), 2)
+        if not _is_same(base, i, j) and not _is_same(platform, i, j)
+    )

@@ -1,0 +1,117 @@
+"""The reference orientation of a six-cable robot, and whether it hangs still there, thesis sections 3.4.3 and 3.9.
+
+The plane of the attachment points is level, and the platform is turned about the vertical so that the squares of the
+level parts of the cables are smallest in sum. The text adds up the level parts of unit vectors along the cables
+instead: the same for the symmetric robots that it treats, but elsewhere its minimum can lie where the tensions are
+unequal (NIST RoboCrane at a depth of its spools' radius), while the squares make them equal, (3.14), at every depth.
+It is computed, not assumed, and so is the sign of det J.
+"""
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax import wrenches
+from cspr_jax.errors import InputError
+from cspr_jax.numerics import leaf
+from cspr_jax.platforms import PlatformRobot
+
+# Axes that differ less from the reference ones are taken to be these.
+ALIGNED = 1e-6
+# Smallest conditioning, and smallest tension over the mean one, that count.
+SMALLEST_CONDITIONING, SMALLEST_TENSION = 1e-6, 1e-6
+
+
+class Reference(NamedTuple):
+    """A robot at rest.
+
+    Fields:
+        robot: the robot, its platform axes parallel to the fixed ones in the reference orientation.
+        rotation: (3, 3) from the axes of the robot file to these.
+        conditioning: of `wrenches.conditioning` at P0; its sign is the one that must not change.
+        tensions: (6,) at rest in P0 over their mean.
+    """
+
+    robot: PlatformRobot
+    rotation: np.ndarray
+    conditioning: float
+    tensions: np.ndarray
+
+
+def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
+    """The reference orientation of a robot, checked.
+
+    Args:
+        robot: in any platform axes.
+        z0: depth of P0 below the centroid of the spools, m.
+
+    Returns:
+        the robot at rest.
+
+    Raises:
+        InputError: singular there, or not in equilibrium with every cable taut.
+    """
+    hub = np.asarray(robot.base_points).mean(0) + np.array([0.0, 0.0, z0])
+    rotation = _level_and_straight(robot, hub)
+    if np.abs(rotation - np.eye(3)).max() < ALIGNED:
+        rotation = np.eye(3)
+    turned = dataclasses.replace(
+        robot,
+        platform_points=leaf(np.asarray(robot.platform_points) @ rotation.T),
+        inertia=leaf(rotation @ np.asarray(robot.inertia) @ rotation.T),
+    )
+    with jax.enable_x64(True):
+        size = float(wrenches.conditioning(turned, jnp.asarray(hub), jnp.eye(3)))
+        still = np.asarray(wrenches.tensions(turned, wrenches.at_rest(jnp.asarray(hub), jnp.eye(3))))
+    if not abs(size) > SMALLEST_CONDITIONING:
+        raise InputError(
+            "platform_points", f"a singular reference pose (determinant {size:.2g})", "points apart from it"
+        )
+    share = still / np.abs(still).mean()
+    if not (np.isfinite(share) & (share > SMALLEST_TENSION)).all():
+        slack = int(np.argmin(np.where(np.isfinite(share), share, -np.inf))) + 1
+        raise InputError(
+            "platform_points",
+            f"a reference pose at rest with a slack cable {slack}",
+            "a platform that hangs in equilibrium with every cable taut",
+        )
+    return Reference(turned, rotation, size, share)
+
+
+def _level_and_straight(robot: PlatformRobot, hub: np.ndarray) -> np.ndarray:
+    # Of both sides of the platform, the one whose points come nearer to below their spools.
+    points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points) - hub
+    normal = np.linalg.svd(points - points.mean(0))[2][2]
+    sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]
+    found = [_straightest(points @ side.T, base) for side in sides]
+    best = int(np.argmax([nearness for _, nearness in found]))
+    return _about_vertical(found[best][0]) @ sides[best]
+
+
+def _to_vertical(normal: np.ndarray) -> np.ndarray:
+    # The smallest rotation that takes a unit vector to +z.
+    axis = np.cross(normal, [0.0, 0.0, 1.0])
+    sine, cosine = np.linalg.norm(axis), normal[2]
+    if sine < ALIGNED:
+        return np.diag([1.0, np.sign(cosine), np.sign(cosine)])
+    x, y, z = axis / sine
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross
+
+
+def _about_vertical(angle: float) -> np.ndarray:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _straightest(points: np.ndarray, base: np.ndarray) -> tuple[float, float]:
+    # The torsion with the smallest squares, and how near the points then are: the sum of a . b over the cables.
+    along = float((points[:, :2] * base[:, :2]).sum())
+    across = float((points[:, 0] * base[:, 1] - points[:, 1] * base[:, 0]).sum())
+    nearness = math.hypot(along, across)
+    is_any = nearness < ALIGNED * np.linalg.norm(points) * np.linalg.norm(base)
+    return (0.0 if is_any else math.atan2(across, along)), nearness

@@ -1,0 +1,89 @@
+"""Orientations as unit quaternions, scalar first."""
+
+import jax.numpy as jnp
+from jax import Array
+
+# Largest deviation of a given quaternion's length from 1 that is mended.
+UNIT_TOLERANCE = 1e-6
+
+
+def from_tilt_torsion(azimuth: Array, tilt: Array, torsion: Array) -> Array:
+    """The orientation of tilt-and-torsion angles, Z_phi X_theta Z_(sigma - phi), thesis section 3.10.2.
+
+    Args:
+        azimuth: (...) phi, direction of the axis of the tilt from x, rad.
+        tilt: (...) theta, rad.
+        torsion: (...) sigma, rad.
+
+    Returns:
+        (..., 4) unit quaternion.
+    """
+    half_tilt, half_torsion = 0.5 * tilt, 0.5 * torsion
+    across = azimuth - half_torsion
+    return jnp.stack(
+        [
+            jnp.cos(half_tilt) * jnp.cos(half_torsion),
+            jnp.sin(half_tilt) * jnp.cos(across),
+            jnp.sin(half_tilt) * jnp.sin(across),
+            jnp.cos(half_tilt) * jnp.sin(half_torsion),
+        ],
+        axis=-1,
+    )
+
+
+def matrix(quaternion: Array) -> Array:
+    """The rotation matrix of a unit quaternion, (3.29) with (3.31).
+
+    Args:
+        quaternion: (4,).
+
+    Returns:
+        (3, 3) from platform to fixed axes.
+    """
+    w, x, y, z = quaternion
+    return jnp.stack(
+        [
+            jnp.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)]),
+            jnp.stack([2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)]),
+            jnp.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)]),
+        ]
+    )
+
+
+def product(left: Array, right: Array) -> Array:
+    """The product of two quaternions, (3.18): the right rotation first.
+
+    Args:
+        left: (4,).
+        right: (4,).
+
+    Returns:
+        (4,).
+    """
+    scalar = left[0] * right[0] - jnp.dot(left[1:], right[1:])
+    vector = left[0] * right[1:] + right[0] * left[1:] + jnp.cross(left[1:], right[1:])
+    return jnp.concatenate([scalar[None], vector])
+
+
+def conjugate(quaternion: Array) -> Array:
+    """The opposite rotation.
+
+    Args:
+        quaternion: (..., 4) unit.
+
+    Returns:
+        (..., 4).
+    """
+    return quaternion * jnp.array([1.0, -1.0, -1.0, -1.0], quaternion.dtype)
+
+
+def upper(quaternion: Array) -> Array:
+    """The one of q and -q whose angle lies in [-pi, pi]: scalar part not negative, thesis section 3.7.
+
+    Args:
+        quaternion: (..., 4).
+
+    Returns:
+        (..., 4) the same orientation.
+    """
+    return jnp.where(quaternion[..., :1] < 0.0, -quaternion, quaternion)

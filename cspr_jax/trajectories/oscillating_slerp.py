@@ -1,0 +1,190 @@
+"""The rotation of a platform that swings: oscillating SLERP, thesis section 3.7.
+
+The orientation runs back and forth through the reference orientation, between an envelope q_env and its
+inverse; the envelope goes slowly from the first orientation to the last, (3.59). With u the rotation vector of
+half the envelope's angle, q = exp(beta u): no angle is divided by, so that nothing is special about small ones.
+The angle of the envelope stays within [0, pi], since both of its ends have a scalar part that is not negative.
+"""
+
+import math
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax import rotations
+from cspr_jax.numerics import length, polynomial, sincospi
+
+# Below these, series stand for quotients that would cancel: of 1 - s for arccos(s) / sqrt(1 - s^2), of the square of
+# an angle for sin(r) / r.
+_NEAR, _NEAR_TERMS = 0.1, 16
+_LOG = [float(c) for c in np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(_NEAR_TERMS + 1))])]
+_SMALL, _SERIES = 0.5, 12
+# An envelope shorter than this does not turn.
+_STILL = 1e-12
+
+
+class Turn(NamedTuple):
+    """How the orientation goes from one pose to another, for one parity of the number of arcs.
+
+    Fields:
+        start: (4,) q_1.
+        across: (4,) unit quaternion at a right angle to q_1 toward the envelope's end; zero if it does not turn.
+        angle: () Theta_env of (3.60), rad.
+        start_bend: () beta-hat of the first pose, (3.81).
+        end_bend: () of the last.
+    """
+
+    start: Array
+    across: Array
+    angle: Array
+    start_bend: Array
+    end_bend: Array
+
+
+def turn(start: Array, end: Array, start_bend: Array, end_bend: Array, *, odd: Array) -> Turn:
+    """The turn between two orientations.
+
+    Args:
+        start: (4,) unit quaternion.
+        end: (4,) unit quaternion.
+        start_bend: () beta-hat of the first pose.
+        end_bend: () beta-hat of the last pose.
+        odd: () whether the number of arcs is odd.
+
+    Returns:
+        the turn.
+    """
+    first, last = rotations.upper(start), rotations.upper(end)
+    last = jnp.where(odd, rotations.conjugate(last), last)  # (3.58)
+    along = jnp.dot(first, last)
+    beside = last - first * along
+    beside = beside - first * jnp.dot(first, beside)
+    size = length(beside)
+    angle = jnp.arctan2(size, along)
+    # Opposite ends, both half a turn from the reference orientation: the envelope goes through that one.
+    identity = jnp.zeros_like(first).at[0].set(1.0)
+    is_opposite = (size < _STILL) & (along < 0.0)
+    across = jnp.where(size < _STILL, 0.0, beside / jnp.where(size < _STILL, 1.0, size))
+    across = jnp.where(is_opposite, identity, across)
+    return Turn(first, across, jnp.where((size < _STILL) & ~is_opposite, 0.0, angle), start_bend, end_bend)
+
+
+def beat(start_bend: Array, end_bend: Array, share: Array, arcs: Array, tau: Array) -> tuple[Array, Array, Array]:
+    """beta_ff of (3.93) and its first two derivatives in tau.
+
+    It is linear in the bend, so that the mean of two beta_f is the beta_f of the mean bend. A bend of -1 / share is
+    beta_1 of (3.66), and 0 is beta_0 of (3.67).
+
+    Args:
+        start_bend: () beta-hat of the first pose.
+        end_bend: () of the last.
+        share: () theta_h^2 (n_h - 1) / (pi p)^2.
+        arcs: () number of arcs p, a float.
+        tau: () normalised time.
+
+    Returns:
+        beta, beta', beta'', () each.
+    """
+    omega = math.pi * arcs
+    slope = (end_bend - start_bend) * share
+    h = start_bend * share + slope * tau  # beta'' over (pi p)^2
+    sine, cosine = sincospi(arcs * tau)
+    sine3, cosine3 = sine * (3.0 - 4.0 * sine**2), cosine * (4.0 * cosine**2 - 3.0)
+    value = ((9.0 + h) * cosine - (1.0 + h) * cosine3) / 8.0  # (3.68)
+    rate = (slope * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) / 8.0
+    bend = (
+        2.0 * slope * omega * (3.0 * sine3 - sine) + omega**2 * (9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine)
+    ) / 8.0
+    return value, rate, bend
+
+
+def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Array, ...]) -> tuple[Array, Array, Array]:
+    """The orientation and its first two derivatives in tau, (3.59) to (3.65).
+
+    Args:
+        how: the turn.
+        amplitude_values: A, A', A''.
+        beats: beta, beta', beta''.
+
+    Returns:
+        q, q', q'', (4,) each.
+    """
+    half = _half_vector(how, amplitude_values)
+    beta, beta1, beta2 = beats
+    return _exponential(
+        beta * half[0],
+        beta1 * half[0] + beta * half[1],
+        beta2 * half[0] + 2.0 * beta1 * half[1] + beta * half[2],
+    )
+
+
+def _half_vector(how: Turn, amplitude_values: tuple[Array, ...]) -> tuple[Array, Array, Array]:
+    # Half of the rotation vector of the envelope, and its derivatives: the envelope turns in a plane of quaternions.
+    a, a1, a2 = amplitude_values[:3]
+    sine, cosine = sincospi(how.angle * a / math.pi)
+    rate, bend = how.angle * a1, how.angle * a2
+    q = how.start * cosine + how.across * sine
+    along = how.across * cosine - how.start * sine
+    q1, q2 = along * rate, along * bend - q * rate**2
+    s, s1, s2, v, v1, v2 = q[0], q1[0], q2[0], q[1:], q1[1:], q2[1:]
+    w, w1, w2 = _angle_ratio(s, v)
+    return v * w, v1 * w + v * w1 * s1, v2 * w + 2.0 * v1 * w1 * s1 + v * (w2 * s1**2 + w1 * s2)
+
+
+def _angle_ratio(s: Array, v: Array) -> tuple[Array, Array, Array]:
+    # W = arccos(s) / sqrt(1 - s^2), with |v|^2 = 1 - s^2, and its first two derivatives in s.
+    x = 1.0 - s
+    is_near = x < _NEAR
+    square = jnp.where(is_near, 1.0, jnp.dot(v, v))
+    sine = jnp.sqrt(square)
+    w = jnp.arctan2(sine, s) / sine
+    w1 = (s * w - 1.0) / square
+    far = (w, w1, (w + 3.0 * s * w1) / square)
+    small = jnp.where(is_near, x, 0.0)
+    near = [
+        (-1.0) ** j * polynomial([math.perm(k, j) * _LOG[k] for k in range(j, _NEAR_TERMS + j)], small)
+        for j in range(3)
+    ]
+    return tuple(jnp.where(is_near, a, b) for a, b in zip(near, far, strict=True))  # type: ignore[return-value]
+
+
+def _exponential(u: Array, u1: Array, u2: Array) -> tuple[Array, Array, Array]:
+    # (cos |u|, u sin |u| / |u|) and its derivatives, with y = |u|^2.
+    y, y1, y2 = jnp.dot(u, u), 2.0 * jnp.dot(u, u1), 2.0 * (jnp.dot(u1, u1) + jnp.dot(u, u2))
+    cosine, s, s1, s2 = _sinc(y)
+    q = jnp.concatenate([cosine[None], u * s])
+    q1 = jnp.concatenate([(-0.5 * s * y1)[None], u1 * s + u * s1 * y1])
+    scalar = -0.5 * (s1 * y1**2 + s * y2)
+    return q, q1, jnp.concatenate([scalar[None], u2 * s + 2.0 * u1 * s1 * y1 + u * (s2 * y1**2 + s1 * y2)])
+
+
+def _sinc(y: Array) -> tuple[Array, Array, Array, Array]:
+    # cos r, sin r / r and its first two derivatives in y = r^2.
+    is_small = y < _SMALL
+    large = jnp.where(is_small, 1.0, y)
+    r = jnp.sqrt(large)
+    cosine, s = jnp.cos(r), jnp.sin(r) / r
+    s1 = 0.5 * (cosine - s) / large
+    s2 = -(0.5 * s + 3.0 * s1) / (2.0 * large)
+    terms = [(-1.0) ** k / math.factorial(2 * k + 1) for k in range(_SERIES + 2)]
+    small = jnp.where(is_small, y, 0.0)
+    series = [polynomial([math.perm(k, j) * terms[k] for k in range(j, _SERIES + j)], small) for j in range(3)]
+    near = polynomial([(-1.0) ** k / math.factorial(2 * k) for k in range(_SERIES)], small)
+    return tuple(  # type: ignore[return-value]
+        jnp.where(is_small, a, b) for a, b in zip((near, *series), (cosine, s, s1, s2), strict=True)
+    )
+
+
+def rates(quaternions: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+    """Angular velocity and acceleration in fixed axes, from a quaternion and its derivatives, (3.32) and (3.33).
+
+    Args:
+        quaternions: q, q', q'', (4,) each.
+
+    Returns:
+        omega (3,) and omega' (3,), per unit of the variable of the derivatives.
+    """
+    back = rotations.conjugate(quaternions[0])
+    return 2.0 * rotations.product(quaternions[1], back)[1:], 2.0 * rotations.product(quaternions[2], back)[1:]

@@ -1,0 +1,320 @@
+"""The six-cable robot: geometry, rotations, wrench balance, motion and ends, beside an oracle and mechanics."""
+
+import dataclasses
+import functools
+import itertools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from oracles import platform as oracle
+
+from cspr_jax import problem, rotations, wrenches
+from cspr_jax.amplitudes import named
+from cspr_jax.config.robot import CATALOGUE, read_robot
+from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.errors import InputError
+from cspr_jax.feasibility.endpoints import endpoint
+from cspr_jax.platforms import pairs_apart, platform_robot
+from cspr_jax.reference_pose import reference_pose
+from cspr_jax.trajectories import pose_segment as segments
+
+MSSM = oracle.mssm()
+PLATFORMS = ("laval-mssm", "nist-robocrane", "fast", "greenline")
+AMPLITUDES = {
+    "quintic": (named("quintic"), oracle.quintic),
+    "effective-c3": (named("effective-c3", 0.1), oracle.effective_c3(0.1)),
+}
+Z0 = 1.4
+
+
+def ours(robot):
+    """An oracle's robot as the package has it."""
+    return platform_robot(
+        robot.base, robot.platform, mass=robot.mass, inertia=robot.inertia, centre_of_mass=robot.com, name="mine"
+    )
+
+
+def general(seed=0):
+    """A robot without any symmetry; its points centred on the mass centre, as the oracle's motion needs."""
+    rng = np.random.default_rng(seed)
+    base = MSSM.base + rng.normal(scale=0.1, size=(6, 3))
+    base -= base.mean(0)
+    turn = oracle.matrix(rng.normal(size=4) / 1.0)
+    turn, _ = np.linalg.qr(turn)
+    inertia = turn @ np.diag([0.02, 0.03, 0.04]) @ turn.T
+    return oracle.Robot(base, MSSM.platform + rng.normal(scale=0.02, size=(6, 3)), 2.5, inertia)
+
+
+def random_pose(rng, *, rest=False):
+    if rest:
+        return np.array([0.0, 0.0, Z0]), np.array([1.0, 0.0, 0.0, 0.0])
+    position = np.array([*rng.uniform(-1.8, 1.8, 2), rng.uniform(0.6, 2.2)])
+    angles = rng.uniform([-np.pi, 0.0, -2.0], [np.pi, 1.2, 2.0])
+    return position, oracle.pose_quaternion(position, angles)
+
+
+@functools.partial(jax.jit, static_argnames="variable")
+def states(robot, segment, amplitude, arcs, tau, *, variable=True):
+    return jax.vmap(lambda t: segments.motion(segment, amplitude, arcs, t, variable=variable))(tau)
+
+
+def made(robot, start, end, z0, bends, p):
+    """A segment of the package."""
+    as_arrays = [tuple(jnp.asarray(x) for x in pose) for pose in (start, end)]
+    odd = jnp.asarray(p % 2 == 1)
+    return segments.pose_segment(robot, *as_arrays, jnp.asarray(z0), tuple(jnp.asarray(b) for b in bends), odd=odd)
+
+
+@pytest.mark.parametrize("which", ["variable", "standard"])
+@pytest.mark.parametrize("name", AMPLITUDES)
+def test_motions_are_the_oracle_s(name, which):
+    """Pose, velocity and acceleration of random segments, rest ends and both parities among them."""
+    rng, amplitude = np.random.default_rng(1), AMPLITUDES[name]
+    tau = np.linspace(0.0, 1.0, 41)
+    robot = ours(MSSM)
+    for i in range(12):
+        p = int(rng.integers(2, 12))
+        start, end = random_pose(rng, rest=i % 4 == 0), random_pose(rng, rest=i % 4 == 1)
+        bends = tuple(rng.uniform(-6.0, 2.0, 2))
+        wanted = oracle.motion(
+            MSSM,
+            oracle.Segment(
+                start[0], end[0], Z0, start[1], end[1], amplitude=amplitude[1], standard=which == "standard"
+            ),
+            p,
+            bends,
+            tau,
+        )
+        segment = made(robot, start, end, Z0, bends, p)
+        found = states(robot, segment, amplitude[0], float(p), tau, variable=which == "variable")
+        assert float(segments.duration(segment, float(p))) == pytest.approx(wanted.duration, rel=1e-12)
+        np.testing.assert_allclose(found.position, wanted.position, atol=1e-11)
+        np.testing.assert_allclose(found.velocity, wanted.velocity, atol=1e-10)
+        np.testing.assert_allclose(found.acceleration, wanted.acceleration, atol=1e-9)
+        np.testing.assert_allclose(found.rotation, wanted.rotation, atol=1e-10)
+        np.testing.assert_allclose(found.angular_velocity, wanted.omega, atol=1e-8)
+        np.testing.assert_allclose(found.angular_acceleration, wanted.omega_dot, atol=1e-7)
+        if which == "variable":  # the platform stands still at every cusp
+            cusps = states(robot, segment, amplitude[0], float(p), np.arange(p + 1) / p)
+            np.testing.assert_allclose(cusps.velocity, 0.0, atol=1e-11)
+
+
+def turned_slightly(rotation, angle):
+    return rotation @ oracle.matrix(np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)]))
+
+
+@pytest.mark.parametrize("start", [0.0, 1e-13, 1e-9, 1e-5, 0.3, np.pi - 1e-9, np.pi])
+def test_angles_near_zero_and_half_a_turn(start):
+    """Values, rates and gradients stay finite, and rates are the differences of the orientation."""
+    robot, amplitude = ours(MSSM), named("quintic")
+    for end, p in ((0.0, 4), (1e-9, 3), (2.0, 5), (np.pi, 6)):
+        poses = [
+            (np.array([0.3, 0.5, 1.2]), np.array([np.cos(a / 2), np.sin(a / 2) * 0.6, 0.0, np.sin(a / 2) * 0.8]))
+            for a in (start, end)
+        ]
+        segment = made(robot, *poses, Z0, (-2.0, -1.0), p)
+        tau = np.linspace(0.0, 1.0, 61)
+        found = states(robot, segment, amplitude, float(p), tau)
+        assert all(np.isfinite(leaf).all() for leaf in found)
+        step, time = 1e-6, float(segments.duration(segment, float(p)))
+        before, after = (states(robot, segment, amplitude, float(p), tau[1:-1] + d) for d in (-step, step))
+        slope = (np.asarray(after.rotation) - np.asarray(before.rotation)) / (2.0 * step * time)
+        spin = np.einsum("nij,nkj->nik", slope, np.asarray(found.rotation)[1:-1])
+        omega = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        np.testing.assert_allclose(found.angular_velocity[1:-1], omega, atol=2e-7)
+        bend = (np.asarray(after.angular_velocity) - np.asarray(before.angular_velocity)) / (2.0 * step * time)
+        np.testing.assert_allclose(found.angular_acceleration[1:-1], bend, atol=2e-5)
+
+        def smallest(z0, bend, poses=poses, p=p, tau=tau):
+            one, arcs = made(robot, *poses, z0, (bend, -1.0), p), jnp.asarray(float(p))
+            at = jax.vmap(lambda t: segments.motion(one, amplitude, arcs, t))(tau)
+            return jnp.min(jax.vmap(lambda *leaves: wrenches.tensions(robot, wrenches.Pose(*leaves)))(*at))
+
+        gradient = jax.grad(smallest, (0, 1))(jnp.asarray(Z0), jnp.asarray(-2.0))
+        assert np.isfinite(gradient).all()
+
+
+def test_gradients_are_differences():
+    """Of the smallest tension with respect to z0 and beta-hat, from rest and between poses."""
+    robot, amplitude, rng = ours(MSSM), named("quintic"), np.random.default_rng(4)
+    tau = np.linspace(0.0, 1.0, 201)
+    for rest in (True, False):
+        end, start = random_pose(rng), random_pose(rng)
+
+        @jax.jit
+        def smallest(z0, bend, start=start, end=end, rest=rest):
+            hub = jnp.zeros(3).at[2].set(z0)
+            first = (hub, jnp.asarray([1.0, 0.0, 0.0, 0.0])) if rest else start
+            one = made(robot, first, end, z0, (-1.0, bend), 7)
+            at = jax.vmap(lambda t: segments.motion(one, amplitude, jnp.asarray(7.0), t))(tau)
+            return jnp.min(jax.vmap(lambda *leaves: wrenches.tensions(robot, wrenches.Pose(*leaves)))(*at))
+
+        place = (jnp.asarray(Z0), jnp.asarray(-1.7))
+        found = jax.grad(smallest, (0, 1))(*place)
+        for i in range(2):
+            h = 1e-6
+            shifted = [[x + s * h * (j == i) for j, x in enumerate(place)] for s in (-1.0, 1.0)]
+            slope = (smallest(*shifted[1]) - smallest(*shifted[0])) / (2.0 * h)
+            assert float(found[i]) == pytest.approx(float(slope), rel=1e-5, abs=1e-7)
+
+
+@pytest.mark.parametrize("robot", [MSSM, general()])
+def test_wrench_balance(robot):
+    """Force and moment of the tensions along the cables make the motion: Newton and Euler, cable by cable."""
+    rng, found = np.random.default_rng(2), ours(robot)
+    for _ in range(50):
+        position, quaternion = random_pose(rng)
+        rotation, (velocity, omega, pull, spin) = oracle.matrix(quaternion), rng.normal(size=(4, 3))
+        pose = wrenches.Pose(*(jnp.asarray(x) for x in (position, rotation, velocity, omega, pull, spin)))
+        tension = np.asarray(wrenches.tensions(found, pose))
+        arms = robot.platform @ rotation.T
+        cables = position + arms - robot.base
+        units = -cables / np.linalg.norm(cables, axis=1)[:, None]
+        force = (tension[:, None] * units).sum(0) + robot.mass * np.array([0.0, 0.0, 9.81])
+        moment = (tension[:, None] * np.cross(arms, units)).sum(0)
+        inertia = rotation @ robot.inertia @ rotation.T
+        scale = np.abs(tension).sum()
+        np.testing.assert_allclose(force, robot.mass * pull, atol=1e-10 * scale)
+        np.testing.assert_allclose(moment, inertia @ spin + np.cross(omega, inertia @ omega), atol=1e-10 * scale)
+        ratios = oracle.force_ratios(robot, position, rotation, oracle.wrench(robot, rotation, pull, omega, spin))
+        wanted = oracle.tensions(robot, position, rotation, ratios).reshape(6)
+        np.testing.assert_allclose(tension, wanted, rtol=1e-8, atol=1e-8 * scale)
+        wanted = np.sign(np.linalg.det(oracle.jacobian(robot, position, rotation)))
+        assert np.sign(wrenches.conditioning(found, pose.position, pose.rotation)) == wanted
+
+
+def test_work_of_the_cables_is_the_change_of_energy():
+    """Along a random trajectory, by Gauss' rule arc by arc."""
+    rng, robot, amplitude = np.random.default_rng(3), general(5), named("effective-c3", 0.15)
+    package, p = ours(robot), 6
+    start, end = random_pose(rng), random_pose(rng)
+    segment = made(package, start, end, Z0, (-2.0, -1.5), p)
+    time = float(segments.duration(segment, float(p)))
+    nodes, parts = np.polynomial.legendre.leggauss(40)
+    edges = np.unique(np.concatenate([np.linspace(0.0, 1.0, p + 1), [0.15, 0.85], [0.4]]))
+    work, last = 0.0, None
+    for a, b in itertools.pairwise(edges):
+        at = states(
+            package, segment, amplitude, float(p), np.concatenate([[a], 0.5 * (a + b) + 0.5 * (b - a) * nodes, [b]])
+        )
+        tension = np.asarray(jax.vmap(lambda *x: wrenches.tensions(package, wrenches.Pose(*x)))(*at))
+        _, rate = jax.vmap(lambda *x: wrenches.cable_motion(package, wrenches.Pose(*x)))(*at)
+        power = -(tension * np.asarray(rate)).sum(1)
+        work += 0.5 * (b - a) * time * float(parts @ power[1:-1])
+
+        def energy(i, at=at):
+            turn, omega = np.asarray(at.rotation[i]), np.asarray(at.angular_velocity[i])
+            kinetic = (
+                robot.mass * float(at.velocity[i] @ at.velocity[i]) + omega @ turn @ robot.inertia @ turn.T @ omega
+            )
+            return 0.5 * kinetic - robot.mass * 9.81 * float(at.position[i][2])
+
+        last = energy(0) if last is None else last
+        assert work == pytest.approx(energy(-1) - last, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("robot", [MSSM, general(1)])
+def test_ends(robot):
+    """beta-hat and its interval, against the oracle; the ends of segments have the tensions promised."""
+    rng, package = np.random.default_rng(6), ours(robot)
+    for _ in range(20):
+        position, quaternion = random_pose(rng)
+        found = endpoint(package, jnp.asarray(position), jnp.asarray(quaternion), jnp.asarray(Z0))
+        u, v = oracle.deviations(robot, position, quaternion, Z0)
+        if robot is MSSM:
+            assert float(found.preferred) == pytest.approx(oracle.preferred_beta_hat(u, v), rel=1e-8)
+        low, high = oracle.beta_hat_interval(u, v, 9.81 / Z0)
+        if low <= high:
+            np.testing.assert_allclose([found.lowest, found.highest], [low, high], rtol=1e-8)
+        else:
+            assert found.lowest > found.highest
+        bend = float(rng.uniform(-4.0, 2.0))
+        segment = made(package, random_pose(rng), (position, quaternion), Z0, (-1.0, bend), 5)
+        at = jax.tree.map(lambda x: x[0], states(package, segment, named("quintic"), 5.0, np.ones(1)))
+        np.testing.assert_allclose(
+            wrenches.tensions_per_length(package, at), found.offset + bend * found.slope, rtol=1e-7, atol=1e-8
+        )
+    rest = endpoint(package, jnp.array([0.0, 0.0, Z0]), jnp.array([1.0, 0.0, 0.0, 0.0]), jnp.asarray(Z0))
+    assert float(rest.preferred) == -1.0
+
+
+@given(*[st.floats(-7.0, 7.0)] * 3)
+def test_tilt_and_torsion(azimuth, tilt, torsion):
+    q = rotations.from_tilt_torsion(jnp.asarray(azimuth), jnp.asarray(tilt), jnp.asarray(torsion))
+    assert float(jnp.linalg.norm(q)) == pytest.approx(1.0, abs=1e-14)
+    wanted = oracle.tilt_torsion_matrix(azimuth, tilt, torsion)
+    np.testing.assert_allclose(rotations.matrix(q), wanted, atol=1e-14)
+    np.testing.assert_allclose(rotations.matrix(rotations.upper(q)), wanted, atol=1e-14)
+    back = rotations.product(q, rotations.conjugate(q))
+    np.testing.assert_allclose(back, [1.0, 0.0, 0.0, 0.0], atol=1e-14)
+
+
+@pytest.mark.parametrize("name", PLATFORMS)
+def test_the_catalogue_hangs_still(name):
+    """Every six-cable robot of the catalogue is in equilibrium in its reference orientation, with equal tensions."""
+    path = CATALOGUE / f"{name}.toml"
+    spec = read_robot(path)
+    robot = problem.build_platform(spec, TrajectoryKeys(), path)
+    span = np.linalg.norm(robot.base_points - robot.base_points.mean(0), axis=1).max()
+    for depth in (1.0, 3.0):
+        found = reference_pose(robot, depth * span)
+        np.testing.assert_allclose(found.tensions, 1.0, atol=2e-3)
+        np.testing.assert_allclose(found.rotation, np.eye(3), atol=2e-3)
+        assert np.sign(found.conditioning) == (1.0 if name == "nist-robocrane" else -1.0)
+    assert len(pairs_apart(robot)) == (9 if name in ("laval-mssm", "nist-robocrane") else 12)
+    assert "placeholder" in spec.source
+
+
+def test_the_reference_orientation_is_found():
+    """A platform described in turned axes, upside down too, is the same robot."""
+    rng, plain = np.random.default_rng(8), reference_pose(ours(MSSM), Z0)
+    for i in range(6):
+        quaternion = rng.normal(size=4)
+        turn = oracle.matrix(quaternion / np.linalg.norm(quaternion)) if i else np.diag([1.0, -1.0, -1.0])
+        robot = dataclasses.replace(
+            MSSM, platform=MSSM.platform @ turn.T, inertia=turn @ MSSM.inertia @ turn.T, com=np.zeros(3)
+        )
+        found = reference_pose(ours(robot), Z0)
+        assert abs(found.conditioning) == pytest.approx(abs(plain.conditioning), rel=1e-9)
+        np.testing.assert_allclose(found.tensions, 1.0, atol=1e-9)
+        np.testing.assert_allclose(found.robot.inertia, MSSM.inertia, atol=1e-12)
+
+
+def changed(**fields):
+    robot = {"base_points": MSSM.base, "platform_points": MSSM.platform, "mass": 1.0, "inertia": MSSM.inertia}
+    return platform_robot(**(robot | fields))
+
+
+@pytest.mark.parametrize(
+    ("fields", "key"),
+    [
+        ({"base_points": MSSM.base[:5]}, "base_points"),
+        ({"base_points": MSSM.base * [1.0, 0.0, 0.0]}, "base_points"),
+        ({"platform_points": np.zeros((6, 3))}, "platform_points"),
+        ({"platform_points": MSSM.platform * np.nan}, "platform_points"),
+        ({"platform_points": np.tile(MSSM.platform[:1], (6, 1))}, "platform_points"),
+        ({"platform_points": MSSM.platform[[0, 0, 2, 3, 4, 5]]}, "platform_points"),
+        ({"mass": 0.0}, "mass"),
+        ({"inertia": np.eye(2)}, "inertia"),
+        ({"inertia": np.diag([1.0, 1.0, 0.0])}, "inertia"),
+        ({"inertia": np.diag([1.0, 1.0, 2.1])}, "inertia"),
+        ({"inertia": np.eye(3) + np.triu(np.ones((3, 3)), 1)}, "inertia"),
+        ({"centre_of_mass": [0.0, 0.0]}, "centre_of_mass"),
+    ],
+)
+def test_robots_that_are_none(fields, key):
+    with pytest.raises(InputError, match=key):
+        changed(**fields)
+
+
+def test_robots_that_do_not_hang():
+    with pytest.raises(InputError, match="slack cable"):
+        reference_pose(changed(centre_of_mass=[0.5, 0.0, 0.0]), Z0)
+    angles = np.arange(6) * np.pi / 3.0  # every cable straight up and down: nothing holds the platform level
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
+    with pytest.raises(InputError, match="singular"):
+        reference_pose(changed(platform_points=ring, base_points=ring), Z0)
