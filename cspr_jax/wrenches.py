@@ -133,17 +133,20 @@ def tensions(robot: PlatformRobot, pose: Pose) -> Array:
     return robot.mass * jnp.linalg.norm(cables, axis=1) * tensions_per_length(robot, pose)
 
 
-def cable_motion(robot: PlatformRobot, pose: Pose) -> tuple[Array, Array]:
-    """Lengths of the cables and their rates, (3.2) and (3.3).
+def cable_motion(robot: PlatformRobot, pose: Pose) -> tuple[Array, Array, Array]:
+    """Lengths of the cables, (3.2), and their first two derivatives in time, (3.3).
 
     Args:
         robot: the robot.
         pose: the state.
 
     Returns:
-        lengths (6,) m and rates (6,) m/s; positive pays out.
+        lengths (6,) m, rates (6,) m/s (positive pays out), accelerations (6,) m/s^2.
     """
-    cables, _ = rays(robot, pose.position, pose.rotation)
+    cables, arms = rays(robot, pose.position, pose.rotation)
     lengths = jnp.linalg.norm(cables, axis=1)
-    twist = jnp.concatenate([pose.velocity, pose.angular_velocity])
-    return lengths, jacobian(robot, pose.position, pose.rotation) @ twist / lengths
+    swing = jnp.cross(pose.angular_velocity, arms)
+    velocity = pose.velocity + swing
+    pull = pose.acceleration + jnp.cross(pose.angular_acceleration, arms) + jnp.cross(pose.angular_velocity, swing)
+    rates = jnp.sum(cables * velocity, axis=1) / lengths
+    return lengths, rates, (jnp.sum(velocity**2 + cables * pull, axis=1) - rates**2) / lengths

@@ -202,7 +202,7 @@ def test_work_of_the_cables_is_the_change_of_energy():
             package, segment, amplitude, float(p), np.concatenate([[a], 0.5 * (a + b) + 0.5 * (b - a) * nodes, [b]])
         )
         tension = np.asarray(jax.vmap(lambda *x: wrenches.tensions(package, wrenches.Pose(*x)))(*at))
-        _, rate = jax.vmap(lambda *x: wrenches.cable_motion(package, wrenches.Pose(*x)))(*at)
+        _, rate, _ = jax.vmap(lambda *x: wrenches.cable_motion(package, wrenches.Pose(*x)))(*at)
         power = -(tension * np.asarray(rate)).sum(1)
         work += 0.5 * (b - a) * time * float(parts @ power[1:-1])
 

@@ -1,0 +1,136 @@
+"""Cables that meet each other or the platform, thesis section 3.10.2: vectors at one instant, tests between two."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.platforms import PlatformRobot, pairs_apart
+from cspr_jax.wrenches import rays
+
+# Points nearer than this part of the platform's size are one corner.
+SAME = 1e-9
+PARALLEL = 1e-14
+
+
+class Contacts(NamedTuple):
+    """What can meet.
+
+    Fields:
+        pairs: (n_pairs, 2) indices of cables.
+        sides: (6, 2, 3) from each platform point along both edges of the platform that leave it, platform axes, m.
+        normal: (3,) of the platform, platform axes.
+    """
+
+    pairs: np.ndarray
+    sides: np.ndarray
+    normal: np.ndarray
+
+
+def contacts(robot: PlatformRobot) -> Contacts:
+    """What can meet on a robot: pairs of cables without a common point; the platform is the polygon of its points.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        the contacts.
+    """
+    points = np.asarray(robot.platform_points)
+    centred = points - points.mean(0)
+    first, second, normal = np.linalg.svd(centred)[2]
+    angle = np.arctan2(centred @ second, centred @ first)
+    # Corners in their order around the platform; cables that share a point share its corner.
+    size = np.linalg.norm(centred, axis=1).max()
+    order = np.argsort(angle)
+    corners = [order[0]]
+    for i in order[1:]:
+        if np.linalg.norm(points[i] - points[corners[-1]]) > SAME * size:
+            corners.append(i)
+    if len(corners) > 1 and np.linalg.norm(points[corners[-1]] - points[corners[0]]) <= SAME * size:
+        corners.pop()
+    ring = points[corners]
+    own = [int(np.argmin(np.linalg.norm(ring - point, axis=1))) for point in points]
+    sides = np.array([[ring[i - 1] - ring[i], ring[(i + 1) % len(ring)] - ring[i]] for i in own])
+    return Contacts(np.array(pairs_apart(robot), int).reshape(-1, 2), sides, normal)
+
+
+def gaps(robot: PlatformRobot, pairs: Array, position: Array, rotation: Array) -> Array:
+    """The shortest vectors between cables.
+
+    Args:
+        robot: the robot.
+        pairs: (n_pairs, 2) indices of cables.
+        position: (3,) m.
+        rotation: (3, 3).
+
+    Returns:
+        (n_pairs, 3) from the first cable of each pair to the second, m.
+    """
+    cables, _ = rays(robot, position, rotation)
+    i, j = pairs[:, 0], pairs[:, 1]
+    return _between(robot.base_points[i], cables[i], robot.base_points[j], cables[j])
+
+
+def _between(a: Array, u: Array, b: Array, v: Array) -> Array:
+    # From the segment a + s u to b + t v, s and t in [0, 1]: the nearest points of the lines, then of the ends.
+    apart = b - a
+    uu, uv, vv = (jnp.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v)))
+    au, av = jnp.sum(apart * u, axis=-1), jnp.sum(apart * v, axis=-1)
+    denominator = uu * vv - uv**2
+    is_parallel = denominator <= PARALLEL * uu * vv
+    s = jnp.clip(jnp.where(is_parallel, 0.0, (au * vv - av * uv) / jnp.where(is_parallel, 1.0, denominator)), 0.0, 1.0)
+    t = jnp.clip((s * uv - av) / vv, 0.0, 1.0)
+    s = jnp.clip((au + t * uv) / uu, 0.0, 1.0)
+    return apart + t[..., None] * v - s[..., None] * u
+
+
+def views(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
+    """The cables as unit vectors from the platform to the spools, seen from the platform.
+
+    Args:
+        robot: the robot.
+        position: (3,) m.
+        rotation: (3, 3).
+
+    Returns:
+        (6, 3) platform axes.
+    """
+    cables, _ = rays(robot, position, rotation)
+    return -(cables / jnp.linalg.norm(cables, axis=1, keepdims=True)) @ rotation
+
+
+def cables_cross(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Pairs of cables that passed through each other between two instants, (3.94).
+
+    Args:
+        before: (..., n_pairs, 3) of `gaps`.
+        after: (..., n_pairs, 3).
+
+    Returns:
+        (..., n_pairs).
+    """
+    return (before * after).sum(-1) <= 0.0
+
+
+def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Cables that swept over the platform between two instants: as in the text, in platform axes.
+
+    Args:
+        sides: (6, 2, 3) of `contacts`.
+        normal: (3,) of `contacts`.
+        before: (..., 6, 3) of `views`.
+        after: (..., 6, 3).
+
+    Returns:
+        (..., 6).
+    """
+    high, low = before @ normal, after @ normal
+    through = high * low <= 0.0
+    # The direction within the platform's plane: a combination of both views with positive weights.
+    weight = np.abs(low)[..., None] * before + np.abs(high)[..., None] * after
+    across = np.cross(sides[:, 0], sides[:, 1]) @ normal
+    first = np.cross(weight, sides[:, 1]) @ normal / across
+    second = np.cross(sides[:, 0], weight) @ normal / across
+    return through & (first >= 0.0) & (second >= 0.0)

@@ -1,0 +1,104 @@
+"""Criteria of a platform's motion as slacks at one instant: taut cables, no singularity, below the spools, limits.
+
+With f the tensions, rho the cable lengths, m the mass:
+
+    taut           6 z0 mu / g, the tension over its value at rest in P0 if all were equal
+    regular        determinant (`wrenches.conditioning`) over its value at rest in P0
+    below          depth of the mass centre below the centroid of the spools, over z0
+    tension        (f - f_min) 6 / (m g),  (f_max - f) 6 / (m g)
+    floor          (floor - z) / z0
+    length, speed, acceleration    1 - value / largest
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax import wrenches
+from cspr_jax.amplitudes import Amplitude
+from cspr_jax.feasibility.limits import FLAGS, Limits, given
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.platforms import PlatformRobot
+from cspr_jax.trajectories.pose_segment import PoseSegment, motion
+from cspr_jax.wrenches import Pose
+
+
+class PoseShared(NamedTuple):
+    """What all segments between poses share.
+
+    Fields:
+        robot: in its reference axes.
+        limits: limits beyond taut cables.
+        amplitude: A.
+        conditioning: () of the reference pose at P0, with its sign.
+    """
+
+    robot: PlatformRobot
+    limits: Limits
+    amplitude: Amplitude
+    conditioning: Array
+
+
+def flags(limits: Limits) -> tuple[Verdict, ...]:
+    """The flag that says that a criterion is broken, for each criterion.
+
+    Args:
+        limits: which limits are given.
+
+    Returns:
+        n_criteria flags.
+    """
+    return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(FLAGS[name] for name in given(limits)))
+
+
+def pose_slacks(shared: PoseShared, pose: Pose, z0: Array) -> Array:
+    """The smallest slack of each criterion at one instant.
+
+    Args:
+        shared: robot, limits, reference.
+        pose: the state.
+        z0: () m.
+
+    Returns:
+        (n_criteria,) in the order of `flags`.
+    """
+    robot, limits = shared.robot, shared.limits
+    per_length = wrenches.tensions_per_length(robot, pose)
+    centre = jnp.mean(robot.base_points, axis=0)
+    found = [
+        6.0 * z0 / robot.gravity * jnp.min(per_length),
+        wrenches.conditioning(robot, pose.position, pose.rotation) / shared.conditioning,
+        (pose.position[2] - centre[2]) / z0,
+    ]
+    names = given(limits)
+    if not names:
+        return jnp.stack(found)
+    lengths, rates, bends = wrenches.cable_motion(robot, pose)
+    force, weight = robot.mass * per_length * lengths, robot.mass * robot.gravity / 6.0
+    slacks = {
+        "tension_min": lambda limit: jnp.min(force - limit) / weight,
+        "tension_max": lambda limit: jnp.min(limit - force) / weight,
+        "floor": lambda limit: (limit - pose.position[2]) / z0,
+        "cable_length_max": lambda limit: jnp.min(1.0 - lengths / limit),
+        "cable_speed_max": lambda limit: jnp.min(1.0 - jnp.abs(rates) / limit),
+        "cable_acceleration_max": lambda limit: jnp.min(1.0 - jnp.abs(bends) / limit),
+    }
+    return jnp.stack([*found, *(slacks[name](getattr(limits, name)) for name in names)])
+
+
+def slacks_at(shared: PoseShared, segment: PoseSegment, arcs: Array, tau: Array, *, variable: bool) -> Array:
+    """The smallest slack of each criterion of a segment at one instant.
+
+    Args:
+        shared: robot, limits, amplitude, reference.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        tau: () normalised time.
+        variable: whether the position is the hypocycloid of variable amplitude.
+
+    Returns:
+        (n_criteria,).
+    """
+    pose = motion(segment, shared.amplitude, arcs, tau, variable=variable)
+    return pose_slacks(shared, pose, shared.robot.gravity / segment.rate)
