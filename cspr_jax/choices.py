@@ -9,7 +9,8 @@ from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.oscillations import best_inclination
-from cspr_jax.robots import PointMassRobot, centroid
+from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.robots import HasSpools, centroid
 from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories import depths
 from cspr_jax.trajectories.transition import depth_for, transition, weights
@@ -21,7 +22,7 @@ EPSILONS = np.linspace(0.02, 0.5, 49)
 DEPTHS = 200
 
 
-def chosen_depth(shared: Shared, sequence: Sequence) -> float:
+def chosen_depth(shared: Shared | PoseShared, sequence: Sequence) -> float:
     """The plan's z0, given or chosen.
 
     Args:
@@ -51,11 +52,15 @@ def chosen_depth(shared: Shared, sequence: Sequence) -> float:
     if not len(targets):
         raise ConfigError(path, "z0 = { choose = ... }: must be a number where every pose is at rest")
     if not isinstance(keys.z0, Choice):
+        if isinstance(shared, PoseShared):
+            raise ConfigError(path, "z0 is missing: depth of P0, m")
         return _depth_of_inclination(shared, sequence)
     if keys.z0.choose == "mean":
         z0 = depths.mean_depth(shared.robot, targets)
     elif keys.z0.choose == "conservative":
         z0 = depths.conservative_depth(shared.robot, targets) * (1.0 + ABOVE_BOUND)
+    elif isinstance(shared, PoseShared):
+        raise ConfigError(path, 'z0.choose = "fastest": must be "mean", "conservative" or a number for a platform')
     else:
         z0 = _fastest_depth(shared, sequence)
     if not z0 > 0.0:
@@ -65,7 +70,7 @@ def chosen_depth(shared: Shared, sequence: Sequence) -> float:
     return z0
 
 
-def _check_rest(robot: PointMassRobot, sequence: Sequence, z0: float) -> None:
+def _check_rest(robot: HasSpools, sequence: Sequence, z0: float) -> None:
     hub = (np.asarray(centroid(robot)) + np.array([0.0, 0.0, z0])) * problem.axis_signs(sequence.spec)
     for i, pose in enumerate(sequence.keys.pose):
         if pose.rest and pose.position is not None and np.abs(np.asarray(pose.position) - hub).max() > REST_TOLERANCE:

@@ -2,14 +2,16 @@
 
 import csv
 import io
+from functools import partial
 from pathlib import Path
 
 import h5py
 import jax
 import numpy as np
 
-from cspr_jax import tensions
+from cspr_jax import tensions, wrenches
 from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.planning import Plan
 from cspr_jax.problem import axis_signs
 from cspr_jax.quantities import TRAJECTORY
@@ -17,19 +19,42 @@ from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
 from cspr_jax.trajectories import hypocycloid
+from cspr_jax.trajectories.pose_segment import motion, quaternion_at
 
-# Those of the states that change sign when time runs backwards: velocity and rates.
-_RATES = (1, 4)
-_OF_EFFECTOR = ("position", "velocity", "acceleration")
+# Those that change sign when time runs backwards.
+_RATES = ("velocity", "omega", "rate")
+_VECTORS = ("position", "velocity", "acceleration", "omega", "omega_dot")
 LARGEST_ROWS = 20_000_000
 
 
 @jax.jit
-def _states(shared, segment, arcs, tau):
+def _point_states(shared, segment, arcs, tau):
     def one(t):
         position, velocity, acceleration = hypocycloid.motion(segment, shared.amplitude, arcs, t)
         length, rate, _ = tensions.cable_motion(shared.robot, position, velocity, acceleration)
-        return position, velocity, acceleration, length, rate, tensions.tensions(shared.robot, position, acceleration)
+        force = tensions.tensions(shared.robot, position, acceleration)
+        states = (position, velocity, acceleration, length, rate, force)
+        return dict(zip(("position", "velocity", "acceleration", "length", "rate", "tension"), states, strict=True))
+
+    return jax.vmap(one)(tau)
+
+
+@partial(jax.jit, static_argnames="variable")
+def _pose_states(shared, segment, arcs, tau, *, variable):
+    def one(t):
+        pose = motion(segment, shared.amplitude, arcs, t, variable=variable)
+        length, rate, _ = wrenches.cable_motion(shared.robot, pose)
+        return {
+            "position": pose.position,
+            "velocity": pose.velocity,
+            "acceleration": pose.acceleration,
+            "quaternion": quaternion_at(segment, shared.amplitude, arcs, t),
+            "omega": pose.angular_velocity,
+            "omega_dot": pose.angular_acceleration,
+            "length": length,
+            "rate": rate,
+            "tension": wrenches.tensions(shared.robot, pose),
+        }
 
     return jax.vmap(one)(tau)
 
@@ -42,7 +67,8 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         rate: rows a second over the whole plan, Hz; None: `samples` rows a segment, ends included.
 
     Returns:
-        "t" (n,) s and the other names of `quantities.TRAJECTORY`, (n, 3) or (n, n_cables), in the plan's axes.
+        "t" (n,) s and the other names of `quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
+        axes; those of `quantities.OF_PLATFORMS` only for a platform.
     """
     duration = plan.answers.duration
     starts = np.concatenate([[0.0], np.cumsum(duration)])
@@ -55,13 +81,24 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
             tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
         segment = jax.tree.map(lambda x, i=i: x[i], plan.segments)
         back = bool(plan.backwards[i])
-        states = _states(plan.shared, segment, float(plan.answers.tried_arcs[i]), 1.0 - tau if back else tau)
-        states = (-np.asarray(s) if back and k in _RATES else np.asarray(s) for k, s in enumerate(states))
-        parts.append((starts[i] + tau * length, *states))
-    found = {name: np.concatenate(column) for name, column in zip(TRAJECTORY, zip(*parts, strict=True), strict=True)}
-    for name in _OF_EFFECTOR:
-        found[name] = found[name] * axis_signs(plan.spec)
+        states = _states(plan, segment, float(plan.answers.tried_arcs[i]), 1.0 - tau if back else tau)
+        part = {name: -np.asarray(x) if back and name in _RATES else np.asarray(x) for name, x in states.items()}
+        parts.append({"t": starts[i] + tau * length, **part})
+    names = [name for name in TRAJECTORY if name in parts[0]]
+    found = {name: np.concatenate([part[name] for part in parts]) for name in names}
+    signs = axis_signs(plan.spec)
+    for name in names:
+        if name in _VECTORS:
+            found[name] = found[name] * signs
+    if "quaternion" in found:
+        found["quaternion"] = found["quaternion"] * np.concatenate([[1.0], signs])
     return found
+
+
+def _states(plan: Plan, segment, arcs: float, tau: np.ndarray):
+    if isinstance(plan.shared, PoseShared):
+        return _pose_states(plan.shared, segment, arcs, tau, variable=plan.keys.family == "hypocycloid")
+    return _point_states(plan.shared, segment, arcs, tau)
 
 
 def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
@@ -89,10 +126,9 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
 
 def _csv(found: dict[str, np.ndarray]) -> str:
     heads = ["t"]
-    for name in list(TRAJECTORY)[1:]:
-        parts = "xyz" if name in _OF_EFFECTOR else range(1, found[name].shape[1] + 1)
-        heads += [f"{name}_{part}" for part in parts]
-    table = np.column_stack([found[name] for name in TRAJECTORY])
+    for name in list(found)[1:]:
+        heads += [f"{name}_{part}" for part in _parts(name, found[name].shape[1])]
+    table = np.column_stack(list(found.values()))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(heads)
@@ -100,17 +136,27 @@ def _csv(found: dict[str, np.ndarray]) -> str:
     return text.getvalue()
 
 
+def _parts(name: str, count: int) -> list[str]:
+    if name in _VECTORS:
+        return list("xyz")
+    return list("wxyz") if name == "quaternion" else [str(k + 1) for k in range(count)]
+
+
 def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
     spec = plan.spec
     attributes = {"Conventions": "CF-1.11", "robot": spec.name, "mass": spec.mass, "z_axis": spec.z_axis, "z0": plan.z0}
     cables = list(range(1, found["tension"].shape[1] + 1))
     with new_hdf5(path, attributes) as file:
-        for name, labels in (("t", found["t"]), ("axis", list("xyz")), ("cable", cables)):
+        scales = {"t": found["t"], "axis": list("xyz"), "cable": cables}
+        if "quaternion" in found:
+            scales["component"] = list("wxyz")
+        for name, labels in scales.items():
             file[name] = labels
             file[name].make_scale(name)
-        for name, quantity in TRAJECTORY.items():
-            data: h5py.Dataset = file[name] if name in file else file.create_dataset(name, data=found[name])
-            set_attributes(data, {"units": quantity.units, "long_name": quantity.long_name})
+        for name, values in found.items():
+            data: h5py.Dataset = file[name] if name == "t" else file.create_dataset(name, data=values)
+            set_attributes(data, {"units": TRAJECTORY[name].units, "long_name": TRAJECTORY[name].long_name})
             if name != "t":
                 data.dims[0].attach_scale(file["t"])
-                data.dims[1].attach_scale(file["axis" if name in _OF_EFFECTOR else "cable"])
+                across = "axis" if name in _VECTORS else "component" if name == "quaternion" else "cable"
+                data.dims[1].attach_scale(file[across])

@@ -3,6 +3,7 @@
 import dataclasses
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import problem
@@ -11,11 +12,17 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
+from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.extremes import Extremes, extremes
+from cspr_jax.feasibility.pose_extremes import pose_extremes
+from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.answers import Answers
+from cspr_jax.pose_sequences import Poses
+from cspr_jax.reference_pose import reference_pose
 from cspr_jax.sequences import sequence_of
 from cspr_jax.trajectories.hypocycloid import Segment
+from cspr_jax.trajectories.pose_segment import PoseSegment
 
 # Where a search for z0 takes "best" epsilon to be, until it is chosen.
 FIRST_EPSILON = 0.2
@@ -28,7 +35,7 @@ class Plan:
     Fields:
         spec: the robot as its file has it.
         keys: the plan file.
-        shared: robot, limits, amplitude function.
+        shared: robot, limits, amplitude function; of a platform its reference too.
         z0: m.
         points: (n + 1, 3) in the kernels' axes, m.
         answers: of the n segments.
@@ -39,12 +46,12 @@ class Plan:
 
     spec: RobotFile
     keys: PlanFile
-    shared: Shared
+    shared: Shared | PoseShared
     z0: float
     points: np.ndarray
     answers: Answers
     extremes: Extremes
-    segments: Segment
+    segments: Segment | PoseSegment
     backwards: np.ndarray
 
 
@@ -62,6 +69,8 @@ def plan(path: Path) -> Plan:
     """
     keys = checked(PlanFile, read_toml(path), path)
     spec = resolve_robot(keys.robot, path, path.parent)
+    if spec.is_platform:
+        return _plan_of_poses(spec, keys, path)
     sequence = sequence_of(spec, keys, path)
     robot = problem.build_robot(spec, keys, path)
     limits = problem.build_limits(spec, keys, keys.floor, path)
@@ -74,6 +83,27 @@ def plan(path: Path) -> Plan:
     points = sequence.points(robot, z0)
     depth = np.full(len(sequence), z0)
     answers = sequence.answers(shared, points, depth)
-    segments = sequence.segments(shared, points, depth, answers.tried_arcs)
+    segments = sequence.segments(shared, points, depth, answers)
     asked = extremes(shared, segments, answers.tried_arcs, keys.samples)
+    return Plan(spec, keys, shared, z0, points, answers, asked, segments, sequence.backwards)
+
+
+def _plan_of_poses(spec: RobotFile, keys: PlanFile, path: Path) -> Plan:
+    # Of a rigid platform, thesis chapter 3.
+    sequence = Poses(spec, keys, path)
+    robot = problem.build_platform(spec, keys, path)
+    limits = problem.build_limits(spec, keys, keys.floor, path)
+    amplitude = problem.build_amplitude(keys, path)
+    # The reference axes do not depend on the depth; whether the robot hangs still there does.
+    guess = PoseShared(robot, limits, amplitude, jnp.ones(()))
+    z0 = chosen_depth(guess, sequence)
+    try:
+        still = reference_pose(robot, z0)
+    except InputError as error:
+        raise ConfigError(path, f"robot.{error}") from error
+    shared = PoseShared(still.robot, limits, amplitude, jnp.asarray(still.conditioning))
+    points, depth = sequence.points(robot, z0), np.full(len(sequence), z0)
+    answers = sequence.answers(shared, points, depth)
+    segments = sequence.segments(shared, points, depth, answers)
+    asked = pose_extremes(shared, segments, answers.tried_arcs, keys.samples, variable=sequence.variable)
     return Plan(spec, keys, shared, z0, points, answers, asked, segments, sequence.backwards)

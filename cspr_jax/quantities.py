@@ -162,11 +162,16 @@ TRAJECTORY = {
         Quantity("position", "m", "position", "Position of the effector (x, y, z)."),
         Quantity("velocity", "m s-1", "velocity", "Velocity of the effector (x, y, z)."),
         Quantity("acceleration", "m s-2", "acceleration", "Acceleration of the effector (x, y, z)."),
+        Quantity("quaternion", "1", "orientation", "Unit quaternion of the platform (w, x, y, z)."),
+        Quantity("omega", "rad s-1", "angular velocity", "Angular velocity of the platform, fixed axes (x, y, z)."),
+        Quantity("omega_dot", "rad s-2", "angular acceleration", "Its derivative in time, fixed axes (x, y, z)."),
         Quantity("length", "m", "cable length", "Length of each cable, in cable order."),
         Quantity("rate", "m s-1", "cable rate", "Rate of each cable's length; positive pays out."),
         Quantity("tension", "N", "cable tension", "Tension of each cable, in cable order."),
     )
 }
+# Those that only a rigid platform has.
+OF_PLATFORMS = ("quaternion", "omega", "omega_dot")
 STORABLE = tuple(QUANTITIES)
 DEFAULT_STORE = {
     "minimum-arcs": ("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),

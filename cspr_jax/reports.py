@@ -6,6 +6,7 @@ from typing import Any
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.minimum_oscillations import OscillationAnswers
 from cspr_jax.planning import Plan
+from cspr_jax.pose_sequences import PoseAnswers
 from cspr_jax.problem import axis_signs
 
 SCHEMA = 1
@@ -65,6 +66,8 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
     answers, asked = plan.answers, plan.extremes
     arcs = int(answers.arcs[i])
     swings = answers if isinstance(answers, OscillationAnswers) else None
+    poses = answers if isinstance(answers, PoseAnswers) else None
+    verdict = Verdict(int(answers.verdict[i]))
     return {
         "from": i,
         "to": i + 1,
@@ -81,12 +84,14 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "margin": float(answers.margin[i]),
         "margin_bound": float(answers.margin_bound[i]),
         "limit_margin": float(answers.limit_margin[i]),
-        "det_sign_constant": bool(asked.depth_ratio_min[i] > 0.0),
-        "cable_interference": None,
-        "platform_interference": None,
+        "det_sign_constant": bool((poses.regularity if poses else asked.depth_ratio_min)[i] > 0.0),
+        "det_margin": float(poses.regularity[i]) if poses else None,
+        "cable_interference": bool(verdict & Verdict.CABLE_CABLE) if poses else None,
+        "cable_distance_min": float(poses.cable_distance[i]) if poses else None,
+        "platform_interference": bool(verdict & Verdict.CABLE_PLATFORM) if poses else None,
         "verdict": verdict_text(answers.verdict[i], arcs),
         "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
-        "beta_hat": None,
+        "beta_hat": [float(value) for value in poses.beta_hat[i]] if poses else None,
         "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
         "z_lowest": float(asked.lowest[i] * axis_signs(plan.spec)[2]),
         "cable_length_max": float(asked.length_max[i]),

@@ -1,6 +1,7 @@
 """The robot as the kernels see it: geometry, mass and gravity in the product's axes (z down)."""
 
 import dataclasses
+from typing import Protocol
 
 import jax
 import jax.numpy as jnp
@@ -125,11 +126,19 @@ def is_planar(robot: PointMassRobot) -> bool:
     return robot.base_points.shape[0] == 2
 
 
-def centroid(robot: PointMassRobot) -> Array:
+class HasSpools(Protocol):
+    """Any robot, as far as its spools are concerned."""
+
+    @property
+    def base_points(self) -> Array:
+        """(n_cables, 3) m."""
+
+
+def centroid(robot: HasSpools) -> Array:
     """Centroid of the spools, thesis (1.75); of a planar robot the middle between them.
 
     Args:
-        robot: the robot.
+        robot: any robot.
 
     Returns:
         (3,) position, m.
@@ -137,19 +146,25 @@ def centroid(robot: PointMassRobot) -> Array:
     return jnp.mean(robot.base_points, axis=0)
 
 
-def plane_normal(robot: PointMassRobot) -> Array:
+def plane_normal(robot: HasSpools) -> Array:
     """Normal of the spool plane, scaled so that its vertical component is 1.
 
-    The depth below the plane, measured along the vertical, is normal . (p - centroid).
+    Of more than three spools it is the plane of least squares. The depth below the plane, measured along the
+    vertical, is normal . (p - centroid).
 
     Args:
-        robot: the robot.
+        robot: any robot.
 
     Returns:
         (3,) the third component is 1; (0, 0, 1) for level spools.
     """
-    if is_planar(robot):
-        return jnp.zeros_like(robot.base_points[0]).at[2].set(1.0)
     a = robot.base_points
+    if a.shape[0] == 2:
+        return jnp.zeros_like(a[0]).at[2].set(1.0)
+    if a.shape[0] > 3:
+        x, y, z = (a - centroid(robot)).T
+        xx, xy, yy, xz, yz = jnp.dot(x, x), jnp.dot(x, y), jnp.dot(y, y), jnp.dot(x, z), jnp.dot(y, z)
+        slope = jnp.stack([xz * yy - yz * xy, yz * xx - xz * xy]) / (xx * yy - xy**2)
+        return jnp.stack([-slope[0], -slope[1], jnp.ones_like(xx)])
     area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
     return area / area[2]

@@ -14,7 +14,7 @@ from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps.answers import Answers, pick
 from cspr_jax.maps.minimum_arcs import minimum_arcs, segments_between
 from cspr_jax.maps.minimum_oscillations import minimum_oscillations, transitions_to
-from cspr_jax.robots import PointMassRobot, centroid
+from cspr_jax.robots import HasSpools, centroid
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.transition import steady
 
@@ -55,7 +55,7 @@ class Sequence(abc.ABC):
         """(n_segments,) whether a segment runs against its normalised time."""
         return np.zeros(len(self), bool)
 
-    def points(self, robot: PointMassRobot, z0: float) -> np.ndarray:
+    def points(self, robot: HasSpools, z0: float) -> np.ndarray:
         """Poses as points in the kernels' axes; those at rest are P0.
 
         Args:
@@ -83,14 +83,14 @@ class Sequence(abc.ABC):
         """
 
     @abc.abstractmethod
-    def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, arcs: np.ndarray) -> Segment:
+    def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
         """The segments, each of the parity of its number of arcs.
 
         Args:
             shared: robot, limits and amplitude.
             points: (n_poses, 3) m.
             z0: (n_segments,) m.
-            arcs: (n_segments,).
+            answers: as `answers` gave them.
 
         Returns:
             leaves (n_segments, ...).
@@ -125,20 +125,20 @@ class Hypocycloids(Sequence):
         fixed = np.tile(self._arcs, len(z0) // len(self))
         return minimum_arcs(shared, starts, ends, z0, max_arcs=self._largest, arcs=fixed)
 
-    def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, arcs: np.ndarray) -> Segment:
+    def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
         """The segments; see `Sequence.segments`.
 
         Args:
             shared: robot, limits and amplitude.
             points: (n_poses, 3) m.
             z0: (n_segments,) m.
-            arcs: (n_segments,).
+            answers: as `answers` gave them.
 
         Returns:
             leaves (n_segments, ...).
         """
         parities, _ = segments_between(shared, points[:-1], points[1:], z0)
-        return pick(parities, np.arange(len(arcs)), arcs)
+        return pick(parities, np.arange(len(self)), answers.tried_arcs)
 
 
 class Transitions(Sequence):
@@ -185,14 +185,14 @@ class Transitions(Sequence):
             steady=np.tile(self._steady, repeats),
         )
 
-    def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, arcs: np.ndarray) -> Segment:
+    def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
         """The segments; see `Sequence.segments`.
 
         Args:
             shared: robot, limits and amplitude.
             points: (n_poses, 3) m.
             z0: (n_segments,) m.
-            arcs: (n_segments,) even.
+            answers: as `answers` gave them.
 
         Returns:
             leaves (n_segments, ...).
@@ -227,7 +227,7 @@ _FAMILIES = {"hypocycloid-standard": Hypocycloids, "transition": Transitions}
 
 
 def sequence_of(spec: RobotFile, keys: PlanFile, path: Path) -> Sequence:
-    """The sequence of a plan.
+    """The sequence of a plan for a point mass.
 
     Args:
         spec: the robot.
@@ -240,4 +240,10 @@ def sequence_of(spec: RobotFile, keys: PlanFile, path: Path) -> Sequence:
     Raises:
         ConfigError: poses that the family cannot join.
     """
+    if keys.family not in _FAMILIES:
+        raise ConfigError(path, f'family = "{keys.family}": must be one of {", ".join(_FAMILIES)} for a point mass')
+    for i, pose in enumerate(keys.pose):
+        for key in ("tilt_torsion", "quaternion", "beta_hat"):
+            if getattr(pose, key) is not None:
+                raise ConfigError(path, f"pose[{i}].{key}: must be absent for a point mass")
     return _FAMILIES[keys.family](spec, keys, path)

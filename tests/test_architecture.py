@@ -25,7 +25,7 @@ LAYERS = (
     ("maps.cells", "maps.envelope_cells", "maps.grid_map", "maps.oscillation_cells"),
     ("sweep.checks", "sweep.definition", "sweep.signals", "sweep.environment"),
     ("sweep.work", "sweep.claims", "sweep.inspection", "sweep.tile"),
-    ("sweep", "planning", "choices", "sequences", "api"),
+    ("sweep", "planning", "choices", "sequences", "pose_sequences", "api"),
     ("bench", "transition_tables", "tables", "reports", "motions", "plots"),
     ("cli", "__main__"),
 )

@@ -55,9 +55,10 @@ Inclination = Annotated[
 class TrajectoryKeys(Table):
     """What both a plan and a sweep say of the trajectory."""
 
-    family: Literal["hypocycloid-standard", "transition"] = Field(
+    family: Literal["hypocycloid-standard", "transition", "hypocycloid"] = Field(
         "hypocycloid-standard",
-        description='trajectory family: "hypocycloid-standard" (thesis chapter 2) or, in maps, "transition" (1)',
+        description='trajectory family: "hypocycloid-standard" (thesis chapter 2), "transition" (1), or "hypocycloid" '
+        "of variable amplitude (3), for platforms",
     )
     amplitude: AmplitudeKey = Field(
         "quintic",

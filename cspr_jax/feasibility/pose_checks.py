@@ -19,7 +19,8 @@ from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.grids import in_batches
 from cspr_jax.trajectories.pose_segment import PoseSegment, duration, motion
 
-BATCH = 4096
+# Few instants are computed in small batches: a batch is always full.
+BATCHES = (512, 4096)
 SAMPLES = 64  # an arc
 # Narrowing: places looked at for each value, points at each, and how often.
 PLACES, POINTS, ROUNDS = 3, 17, 4
@@ -62,6 +63,10 @@ def _everything(shared: PoseShared, pairs: Array, arguments, *, variable: bool) 
     return jax.vmap(one)(*arguments)
 
 
+def _size(count: int) -> int:
+    return BATCHES[0] if count <= 2 * BATCHES[0] else BATCHES[1]
+
+
 @jax.jit
 def _durations(arguments) -> Array:
     return jax.vmap(duration)(*arguments)
@@ -92,7 +97,7 @@ class PoseChecker:
         Returns:
             (n,) s.
         """
-        return in_batches(_durations, (segments, arcs.astype(float)), size=BATCH)
+        return in_batches(_durations, (segments, arcs.astype(float)), size=BATCHES[0])
 
     def first_look(self, segments: PoseSegment, arcs: np.ndarray, tau: np.ndarray) -> np.ndarray:
         """Smallest slack over some instants, interference left out: what is negative here is infeasible.
@@ -124,12 +129,12 @@ class PoseChecker:
 
     def _slack(self, segments: PoseSegment, arcs: np.ndarray, owner: np.ndarray, tau: np.ndarray) -> np.ndarray:
         items = (*jax.tree.map(lambda x: np.asarray(x)[owner], (segments, arcs.astype(float))), tau)
-        return in_batches(partial(_slacks, self.shared, variable=self.variable), items, size=BATCH)
+        return in_batches(partial(_slacks, self.shared, variable=self.variable), items, size=_size(len(tau)))
 
     def _all(self, segment: PoseSegment, arcs: int, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         items = jax.tree.map(lambda x: np.broadcast_to(x, (len(tau), *np.shape(x))), (segment, float(arcs)))
         kernel = partial(_everything, self.shared, self._contacts.pairs, variable=self.variable)
-        return in_batches(kernel, (*items, tau), size=BATCH)
+        return in_batches(kernel, (*items, tau), size=_size(len(tau)))
 
     def _check_one(self, segment: PoseSegment, arcs: int) -> tuple[int, np.ndarray, float, int]:
         tau = np.linspace(0.0, 1.0, SAMPLES * arcs + 1)

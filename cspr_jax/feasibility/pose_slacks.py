@@ -4,7 +4,7 @@ With f the tensions, rho the cable lengths, m the mass:
 
     taut           6 z0 mu / g, the tension over its value at rest in P0 if all were equal
     regular        determinant (`wrenches.conditioning`) over its value at rest in P0
-    below          depth of the mass centre below the centroid of the spools, over z0
+    below          depth of the mass centre below the spool plane, over z0
     tension        (f - f_min) 6 / (m g),  (f_max - f) 6 / (m g)
     floor          (floor - z) / z0
     length, speed, acceleration    1 - value / largest
@@ -20,6 +20,7 @@ from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility.limits import FLAGS, Limits, given
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.platforms import PlatformRobot
+from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.trajectories.pose_segment import PoseSegment, motion
 from cspr_jax.wrenches import Pose
 
@@ -65,11 +66,10 @@ def pose_slacks(shared: PoseShared, pose: Pose, z0: Array) -> Array:
     """
     robot, limits = shared.robot, shared.limits
     per_length = wrenches.tensions_per_length(robot, pose)
-    centre = jnp.mean(robot.base_points, axis=0)
     found = [
         6.0 * z0 / robot.gravity * jnp.min(per_length),
         wrenches.conditioning(robot, pose.position, pose.rotation) / shared.conditioning,
-        (pose.position[2] - centre[2]) / z0,
+        plane_normal(robot) @ (pose.position - centroid(robot)) / z0,
     ]
     names = given(limits)
     if not names:

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from cspr_jax.robots import PointMassRobot, centroid, plane_normal
+from cspr_jax.robots import HasSpools, centroid, plane_normal
 
 
-def _depths(robot: PointMassRobot, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _depths(robot: HasSpools, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     below = np.asarray(targets) - np.asarray(centroid(robot))
     normal = np.asarray(plane_normal(robot))
     return below, below @ normal, normal
 
 
-def mean_depth(robot: PointMassRobot, targets: np.ndarray) -> float:
+def mean_depth(robot: HasSpools, targets: np.ndarray) -> float:
     """Mean height of the targets, as chosen in thesis section 2.9.
 
     Args:
@@ -24,11 +24,11 @@ def mean_depth(robot: PointMassRobot, targets: np.ndarray) -> float:
     return float(_depths(robot, targets)[0][:, 2].mean())
 
 
-def least_depth(robot: PointMassRobot, targets: np.ndarray) -> float:
+def least_depth(robot: HasSpools, targets: np.ndarray) -> float:
     """Bound (2.59): below it some target cannot be reached with many arcs, though perhaps with few.
 
     Args:
-        robot: any triangle of spools; the depth is measured below their plane, along the vertical.
+        robot: any robot; the depth is measured below their plane, along the vertical.
         targets: (n, 3) m, z down.
 
     Returns:
@@ -37,7 +37,7 @@ def least_depth(robot: PointMassRobot, targets: np.ndarray) -> float:
     return float(_depths(robot, targets)[1].max() / 2.0)
 
 
-def conservative_depth(robot: PointMassRobot, targets: np.ndarray) -> float:
+def conservative_depth(robot: HasSpools, targets: np.ndarray) -> float:
     """Bound (2.58): above it every segment between the targets is feasible with enough arcs.
 
     It keeps every target inside the sphere about P0 that touches the spool plane,
@@ -45,7 +45,7 @@ def conservative_depth(robot: PointMassRobot, targets: np.ndarray) -> float:
     not level the condition is quadratic in z0, and can fail for large z0 too, or for all.
 
     Args:
-        robot: any triangle of spools.
+        robot: any robot.
         targets: (n, 3) m, z down, below the spools.
 
     Returns:

@@ -117,8 +117,7 @@ def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, 
     values = derivatives(amplitude, tau, order=3)
     time = duration(segment, arcs)
     c, c1, c2 = _swing(segment, values, arcs, tau, variable=variable)
-    beats = beat(segment.turn.start_bend, segment.turn.end_bend, _share(segment, arcs), arcs, tau)
-    quaternions = orientation(segment.turn, values, beats)
+    quaternions = _quaternions(segment, values, arcs, tau)
     omega, omega1 = rates(quaternions)
     return Pose(
         segment.hub + segment.plane @ c,  # (3.43)
@@ -128,6 +127,28 @@ def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, 
         segment.plane @ c2 / time**2,
         omega1 / time**2,
     )
+
+
+def quaternion_at(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array) -> Array:
+    """The orientation at one instant.
+
+    Args:
+        segment: of the parity of `arcs`.
+        amplitude: A.
+        arcs: () number of arcs, a float.
+        tau: () normalised time in [0, 1].
+
+    Returns:
+        (4,) unit quaternion; continuous along the segment.
+    """
+    return _quaternions(segment, derivatives(amplitude, tau, order=3), arcs, tau)[0]
+
+
+def _quaternions(
+    segment: PoseSegment, values: tuple[Array, ...], arcs: Array, tau: Array
+) -> tuple[Array, Array, Array]:
+    beats = beat(segment.turn.start_bend, segment.turn.end_bend, _share(segment, arcs), arcs, tau)
+    return orientation(segment.turn, values, beats)
 
 
 def _swing(

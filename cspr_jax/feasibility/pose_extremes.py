@@ -1,0 +1,84 @@
+"""What a platform's segments ask of the robot, at their extremes; the state of the platform along them."""
+
+import dataclasses
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax import wrenches
+from cspr_jax.feasibility.extremes import Extremes
+from cspr_jax.feasibility.pose_checks import SAMPLES
+from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.grids import in_batches
+from cspr_jax.robots import centroid, plane_normal
+from cspr_jax.trajectories.pose_segment import PoseSegment, motion
+
+BATCH = 512
+# Narrowing around the smallest sample: points, and how often.
+POINTS, ROUNDS = 17, 4
+
+
+@partial(jax.jit, static_argnames="variable")
+def _demands(shared: PoseShared, arguments, *, variable: bool) -> Array:
+    def one(segment, arcs, tau):
+        robot, pose = shared.robot, motion(segment, shared.amplitude, arcs, tau, variable=variable)
+        per_length = wrenches.tensions_per_length(robot, pose)
+        lengths, rates, bends = wrenches.cable_motion(robot, pose)
+        force = robot.mass * per_length * lengths
+        depth = plane_normal(robot) @ (pose.position - centroid(robot)) * segment.rate / robot.gravity
+        return jnp.stack(
+            [
+                jnp.min(force),
+                -jnp.max(force),
+                jnp.min(per_length),
+                depth,
+                -pose.position[2],
+                -jnp.max(lengths),
+                -jnp.max(jnp.abs(rates)),
+                -jnp.max(jnp.abs(bends)),
+            ]
+        )
+
+    return jax.vmap(one)(*arguments)
+
+
+def pose_extremes(
+    shared: PoseShared, segments: PoseSegment, arcs: np.ndarray, least_samples: int, *, variable: bool
+) -> Extremes:
+    """What segments ask of the robot: at least 64 samples an arc, narrowed where a value is extreme.
+
+    Args:
+        shared: robot, limits, amplitude, reference.
+        segments: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n,).
+        least_samples: smallest number of samples of a segment.
+        variable: whether positions are hypocycloids of variable amplitude.
+
+    Returns:
+        the extremes.
+    """
+    signs = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
+    found, samples = [], []
+    for i, p in enumerate(arcs):
+        segment = jax.tree.map(lambda x, i=i: x[i], segments)
+        tau = np.linspace(0.0, 1.0, max(SAMPLES * int(p), least_samples) + 1)
+
+        def at(points, segment=segment, p=p):
+            items = jax.tree.map(lambda x: np.broadcast_to(x, (len(points), *np.shape(x))), (segment, float(p)))
+            return in_batches(partial(_demands, shared, variable=variable), (*items, points), size=BATCH)
+
+        values, width = at(tau), tau[1] - tau[0]
+        smallest, place = values.min(0), tau[values.argmin(0)]
+        for _ in range(ROUNDS):
+            points = np.clip(place[:, None] + width * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
+            near = at(points.ravel()).reshape(*points.shape, -1)
+            own = np.take_along_axis(near, np.arange(len(place))[:, None, None], axis=2)[..., 0]
+            smallest, place = np.minimum(smallest, own.min(1)), points[np.arange(len(place)), own.argmin(1)]
+            width = 2.0 * width / (POINTS - 1)
+        found.append(smallest * signs + 0.0)  # no -0
+        samples.append(len(tau))
+    names = [field.name for field in dataclasses.fields(Extremes)][:-1]
+    return Extremes(**dict(zip(names, np.array(found).T, strict=True)), samples=np.array(samples))

@@ -1,0 +1,55 @@
+"""Values of beta-hat to try at the ends of segments, and the choice among them along a sequence of poses."""
+
+import numpy as np
+
+# Beyond this nothing was ever gained, docs/theory.md.
+LARGEST = 12.0
+OPTIONS = 11
+# Arcs tried beyond the first number that some values allow: more are rarely better.
+BEYOND = 4
+
+
+def options(preferred: float, lowest: float, highest: float, count: int = OPTIONS) -> np.ndarray:
+    """Values of beta-hat in the order in which they are tried.
+
+    First the preferred one of (3.91), if it keeps every cable taut, else the middle of the interval (3.92); then
+    values that divide the interval evenly, the nearest to the first one first. The interval is cut at +-12.
+
+    Args:
+        preferred: beta-hat of (3.91).
+        lowest: of (3.92).
+        highest: of (3.92).
+        count: how many values in all.
+
+    Returns:
+        (count,) or fewer; empty if no value keeps every cable taut.
+    """
+    low, high = max(lowest, -LARGEST), min(highest, LARGEST)
+    if not low < high:
+        return np.array([preferred]) if lowest < preferred < highest else np.array([])
+    first = preferred if lowest < preferred < highest else 0.5 * (low + high)
+    others = low + (high - low) * (np.arange(count - 1) + 0.5) / (count - 1)
+    return np.concatenate([[first], others[np.argsort(np.abs(others - first), kind="stable")]])
+
+
+def cheapest_path(costs: list[np.ndarray]) -> list[int]:
+    """The options along a sequence whose segments cost least in sum; among equals those tried first.
+
+    Args:
+        costs: of each segment, (n_options_at_start, n_options_at_end); inf where it is infeasible.
+
+    Returns:
+        the option of each pose. Where no path is feasible, the one with the fewest infeasible segments.
+    """
+    # An infeasible segment costs more than everything else together.
+    finite = [c[np.isfinite(c)] for c in costs]
+    wall = 1.0 + 10.0 * sum(float(c.max()) if c.size else 0.0 for c in finite)
+    total, back = np.arange(costs[0].shape[0]) * 1e-9, []
+    for cost in costs:
+        through = total[:, None] + np.where(np.isfinite(cost), cost, wall) + np.arange(cost.shape[1]) * 1e-9
+        back.append(through.argmin(0))
+        total = through.min(0)
+    path = [int(total.argmin())]
+    for choice in reversed(back):
+        path.append(int(choice[path[-1]]))
+    return path[::-1]

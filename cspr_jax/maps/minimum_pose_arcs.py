@@ -1,0 +1,117 @@
+"""Smallest numbers of arcs between poses, for all pairs of values of beta-hat at both ends."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.feasibility.pose_checks import PoseChecker
+from cspr_jax.maps.bends import BEYOND
+from cspr_jax.platforms import PlatformRobot
+from cspr_jax.trajectories.pose_segment import PoseSegment, pose_segment
+
+# Instants an arc of the first look, late ones first: there most motions fail.
+COARSE = 6
+LATE = np.linspace(0.7, 1.0, 13)
+
+
+class Ends(NamedTuple):
+    """Both ends of a segment.
+
+    Fields:
+        start: position (3,) and quaternion (4,).
+        end: likewise.
+        start_bends: values of beta-hat to try at the start.
+        end_bends: at the end.
+    """
+
+    start: tuple[np.ndarray, np.ndarray]
+    end: tuple[np.ndarray, np.ndarray]
+    start_bends: np.ndarray
+    end_bends: np.ndarray
+
+
+@jax.jit
+def _segments(robot: PlatformRobot, start, end, z0, bends, odd) -> PoseSegment:
+    return jax.vmap(lambda a, b: pose_segment(robot, start, end, z0, (a, b), odd=odd))(*bends)
+
+
+def segments_between(robot: PlatformRobot, ends: Ends, z0: float, arcs: int) -> PoseSegment:
+    """The segments for every pair of values of beta-hat.
+
+    Args:
+        robot: the robot.
+        ends: both ends.
+        z0: m.
+        arcs: their number.
+
+    Returns:
+        leaves (n_start_bends * n_end_bends, ...), the end's values fastest.
+    """
+    pairs = np.meshgrid(ends.start_bends, ends.end_bends, indexing="ij")
+    bends = tuple(jnp.asarray(x.ravel()) for x in pairs)
+    found = _segments(robot, ends.start, ends.end, jnp.asarray(z0), bends, jnp.asarray(arcs % 2 == 1))
+    return jax.tree.map(np.asarray, found)
+
+
+def smallest_arcs(checker: PoseChecker, ends: Ends, z0: float, *, max_arcs: int, fixed: int = 0) -> np.ndarray:
+    """The smallest number of arcs that passes all tests, for every pair of values of beta-hat.
+
+    A few instants refuse most motions before they are checked in full. Some arcs beyond the first number that
+    any pair allows are tried, no more.
+
+    Args:
+        checker: of the robot.
+        ends: both ends.
+        z0: m.
+        max_arcs: largest number tried.
+        fixed: a fixed number of arcs; 0: free.
+
+    Returns:
+        (n_start_bends, n_end_bends), 0 where none was found.
+    """
+    count = len(ends.start_bends) * len(ends.end_bends)
+    found, last = np.zeros(count, int), max_arcs
+    for arcs in [fixed] if fixed else range(1, max_arcs + 1):
+        if arcs > last:
+            break
+        segments = segments_between(checker.shared.robot, ends, z0, arcs)
+        open_ones = np.flatnonzero(found == 0)
+        for tau in (LATE, np.linspace(0.0, 1.0, COARSE * arcs + 1)):
+            some = jax.tree.map(lambda x, o=open_ones: x[o], segments)
+            slack = checker.first_look(some, np.full(len(open_ones), arcs), tau) if len(open_ones) else np.array([])
+            open_ones = open_ones[slack > 0.0]
+        checks = (
+            checker.check(jax.tree.map(lambda x, o=open_ones: x[o], segments), np.full(len(open_ones), arcs))
+            if len(open_ones)
+            else None
+        )
+        if checks is not None:
+            found[open_ones[checks.verdict == 0]] = arcs
+            if (checks.verdict == 0).any():
+                last = min(last, arcs + BEYOND)
+    return found.reshape(len(ends.start_bends), len(ends.end_bends))
+
+
+def best_candidate(checker: PoseChecker, ends: Ends, z0: float, *, max_arcs: int) -> int:
+    """The number of arcs with the largest smallest slack, where none is feasible.
+
+    Args:
+        checker: of the robot.
+        ends: both ends, with one value of beta-hat each.
+        z0: m.
+        max_arcs: largest number tried.
+
+    Returns:
+        the number.
+    """
+    slack = [
+        checker.first_look(
+            segments_between(checker.shared.robot, ends, z0, arcs),
+            np.array([arcs]),
+            np.linspace(0.0, 1.0, COARSE * arcs + 1),
+        )[0]
+        for arcs in range(1, max_arcs + 1)
+    ]
+    return int(np.argmax(slack)) + 1
