@@ -1,5 +1,7 @@
 """What a plan leaves open: z0, by a rule or from an inclination, and the epsilon of its amplitude function."""
 
+from typing import Any
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -9,7 +11,6 @@ from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.oscillations import best_inclination
-from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.robots import HasSpools, centroid
 from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories import depths
@@ -22,11 +23,11 @@ EPSILONS = np.linspace(0.02, 0.5, 49)
 DEPTHS = 200
 
 
-def chosen_depth(shared: Shared | PoseShared, sequence: Sequence) -> float:
+def chosen_depth(shared: Any, sequence: Sequence) -> float:
     """The plan's z0, given or chosen.
 
     Args:
-        shared: robot, limits and amplitude.
+        shared: robot, limits and amplitude, `Shared` or `PoseShared`.
         sequence: the plan's poses.
 
     Returns:
@@ -36,13 +37,7 @@ def chosen_depth(shared: Shared | PoseShared, sequence: Sequence) -> float:
         ConfigError: a rest pose off P0, or no z0 that can be chosen.
     """
     keys, path, targets = sequence.keys, sequence.path, sequence.targets
-    if keys.z0 is None and keys.inclination is None:
-        other = ", or inclination" if keys.family == "transition" else ""
-        raise ConfigError(
-            path, f'z0 is missing: depth of P0, m, or {{ choose = "mean" | "conservative" | "fastest" }}{other}'
-        )
-    if keys.z0 is not None and keys.inclination is not None:
-        raise ConfigError(path, "z0, inclination: must be one of them")
+    _check_depth_keys(sequence)
     if isinstance(keys.z0, float):
         _check_rest(shared.robot, sequence, keys.z0)
         return keys.z0
@@ -52,15 +47,11 @@ def chosen_depth(shared: Shared | PoseShared, sequence: Sequence) -> float:
     if not len(targets):
         raise ConfigError(path, "z0 = { choose = ... }: must be a number where every pose is at rest")
     if not isinstance(keys.z0, Choice):
-        if isinstance(shared, PoseShared):
-            raise ConfigError(path, "z0 is missing: depth of P0, m")
         return _depth_of_inclination(shared, sequence)
     if keys.z0.choose == "mean":
         z0 = depths.mean_depth(shared.robot, targets)
     elif keys.z0.choose == "conservative":
         z0 = depths.conservative_depth(shared.robot, targets) * (1.0 + ABOVE_BOUND)
-    elif isinstance(shared, PoseShared):
-        raise ConfigError(path, 'z0.choose = "fastest": must be "mean", "conservative" or a number for a platform')
     else:
         z0 = _fastest_depth(shared, sequence)
     if not z0 > 0.0:
@@ -68,6 +59,19 @@ def chosen_depth(shared: Shared | PoseShared, sequence: Sequence) -> float:
             path, f'z0.choose = "{keys.z0.choose}": must be a number here, since no z0 > 0 follows from the poses'
         )
     return z0
+
+
+def _check_depth_keys(sequence: Sequence) -> None:
+    keys, path = sequence.keys, sequence.path
+    if keys.z0 is None and keys.inclination is None:
+        other = ", or inclination" if keys.family == "transition" else ""
+        raise ConfigError(
+            path, f'z0 is missing: depth of P0, m, or {{ choose = "mean" | "conservative" | "fastest" }}{other}'
+        )
+    if keys.z0 is not None and keys.inclination is not None:
+        raise ConfigError(path, "z0, inclination: must be one of them")
+    if sequence.spec.is_platform and isinstance(keys.z0, Choice) and keys.z0.choose == "fastest":
+        raise ConfigError(path, 'z0.choose = "fastest": must be "mean", "conservative" or a number for a platform')
 
 
 def _check_rest(robot: HasSpools, sequence: Sequence, z0: float) -> None:

@@ -67,7 +67,22 @@ def plan(path: Path) -> Plan:
     Raises:
         ConfigError: a mistake in the file.
     """
-    keys = checked(PlanFile, read_toml(path), path)
+    return plan_of(checked(PlanFile, read_toml(path), path), path)
+
+
+def plan_of(keys: PlanFile, path: Path) -> Plan:
+    """Plan the sequence of a plan file's content.
+
+    Args:
+        keys: the content.
+        path: of the file, named in errors.
+
+    Returns:
+        the plan, feasible or not.
+
+    Raises:
+        ConfigError: a mistake in it.
+    """
     spec = resolve_robot(keys.robot, path, path.parent)
     if spec.is_platform:
         return _plan_of_poses(spec, keys, path)

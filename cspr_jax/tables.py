@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax import transition_tables
+from cspr_jax import pose_tables, transition_tables
 from cspr_jax.planning import plan
 from cspr_jax.transition_tables import Key
 
@@ -83,6 +83,11 @@ TABLES = {
         {(row, column, ""): value for row, cells in _PUBLISHED_2_1.items() for column, value in cells.items()},
         _table_2_1,
     ),
+    "3.2": Source(
+        "Dion-Gauvin thesis, Table 3.2: smallest number of arcs and duration (s) with the printed beta-hat",
+        pose_tables.PUBLISHED,
+        pose_tables.table_3_2,
+    ),
 }
 
 
@@ -118,7 +123,14 @@ def table_object(name: str, cells: list[Cell]) -> dict[str, Any]:
 def _plain(cell: Cell) -> dict[str, Any]:
     found = dataclasses.asdict(cell)
     variant = found.pop("variant")
-    return found | ({"variant": {"reading": variant}} if variant else {})
+    return found | ({"variant": _variant(variant)} if variant else {})
+
+
+def _variant(text: str) -> dict[str, str]:
+    # "key = value; key = value", or a reading in words.
+    if "; " not in text:
+        return {"reading": text}
+    return dict(part.split(" = ", 1) for part in text.split("; "))
 
 
 def table_for_people(name: str, cells: list[Cell]):

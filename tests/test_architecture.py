@@ -26,7 +26,7 @@ LAYERS = (
     ("sweep.checks", "sweep.definition", "sweep.signals", "sweep.environment"),
     ("sweep.work", "sweep.claims", "sweep.inspection", "sweep.tile"),
     ("sweep", "planning", "choices", "sequences", "pose_sequences", "api"),
-    ("bench", "transition_tables", "tables", "reports", "motions", "plots"),
+    ("bench", "transition_tables", "pose_tables", "tables", "reports", "motions", "plots"),
     ("cli", "__main__"),
 )
 KERNELS = tuple(name for layer in LAYERS[:6] for name in layer)

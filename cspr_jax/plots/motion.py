@@ -21,9 +21,15 @@ def motion_figure(result: Result) -> Figure:
     """
     time, position, tension = result.axes["t"], result.data["position"], result.data["tension"]
     planar = tension.shape[1] == 2
-    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
     places: Any = [["xz", "xz"] if planar else ["xy", "xz"], ["tension", "tension"]]
-    drawn = figure.subplot_mosaic(places, height_ratios=[1.2, 1.0])
+    heights = [1.2, 1.0]
+    if "quaternion" in result.data:
+        places.insert(1, ["orientation", "orientation"])
+        heights.insert(1, 0.8)
+    figure = Figure(figsize=(10.0, 2.8 * sum(heights)), layout="constrained")
+    drawn = figure.subplot_mosaic(places, height_ratios=heights)
+    if "quaternion" in result.data:
+        _orientation(drawn["orientation"], time, result.data["quaternion"])
     for name, j in (("xy", 1), ("xz", 2)):
         if name in drawn:
             _path(drawn[name], position, j)
@@ -41,6 +47,15 @@ def _path(panel: Axes, position: np.ndarray, j: int) -> None:
     panel.set_ylabel(f"{'xyz'[j]} (m)")
     panel.set_aspect("equal", adjustable="datalim")
     panel.grid(alpha=0.3)
+
+
+def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:
+    for k, name in enumerate("wxyz"):
+        panel.plot(time, quaternion[:, k], linestyle=STYLES[k], color=COLOURS[k], linewidth=1.0, label=name)
+    panel.set_xlabel("time (s)")
+    panel.set_ylabel("quaternion")
+    panel.legend(ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    panel.margins(x=0.01)
 
 
 def _tensions(panel: Axes, time: np.ndarray, tension: np.ndarray, mass: object) -> None:

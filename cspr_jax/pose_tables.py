@@ -1,0 +1,56 @@
+"""Table 3.2 of the thesis: arcs and durations of the sequence of poses of Table 3.1."""
+
+import copy
+import math
+from pathlib import Path
+from typing import Any
+
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.reading import checked, read_toml
+from cspr_jax.planning import plan_of
+from cspr_jax.transition_tables import Key
+
+SEQUENCE = Path(__file__).parent / "published" / "table_3_2.toml"
+# The text names the quintic; its numbers fit the others. Which epsilon was used is not printed.
+_AMPLITUDES: dict[str, Any] = {
+    "quintic": "quintic",
+    "effective 0.1": {"name": "effective", "epsilon": 0.1},
+    "effective-c3 0.1": {"name": "effective-c3", "epsilon": 0.1},
+}
+# Torsion of pose 2: as printed, neither of its segments has a feasible number of arcs.
+_TORSIONS = {"pi/3": math.pi / 3.0, "pi/2 (printed)": math.pi / 2.0}
+_POSE = 2
+
+
+def _variant(amplitude: str, torsion: str) -> str:
+    return f"amplitude = {amplitude}; pose_2 = {torsion}"
+
+
+def table_3_2() -> dict[Key, float | None]:
+    """Arcs and durations with the printed values of beta-hat, for three amplitude functions and two readings of pose 2.
+
+    Returns:
+        cells; rows name the pose at which a segment starts.
+    """
+    data, found = read_toml(SEQUENCE), {}
+    for amplitude, key in _AMPLITUDES.items():
+        for torsion, angle in _TORSIONS.items():
+            changed = copy.deepcopy(data)
+            changed["amplitude"] = key
+            changed["pose"][_POSE]["tilt_torsion"][2] = angle
+            answers = plan_of(checked(PlanFile, changed, SEQUENCE), SEQUENCE).answers
+            for i, arcs in enumerate(answers.arcs):
+                is_found = arcs > 0
+                found[str(i), "p", _variant(amplitude, torsion)] = float(arcs) if is_found else None
+                found[str(i), "T", _variant(amplitude, torsion)] = float(answers.duration[i]) if is_found else None
+    return found
+
+
+_PRINTED = {"0": (8, 9.4944), "1": (9, 10.6739), "2": (9, 10.6740), "6": (4, 4.7472)}
+PUBLISHED: dict[Key, float] = {
+    (row, column, _variant(amplitude, torsion)): value
+    for amplitude in _AMPLITUDES
+    for torsion in _TORSIONS
+    for row, values in _PRINTED.items()
+    for column, value in zip(("p", "T"), values, strict=True)
+}
