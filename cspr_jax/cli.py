@@ -254,6 +254,8 @@ def _plan(options: argparse.Namespace) -> int:
 
     plan = planning.plan(options.plan)
     feasible = reports.is_feasible(plan)
+    for line in plan.warnings:
+        _warn(line)
     if options.json:
         _print_json(reports.plan_object(plan))
     else:

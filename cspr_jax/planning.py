@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import problem
+from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.choices import best_amplitude, chosen_depth
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
@@ -24,6 +25,9 @@ from cspr_jax.sequences import sequence_of
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.pose_segment import PoseSegment
 
+# A third derivative that changes more than this, relative to its largest value, just beside a knot makes tensions jump.
+JUMP, NEAR_KNOT = 1e-6, 1e-12
+_JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
 # Where a search for z0 takes "best" epsilon to be, until it is chosen.
 FIRST_EPSILON = 0.2
 
@@ -42,6 +46,7 @@ class Plan:
         extremes: of the n segments.
         segments: of the n segments, each of the parity of its number of arcs.
         backwards: (n,) whether a segment runs against its normalised time, from its target back to rest.
+        warnings: what its user should know, one line each.
     """
 
     spec: RobotFile
@@ -53,6 +58,7 @@ class Plan:
     extremes: Extremes
     segments: Segment | PoseSegment
     backwards: np.ndarray
+    warnings: tuple[str, ...] = ()
 
 
 def plan(path: Path) -> Plan:
@@ -103,6 +109,12 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     return Plan(spec, keys, shared, z0, points, answers, asked, segments, sequence.backwards)
 
 
+def _jumps(amplitude: Amplitude) -> bool:
+    # Whether A''' jumps between pieces.
+    sides = [derivatives(amplitude, jnp.asarray(amplitude.knots) + s, order=3)[3] for s in (-NEAR_KNOT, NEAR_KNOT)]
+    return bool((np.abs(np.asarray(sides[1] - sides[0])) > JUMP * float(amplitude.largest[3])).any())
+
+
 def _plan_of_poses(spec: RobotFile, keys: PlanFile, path: Path) -> Plan:
     # Of a rigid platform, thesis chapter 3.
     sequence = Poses(spec, keys, path)
@@ -121,4 +133,5 @@ def _plan_of_poses(spec: RobotFile, keys: PlanFile, path: Path) -> Plan:
     answers = sequence.answers(shared, points, depth)
     segments = sequence.segments(shared, points, depth, answers)
     asked = pose_extremes(shared, segments, answers.tried_arcs, keys.samples, variable=sequence.variable)
-    return Plan(spec, keys, shared, z0, points, answers, asked, segments, sequence.backwards)
+    warnings = (_JUMPS.format(amplitude.name),) if sequence.variable and _jumps(amplitude) else ()
+    return Plan(spec, keys, shared, z0, points, answers, asked, segments, sequence.backwards, warnings)

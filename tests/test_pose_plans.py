@@ -1,0 +1,340 @@
+"""Plans of a six-cable platform: verdicts beside the oracle, symmetries, Table 3.2, motions, mistakes."""
+
+import contextlib
+import csv
+import io
+import itertools
+import json
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from oracles import platform as oracle
+from test_platform import MSSM, Z0, made, ours, random_pose
+
+from cspr_jax.amplitudes import named
+from cspr_jax.cli import main
+from cspr_jax.feasibility.interference import contacts, gaps, platform_hit, views
+from cspr_jax.feasibility.limits import Limits
+from cspr_jax.feasibility.pose_checks import PoseChecker
+from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.maps.bends import LARGEST, cheapest_path, options
+from cspr_jax.reference_pose import reference_pose
+
+ROOT = Path(__file__).parent.parent
+SEQUENCE = (ROOT / "sweeps" / "table_3_2.toml").read_text("utf-8")
+HEAD, *PARTS = SEQUENCE.split("[[pose]]\n")
+# Rest, the last pose, rest.
+SHORT = "[[pose]]\n".join([HEAD, PARTS[0], PARTS[-2], PARTS[-1]])
+
+
+def cspr(*arguments):
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        code = main([str(argument) for argument in arguments])
+    return code, out.getvalue(), err.getvalue()
+
+
+def planned(folder, text, *arguments):
+    (folder / "plan.toml").write_text(text)
+    return cspr("plan", folder / "plan.toml", *arguments)
+
+
+@pytest.fixture(scope="module")
+def checker():
+    """Of the MSSM, with the function that has no jumps."""
+    return checker_with(named("effective-c3", 0.1))
+
+
+def checker_with(amplitude, limits=None):
+    robot = ours(MSSM)
+    still = reference_pose(robot, Z0)
+    return PoseChecker(PoseShared(robot, limits or Limits(), amplitude, jnp.asarray(still.conditioning)))
+
+
+def checked(checker, start, end, bends, p):
+    segment = made(checker.shared.robot, start, end, Z0, bends, p)
+    return checker.check(jax.tree.map(lambda x: np.asarray(x)[None], segment), np.array([p]))
+
+
+def near_pose(rng):
+    position = np.array([*rng.uniform(-1.3, 1.3, 2), rng.uniform(0.9, 1.8)])
+    return position, oracle.pose_quaternion(position, rng.uniform([-np.pi, 0.0, -1.2], [np.pi, 1.3, 1.2]))
+
+
+def test_verdicts_are_the_oracle_s(checker):
+    """Of random motions, at 4001 samples; margins and distances too, where the motion is not singular."""
+    rng, seen = np.random.default_rng(11), set()
+    for i in range(60):
+        p = int(rng.integers(2, 10))
+        start, end = random_pose(rng, rest=True) if i % 2 else near_pose(rng), near_pose(rng)
+        bends = (-1.0 if i % 2 else rng.uniform(-6.0, 1.0), rng.uniform(-6.0, 1.0))
+        found = checked(checker, start, end, bends, p)
+        segment = oracle.Segment(start[0], end[0], Z0, start[1], end[1], amplitude=oracle.effective_c3(0.1))
+        wanted = oracle.check_motion(MSSM, segment, p, bends, 4001)
+        verdict = Verdict(int(found.verdict[0]))
+        seen |= {flag for flag in Verdict if flag & verdict} | ({None} if verdict == 0 else set())
+        assert (verdict == 0) == wanted["feasible"], (i, verdict.text)
+        assert bool(verdict & Verdict.CABLE_CABLE) == wanted["cable_cable"]
+        assert bool(verdict & Verdict.CABLE_PLATFORM) == wanted["cable_platform"]
+        if wanted["det_min"] > 0.0:
+            assert found.slack[0, 0] == pytest.approx(wanted["mu_hat_min"], rel=2e-3, abs=2e-3)
+            assert found.slack[0, 0] <= wanted["mu_hat_min"] + 1e-9
+        assert found.gap[0] == pytest.approx(wanted["cable_distance_min"], abs=2e-4)
+    assert {None, Verdict.SLACK_CABLE, Verdict.SINGULAR} <= seen
+
+
+def test_verdicts_do_not_change_with_more_samples(checker, monkeypatch):
+    rng = np.random.default_rng(12)
+    cases = [
+        (near_pose(rng), near_pose(rng), tuple(rng.uniform(-5.0, 0.0, 2)), int(rng.integers(3, 9))) for _ in range(40)
+    ]
+    first = [checked(checker, *case) for case in cases]
+    monkeypatch.setattr("cspr_jax.feasibility.pose_checks.SAMPLES", 201)
+    for case, before in zip(cases, first, strict=True):
+        after = checked(checker, *case)
+        assert after.verdict[0] == before.verdict[0]
+        if after.slack[0, 1] > 0.0:
+            np.testing.assert_allclose(after.slack, before.slack, atol=1e-6)
+            np.testing.assert_allclose(after.gap, before.gap, atol=1e-6)
+
+
+def turned(pose, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    half = np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
+    position = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ pose[0]
+    return position, oracle.product(oracle.product(half, pose[1]), oracle.conjugate(half))
+
+
+def mirrored(pose):
+    return pose[0] * [-1.0, 1.0, 1.0], pose[1] * [1.0, 1.0, -1.0, -1.0]
+
+
+def test_symmetries_of_the_mssm():
+    """A third of a turn, the mirror x -> -x, and time reversed change no verdict and no margin."""
+    checker, rng = checker_with(named("quintic")), np.random.default_rng(13)
+    for _ in range(12):
+        start, end, bends, p = near_pose(rng), near_pose(rng), tuple(rng.uniform(-5.0, 0.0, 2)), int(rng.integers(3, 9))
+        plain = checked(checker, start, end, bends, p)
+        for other in (
+            checked(checker, turned(start, 2.0 * np.pi / 3.0), turned(end, 2.0 * np.pi / 3.0), bends, p),
+            checked(checker, mirrored(start), mirrored(end), bends, p),
+            checked(checker, end, start, bends[::-1], p),
+        ):
+            assert other.verdict[0] == plain.verdict[0]
+            if plain.slack[0, 1] > 0.0:
+                np.testing.assert_allclose(other.slack, plain.slack, atol=1e-7)
+                np.testing.assert_allclose(other.gap, plain.gap, atol=1e-7)
+
+
+def test_limits_of_a_platform():
+    """Each limit, set to just beyond and just within what a motion asks for."""
+    rng = np.random.default_rng(14)
+    start, end = random_pose(rng, rest=True), (np.array([0.9, 0.6, 1.3]), np.array([1.0, 0.0, 0.0, 0.0]))
+    motion = oracle.motion(
+        MSSM, oracle.Segment(start[0], end[0], Z0, start[1], end[1]), 5, (-1.0, -1.0), np.linspace(0, 1, 4001)
+    )
+    lengths = np.linalg.norm(oracle.cables(MSSM, motion.position, motion.rotation), axis=-1)
+    cases = {
+        "cable_length_max": (lengths.max(), Verdict.CABLE_TOO_LONG),
+        "floor": (motion.position[:, 2].max(), Verdict.BELOW_FLOOR),
+    }
+    for name, (value, flag) in cases.items():
+        for factor, broken in ((0.999, True), (1.001, False)):
+            limit = np.asarray(value * factor) if name == "floor" else np.full(6, value * factor)
+            found = checked(checker_with(named("quintic"), Limits(**{name: limit})), start, end, (-1.0, -1.0), 5)
+            assert bool(Verdict(int(found.verdict[0])) & flag) == broken, name
+
+
+def test_vectors_between_cables_and_hits():
+    """Against the oracle, pair by pair and step by step."""
+    robot, rng = ours(MSSM), np.random.default_rng(15)
+    near = contacts(robot)
+    pairs = oracle.colliding_pairs(MSSM)
+    order = [[tuple(pair) for pair in near.pairs.tolist()].index(pair) for pair in pairs]
+    poses = [random_pose(rng) for _ in range(300)]
+    position = np.array([p for p, _ in poses])
+    rotation = np.array([oracle.matrix(q) for _, q in poses])
+    found = np.asarray(jax.vmap(lambda p, r: gaps(robot, near.pairs, p, r))(position, rotation))[:, order]
+    shortest, _ = oracle.cable_vectors(MSSM, position, rotation)
+    lengths = np.linalg.norm(np.asarray(shortest).reshape(found.shape), axis=-1)
+    np.testing.assert_allclose(np.linalg.norm(found, axis=2), lengths, atol=1e-9)
+    step = np.array([np.cos(0.1), *(np.sin(0.1) * np.array([0.6, 0.0, 0.8]))])
+    after = np.array([oracle.matrix(oracle.product(q, step)) for _, q in poses])
+    seen = [np.asarray(jax.vmap(lambda p, r: views(robot, p, r))(position, r)) for r in (rotation, after)]
+    hits = platform_hit(near.sides, near.normal, *seen).any(1)
+    wanted = [
+        bool(np.any(oracle.platform_hit(MSSM, np.stack([p, p]), np.stack([a, b]))))
+        for p, a, b in zip(position, rotation, after, strict=True)
+    ]
+    assert hits.tolist() == wanted and 3 < sum(wanted) < 200
+
+
+@given(st.floats(-30.0, 30.0), st.floats(-30.0, 30.0), st.floats(-30.0, 30.0))
+def test_values_of_beta_hat(preferred, low, high):
+    """All within the interval, the preferred one first if it is, the others by their distance from the first."""
+    found = options(preferred, low, high)
+    if not len(found):
+        assert not low < high or not max(low, -LARGEST) < min(high, LARGEST)
+        return
+    assert ((found >= low) & (found <= high)).all()
+    if low < preferred < high:
+        assert found[0] == preferred
+    gaps_to_first = np.abs(found[1:] - found[0])
+    assert (np.diff(gaps_to_first) >= -1e-9).all()
+
+
+@given(st.integers(1, 4), st.integers(0, 10_000))
+def test_the_cheapest_path(segments, seed):
+    """Against all paths: fewest infeasible segments, then the smallest sum."""
+    rng = np.random.default_rng(seed)
+    sizes = rng.integers(1, 4, segments + 1)
+    costs = [
+        np.where(rng.random((a, b)) < 0.3, np.inf, rng.integers(1, 9, (a, b)).astype(float))
+        for a, b in itertools.pairwise(sizes)
+    ]
+
+    def price(path):
+        values = [cost[i, j] for cost, (i, j) in zip(costs, itertools.pairwise(path), strict=True)]
+        return sum(np.isinf(v) for v in values), sum(v for v in values if np.isfinite(v))
+
+    best = min(price(path) for path in itertools.product(*(range(n) for n in sizes)))
+    assert price(cheapest_path(costs)) == best
+
+
+@pytest.fixture(scope="module")
+def table():
+    code, out, _ = cspr("table", "3.2", "--json")
+    assert code == 0
+    return json.loads(out)["cells"]
+
+
+def test_table_3_2(table):
+    """Every printed row with either of the functions that are nearly straight; the quintic of the text needs more."""
+    for cell in table:
+        amplitude, pose = cell["variant"]["amplitude"], cell["variant"]["pose_2"]
+        if cell["published"] is None:
+            continue
+        if pose != "pi/3" and cell["row"] in "12":
+            assert cell["computed"] is None  # pose 2 as printed cannot be reached, nor left
+        elif amplitude != "quintic":
+            assert cell["computed"] == pytest.approx(cell["published"], abs=1e-3 if cell["column"] == "T" else 0)
+        elif cell["column"] == "p":
+            assert cell["computed"] == {"0": 12, "1": 9, "2": 9, "6": 5}[cell["row"]]
+    found = [c["computed"] for c in table if c["column"] == "p" and c["variant"]["pose_2"] == "pi/3"]
+    assert found[14:] == [8, 9, 9, 12, 9, 7, 4] == found[7:14]
+
+
+def test_a_free_beta_hat_needs_no_more_arcs(tmp_path):
+    free = "\n".join(line for line in SHORT.splitlines() if not line.startswith("beta_hat"))
+    found = [json.loads(planned(tmp_path, text, "--json")[1]) for text in (SHORT, free)]
+    assert found[1]["feasible"] and found[1]["total_duration"] <= found[0]["total_duration"] + 1e-9
+    ends = [s["beta_hat"] for s in found[1]["segments"]]
+    assert ends[0][1] == ends[1][0] and ends[0][0] == ends[1][1] == -1.0
+
+
+def test_the_motion(tmp_path):
+    """Columns, the oracle's numbers, and no jump of acceleration, angular acceleration and tension between segments."""
+    code, out, err = planned(tmp_path, SHORT, "--json", "-o", tmp_path / "motion.csv")
+    found = json.loads(out)
+    assert (code, err) == (0, "") and [s["cable_interference"] for s in found["segments"]] == [False, False]
+    heads, *rows = csv.reader((tmp_path / "motion.csv").read_text().splitlines())
+    vectors = [f"{n}_{k}" for n in ("position", "velocity", "acceleration") for k in "xyz"]
+    spins = [*(f"quaternion_{k}" for k in "wxyz"), *(f"{n}_{k}" for n in ("omega", "omega_dot") for k in "xyz")]
+    assert heads == ["t", *vectors, *spins, *(f"{n}_{k}" for n in ("length", "rate", "tension") for k in range(1, 7))]
+    table = dict(zip(heads, np.array(rows, float).T, strict=True))
+    tau, target = np.linspace(0.0, 1.0, 400), np.array([0.0, 1.732, 1.7])
+    orientation = oracle.pose_quaternion(target, (np.pi / 2, -np.pi / 6, 0.0))
+    rest = np.array([0.0, 0.0, 1.4]), np.array([1.0, 0.0, 0.0, 0.0])
+    for i, segment in enumerate(found["segments"]):
+        ends = (rest, (target, orientation))[:: 1 if i == 0 else -1]
+        made_of = oracle.Segment(
+            ends[0][0], ends[1][0], 1.4, ends[0][1], ends[1][1], amplitude=oracle.effective_c3(0.1)
+        )
+        wanted = oracle.motion(MSSM, made_of, segment["arcs"], segment["beta_hat"], tau)
+        part = {name: column[400 * i : 400 * (i + 1)] for name, column in table.items()}
+        for name, values in (("position", wanted.position), ("acceleration", wanted.acceleration)):
+            np.testing.assert_allclose(np.stack([part[f"{name}_{k}"] for k in "xyz"], 1), values, atol=1e-8)
+        np.testing.assert_allclose(np.stack([part[f"omega_dot_{k}"] for k in "xyz"], 1), wanted.omega_dot, atol=1e-7)
+        turn = np.stack([part[f"quaternion_{k}"] for k in "wxyz"], 1)
+        np.testing.assert_allclose([oracle.matrix(q) for q in turn], wanted.rotation, atol=1e-9)
+        lowest = min(part[f"tension_{k}"].min() for k in range(1, 7))
+        assert 0.0 < segment["tension_min"] <= lowest + 1e-9 and segment["tension_min"] > 0.95 * lowest
+    for name in (*vectors, *(f"omega_dot_{k}" for k in "xyz"), *(f"tension_{k}" for k in range(1, 7))):
+        assert table[name][399] == pytest.approx(table[name][400], abs=1e-8), name
+
+
+def test_an_upward_z_axis(tmp_path):
+    """The same robot and poses described with z up: a rotation by half a turn about x."""
+    base, platform = (np.round(x * [1.0, -1.0, -1.0], 15).tolist() for x in (MSSM.base, MSSM.platform))
+    robot = f'{{ name = "up", mass = 1.0, z_axis = "up", base_points = {base}, platform_points = {platform}, '
+    robot += f"inertia = {MSSM.inertia.tolist()} }}"
+    text = SHORT.replace('"laval-mssm"', robot).replace("[0.0, 1.732, 1.7]", "[0.0, -1.732, -1.7]")
+    down, q = SHORT, oracle.pose_quaternion([0.0, 1.732, 1.7], (np.pi / 2, -np.pi / 6, 0.0))
+    old = next(line for line in text.splitlines() if line.startswith("tilt_torsion"))
+    text = text.replace(old, f"quaternion = {(q * [1, 1, -1, -1]).tolist()}")
+    found = [json.loads(planned(tmp_path, t, "--json")[1]) for t in (down, text)]
+    for a, b in zip(found[0]["segments"], found[1]["segments"], strict=True):
+        assert a["arcs"] == b["arcs"] and a["margin"] == pytest.approx(b["margin"], rel=1e-6)
+        assert a["z_lowest"] == pytest.approx(-b["z_lowest"])
+
+
+def test_jumps_are_named(tmp_path):
+    text = SHORT.replace('"effective-c3"', '"effective"')
+    code, _, err = planned(tmp_path, text)
+    assert code == 0 and "jump" in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('"hypocycloid"', '"transition"'), 'family = "transition": must be'),
+        (("tilt_torsion", "quaternion = [1.0, 0.0, 0.0, 0.0]\ntilt_torsion"), "must be absent beside tilt_torsion"),
+        (("rest = true", "rest = true\ntilt_torsion = [0.0, 0.1, 0.0]"), "reference orientation at rest"),
+        (("rest = true", "rest = true\nposition = [0.1, 0.0, 1.4]"), "must be P0"),
+        (("[0.0, 1.732, 1.7]", "[0.0, 1.732, -0.1]"), "pose[1].position: must be below the spool plane"),
+        (("[1.5707963267948966, -0.5235987755982988, 0.0]", "[0.0, 0.0, 1.5707963267948966]"), "singular there"),
+        (("beta_hat = -14.6701", "beta_hat = -1000.0"), "beta_hat = -1000.0"),
+        (("epsilon = 0.1", 'epsilon = "best"'), "must be a number"),
+        (("z0 = 1.4", 'z0 = { choose = "fastest" }'), "for a platform"),
+        (('"laval-mssm"', '"prototype"'), "for a point mass"),
+    ],
+)
+def test_mistakes(tmp_path, change, words):
+    assert change[0] in SHORT
+    code, out, err = planned(tmp_path, SHORT.replace(*change, 1), "-o", tmp_path / "motion.csv")
+    assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1, err
+    assert not (tmp_path / "motion.csv").exists()
+
+
+def test_quaternions_that_are_not_unit(tmp_path):
+    old = next(line for line in SHORT.splitlines() if line.startswith("tilt_torsion"))
+    good = SHORT.replace(old, "quaternion = [0.9659258262890683, 0.0, -0.25881904510252074, 0.0000005]")
+    assert planned(tmp_path, good)[0] == 0
+    bad = SHORT.replace(old, "quaternion = [0.97, 0.0, -0.25881904510252074, 0.0]")
+    code, _, err = planned(tmp_path, bad)
+    assert code == 2 and "must have length 1" in err
+
+
+ROBOT = 'base_points = {base}\nplatform_points = {platform}\ninertia = {inertia}\nmass = 1.0\nname = "mine"\n'
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("inertia = ", "# "), "both platform_points and inertia"),
+        (("name", "planar = true\nname"), "not both"),
+        (("name", "centre_of_mass = [0.6, 0.0, 0.0]\nname"), "slack cable"),
+        (("[[0.003", "[[-0.003"), "positive definite"),
+    ],
+)
+def test_robot_files_that_are_wrong(tmp_path, change, words):
+    text = ROBOT.format(base=MSSM.base.tolist(), platform=MSSM.platform.tolist(), inertia=MSSM.inertia.tolist())
+    assert change[0] in text
+    (tmp_path / "robot.toml").write_text(text.replace(*change, 1))
+    code, _, err = planned(tmp_path, SHORT.replace('"laval-mssm"', '"robot.toml"'))
+    assert code == 2 and words in err and len(err.splitlines()) == 1, err
