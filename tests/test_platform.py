@@ -18,6 +18,7 @@ from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.endpoints import endpoint
+from cspr_jax.feasibility.pose_kernel import smallest_tensions
 from cspr_jax.platforms import pairs_apart, platform_robot
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.trajectories import pose_segment as segments
@@ -318,3 +319,41 @@ def test_robots_that_do_not_hang():
     ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
     with pytest.raises(InputError, match="singular"):
         reference_pose(changed(platform_points=ring, base_points=ring), Z0)
+
+
+@pytest.mark.parametrize("variable", [True, False])
+@pytest.mark.parametrize("name", AMPLITUDES)
+@pytest.mark.parametrize("robot", [MSSM, general(2)])
+def test_the_fast_kernel(robot, name, variable):
+    """The smallest tension of many segments as the readable functions give it; -inf past a singularity."""
+    package, rng, amplitude = ours(robot), np.random.default_rng(9), AMPLITUDES[name][0]
+    rest = (jnp.array([0.0, 0.0, Z0]), jnp.eye(3))
+    reference = float(wrenches.conditioning(package, *rest))
+    for p in (1, 4, 7):
+        tau = np.linspace(0.0, 1.0, 32)
+        some = [
+            made(package, random_pose(rng, rest=i % 3 == 0), random_pose(rng), Z0, (-1.0, rng.uniform(-5.0, 1.0)), p)
+            for i in range(24)
+        ]
+        batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
+        found = smallest_tensions(package, np.sign(reference), amplitude, float(p), tau, batch, variable=variable)
+        single = jax.tree.map(lambda x: np.asarray(x, np.float32), (package, amplitude, batch))
+        rough = smallest_tensions(
+            single[0],
+            np.float32(np.sign(reference)),
+            single[1],
+            np.float32(p),
+            tau.astype(np.float32),
+            single[2],
+            variable=variable,
+        )
+        for i, segment in enumerate(some):
+            at = states(package, segment, amplitude, float(p), tau, variable=variable)
+            mu = np.asarray(jax.vmap(lambda *x: wrenches.tensions_per_length(package, wrenches.Pose(*x)))(*at))
+            det = np.asarray(jax.vmap(lambda x, r: wrenches.conditioning(package, x, r))(at.position, at.rotation))
+            if (det / reference > 1e-4).all():
+                wanted = 6.0 * Z0 / 9.81 * mu.min()
+                assert float(found[i]) == pytest.approx(wanted, rel=1e-8, abs=1e-9)
+                assert float(rough[i]) == pytest.approx(wanted, rel=0.02, abs=0.02)
+            elif (det / reference < -1e-4).any():
+                assert float(found[i]) == -np.inf

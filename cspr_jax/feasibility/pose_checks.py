@@ -14,6 +14,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.feasibility.interference import Contacts, cables_cross, contacts, gaps, platform_hit, views
+from cspr_jax.feasibility.pose_kernel import smallest_tensions
 from cspr_jax.feasibility.pose_slacks import PoseShared, flags, slacks_at
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.grids import in_batches
@@ -21,6 +22,8 @@ from cspr_jax.trajectories.pose_segment import PoseSegment, duration, motion
 
 # Few instants are computed in small batches: a batch is always full.
 BATCHES = (512, 4096)
+# Instants of one call of the fast kernel, and segments.
+CHUNK, KERNEL_BATCH = 32, 2048
 SAMPLES = 64  # an arc
 # Narrowing: places looked at for each value, points at each, and how often.
 PLACES, POINTS, ROUNDS = 3, 17, 4
@@ -47,9 +50,9 @@ class PoseChecks:
     samples: np.ndarray
 
 
-@partial(jax.jit, static_argnames="variable")
-def _slacks(shared: PoseShared, arguments, *, variable: bool) -> Array:
-    return jax.vmap(partial(slacks_at, shared, variable=variable))(*arguments)
+def _lowest(shared: PoseShared, arcs: float, tau: np.ndarray, segments: PoseSegment, *, variable: bool) -> Array:
+    sign = jnp.sign(shared.conditioning)
+    return smallest_tensions(shared.robot, sign, shared.amplitude, arcs, tau, segments, variable=variable)
 
 
 @partial(jax.jit, static_argnames="variable")
@@ -99,20 +102,30 @@ class PoseChecker:
         """
         return in_batches(_durations, (segments, arcs.astype(float)), size=BATCHES[0])
 
-    def first_look(self, segments: PoseSegment, arcs: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        """Smallest slack over some instants, interference left out: what is negative here is infeasible.
+    def first_look(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest tension over some instants, by the fast kernel: what is negative here is infeasible.
 
         Args:
-            segments: leaves (n, ...), of the parity of `arcs`.
-            arcs: (n,).
-            tau: (m,) instants, the same for all.
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants.
 
         Returns:
-            (n,); NaN counts as -inf.
+            (n,) over its value at rest in P0; -inf beyond a singularity or where not finite.
         """
-        owner, instant = np.repeat(np.arange(len(arcs)), len(tau)), np.tile(tau, len(arcs))
-        slack = self._slack(segments, arcs, owner, instant).min(1).reshape(len(arcs), len(tau))
-        return np.where(np.isnan(slack), -np.inf, slack).min(1)
+        shared, count = self.shared, len(segments.rate)
+        # One shape for all: instants in chunks, the last of them repeated.
+        whole = -(-len(tau) // CHUNK) * CHUNK
+        chunks = np.pad(tau, (0, whole - len(tau)), mode="edge").reshape(-1, CHUNK)
+        lowest = np.full(count, np.inf)
+        for chunk in chunks:
+            alive = np.flatnonzero(lowest > 0.0)
+            if not len(alive):
+                break
+            kernel = partial(_lowest, shared, float(arcs), chunk, variable=self.variable)
+            found = in_batches(kernel, jax.tree.map(lambda x, a=alive: x[a], segments), size=KERNEL_BATCH)
+            lowest[alive] = np.minimum(lowest[alive], np.where(np.isnan(found), -np.inf, found))
+        return lowest
 
     def check(self, segments: PoseSegment, arcs: np.ndarray) -> PoseChecks:
         """Check motions in full.
@@ -126,10 +139,6 @@ class PoseChecker:
         """
         parts = [self._check_one(jax.tree.map(lambda x, i=i: x[i], segments), int(p)) for i, p in enumerate(arcs)]
         return PoseChecks(*(np.array(column) for column in zip(*parts, strict=True)))
-
-    def _slack(self, segments: PoseSegment, arcs: np.ndarray, owner: np.ndarray, tau: np.ndarray) -> np.ndarray:
-        items = (*jax.tree.map(lambda x: np.asarray(x)[owner], (segments, arcs.astype(float))), tau)
-        return in_batches(partial(_slacks, self.shared, variable=self.variable), items, size=_size(len(tau)))
 
     def _all(self, segment: PoseSegment, arcs: int, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         items = jax.tree.map(lambda x: np.broadcast_to(x, (len(tau), *np.shape(x))), (segment, float(arcs)))

@@ -11,9 +11,9 @@ from cspr_jax.maps.bends import BEYOND
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.trajectories.pose_segment import PoseSegment, pose_segment
 
-# Instants an arc of the first look, late ones first: there most motions fail.
-COARSE = 6
-LATE = np.linspace(0.7, 1.0, 13)
+# Instants of the first look: late ones first, since there most motions fail; then so many an arc.
+LATE = np.linspace(0.7, 1.0, 32)
+COARSE = 12
 
 
 class Ends(NamedTuple):
@@ -79,19 +79,19 @@ def smallest_arcs(checker: PoseChecker, ends: Ends, z0: float, *, max_arcs: int,
         segments = segments_between(checker.shared.robot, ends, z0, arcs)
         open_ones = np.flatnonzero(found == 0)
         for tau in (LATE, np.linspace(0.0, 1.0, COARSE * arcs + 1)):
-            some = jax.tree.map(lambda x, o=open_ones: x[o], segments)
-            slack = checker.first_look(some, np.full(len(open_ones), arcs), tau) if len(open_ones) else np.array([])
-            open_ones = open_ones[slack > 0.0]
-        checks = (
-            checker.check(jax.tree.map(lambda x, o=open_ones: x[o], segments), np.full(len(open_ones), arcs))
-            if len(open_ones)
-            else None
-        )
-        if checks is not None:
-            found[open_ones[checks.verdict == 0]] = arcs
-            if (checks.verdict == 0).any():
-                last = min(last, arcs + BEYOND)
+            if len(open_ones):
+                open_ones = open_ones[checker.first_look(_rows(segments, open_ones), arcs, tau) > 0.0]
+        if not len(open_ones):
+            continue
+        passed = checker.check(_rows(segments, open_ones), np.full(len(open_ones), arcs)).verdict == 0
+        found[open_ones[passed]] = arcs
+        if passed.any():
+            last = min(last, arcs + BEYOND)
     return found.reshape(len(ends.start_bends), len(ends.end_bends))
+
+
+def _rows(segments: PoseSegment, rows: np.ndarray) -> PoseSegment:
+    return jax.tree.map(lambda x: x[rows], segments)
 
 
 def best_candidate(checker: PoseChecker, ends: Ends, z0: float, *, max_arcs: int) -> int:
@@ -109,7 +109,7 @@ def best_candidate(checker: PoseChecker, ends: Ends, z0: float, *, max_arcs: int
     slack = [
         checker.first_look(
             segments_between(checker.shared.robot, ends, z0, arcs),
-            np.array([arcs]),
+            arcs,
             np.linspace(0.0, 1.0, COARSE * arcs + 1),
         )[0]
         for arcs in range(1, max_arcs + 1)
