@@ -152,6 +152,10 @@ class Processes:
                 )
                 for future in done:
                     yield future.result()
+        except BrokenProcessPool:
+            # The pool asks the others to end, but they ignore signals, and may wait for a lock that the dead one held.
+            _kill(pool)
+            raise
         finally:
             if running:
                 _kill(pool)

@@ -85,6 +85,23 @@ def test_worker_processes(job, tmp_path):
     check_same(tmp_path / "run", reference)
 
 
+def test_a_worker_dies_while_another_cannot_end(job, tmp_path):
+    """As one does that waits for a lock the dead one held; here it is stopped."""
+    path, reference = job
+
+    def victims():
+        found = spawned()
+        if len(found) > 1:
+            found[1].suspend()
+        return found
+
+    thread = kill_one_when(tmp_path / "run", 2, victims)
+    code, _, err = cspr("run", path, "-o", tmp_path / "run", "--workers", 2)
+    thread.join()
+    assert (code, err) == (0, "")
+    check_same(tmp_path / "run", reference)
+
+
 def workers_of(cluster):
     return [psutil.Process(worker.pid) for worker in cluster.workers.values()]
 
