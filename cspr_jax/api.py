@@ -15,23 +15,25 @@ from cspr_jax.feasibility.limits import Limits
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_arcs import minimum_arcs as _minimum_arcs
 from cspr_jax.planning import Plan
-from cspr_jax.robots import PointMassRobot, centroid
+from cspr_jax.platforms import PlatformRobot
+from cspr_jax.robots import PointMassRobot, centroid, is_planar
 
 
-def load_robot(reference: str | Path) -> PointMassRobot:
+def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
     """A robot of the catalogue, or of a file. Its axes become z down.
 
     Args:
         reference: a catalogue name, or the path of a robot file.
 
     Returns:
-        the robot, without the limits that its file may hold.
+        the robot, without the limits that its file may hold; with six cables, a platform.
 
     Raises:
         ConfigError: no such robot, or a mistake in its file.
     """
     spec = resolve_robot(str(reference), reference, Path.cwd())
-    return problem.build_robot(spec, TrajectoryKeys(), reference)
+    build = problem.build_platform if spec.is_platform else problem.build_robot
+    return build(spec, TrajectoryKeys(), reference)
 
 
 def plan(path: str | Path) -> Plan:
@@ -75,9 +77,11 @@ def minimum_arcs(
         the answers, (n,) each.
 
     Raises:
-        InputError: shapes that do not fit, values that are not finite, z0 not positive, max_arcs below 1,
+        InputError: another kind of robot, shapes that do not fit, values that are not finite, z0 not positive, max_arcs below 1,
             or an amplitude function that breaks (2.49).
     """
+    if not isinstance(robot, PointMassRobot) or is_planar(robot):
+        raise InputError("robot", robot.name, "a point mass on three cables")
     ends = np.asarray(targets, float)
     if ends.ndim != 2 or ends.shape[1] != 3 or not len(ends) or not np.isfinite(ends).all():
         raise InputError("targets", f"shape {ends.shape}", "finite numbers of shape (n, 3), n >= 1")

@@ -60,7 +60,8 @@ def length(vector: Array) -> Array:
         ().
     """
     square = jnp.sum(vector * vector)
-    return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), 0.0)
+    # NaN stays NaN.
+    return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), square)
 
 
 def leaf(value) -> Array:
