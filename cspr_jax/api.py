@@ -77,8 +77,8 @@ def minimum_arcs(
         the answers, (n,) each.
 
     Raises:
-        InputError: another kind of robot, shapes that do not fit, values that are not finite, z0 not positive, max_arcs below 1,
-            or an amplitude function that breaks (2.49).
+        InputError: another kind of robot, shapes that do not fit, values that are not finite, z0 not positive,
+            max_arcs below 1, or an amplitude function that breaks (2.49).
     """
     if not isinstance(robot, PointMassRobot) or is_planar(robot):
         raise InputError("robot", robot.name, "a point mass on three cables")
