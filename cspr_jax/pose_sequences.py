@@ -86,16 +86,7 @@ class Poses(Sequence):
         return np.array(found)
 
     def answers(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray) -> PoseAnswers:  # type: ignore[override]
-        """Smallest numbers of arcs, with the values of beta-hat that give the fewest in sum; see `Sequence.answers`.
-
-        Args:
-            shared: robot, limits, amplitude, reference.
-            points: (n_poses, 3) m.
-            z0: (n_segments,) m.
-
-        Returns:
-            the answers.
-        """
+        """Smallest numbers of arcs, with the values of beta-hat that give the fewest in sum; see `Sequence.answers`."""
         depth, checker = float(z0[0]), PoseChecker(shared, variable=self.variable)
         poses = list(zip(points, self.quaternions(shared.robot, depth), strict=True))
         bends = [self._bends(shared, i, *pose, depth) for i, pose in enumerate(poses)]
@@ -133,17 +124,7 @@ class Poses(Sequence):
     def segments(  # type: ignore[override]
         self, shared: PoseShared, points: np.ndarray, z0: np.ndarray, answers: PoseAnswers
     ) -> PoseSegment:
-        """The segments; see `Sequence.segments`.
-
-        Args:
-            shared: robot, limits, amplitude, reference.
-            points: (n_poses, 3) m.
-            z0: (n_segments,) m.
-            answers: as `answers` gave them.
-
-        Returns:
-            leaves (n_segments, ...).
-        """
+        """The segments; see `Sequence.segments`."""
         depth = float(z0[0])
         poses = list(zip(points, self.quaternions(shared.robot, depth), strict=True))
         bends = np.append(answers.beta_hat[:, 0], answers.beta_hat[-1, 1])

@@ -111,32 +111,13 @@ class Hypocycloids(Sequence):
         super().__init__(spec, keys, path)
 
     def answers(self, shared: Shared, points: np.ndarray, z0: np.ndarray) -> Answers:
-        """Smallest numbers of arcs; see `Sequence.answers`.
-
-        Args:
-            shared: robot, limits and amplitude.
-            points: (n_poses, 3), or (n_depths, n_poses, 3), m.
-            z0: (n_segments,), or (n_depths * n_segments,), m.
-
-        Returns:
-            the answers, as long as `z0`.
-        """
+        """Smallest numbers of arcs; see `Sequence.answers`."""
         starts, ends = points[..., :-1, :].reshape(-1, 3), points[..., 1:, :].reshape(-1, 3)
         fixed = np.tile(self._arcs, len(z0) // len(self))
         return minimum_arcs(shared, starts, ends, z0, max_arcs=self._largest, arcs=fixed)
 
     def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
-        """The segments; see `Sequence.segments`.
-
-        Args:
-            shared: robot, limits and amplitude.
-            points: (n_poses, 3) m.
-            z0: (n_segments,) m.
-            answers: as `answers` gave them.
-
-        Returns:
-            leaves (n_segments, ...).
-        """
+        """The segments; see `Sequence.segments`."""
         parities, _ = segments_between(shared, points[:-1], points[1:], z0)
         return pick(parities, np.arange(len(self)), answers.tried_arcs)
 
@@ -164,16 +145,7 @@ class Transitions(Sequence):
         return self._backwards
 
     def answers(self, shared: Shared, points: np.ndarray, z0: np.ndarray) -> Answers:
-        """Smallest numbers of oscillations; see `Sequence.answers`.
-
-        Args:
-            shared: robot, limits and amplitude.
-            points: (n_poses, 3), or (n_depths, n_poses, 3), m.
-            z0: (n_segments,), or (n_depths * n_segments,), m.
-
-        Returns:
-            the answers, as long as `z0`.
-        """
+        """Smallest numbers of oscillations; see `Sequence.answers`."""
         repeats = len(z0) // len(self)
         segments = self._between(shared, points, z0)
         return minimum_oscillations(
@@ -186,17 +158,7 @@ class Transitions(Sequence):
         )
 
     def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
-        """The segments; see `Sequence.segments`.
-
-        Args:
-            shared: robot, limits and amplitude.
-            points: (n_poses, 3) m.
-            z0: (n_segments,) m.
-            answers: as `answers` gave them.
-
-        Returns:
-            leaves (n_segments, ...).
-        """
+        """The segments; see `Sequence.segments`."""
         return self._between(shared, points, z0)
 
     def _between(self, shared: Shared, points: np.ndarray, z0: np.ndarray) -> Segment:

@@ -22,14 +22,7 @@ class CellMap(GridMap):
         super().__init__(spec, keys, file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Answers of the cells of a tile.
-
-        Args:
-            cells: (n,) coordinates for each axis, in the file's axes.
-
-        Returns:
-            (n,) for each quantity.
-        """
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
         starts, ends = self._starts(cells), self._targets(cells)
         answers = minimum_arcs(
             self._shared, starts, ends, cells["z0"], max_arcs=self._keys.trajectory.max_arcs, dtype=self._keys.run.dtype
@@ -48,14 +41,7 @@ class CellMap(GridMap):
         return np.stack(columns, axis=1) * self._signs
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse a grid in which no cell has both ends below the spools and within the limits.
-
-        Args:
-            grid: the grid.
-
-        Raises:
-            ConfigError: what is wrong with all of them.
-        """
+        """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""
         self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")
         self._refuse_out_of_reach(self._starts(self._corners(grid, _OF_STARTS)), "trajectory.from")
         self._refuse_long(grid)

@@ -45,14 +45,7 @@ class EnvelopeMap(OscillationMap):
     """The map of instants of transitions; see `GridMap`."""
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Answers of the cells of a tile.
-
-        Args:
-            cells: (n,) coordinates for each axis, in the file's axes.
-
-        Returns:
-            (n,) for each quantity.
-        """
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
         targets = self._targets(cells)
         z0 = self._depths(cells, targets)
         segments = transitions_to(self._shared, targets, z0)
@@ -69,26 +62,12 @@ class EnvelopeMap(OscillationMap):
         }
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse what a map of transitions refuses, and cables that the robot has not.
-
-        Args:
-            grid: the grid.
-
-        Raises:
-            ConfigError: what is wrong.
-        """
+        """Refuse cables that the robot has not; see `GridMap.refuse_hopeless`."""
         n_cables = self._shared.robot.base_points.shape[0]
         if "cable" in grid.axes and not np.isin(grid.axes["cable"], np.arange(1, n_cables + 1)).all():
             raise ConfigError(self._file, f"axes.cable: must be numbers of cables, from 1 to {n_cables}")
         super().refuse_hopeless(grid)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Cells whose numbers contradict each other.
-
-        Args:
-            answers: (n,) each.
-
-        Returns:
-            for each kind of contradiction, (n,) where it is.
-        """
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         return {"an envelope below zero at its own number of oscillations": answers["lower_envelope"] < -_ROUNDING}

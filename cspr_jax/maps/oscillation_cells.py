@@ -27,14 +27,7 @@ class OscillationMap(GridMap):
         super().__init__(spec, keys, file, for_bounds=True)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Answers of the cells of a tile.
-
-        Args:
-            cells: (n,) coordinates for each axis, in the file's axes.
-
-        Returns:
-            (n,) for each quantity.
-        """
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
         targets = self._targets(cells)
         z0 = self._depths(cells, targets)
         segments = transitions_to(self._shared, targets, z0)
@@ -55,14 +48,7 @@ class OscillationMap(GridMap):
         return np.where(z0 > 0.0, z0, _ANY_DEPTH)
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse a grid without a target below the spools and above the floor, or out of a planar robot's plane.
-
-        Args:
-            grid: the grid.
-
-        Raises:
-            ConfigError: what is wrong with all of them.
-        """
+        """Refuse targets that are all out of reach, or out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
         if is_planar(self._shared.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
             raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
         self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")
