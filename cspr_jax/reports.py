@@ -124,12 +124,14 @@ def plan_table(plan: Plan):
     table = Table(title=title, caption=_caption(plan), title_justify="left", caption_justify="left")
     swings = isinstance(plan.answers, OscillationAnswers)
     count = ("oscillations", "v") if swings else ("arcs",)
-    heads = ("to", "position (m)", *count, "T (s)", "margin", "tension (N)", "p → ∞", "verdict")
+    last = "beta-hat" if isinstance(plan.answers, PoseAnswers) else "p → ∞"
+    heads = ("to", "position (m)", *count, "T (s)", "margin", "tension (N)", last, "verdict")
     for head in heads:
         table.add_column(head, justify="left" if head in ("position (m)", "verdict") else "right")
     signs = axis_signs(plan.spec)
     for i, segment in enumerate(plan_object(plan)["segments"]):
-        position = ", ".join(f"{value:.4g}" for value in plan.points[i + 1] * signs)
+        position = ", ".join(f"{round(value, 9) + 0.0:.4g}" for value in plan.points[i + 1] * signs)
+        bends = " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
         found = segment["oscillations" if swings else "arcs"]
         tried = segment["tried_arcs"] // (2 if swings else 1)
         table.add_row(
@@ -140,7 +142,7 @@ def plan_table(plan: Plan):
             _number(segment["duration"], ".2f"),
             _number(segment["margin"], ".4f"),
             f"{_number(segment['tension_min'], '.3f')} .. {_number(segment['tension_max'], '.3f')}",
-            _number(segment["feasible_at_infinity"], ".4f"),
+            bends or _number(segment["feasible_at_infinity"], ".4f"),
             segment["verdict"],
         )
     return table
