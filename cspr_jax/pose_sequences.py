@@ -36,16 +36,14 @@ class PoseAnswers(Answers):
         beta_hat: (n, 2) at both ends.
         regularity: (n,) smallest determinant over its value at rest in P0.
         cable_distance: (n,) smallest distance between cables that can meet, m.
-        samples: (n,) instants of the first look.
     """
 
     beta_hat: np.ndarray
     regularity: np.ndarray
     cable_distance: np.ndarray
-    samples: np.ndarray
 
 
-class Poses(Sequence):
+class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
     """Poses of a platform, joined by the motions of chapter 3; see `Sequence`."""
 
     def __init__(self, spec: RobotFile, keys: PlanFile, path: Path) -> None:
@@ -85,7 +83,7 @@ class Poses(Sequence):
             found.append(given * np.concatenate([[1.0], signs]))
         return np.array(found)
 
-    def answers(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray) -> PoseAnswers:  # type: ignore[override]
+    def answers(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray) -> PoseAnswers:
         """Smallest numbers of arcs, with the values of beta-hat that give the fewest in sum; see `Sequence.answers`."""
         depth, checker = float(z0[0]), PoseChecker(shared, variable=self.variable)
         poses = list(zip(points, self.quaternions(shared.robot, depth), strict=True))
@@ -95,9 +93,12 @@ class Poses(Sequence):
             ends = Ends(poses[i], poses[i + 1], bends[i], bends[i + 1])
             fixed = int(self._arcs[i])
             found.append(smallest_arcs(checker, ends, depth, max_arcs=self._largest, fixed=fixed))
-        path = cheapest_path([np.where(arcs > 0, arcs, np.inf) for arcs in found])
+        path = cheapest_path([np.where(f.arcs > 0, f.arcs, np.inf) for f in found])
         chosen = np.array([bend[k] for bend, k in zip(bends, path, strict=True)])
-        arcs = np.array([a[path[i], path[i + 1]] for i, a in enumerate(found)])
+        arcs, doubtful = (
+            np.array([values[i][path[i], path[i + 1]] for i in range(len(self))])
+            for values in ([f.arcs for f in found], [f.doubtful for f in found])
+        )
         tried = arcs.copy()
         for k in np.flatnonzero(arcs == 0):
             i = int(k)
@@ -105,7 +106,8 @@ class Poses(Sequence):
             tried[i] = int(self._arcs[i]) or best_candidate(checker, ends, depth, max_arcs=self._largest)
         segments = self._between(shared, poses, chosen, depth, tried)
         checks = checker.check(segments, tried)
-        verdict = np.where(arcs > 0, 0, checks.verdict | Verdict.NO_ARCS.value)
+        none = np.where(doubtful, Verdict.UNDECIDED.value, checks.verdict | Verdict.NO_ARCS.value)
+        verdict = np.where(arcs > 0, np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0), none)
         return PoseAnswers(
             arcs,
             tried,
@@ -118,12 +120,9 @@ class Poses(Sequence):
             np.stack([chosen[:-1], chosen[1:]], axis=1),
             checks.slack[:, 1],
             checks.gap,
-            checks.samples,
         )
 
-    def segments(  # type: ignore[override]
-        self, shared: PoseShared, points: np.ndarray, z0: np.ndarray, answers: PoseAnswers
-    ) -> PoseSegment:
+    def segments(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray, answers: PoseAnswers) -> PoseSegment:
         """The segments; see `Sequence.segments`."""
         depth = float(z0[0])
         poses = list(zip(points, self.quaternions(shared.robot, depth), strict=True))

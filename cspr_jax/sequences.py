@@ -2,6 +2,7 @@
 
 import abc
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import jax
 import numpy as np
@@ -18,8 +19,12 @@ from cspr_jax.robots import HasSpools, centroid
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.transition import steady
 
+SharedKind = TypeVar("SharedKind")
+AnswersKind = TypeVar("AnswersKind", bound=Answers)
+SegmentKind = TypeVar("SegmentKind")
 
-class Sequence(abc.ABC):
+
+class Sequence(abc.ABC, Generic[SharedKind, AnswersKind, SegmentKind]):
     """The poses of a plan, joined by the segments of one family.
 
     Args:
@@ -70,8 +75,8 @@ class Sequence(abc.ABC):
         return np.array([hub if pose.rest else np.asarray(pose.position) * signs for pose in self.keys.pose])
 
     @abc.abstractmethod
-    def answers(self, shared: Shared, points: np.ndarray, z0: np.ndarray) -> Answers:
-        """Answers of all segments, for one z0 or several at once.
+    def answers(self, shared: SharedKind, points: np.ndarray, z0: np.ndarray) -> AnswersKind:
+        """Answers of all segments, for one z0; those of point masses also for several at once.
 
         Args:
             shared: robot, limits and amplitude.
@@ -83,7 +88,7 @@ class Sequence(abc.ABC):
         """
 
     @abc.abstractmethod
-    def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
+    def segments(self, shared: SharedKind, points: np.ndarray, z0: np.ndarray, answers: AnswersKind) -> SegmentKind:
         """The segments, each of the parity of its number of arcs.
 
         Args:
@@ -97,7 +102,7 @@ class Sequence(abc.ABC):
         """
 
 
-class Hypocycloids(Sequence):
+class Hypocycloids(Sequence[Shared, Answers, Segment]):
     """Any poses, joined by the standard hypocycloids of chapter 2; see `Sequence`."""
 
     def __init__(self, spec: RobotFile, keys: PlanFile, path: Path) -> None:
@@ -122,7 +127,7 @@ class Hypocycloids(Sequence):
         return pick(parities, np.arange(len(self)), answers.tried_arcs)
 
 
-class Transitions(Sequence):
+class Transitions(Sequence[Shared, Answers, Segment]):
     """Rest to a target, swings at it, back to rest: chapter 1; see `Sequence`."""
 
     def __init__(self, spec: RobotFile, keys: PlanFile, path: Path) -> None:
@@ -185,10 +190,13 @@ def _check_pair(i: int, start: Pose, end: Pose, path: Path) -> None:
         raise ConfigError(path, f"pose[{i + 1}].arcs = {end.arcs}: must be even in a plan of transitions")
 
 
-_FAMILIES = {"hypocycloid-standard": Hypocycloids, "transition": Transitions}
+_FAMILIES: dict[str, type[Hypocycloids] | type[Transitions]] = {
+    "hypocycloid-standard": Hypocycloids,
+    "transition": Transitions,
+}
 
 
-def sequence_of(spec: RobotFile, keys: PlanFile, path: Path) -> Sequence:
+def sequence_of(spec: RobotFile, keys: PlanFile, path: Path) -> Hypocycloids | Transitions:
     """The sequence of a plan for a point mass.
 
     Args:

@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import dataclasses
 import io
 import itertools
 import json
@@ -25,6 +26,7 @@ from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.bends import LARGEST, cheapest_path, options
+from cspr_jax.maps.minimum_pose_arcs import Ends, smallest_arcs
 from cspr_jax.reference_pose import reference_pose
 
 ROOT = Path(__file__).parent.parent
@@ -123,6 +125,42 @@ def test_verdicts_against_dense_samples(checker):
         dense = dense and not platform_hit(near.sides, near.normal, view[:-1], view[1:]).any()
         assert (found.verdict[0] == 0) == dense, (i, Verdict(int(found.verdict[0])).text, slack.min(0))
     assert undecided < 5
+
+
+def test_steps_are_halved_where_cables_turn(checker, monkeypatch):
+    """With four samples an arc interference is still what it is with many."""
+    rng, seen = np.random.default_rng(17), 0
+    cases = [
+        (near_pose(rng), near_pose(rng), tuple(rng.uniform(-8.0, 1.0, 2)), int(rng.integers(2, 6))) for _ in range(60)
+    ]
+    flags = Verdict.CABLE_CABLE.value | Verdict.CABLE_PLATFORM.value
+    first = [int(checked(checker, *case).verdict[0]) & flags for case in cases]
+    monkeypatch.setattr("cspr_jax.feasibility.pose_checks.SAMPLES", 4)
+    for case, before in zip(cases, first, strict=True):
+        assert int(checked(checker, *case).verdict[0]) & flags == before
+        seen += before > 0
+    assert seen > 3
+
+
+def test_what_stays_undecided_is_said(checker, monkeypatch):
+    """A smaller number of arcs that cannot be told leaves a flag; where nothing else is found, it is the answer."""
+    start, end = (random_pose(np.random.default_rng(1), rest=True), (np.array([1.0, 0.0, 1.4]), np.eye(4)[0]))
+    ends = Ends(start, end, np.array([-1.0]), np.array([-1.0]))
+    plain = smallest_arcs(checker, ends, Z0, max_arcs=8)
+    p = int(plain.arcs[0, 0])
+    assert p > 0 and not plain.doubtful.any()
+    whole = PoseChecker.check
+
+    def unsure(self, segments, arcs):
+        found = whole(self, segments, arcs)
+        at_first = np.where(arcs == p, Verdict.UNDECIDED.value, found.verdict)
+        return dataclasses.replace(found, verdict=at_first)
+
+    monkeypatch.setattr(PoseChecker, "check", unsure)
+    found = smallest_arcs(checker, ends, Z0, max_arcs=p)
+    assert found.arcs[0, 0] == 0 and found.doubtful[0, 0]
+    more = smallest_arcs(checker, ends, Z0, max_arcs=p + 4)
+    assert more.arcs[0, 0] > p and more.doubtful[0, 0]
 
 
 def turned(pose, angle):

@@ -15,7 +15,7 @@ from jax import Array
 
 from cspr_jax.feasibility.interference import Contacts, cables_cross, contacts, gaps, platform_hit, views
 from cspr_jax.feasibility.pose_kernel import smallest_tensions
-from cspr_jax.feasibility.pose_slacks import PoseShared, flags, slacks_at
+from cspr_jax.feasibility.pose_slacks import PoseShared, flags, pose_slacks
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.grids import in_batches
 from cspr_jax.trajectories.pose_segment import PoseSegment, duration, motion
@@ -41,13 +41,11 @@ class PoseChecks:
         verdict: (n,) `Verdict` flags; 0 is feasible.
         slack: (n, n_criteria) smallest of each criterion of `pose_slacks.flags`; NaN where not finite.
         gap: (n,) smallest distance between cables that can meet, m.
-        samples: (n,) instants of the first look.
     """
 
     verdict: np.ndarray
     slack: np.ndarray
     gap: np.ndarray
-    samples: np.ndarray
 
 
 def _lowest(shared: PoseShared, arcs: float, tau: np.ndarray, segments: PoseSegment, *, variable: bool) -> Array:
@@ -60,7 +58,7 @@ def _everything(shared: PoseShared, pairs: Array, arguments, *, variable: bool) 
     def one(segment, arcs, tau):
         pose = motion(segment, shared.amplitude, arcs, tau, variable=variable)
         where = (shared.robot, pose.position, pose.rotation)
-        slack = slacks_at(shared, segment, arcs, tau, variable=variable)
+        slack = pose_slacks(shared, pose, shared.robot.gravity / segment.rate)
         return slack, gaps(shared.robot, pairs, *where[1:]), views(*where)
 
     return jax.vmap(one)(*arguments)
@@ -119,7 +117,7 @@ class PoseChecker:
         chunks = np.pad(tau, (0, whole - len(tau)), mode="edge").reshape(-1, CHUNK)
         lowest = np.full(count, np.inf)
         for chunk in chunks:
-            alive = np.flatnonzero(lowest > 0.0)
+            alive = np.flatnonzero(lowest > -TOLERANCE)
             if not len(alive):
                 break
             kernel = partial(_lowest, shared, float(arcs), chunk, variable=self.variable)
@@ -145,13 +143,13 @@ class PoseChecker:
         kernel = partial(_everything, self.shared, self._contacts.pairs, variable=self.variable)
         return in_batches(kernel, (*items, tau), size=_size(len(tau)))
 
-    def _check_one(self, segment: PoseSegment, arcs: int) -> tuple[int, np.ndarray, float, int]:
+    def _check_one(self, segment: PoseSegment, arcs: int) -> tuple[int, np.ndarray, float]:
         tau = np.linspace(0.0, 1.0, SAMPLES * arcs + 1)
         slack, gap, view = self._all(segment, arcs, tau)
         values = np.concatenate([slack, np.linalg.norm(gap, axis=2)], axis=1)
         if not (np.isfinite(values).all() and float(duration(segment, jnp.asarray(float(arcs)))) > 0.0):
             nothing = np.full(slack.shape[1], np.nan)
-            return Verdict.NOT_FINITE.value, nothing, np.nan, len(tau)
+            return Verdict.NOT_FINITE.value, nothing, np.nan
         smallest = self._narrowed(segment, arcs, tau, values)
         count = slack.shape[1]
         verdict, least, nearest = 0, smallest[:count], float(smallest[count:].min(initial=np.inf))
@@ -163,7 +161,7 @@ class PoseChecker:
             verdict |= Verdict.UNDECIDED.value
         if verdict & ~Verdict.UNDECIDED.value:
             verdict &= ~Verdict.UNDECIDED.value
-        return verdict, least, nearest, len(tau)
+        return verdict, least, nearest
 
     def _narrowed(self, segment: PoseSegment, arcs: int, tau: np.ndarray, values: np.ndarray) -> np.ndarray:
         # Smallest of each column, looked for around its smallest samples.

@@ -1,8 +1,8 @@
 """The fast form of the first look at a platform's motions: many segments of one number of arcs, instant by instant.
 
 The same mechanics as `pose_segment.motion` and `wrenches.tensions_per_length` (tests compare them), written for
-numbers instead of small vectors, so that XLA makes one loop over the segments of it. No division but one at the end:
-with the cables in two groups of three, the balance (3.11) is solved by adjugates.
+numbers instead of small vectors, so that XLA makes one loop over the segments of it. The balance (3.11) is solved by
+adjugates, the cables in two groups of three, without a division but the last.
 """
 
 import math

@@ -21,7 +21,6 @@ from cspr_jax.feasibility.limits import FLAGS, Limits, given
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import centroid, plane_normal
-from cspr_jax.trajectories.pose_segment import PoseSegment, motion
 from cspr_jax.wrenches import Pose
 
 
@@ -85,20 +84,3 @@ def pose_slacks(shared: PoseShared, pose: Pose, z0: Array) -> Array:
         "cable_acceleration_max": lambda limit: jnp.min(1.0 - jnp.abs(bends) / limit),
     }
     return jnp.stack([*found, *(slacks[name](getattr(limits, name)) for name in names)])
-
-
-def slacks_at(shared: PoseShared, segment: PoseSegment, arcs: Array, tau: Array, *, variable: bool) -> Array:
-    """The smallest slack of each criterion of a segment at one instant.
-
-    Args:
-        shared: robot, limits, amplitude, reference.
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        tau: () normalised time.
-        variable: whether the position is the hypocycloid of variable amplitude.
-
-    Returns:
-        (n_criteria,).
-    """
-    pose = motion(segment, shared.amplitude, arcs, tau, variable=variable)
-    return pose_slacks(shared, pose, shared.robot.gravity / segment.rate)

@@ -6,7 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.feasibility.pose_checks import PoseChecker
+from cspr_jax.feasibility.pose_checks import TOLERANCE, PoseChecker
+from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.bends import BEYOND
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.trajectories.pose_segment import PoseSegment, pose_segment
@@ -32,6 +33,18 @@ class Ends(NamedTuple):
     end_bends: np.ndarray
 
 
+class Found(NamedTuple):
+    """Smallest numbers of arcs for every pair of values of beta-hat.
+
+    Fields:
+        arcs: 0 where none passes all tests.
+        doubtful: whether a smaller number, or any where there is none, stayed undecided.
+    """
+
+    arcs: np.ndarray
+    doubtful: np.ndarray
+
+
 @jax.jit
 def _segments(robot: PlatformRobot, start, end, z0, bends, odd) -> PoseSegment:
     return jax.vmap(lambda a, b: pose_segment(robot, start, end, z0, (a, b), odd=odd))(*bends)
@@ -55,7 +68,7 @@ def segments_between(robot: PlatformRobot, ends: Ends, z0: float, arcs: int) -> 
     return jax.tree.map(np.asarray, found)
 
 
-def smallest_arcs(checker: PoseChecker, ends: Ends, z0: float, *, max_arcs: int, fixed: int = 0) -> np.ndarray:
+def smallest_arcs(checker: PoseChecker, ends: Ends, z0: float, *, max_arcs: int, fixed: int = 0) -> Found:
     """The smallest number of arcs that passes all tests, for every pair of values of beta-hat.
 
     A few instants refuse most motions before they are checked in full. Some arcs beyond the first number that
@@ -69,10 +82,10 @@ def smallest_arcs(checker: PoseChecker, ends: Ends, z0: float, *, max_arcs: int,
         fixed: a fixed number of arcs; 0: free.
 
     Returns:
-        (n_start_bends, n_end_bends), 0 where none was found.
+        what was found, (n_start_bends, n_end_bends) each.
     """
     count = len(ends.start_bends) * len(ends.end_bends)
-    found, last = np.zeros(count, int), max_arcs
+    found, doubtful, last = np.zeros(count, int), np.zeros(count, bool), max_arcs
     for arcs in [fixed] if fixed else range(1, max_arcs + 1):
         if arcs > last:
             break
@@ -80,14 +93,17 @@ def smallest_arcs(checker: PoseChecker, ends: Ends, z0: float, *, max_arcs: int,
         open_ones = np.flatnonzero(found == 0)
         for tau in (LATE, np.linspace(0.0, 1.0, COARSE * arcs + 1)):
             if len(open_ones):
-                open_ones = open_ones[checker.first_look(_rows(segments, open_ones), arcs, tau) > 0.0]
+                open_ones = open_ones[checker.first_look(_rows(segments, open_ones), arcs, tau) > -TOLERANCE]
         if not len(open_ones):
             continue
-        passed = checker.check(_rows(segments, open_ones), np.full(len(open_ones), arcs)).verdict == 0
+        verdict = checker.check(_rows(segments, open_ones), np.full(len(open_ones), arcs)).verdict
+        passed = verdict == 0
         found[open_ones[passed]] = arcs
+        doubtful[open_ones[verdict == Verdict.UNDECIDED]] = True
         if passed.any():
             last = min(last, arcs + BEYOND)
-    return found.reshape(len(ends.start_bends), len(ends.end_bends))
+    shape = len(ends.start_bends), len(ends.end_bends)
+    return Found(found.reshape(shape), doubtful.reshape(shape))
 
 
 def _rows(segments: PoseSegment, rows: np.ndarray) -> PoseSegment:

@@ -147,7 +147,8 @@ def _angle_ratio(s: Array, v: Array) -> tuple[Array, Array, Array]:
         (-1.0) ** j * polynomial([math.perm(k, j) * _LOG[k] for k in range(j, _NEAR_TERMS + j)], small)
         for j in range(3)
     ]
-    return tuple(jnp.where(is_near, a, b) for a, b in zip(near, far, strict=True))  # type: ignore[return-value]
+    value, slope, bend = (jnp.where(is_near, a, b) for a, b in zip(near, far, strict=True))
+    return value, slope, bend
 
 
 def _exponential(u: Array, u1: Array, u2: Array) -> tuple[Array, Array, Array]:
@@ -172,9 +173,9 @@ def _sinc(y: Array) -> tuple[Array, Array, Array, Array]:
     small = jnp.where(is_small, y, 0.0)
     series = [polynomial([math.perm(k, j) * terms[k] for k in range(j, _SERIES + j)], small) for j in range(3)]
     near = polynomial([(-1.0) ** k / math.factorial(2 * k) for k in range(_SERIES)], small)
-    return tuple(  # type: ignore[return-value]
-        jnp.where(is_small, a, b) for a, b in zip((near, *series), (cosine, s, s1, s2), strict=True)
-    )
+    pairs = zip((near, *series), (cosine, s, s1, s2), strict=True)
+    cosine, s, s1, s2 = (jnp.where(is_small, a, b) for a, b in pairs)
+    return cosine, s, s1, s2
 
 
 def rates(quaternions: tuple[Array, Array, Array]) -> tuple[Array, Array]:
