@@ -14,6 +14,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.feasibility.interference import Contacts, cables_cross, contacts, gaps, platform_hit, views
+from cspr_jax.feasibility.narrowing import narrowed
 from cspr_jax.feasibility.pose_kernel import smallest_tensions
 from cspr_jax.feasibility.pose_slacks import PoseShared, flags, pose_slacks
 from cspr_jax.feasibility.verdicts import Verdict
@@ -25,8 +26,6 @@ BATCHES = (512, 4096)
 # Instants of one call of the fast kernel, and segments.
 CHUNK, KERNEL_BATCH = 32, 2048
 SAMPLES = 64  # an arc
-# Narrowing: places looked at for each value, points at each, and how often.
-PLACES, POINTS, ROUNDS = 3, 17, 4
 # Steps between which a gap or a cable turns by more than this are halved, at most so often.
 LEAST_COSINE, HALVINGS = 0.8, 12
 TOLERANCE = 1e-7
@@ -62,6 +61,10 @@ def _everything(shared: PoseShared, pairs: Array, arguments, *, variable: bool) 
         return slack, gaps(shared.robot, pairs, *where[1:]), views(*where)
 
     return jax.vmap(one)(*arguments)
+
+
+def _values(slack: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    return np.concatenate([slack, np.linalg.norm(gap, axis=2)], axis=1)
 
 
 def _size(count: int) -> int:
@@ -146,11 +149,11 @@ class PoseChecker:
     def _check_one(self, segment: PoseSegment, arcs: int) -> tuple[int, np.ndarray, float]:
         tau = np.linspace(0.0, 1.0, SAMPLES * arcs + 1)
         slack, gap, view = self._all(segment, arcs, tau)
-        values = np.concatenate([slack, np.linalg.norm(gap, axis=2)], axis=1)
+        values = _values(slack, gap)
         if not (np.isfinite(values).all() and float(duration(segment, jnp.asarray(float(arcs)))) > 0.0):
             nothing = np.full(slack.shape[1], np.nan)
             return Verdict.NOT_FINITE.value, nothing, np.nan
-        smallest = self._narrowed(segment, arcs, tau, values)
+        smallest = narrowed(lambda points: _values(*self._all(segment, arcs, points)[:2]), tau, values)
         count = slack.shape[1]
         verdict, least, nearest = 0, smallest[:count], float(smallest[count:].min(initial=np.inf))
         for flag, value in zip(self._flags, least, strict=True):
@@ -162,25 +165,6 @@ class PoseChecker:
         if verdict & ~Verdict.UNDECIDED.value:
             verdict &= ~Verdict.UNDECIDED.value
         return verdict, least, nearest
-
-    def _narrowed(self, segment: PoseSegment, arcs: int, tau: np.ndarray, values: np.ndarray) -> np.ndarray:
-        # Smallest of each column, looked for around its smallest samples.
-        padded = np.pad(values, ((1, 1), (0, 0)), constant_values=np.inf)
-        lows = np.where((values <= padded[:-2]) & (values <= padded[2:]), values, np.inf)
-        place = tau[np.argsort(lows, axis=0)[:PLACES]]  # (PLACES, n_values)
-        smallest, width = values.min(0), tau[1] - tau[0]
-        offsets = np.linspace(-1.0, 1.0, POINTS)
-        column = np.arange(values.shape[1])
-        for _ in range(ROUNDS):
-            points = np.clip(place[..., None] + width * offsets, 0.0, 1.0)
-            slack, gap, _ = self._all(segment, arcs, points.ravel())
-            found = np.concatenate([slack, np.linalg.norm(gap, axis=2)], axis=1).reshape(*points.shape, -1)
-            own = found[:, column, :, column].transpose(1, 0, 2)  # (PLACES, n_values, POINTS)
-            best = own.argmin(2)
-            smallest = np.minimum(smallest, own.min((0, 2)))
-            place = np.take_along_axis(points, best[..., None], axis=2)[..., 0]
-            width = 2.0 * width / (POINTS - 1)
-        return smallest
 
     def _followed(
         self, segment: PoseSegment, arcs: int, tau: np.ndarray, gap: np.ndarray, view: np.ndarray

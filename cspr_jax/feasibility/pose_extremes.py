@@ -10,6 +10,7 @@ from jax import Array
 
 from cspr_jax import wrenches
 from cspr_jax.feasibility.extremes import Extremes
+from cspr_jax.feasibility.narrowing import narrowed
 from cspr_jax.feasibility.pose_checks import SAMPLES
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.grids import in_batches
@@ -17,8 +18,6 @@ from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.trajectories.pose_segment import PoseSegment, motion
 
 BATCH = 512
-# Narrowing around the smallest sample: points, and how often.
-POINTS, ROUNDS = 17, 4
 
 
 @partial(jax.jit, static_argnames="variable")
@@ -70,14 +69,7 @@ def pose_extremes(
             items = jax.tree.map(lambda x: np.broadcast_to(x, (len(points), *np.shape(x))), (segment, float(p)))
             return in_batches(partial(_demands, shared, variable=variable), (*items, points), size=BATCH)
 
-        values, width = at(tau), tau[1] - tau[0]
-        smallest, place = values.min(0), tau[values.argmin(0)]
-        for _ in range(ROUNDS):
-            points = np.clip(place[:, None] + width * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
-            near = at(points.ravel()).reshape(*points.shape, -1)
-            own = np.take_along_axis(near, np.arange(len(place))[:, None, None], axis=2)[..., 0]
-            smallest, place = np.minimum(smallest, own.min(1)), points[np.arange(len(place)), own.argmin(1)]
-            width = 2.0 * width / (POINTS - 1)
+        smallest = narrowed(at, tau, at(tau))
         found.append(smallest * signs + 0.0)  # no -0
         samples.append(len(tau))
     names = [field.name for field in dataclasses.fields(Extremes)][:-1]
