@@ -70,8 +70,6 @@ def _check_depth_keys(sequence: Sequence) -> None:
         )
     if keys.z0 is not None and keys.inclination is not None:
         raise ConfigError(path, "z0, inclination: must be one of them")
-    if sequence.spec.is_platform and isinstance(keys.z0, Choice) and keys.z0.choose == "fastest":
-        raise ConfigError(path, 'z0.choose = "fastest": must be "mean", "conservative" or a number for a platform')
 
 
 def _check_rest(robot: HasSpools, sequence: Sequence, z0: float) -> None:
@@ -121,11 +119,11 @@ def _fastest_depth(shared: Shared, sequence: Sequence) -> float:
     return chosen
 
 
-def best_amplitude(shared: Shared, sequence: Sequence, z0: float) -> tuple[Amplitude, float]:
+def best_amplitude(shared: Any, sequence: Sequence, z0: float) -> tuple[Amplitude, float]:
     """The amplitude function whose epsilon gives the shortest plan; among equals, the largest margin.
 
     Args:
-        shared: robot and limits.
+        shared: robot and limits, `Shared` or `PoseShared`.
         sequence: the plan's poses.
         z0: m.
 

@@ -26,14 +26,27 @@ def in_batches(function: Callable, arguments, *, size: int):
     if count == 0:
         return None
     pending = [
-        function(jax.tree.map(lambda a, s=start: _padded(a[s : s + size], size), arguments))
+        function(padded(jax.tree.map(lambda a, s=start: a[s : s + size], arguments), size))
         for start in range(0, count, size)
     ]
     parts = [jax.tree.map(np.asarray, part) for part in pending]
     return jax.tree.map(lambda *pieces: np.concatenate(pieces)[:count], *parts)
 
 
-def _padded(array: np.ndarray, size: int) -> np.ndarray:
-    if len(array) == size:
-        return array
-    return np.concatenate([array, np.repeat(array[-1:], size - len(array), axis=0)])
+def padded(arguments, size: int):
+    """Arrays made as long as a batch.
+
+    Args:
+        arguments: pytree of NumPy arrays (n, ...), 0 < n <= size.
+        size: length of a batch.
+
+    Returns:
+        the pytree (size, ...), its last elements repeated.
+    """
+
+    def one(array):
+        if len(array) == size:
+            return array
+        return np.concatenate([array, np.repeat(array[-1:], size - len(array), axis=0)])
+
+    return jax.tree.map(one, arguments)

@@ -20,7 +20,7 @@ from cspr_jax.feasibility.pose_extremes import pose_extremes
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.answers import Answers
 from cspr_jax.pose_sequences import Poses
-from cspr_jax.reference_pose import reference_pose
+from cspr_jax.reference_pose import aligned, reference_pose
 from cspr_jax.sequences import sequence_of
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.pose_segment import PoseSegment
@@ -120,15 +120,17 @@ def _plan_of_poses(spec: RobotFile, keys: PlanFile, path: Path) -> Plan:
     sequence = Poses(spec, keys, path)
     robot = problem.build_platform(spec, keys, path)
     limits = problem.build_limits(spec, keys, keys.floor, path)
-    amplitude = problem.build_amplitude(keys, path)
-    # The reference axes do not depend on the depth; whether the robot hangs still there does.
-    guess = PoseShared(robot, limits, amplitude, jnp.ones(()))
-    z0 = chosen_depth(guess, sequence)
+    amplitude = problem.build_amplitude(keys, path, epsilon=FIRST_EPSILON)
+    shared = PoseShared(aligned(robot)[0], limits, amplitude)
+    sequence.check_poses(shared)
+    z0 = chosen_depth(shared, sequence)
     try:
-        still = reference_pose(robot, z0)
+        reference_pose(robot, z0)
     except InputError as error:
         raise ConfigError(path, f"robot.{error}") from error
-    shared = PoseShared(still.robot, limits, amplitude, jnp.asarray(still.conditioning))
+    if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
+        amplitude, z0 = best_amplitude(shared, sequence, z0)
+        shared = shared._replace(amplitude=amplitude)
     points, depth = sequence.points(robot, z0), np.full(len(sequence), z0)
     answers = sequence.answers(shared, points, depth)
     segments = sequence.segments(shared, points, depth, answers)

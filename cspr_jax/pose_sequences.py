@@ -1,24 +1,29 @@
 """Sequences of poses of a platform: orientations, values of beta-hat, and the search along the sequence."""
 
-import dataclasses
+import itertools
 from pathlib import Path
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import problem, rotations
 from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.errors import ConfigError, shown
+from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.endpoints import AT_REST, endpoint
 from cspr_jax.feasibility.interference import contacts, gaps
-from cspr_jax.feasibility.pose_checks import TOUCH, PoseChecker
+from cspr_jax.feasibility.pose_checks import FEW, MANY, TOUCH, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.maps.answers import Answers
-from cspr_jax.maps.bends import cheapest_path, options
-from cspr_jax.maps.minimum_pose_arcs import Ends, best_candidate, segments_between, smallest_arcs
+from cspr_jax.maps.bends import BEYOND, cheapest_path, options
+from cspr_jax.maps.minimum_pose_arcs import (
+    Candidates,
+    Found,
+    best_candidates,
+    segments_with,
+    smallest_arcs,
+)
+from cspr_jax.maps.pose_answers import PoseAnswers, settled
+from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories.pose_segment import PoseSegment
@@ -26,21 +31,6 @@ from cspr_jax.wrenches import conditioning
 
 # Relative determinant below which a pose counts as singular.
 SINGULAR = 1e-9
-
-
-@dataclasses.dataclass(frozen=True)
-class PoseAnswers(Answers):
-    """One answer a segment between poses.
-
-    Fields:
-        beta_hat: (n, 2) at both ends.
-        regularity: (n,) smallest determinant over its value at rest in P0.
-        cable_distance: (n,) smallest distance between cables that can meet, m.
-    """
-
-    beta_hat: np.ndarray
-    regularity: np.ndarray
-    cable_distance: np.ndarray
 
 
 class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
@@ -55,7 +45,7 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         if keys.inclination is not None:
             raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
         super().__init__(spec, keys, path)
-        self._given = [_orientation(i, pose, path) for i, pose in enumerate(keys.pose)]
+        self._given = np.array([_orientation(i, pose, path) for i, pose in enumerate(keys.pose)])
 
     @property
     def variable(self) -> bool:
@@ -72,89 +62,101 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         Returns:
             (n_poses, 4).
         """
-        signs = problem.axis_signs(self.spec)
-        own = (self.points(robot, z0) - np.asarray(centroid(robot))) * signs
-        found = []
-        for pose, given, place in zip(self.keys.pose, self._given, own, strict=True):
-            if pose.tilt_torsion is not None and not pose.rest:
-                azimuth, tilt, torsion = pose.tilt_torsion
-                towards = np.arctan2(place[1], place[0])  # (3.98)
-                given = np.asarray(rotations.from_tilt_torsion(*map(jnp.asarray, (azimuth + towards, tilt, torsion))))
-            found.append(given * np.concatenate([[1.0], signs]))
-        return np.array(found)
+        points, centre = self.points(robot, z0), np.asarray(centroid(robot))
+        angles = np.array([[0.0] * 3 if p.rest else p.tilt_torsion or [0.0] * 3 for p in self.keys.pose])
+        turned = problem.orientations(self.spec, centre, points, angles)
+        is_given = np.array([pose.rest or pose.tilt_torsion is None for pose in self.keys.pose])
+        return np.where(is_given[:, None], self._given * np.append(1.0, problem.axis_signs(self.spec)), turned)
+
+    def check_poses(self, shared: PoseShared) -> None:
+        """Refuse poses at which no motion can begin or end.
+
+        Args:
+            shared: gives the robot.
+
+        Raises:
+            ConfigError: which pose, and why.
+        """
+        robot, centre = shared.robot, np.asarray(centroid(shared.robot))
+        poses = zip(self.points(robot, 1.0), self.quaternions(robot, 1.0), strict=True)
+        for i, (position, quaternion) in enumerate(poses):
+            if not self.keys.pose[i].rest:
+                _check_pose(robot, i, position, quaternion, centre, self.path)
 
     def answers(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray) -> PoseAnswers:
         """Smallest numbers of arcs, with the values of beta-hat that give the fewest in sum; see `Sequence.answers`."""
-        depth, checker = float(z0[0]), PoseChecker(shared, variable=self.variable)
-        poses = list(zip(points, self.quaternions(shared.robot, depth), strict=True))
-        bends = [self._bends(shared, i, *pose, depth) for i, pose in enumerate(poses)]
-        found = []
-        for i in range(len(self)):
-            ends = Ends(poses[i], poses[i + 1], bends[i], bends[i + 1])
-            fixed = int(self._arcs[i])
-            found.append(smallest_arcs(checker, ends, depth, max_arcs=self._largest, fixed=fixed))
-        path = cheapest_path([np.where(f.arcs > 0, f.arcs, np.inf) for f in found])
-        chosen = np.array([bend[k] for bend, k in zip(bends, path, strict=True)])
-        arcs, doubtful = (
-            np.array([values[i][path[i], path[i + 1]] for i in range(len(self))])
-            for values in ([f.arcs for f in found], [f.doubtful for f in found])
+        count, depths = len(self), z0.reshape(-1, len(self))[:, 0]
+        points = points.reshape(len(depths), -1, 3)
+        quaternions = self.quaternions(shared.robot, float(depths[0]))
+        checker = PoseChecker(shared, variable=self.variable, batch=FEW if len(depths) == 1 else MANY)
+        bends = [self._bends(shared, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)]
+        if len(depths) == 1:
+            self._refuse_slack(bends[0])
+        # Every pair of values at the ends of every segment, for every depth.
+        pairs = [[np.meshgrid(own[i], own[i + 1], indexing="ij") for i in range(count)] for own in bends]
+        group = np.concatenate(
+            [np.full(pair[0].size, d * count + i) for d, own in enumerate(pairs) for i, pair in enumerate(own)]
         )
-        tried = arcs.copy()
-        for k in np.flatnonzero(arcs == 0):
-            i = int(k)
-            ends = Ends(poses[i], poses[i + 1], chosen[i : i + 1], chosen[i + 1 : i + 2])
-            tried[i] = int(self._arcs[i]) or best_candidate(checker, ends, depth, max_arcs=self._largest)
-        segments = self._between(shared, poses, chosen, depth, tried)
-        checks = checker.check(segments, tried)
-        none = np.where(doubtful, Verdict.UNDECIDED.value, checks.verdict | Verdict.NO_ARCS.value)
-        verdict = np.where(arcs > 0, np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0), none)
-        return PoseAnswers(
-            arcs,
-            tried,
-            verdict.astype(np.uint16),
-            checker.durations(segments, tried),
-            np.minimum(checks.slack[:, 0], checks.slack[:, 2]),
-            np.full(len(self), np.nan),
-            checks.slack[:, 3:].min(1, initial=np.inf),
-            np.full(len(self), np.nan),
-            np.stack([chosen[:-1], chosen[1:]], axis=1),
-            checks.slack[:, 1],
-            checks.gap,
-        )
+        values = tuple(np.concatenate([pair[k].ravel() for own in pairs for pair in own]) for k in (0, 1))
+        trial = self._candidates(points, quaternions, z0, group, values)
+        fixed = np.tile(self._arcs, len(depths))
+        found = smallest_arcs(checker, trial, max_arcs=self._largest, fixed=fixed, beyond=BEYOND)
+        path = _best_paths(found.arcs, pairs)
+        best, arcs = trial.rows(path)._replace(group=np.arange(len(path))), found.arcs[path]
+        tried = np.where(arcs > 0, arcs, fixed)
+        none = np.flatnonzero(tried == 0)
+        tried[none] = best_candidates(checker, best.rows(none), max_arcs=self._largest)
+        return settled(checker, best, Found(arcs, found.undecided[path], found.checks.rows(path)), tried)
+
+    def _candidates(
+        self, points: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, group: np.ndarray, bends: tuple
+    ) -> Candidates:
+        # Of the segments `group`, counted over all depths.
+        depth, i = np.divmod(group, len(self))
+        start, end = ((points[depth, i + k], quaternions[i + k]) for k in (0, 1))
+        return Candidates(start, end, z0[group], bends, group)
 
     def segments(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray, answers: PoseAnswers) -> PoseSegment:
         """The segments; see `Sequence.segments`."""
-        depth = float(z0[0])
-        poses = list(zip(points, self.quaternions(shared.robot, depth), strict=True))
-        bends = np.append(answers.beta_hat[:, 0], answers.beta_hat[-1, 1])
-        return self._between(shared, poses, bends, depth, answers.tried_arcs)
+        quaternions = self.quaternions(shared.robot, float(z0[0]))
+        found = self._candidates(points[None], quaternions, z0, np.arange(len(self)), tuple(answers.beta_hat.T))
+        return segments_with(shared.robot, found, answers.tried_arcs)
 
-    def _between(self, shared: PoseShared, poses: list, chosen: np.ndarray, z0: float, arcs: np.ndarray) -> PoseSegment:
-        found = [
-            segments_between(
-                shared.robot,
-                Ends(poses[i], poses[i + 1], chosen[i : i + 1], chosen[i + 1 : i + 2]),
-                z0,
-                int(p),
-            )
-            for i, p in enumerate(arcs)
-        ]
-        return jax.tree.map(lambda *leaves: np.concatenate(leaves), *found)
+    def _bends(self, shared: PoseShared, points: np.ndarray, quaternions: np.ndarray, z0: float) -> list[np.ndarray]:
+        # Values of beta-hat to try at each pose; NaN where none keeps every cable taut.
+        found = []
+        for pose, position, quaternion in zip(self.keys.pose, points, quaternions, strict=True):
+            if pose.beta_hat is not None or pose.rest:
+                found.append(np.array([AT_REST if pose.beta_hat is None else pose.beta_hat]))
+                continue
+            end = endpoint(shared.robot, jnp.asarray(position), jnp.asarray(quaternion), jnp.asarray(z0))
+            preferred, lowest, highest = (np.atleast_1d(x) for x in end[2:])
+            values = options(preferred, lowest, highest)[0]
+            found.append(values[~np.isnan(values)] if not np.isnan(values[0]) else values[:1])
+        return found
 
-    def _bends(self, shared: PoseShared, i: int, position: np.ndarray, quaternion: np.ndarray, z0: float) -> np.ndarray:
-        pose = self.keys.pose[i]
-        _check_pose(shared, i, position, quaternion, z0, self.path)
-        if pose.beta_hat is not None:
-            return np.array([pose.beta_hat])
-        if pose.rest:
-            return np.array([AT_REST])
-        found = endpoint(shared.robot, jnp.asarray(position), jnp.asarray(quaternion), jnp.asarray(z0))
-        values = options(float(found.preferred), float(found.lowest), float(found.highest))
-        if not len(values):
-            raise ConfigError(
-                self.path, f"pose[{i}]: must be another pose, or z0: no beta_hat keeps every cable taut there"
-            )
-        return values
+    def _refuse_slack(self, bends: list[np.ndarray]) -> None:
+        for i, values in enumerate(bends):
+            if np.isnan(values).any():
+                raise ConfigError(
+                    self.path, f"pose[{i}]: must be another pose, or z0: no beta_hat keeps every cable taut there"
+                )
+
+
+def _best_paths(arcs: np.ndarray, pairs: list) -> np.ndarray:
+    # Which candidate of each segment of each depth, (n_depths * n_segments,).
+    places, last = [], 0
+    for own in pairs:
+        costs, starts = [], []
+        for first, _ in own:
+            starts.append(last)
+            last += first.size
+            found = arcs[starts[-1] : last].reshape(first.shape)
+            costs.append(np.where(found > 0, found, np.inf))
+        steps = itertools.pairwise(cheapest_path(costs))
+        for start, cost, step in zip(starts, costs, steps, strict=True):
+            places.append(start + int(np.ravel_multi_index(step, cost.shape)))
+    return np.array(places)
 
 
 def _orientation(i: int, pose: Pose, path: Path) -> np.ndarray:
@@ -167,24 +169,19 @@ def _orientation(i: int, pose: Pose, path: Path) -> np.ndarray:
         if turned or (pose.tilt_torsion is not None and (pose.tilt_torsion[1] != 0.0 or pose.tilt_torsion[2] != 0.0)):
             raise ConfigError(path, f"pose[{i}]: must have the reference orientation at rest")
         return reference
-    if pose.quaternion is None:
-        return reference
-    given = np.asarray(pose.quaternion)
-    size = float(np.linalg.norm(given))
-    if abs(size - 1.0) > rotations.UNIT_TOLERANCE:
-        raise ConfigError(
-            path, f"pose[{i}].quaternion = {shown(pose.quaternion)}: must have length 1 (it has {size:.7g})"
-        )
-    return given / size
+    return problem.given_quaternion(pose.quaternion, f"pose[{i}].quaternion", path)
 
 
 def _check_pose(
-    shared: PoseShared, i: int, position: np.ndarray, quaternion: np.ndarray, z0: float, path: Path
+    robot: PlatformRobot, i: int, position: np.ndarray, quaternion: np.ndarray, centre: np.ndarray, path: Path
 ) -> None:
-    robot, where = shared.robot, (jnp.asarray(position), rotations.matrix(jnp.asarray(quaternion)))
-    if not plane_normal(robot) @ (where[0] - centroid(robot)) > 0.0:
+    where = (jnp.asarray(position), rotations.matrix(jnp.asarray(quaternion)))
+    depth = float(plane_normal(robot) @ (where[0] - centre))
+    if not depth > 0.0:
         raise ConfigError(path, f"pose[{i}].position: must be below the spool plane")
-    share = float(conditioning(robot, *where)) / float(shared.conditioning)
+    # Beside the reference orientation in the middle, at the same depth.
+    middle = (jnp.asarray(centre + np.array([0.0, 0.0, depth])), jnp.eye(3))
+    share = float(conditioning(robot, *where)) / float(conditioning(robot, *middle))
     if not abs(share) > SINGULAR:
         raise ConfigError(
             path, f"pose[{i}]: must be another orientation: singular there (relative determinant {share:.1g})"

@@ -1,5 +1,6 @@
 """From checked files to what the kernels take: robot, limits, amplitude function, axes."""
 
+import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import amplitudes, robots
@@ -11,6 +12,7 @@ from cspr_jax.feasibility.limits import Limits
 from cspr_jax.numerics import leaf
 from cspr_jax.platforms import PlatformRobot, platform_robot
 from cspr_jax.robots import STANDARD_GRAVITY, PointMassRobot
+from cspr_jax.rotations import UNIT_TOLERANCE, from_tilt_torsion
 
 # A z-up file is turned by half a turn about x: a rotation, so that nothing is mirrored.
 _TURN = {"down": np.array([1.0, 1.0, 1.0]), "up": np.array([1.0, -1.0, -1.0])}
@@ -158,3 +160,43 @@ def build_limits(spec: RobotFile, keys: LimitKeys, floor: float | None, file: ob
         raise ConfigError(file, f"tension_min = {np.asarray(low).tolist()}: must be below tension_max for every cable")
     depth = None if floor is None else leaf(floor * axis_signs(spec)[2])
     return Limits(floor=depth, **found)
+
+
+def orientations(spec: RobotFile, centre: np.ndarray, points: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes.
+
+    Args:
+        spec: gives the file's axes, which the angles are of.
+        centre: (3,) centroid of the spools, kernels' axes, m.
+        points: (n, 3) kernels' axes, m.
+        angles: (n, 3) phi, theta, sigma, rad.
+
+    Returns:
+        (n, 4) unit quaternions.
+    """
+    signs = axis_signs(spec)
+    own = (points - centre) * signs
+    towards = np.arctan2(own[:, 1], own[:, 0])
+    azimuth, tilt, torsion = (jnp.asarray(x) for x in (angles[:, 0] + towards, angles[:, 1], angles[:, 2]))
+    return np.asarray(from_tilt_torsion(azimuth, tilt, torsion)) * np.concatenate([[1.0], signs])
+
+
+def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> np.ndarray:
+    """An orientation given as a quaternion, which may miss length 1 by rounding.
+
+    Args:
+        quaternion: scalar first; None: the reference orientation.
+        key: named in errors.
+        file: named in errors.
+
+    Returns:
+        (4,) of unit length.
+
+    Raises:
+        ConfigError: not of unit length.
+    """
+    given = np.asarray([1.0, 0.0, 0.0, 0.0] if quaternion is None else quaternion)
+    size = float(np.linalg.norm(given))
+    if abs(size - 1.0) > UNIT_TOLERANCE:
+        raise ConfigError(file, f"{key} = {shown(quaternion)}: must have length 1 (it has {size:.7g})")
+    return given / size

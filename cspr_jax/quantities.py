@@ -35,6 +35,11 @@ AXES = {
         Quantity("radius", "m", "distance from the central vertical", "From the vertical through the centroid."),
         Quantity("azimuth", "rad", "azimuth", "Direction of the target from the central vertical, from x to y."),
         Quantity("z", "m", "z of the target", "Vertical coordinate of the target; see z_axis."),
+        Quantity(
+            "tilt_azimuth", "rad", "azimuth phi of the tilt", "From the direction of the target; tilt and torsion."
+        ),
+        Quantity("tilt", "rad", "tilt theta", "Angle between the platform's normal and the vertical."),
+        Quantity("torsion", "rad", "torsion sigma", "Of tilt and torsion, Z_phi X_theta Z_(sigma - phi)."),
         Quantity("z0", "m", "depth of P0 below the centroid", "The point P0 about which the effector swings."),
         Quantity(
             "inclination",
@@ -135,6 +140,19 @@ QUANTITIES = {
             "(1.39) of the cable, or the lowest over the cables, with the real number `least_oscillations`.",
         ),
         Quantity("used_inclination", "1", "inclination v", "Inclination of the transition, v of (1.31)."),
+        Quantity(
+            "det_margin",
+            "1",
+            "smallest determinant",
+            "Smallest determinant of J, with cables and platform of unit size, over its value at rest in P0.",
+        ),
+        Quantity(
+            "cable_distance",
+            "m",
+            "smallest distance between cables",
+            "Of those that can meet: that share neither spool nor platform point.",
+        ),
+        Quantity("beta_hat", "1", "beta-hat at the target", "Of the motion that the other quantities belong to."),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination asks for."),
     )
 }
@@ -149,11 +167,23 @@ _OF_OSCILLATIONS = (
     "used_z0",
 )
 _OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
+_OF_POSES = (
+    "arcs",
+    "tried_arcs",
+    "verdict",
+    "duration",
+    "margin",
+    "det_margin",
+    "cable_distance",
+    "limit_margin",
+    "beta_hat",
+)
 # What each kind of map can store.
 OF_MAP = {
     "minimum-arcs": ("arcs", "tried_arcs", *_COMMON),
     "minimum-oscillations": (*_OF_OSCILLATIONS, *_COMMON),
     "transition-envelopes": _OF_INSTANTS,
+    "poses": _OF_POSES,
 }
 TRAJECTORY = {
     q.name: q
@@ -187,11 +217,13 @@ DEFAULT_STORE = {
         "used_z0",
     ),
     "transition-envelopes": _OF_INSTANTS,
+    "poses": ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat"),
 }
 TITLES = {
     "minimum-arcs": "Smallest number of arcs",
     "minimum-oscillations": "Smallest number of oscillations",
     "transition-envelopes": "Envelopes of the pseudotensions along transitions",
+    "poses": "Smallest number of arcs to poses",
 }
 
 

@@ -42,6 +42,22 @@ class Reference(NamedTuple):
     tensions: np.ndarray
 
 
+def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
+    """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
+
+    Args:
+        robot: in any platform axes.
+
+    Returns:
+        the robot, and the rotation (3, 3) from its former axes to these.
+    """
+    rotation = _level_and_straight(robot)
+    if np.abs(rotation - np.eye(3)).max() < ALIGNED:
+        rotation = np.eye(3)
+    points, inertia = np.asarray(robot.platform_points) @ rotation.T, rotation @ np.asarray(robot.inertia) @ rotation.T
+    return dataclasses.replace(robot, platform_points=leaf(points), inertia=leaf(inertia)), rotation
+
+
 def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     """The reference orientation of a robot, checked.
 
@@ -56,14 +72,7 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
         InputError: singular there, or not in equilibrium with every cable taut.
     """
     hub = np.asarray(robot.base_points).mean(0) + np.array([0.0, 0.0, z0])
-    rotation = _level_and_straight(robot, hub)
-    if np.abs(rotation - np.eye(3)).max() < ALIGNED:
-        rotation = np.eye(3)
-    turned = dataclasses.replace(
-        robot,
-        platform_points=leaf(np.asarray(robot.platform_points) @ rotation.T),
-        inertia=leaf(rotation @ np.asarray(robot.inertia) @ rotation.T),
-    )
+    turned, rotation = aligned(robot)
     with jax.enable_x64(True):
         size = float(wrenches.conditioning(turned, jnp.asarray(hub), jnp.eye(3)))
         still = np.asarray(wrenches.tensions(turned, wrenches.at_rest(jnp.asarray(hub), jnp.eye(3))))
@@ -82,9 +91,10 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     return Reference(turned, rotation, size, share)
 
 
-def _level_and_straight(robot: PlatformRobot, hub: np.ndarray) -> np.ndarray:
+def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
     # Of both sides of the platform, the one whose points come nearer to below their spools.
-    points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points) - hub
+    points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points)
+    base = base - base.mean(0)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]
     found = [_straightest(points @ side.T, base) for side in sides]

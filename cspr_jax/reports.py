@@ -5,8 +5,8 @@ from typing import Any
 
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.minimum_oscillations import OscillationAnswers
+from cspr_jax.maps.pose_answers import PoseAnswers
 from cspr_jax.planning import Plan
-from cspr_jax.pose_sequences import PoseAnswers
 from cspr_jax.problem import axis_signs
 
 SCHEMA = 1
@@ -84,8 +84,8 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "margin": float(answers.margin[i]),
         "margin_bound": float(answers.margin_bound[i]),
         "limit_margin": float(answers.limit_margin[i]),
-        "det_sign_constant": bool((poses.regularity if poses else asked.depth_ratio_min)[i] > 0.0),
-        "det_margin": float(poses.regularity[i]) if poses else None,
+        "det_sign_constant": bool((poses.det_margin if poses else asked.depth_ratio_min)[i] > 0.0),
+        "det_margin": float(poses.det_margin[i]) if poses else None,
         "cable_interference": bool(verdict & Verdict.CABLE_CABLE) if poses else None,
         "cable_distance_min": float(poses.cable_distance[i]) if poses else None,
         "platform_interference": bool(verdict & Verdict.CABLE_PLATFORM) if poses else None,

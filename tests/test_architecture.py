@@ -14,15 +14,15 @@ PACKAGE = ROOT / "cspr_jax"
 
 # From the bottom up, as docs/architecture.md draws them; a package stands for its modules, a longer name goes first.
 LAYERS = (
-    ("errors", "numerics", "bounds", "grids"),
+    ("errors", "numerics", "bounds", "grids", "lanes"),
     ("amplitudes", "robots", "platforms", "rotations"),
-    ("tensions", "wrenches", "reference_pose"),
+    ("tensions", "wrenches", "wrench_lanes", "reference_pose"),
     ("trajectories",),
     ("feasibility",),
     ("maps", "maps.minimum_arcs", "maps.sieve"),
     ("config", "identity", "quantities", "tiles"),
     ("problem", "store", "results"),
-    ("maps.cells", "maps.envelope_cells", "maps.grid_map", "maps.oscillation_cells"),
+    ("maps.cells", "maps.envelope_cells", "maps.grid_map", "maps.oscillation_cells", "maps.pose_cells"),
     ("sweep.checks", "sweep.definition", "sweep.signals", "sweep.environment"),
     ("sweep.work", "sweep.claims", "sweep.inspection", "sweep.tile"),
     ("sweep", "planning", "choices", "sequences", "pose_sequences", "api"),

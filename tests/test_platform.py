@@ -22,6 +22,7 @@ from cspr_jax.feasibility.pose_kernel import smallest_tensions
 from cspr_jax.platforms import pairs_apart, platform_robot
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.trajectories import pose_segment as segments
+from cspr_jax.trajectories.pose_lanes import Kind
 
 MSSM = oracle.mssm()
 PLATFORMS = ("laval-mssm", "nist-robocrane", "fast", "greenline")
@@ -336,16 +337,15 @@ def test_the_fast_kernel(robot, name, variable):
             for i in range(24)
         ]
         batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
-        found = smallest_tensions(package, np.sign(reference), amplitude, float(p), tau, batch, variable=variable)
+        found = smallest_tensions(package, amplitude, float(p), tau, batch, kind=Kind(variable))
         single = jax.tree.map(lambda x: np.asarray(x, np.float32), (package, amplitude, batch))
         rough = smallest_tensions(
             single[0],
-            np.float32(np.sign(reference)),
             single[1],
             np.float32(p),
             tau.astype(np.float32),
             single[2],
-            variable=variable,
+            kind=Kind(variable),
         )
         for i, segment in enumerate(some):
             at = states(package, segment, amplitude, float(p), tau, variable=variable)

@@ -6,7 +6,7 @@ from pydantic import Discriminator, Field, Tag
 
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Coordinate, LimitKeys, Point, Positive
-from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, TrajectoryKeys
+from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 
 
 class Choice(Table):
@@ -23,24 +23,20 @@ Depth = Annotated[
 ]
 
 
-Angle = Annotated[float, Field(ge=-100.0, le=100.0)]
-Component = Annotated[float, Field(ge=-1.1, le=1.1)]
-
-
 class Pose(Table):
     """One pose of the sequence."""
 
     position: Point | None = Field(None, description="target [x, y, z], m; a rest pose may leave it out")
     rest: bool = Field(False, description="true: at rest in P0, below the centroid of the spools")
-    tilt_torsion: Annotated[list[Angle], Field(min_length=3, max_length=3)] | None = Field(
+    tilt_torsion: TiltTorsion | None = Field(
         None,
         description="platform: orientation [phi, theta, sigma], Z_phi X_theta Z_(sigma - phi), rad; phi from the "
         "direction of the target seen from the vertical through the centroid",
     )
-    quaternion: Annotated[list[Component], Field(min_length=4, max_length=4)] | None = Field(
+    quaternion: Quaternion | None = Field(
         None, description="platform: orientation [w, x, y, z], a unit quaternion, in place of tilt_torsion"
     )
-    beta_hat: Annotated[float, Field(ge=-100, le=100)] | None = Field(
+    beta_hat: BetaHat | None = Field(
         None, description="platform: fixes the angular acceleration at this pose, thesis (3.81); absent: searched for"
     )
     arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] | None = Field(

@@ -6,7 +6,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Coordinate, LimitKeys, Point
-from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.quantities import STORABLE
 from cspr_jax.tiles import LARGEST_TILE
 
@@ -46,6 +46,9 @@ class Axes(Table):
     )
     azimuth: Axis | None = Field(None, description="direction of the targets from that vertical, from x to y, rad")
     z: Axis = Field(description=_OF_TARGETS.format("z"))
+    tilt_azimuth: Axis | None = Field(None, description="poses: phi of the tilt and torsion of the targets, rad; or 0")
+    tilt: Axis | None = Field(None, description="poses: theta, rad; or 0")
+    torsion: Axis | None = Field(None, description="poses: sigma, rad; or 0")
     z0: Axis | None = Field(None, description="depth of P0 below the centroid of the spools, m; all > 0")
     inclination: Axis | None = Field(None, description="inclination v of transitions, in place of z0; all in ]-1, 1[")
     tau: Axis | None = Field(None, description="instants of transition-envelopes, normalised time in [0, 1]")
@@ -57,16 +60,34 @@ class Axes(Table):
     from_z: Axis | None = Field(None, description=_OF_STARTS.format("z"))
 
 
+BetaHatChoice = Annotated[
+    Annotated[BetaHat, Tag("~number")] | Annotated[Literal["preferred"], Tag("~preferred")],
+    Discriminator(lambda value: "~preferred" if isinstance(value, str) else "~number"),
+]
+
+
 class From(Table):
     """Where every segment starts."""
 
     position: Point | None = Field(None, description="start point [x, y, z], m")
     rest: bool = Field(False, description="true: at rest in P0")
+    tilt_torsion: TiltTorsion | None = Field(None, description="poses: orientation there, as in a plan")
+    quaternion: Quaternion | None = Field(None, description="poses: orientation there, in place of tilt_torsion")
+    beta_hat: BetaHat | None = Field(None, description="poses: beta-hat there; absent: the preferred one (3.91)")
+
+    @property
+    def is_pose(self) -> bool:
+        """Whether it says more than a place."""
+        return any(key is not None for key in (self.tilt_torsion, self.quaternion, self.beta_hat))
 
     @model_validator(mode="after")
     def _one(self) -> "From":
         if self.rest == (self.position is not None):
             raise ValueError("{ position = [x, y, z] } or { rest = true }, one of them")
+        if self.rest and self.is_pose:
+            raise ValueError("{ rest = true } alone: the reference orientation, and beta-hat -1")
+        if self.tilt_torsion is not None and self.quaternion is not None:
+            raise ValueError("tilt_torsion or quaternion, one of them")
         return self
 
 
@@ -75,6 +96,11 @@ class SweepTrajectory(TrajectoryKeys):
 
     start: From | None = Field(
         None, alias="from", description="{ position = [x, y, z] } or { rest = true }; or axes from_x, from_y and from_z"
+    )
+    beta_hat: BetaHatChoice | None = Field(
+        None,
+        description='poses: beta-hat at the targets, a number, or "preferred" (3.91); absent: several are tried, the '
+        "preferred one first",
     )
 
 
@@ -109,9 +135,9 @@ class SweepFile(Table):
     """A sweep."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
-    map: Literal["minimum-arcs", "minimum-oscillations", "transition-envelopes"] = Field(
+    map: Literal["minimum-arcs", "minimum-oscillations", "transition-envelopes", "poses"] = Field(
         description='kind of map: "minimum-arcs"; of transitions "minimum-oscillations", or "transition-envelopes": '
-        "what each instant asks for"
+        'what each instant asks for; of platforms "poses": smallest numbers of arcs'
     )
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
     axes: Axes = Field(

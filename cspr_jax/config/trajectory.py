@@ -10,6 +10,13 @@ from cspr_jax.config.robot import Positive
 LARGEST_MAX_ARCS = 1000
 
 
+Angle = Annotated[float, Field(ge=-100.0, le=100.0)]
+Component = Annotated[float, Field(ge=-1.1, le=1.1)]
+TiltTorsion = Annotated[list[Angle], Field(min_length=3, max_length=3)]
+Quaternion = Annotated[list[Component], Field(min_length=4, max_length=4)]
+BetaHat = Annotated[float, Field(ge=-100, le=100)]
+
+
 class NamedAmplitude(Table):
     """An amplitude function with a parameter."""
 

@@ -31,13 +31,11 @@ class PoseShared(NamedTuple):
         robot: in its reference axes.
         limits: limits beyond taut cables.
         amplitude: A.
-        conditioning: () of the reference pose at P0, with its sign.
     """
 
     robot: PlatformRobot
     limits: Limits
     amplitude: Amplitude
-    conditioning: Array
 
 
 def flags(limits: Limits) -> tuple[Verdict, ...]:
@@ -52,13 +50,14 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
     return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(FLAGS[name] for name in given(limits)))
 
 
-def pose_slacks(shared: PoseShared, pose: Pose, z0: Array) -> Array:
+def pose_slacks(shared: PoseShared, pose: Pose, z0: Array, regular: Array) -> Array:
     """The smallest slack of each criterion at one instant.
 
     Args:
-        shared: robot, limits, reference.
+        shared: robot, limits.
         pose: the state.
         z0: () m.
+        regular: () determinant at rest in P0.
 
     Returns:
         (n_criteria,) in the order of `flags`.
@@ -67,7 +66,7 @@ def pose_slacks(shared: PoseShared, pose: Pose, z0: Array) -> Array:
     per_length = wrenches.tensions_per_length(robot, pose)
     found = [
         6.0 * z0 / robot.gravity * jnp.min(per_length),
-        wrenches.conditioning(robot, pose.position, pose.rotation) / shared.conditioning,
+        wrenches.conditioning(robot, pose.position, pose.rotation) / regular,
         plane_normal(robot) @ (pose.position - centroid(robot)) / z0,
     ]
     names = given(limits)

@@ -9,27 +9,28 @@ OPTIONS = 11
 BEYOND = 4
 
 
-def options(preferred: float, lowest: float, highest: float, count: int = OPTIONS) -> np.ndarray:
+def options(preferred: np.ndarray, lowest: np.ndarray, highest: np.ndarray, count: int = OPTIONS) -> np.ndarray:
     """Values of beta-hat in the order in which they are tried.
 
     First the preferred one of (3.91), if it keeps every cable taut, else the middle of the interval (3.92); then
     values that divide the interval evenly, the nearest to the first one first. The interval is cut at +-12.
 
     Args:
-        preferred: beta-hat of (3.91).
-        lowest: of (3.92).
-        highest: of (3.92).
+        preferred: (n,) beta-hat of (3.91).
+        lowest: (n,) of (3.92).
+        highest: (n,) of (3.92).
         count: how many values in all.
 
     Returns:
-        (count,) or fewer; empty if no value keeps every cable taut.
+        (n, count) NaN in place of a value; all of a row if none keeps every cable taut.
     """
-    low, high = max(lowest, -LARGEST), min(highest, LARGEST)
-    if not low < high:
-        return np.array([preferred]) if lowest < preferred < highest else np.array([])
-    first = preferred if lowest < preferred < highest else 0.5 * (low + high)
-    others = low + (high - low) * (np.arange(count - 1) + 0.5) / (count - 1)
-    return np.concatenate([[first], others[np.argsort(np.abs(others - first), kind="stable")]])
+    low, high = np.maximum(lowest, -LARGEST)[:, None], np.minimum(highest, LARGEST)[:, None]
+    is_inside = ((lowest < preferred) & (preferred < highest))[:, None]
+    first = np.where(is_inside, preferred[:, None], np.where(low < high, 0.5 * (low + high), np.nan))
+    others = low + (high - low) * (np.arange(count - 1) + 0.5) / max(count - 1, 1)
+    nearest = np.argsort(np.abs(others - first), axis=1, kind="stable")
+    others = np.where(low < high, np.take_along_axis(others, nearest, axis=1), np.nan)
+    return np.concatenate([first, others], axis=1)
 
 
 def cheapest_path(costs: list[np.ndarray]) -> list[int]:

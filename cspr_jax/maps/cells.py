@@ -5,14 +5,14 @@ import numpy as np
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
+from cspr_jax.maps.grid_map import OF_TARGETS, PointMassMap
 from cspr_jax.maps.minimum_arcs import minimum_arcs
 from cspr_jax.tiles import Grid
 
 _OF_STARTS = ("from_x", "from_y", "from_z", "z0")
 
 
-class CellMap(GridMap):
+class CellMap(PointMassMap):
     """The map of a sweep of smallest numbers of arcs; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:

@@ -1,24 +1,29 @@
 """What all maps of a sweep share: robot, limits, amplitude function, and the targets of a grid."""
 
 import abc
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from cspr_jax import problem
+from cspr_jax.amplitudes import Amplitude
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.limits import Limits
+from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.tiles import Grid
 
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
+SharedKind = TypeVar("SharedKind", Shared, PoseShared)
 OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
 
-class GridMap(abc.ABC):
+class GridMap(abc.ABC, Generic[SharedKind]):
     """The map of a sweep, ready to compute tiles.
 
     Args:
@@ -34,11 +39,15 @@ class GridMap(abc.ABC):
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Build what all tiles share."""
         self._keys, self._file, self._signs = keys, file, problem.axis_signs(spec)
-        robot = problem.build_robot(spec, keys.trajectory, file)
         amplitude = problem.build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=for_bounds)
         limits = problem.build_limits(spec, keys.limits, keys.limits.floor, file)
-        self._shared = Shared(robot, limits, amplitude)
-        self._centre = np.asarray(centroid(robot))
+        self._shared: SharedKind = self._built(spec, limits, amplitude)
+        self._centre = np.asarray(centroid(self._shared.robot))
+
+    @abc.abstractmethod
+    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> SharedKind:
+        # What the kernels take.
+        ...
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -87,7 +96,7 @@ class GridMap(abc.ABC):
         if "radius" not in cells:
             return np.stack([cells["x"], cells["y"], cells["z"]], axis=1) * self._signs
         middle, radius, azimuth = self._centre * self._signs, cells["radius"], cells["azimuth"]
-        level = [middle[0] + radius * np.cos(azimuth), middle[1] + radius * np.sin(azimuth)]
+        level: list[np.ndarray] = [middle[0] + radius * np.cos(azimuth), middle[1] + radius * np.sin(azimuth)]
         return np.stack([*level, cells["z"]], axis=1) * self._signs
 
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
@@ -109,3 +118,10 @@ class GridMap(abc.ABC):
             raise ConfigError(self._file, f"{key}: every point is above the spool plane: must be some below it")
         if floor is not None and not (points[:, 2] <= np.asarray(floor)).any():
             raise ConfigError(self._file, f"{key}: every point is below the floor: must be some above it")
+
+
+class PointMassMap(GridMap[Shared]):
+    """The map of a sweep of a point mass; see `GridMap`."""
+
+    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Shared:
+        return Shared(problem.build_robot(spec, self._keys.trajectory, self._file), limits, amplitude)

@@ -9,7 +9,7 @@ import numpy as np
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
+from cspr_jax.maps.grid_map import OF_TARGETS, PointMassMap
 from cspr_jax.maps.minimum_oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.robots import is_planar
 from cspr_jax.tiles import Grid
@@ -19,7 +19,7 @@ from cspr_jax.trajectories.transition import depth_for
 _ANY_DEPTH = 1.0
 
 
-class OscillationMap(GridMap):
+class OscillationMap(PointMassMap):
     """The map of a sweep of transitions; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:

@@ -10,6 +10,7 @@ from cspr_jax.errors import ConfigError, shown
 
 _START = ("from_x", "from_y", "from_z")
 _INSTANTS = ("tau", "cable")
+_POSES = ("tilt_azimuth", "tilt", "torsion")
 
 
 def check_map(keys: SweepFile, path: Path) -> None:
@@ -25,6 +26,8 @@ def check_map(keys: SweepFile, path: Path) -> None:
     given = tuple(name for name in ("x", "y", "radius", "azimuth") if getattr(keys.axes, name) is not None)
     if given not in (("x", "y"), ("radius", "azimuth")):
         raise ConfigError(path, f"axes: {', '.join(given) or 'no targets'}: must be x and y, or radius and azimuth")
+    if keys.map != "poses":
+        _refuse_poses(keys, path)
     _CHECKS[keys.map](keys, path)
 
 
@@ -101,8 +104,33 @@ def _check_arcs(keys: SweepFile, path: Path) -> None:
         raise ConfigError(path, f"axes.{given[0]}: must be absent where trajectory.from.rest = true")
 
 
+def _refuse_poses(keys: SweepFile, path: Path) -> None:
+    for name in _POSES:
+        if getattr(keys.axes, name) is not None:
+            raise ConfigError(path, f'axes.{name}: must be absent in this map; it is for map = "poses"')
+    start, given = keys.trajectory.start, keys.trajectory.beta_hat is not None
+    if given or (start is not None and start.is_pose):
+        key = "trajectory.beta_hat" if given else "trajectory.from"
+        raise ConfigError(path, f'{key}: must be without an orientation or a beta_hat but for map = "poses"')
+
+
+def _check_poses(keys: SweepFile, path: Path) -> None:
+    if keys.trajectory.family == "transition":
+        raise ConfigError(
+            path, 'trajectory.family = "transition": must be "hypocycloid" or "hypocycloid-standard" in this map'
+        )
+    for name in (*_START, *_INSTANTS, "inclination"):
+        if getattr(keys.axes, name) is not None:
+            raise ConfigError(path, f"axes.{name}: must be absent in this map")
+    if keys.trajectory.inclination is not None:
+        raise ConfigError(path, "trajectory.inclination: must be absent in this map")
+    if keys.axes.z0 is None:
+        raise ConfigError(path, "axes.z0 is missing: depth of P0 below the centroid of the spools, m")
+
+
 _CHECKS: dict[str, Callable[[SweepFile, Path], None]] = {
     "minimum-arcs": _check_arcs,
     "minimum-oscillations": _check_oscillations,
     "transition-envelopes": _check_envelopes,
+    "poses": _check_poses,
 }

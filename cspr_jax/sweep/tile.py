@@ -15,6 +15,7 @@ from cspr_jax.maps.cells import CellMap
 from cspr_jax.maps.envelope_cells import EnvelopeMap
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.maps.oscillation_cells import OscillationMap
+from cspr_jax.maps.pose_cells import PoseMap
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
@@ -24,6 +25,7 @@ MAPS: dict[str, Callable[[RobotFile, SweepFile, object], GridMap]] = {
     "minimum-arcs": CellMap,
     "minimum-oscillations": OscillationMap,
     "transition-envelopes": EnvelopeMap,
+    "poses": PoseMap,
 }
 # Margins so near zero can change sign with the processor; how many there are stands in the result.
 NEAR_ZERO = 1e-9

@@ -23,7 +23,7 @@ from cspr_jax.numerics import sincospi
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn
 from cspr_jax.trajectories.swing_plane import swing_plane
-from cspr_jax.wrenches import Pose
+from cspr_jax.wrenches import Pose, conditioning
 
 
 @jax.tree_util.register_dataclass
@@ -40,6 +40,7 @@ class PoseSegment:
         sense: () +1 (p odd) or -1 (p even).
         rate: () lambda of (3.50), 1/s^2.
         turn: of the orientation.
+        regular: () determinant (`wrenches.conditioning`) at rest in P0, whose sign must not change.
     """
 
     plane: Array
@@ -50,6 +51,7 @@ class PoseSegment:
     sense: Array
     rate: Array
     turn: Turn
+    regular: Array
 
 
 def pose_segment(
@@ -79,7 +81,8 @@ def pose_segment(
     plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, z0, upright, odd)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
     how = turn(start[1], end[1], *bends, odd=odd)
-    return PoseSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, how)
+    regular = conditioning(robot, hub, jnp.eye(3, dtype=hub.dtype))
+    return PoseSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, how, regular)
 
 
 def duration(segment: PoseSegment, arcs: Array) -> Array:

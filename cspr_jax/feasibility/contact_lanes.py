@@ -1,0 +1,91 @@
+"""Cables that meet each other or the platform, one lane a case: the fast form of `interference`."""
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.feasibility.interference import PARALLEL
+from cspr_jax.lanes import Matrix, Vector, combined, cross, dot, turned_back
+from cspr_jax.wrench_lanes import Cables
+
+
+def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: Cables) -> list[Vector]:
+    """The shortest vectors between cables.
+
+    Args:
+        base_points: (6, 3) m.
+        pairs: indices of cables; known when this is compiled.
+        wires: the cables.
+
+    Returns:
+        one vector a pair, from its first cable to its second, m.
+    """
+    squares = [dot(ray, ray) for ray in wires.rays]
+    found: list[Vector] = []
+    for i, j in pairs:
+        u, v, uu, vv = wires.rays[i], wires.rays[j], squares[i], squares[j]
+        apart = [base_points[j, k] - base_points[i, k] for k in range(3)]
+        uv, au, av = dot(u, v), dot(apart, u), dot(apart, v)
+        denominator = uu * vv - uv * uv
+        is_parallel = denominator <= PARALLEL * uu * vv
+        s = (au * vv - av * uv) / jnp.where(is_parallel, 1.0, denominator)
+        s = jnp.clip(jnp.where(is_parallel, 0.0, s), 0.0, 1.0)
+        t = jnp.clip((s * uv - av) / vv, 0.0, 1.0)
+        s = jnp.clip((au + t * uv) / uu, 0.0, 1.0)
+        found.append(tuple(apart[k] + t * v[k] - s * u[k] for k in range(3)))
+    return found
+
+
+def views(wires: Cables, turn: Matrix) -> list[Vector]:
+    """The cables from the platform to the spools, seen from the platform; not of unit length.
+
+    Args:
+        wires: the cables.
+        turn: rows of the rotation matrix.
+
+    Returns:
+        one vector a cable, platform axes, m.
+    """
+    return [turned_back(turn, tuple(-x for x in ray)) for ray in wires.rays]
+
+
+def turns_much(before: Sequence[Vector], after: Sequence[Vector], least_cosine: float) -> Array:
+    """Whether any of some vectors turns by more than an angle between two instants.
+
+    Args:
+        before: vectors.
+        after: as many.
+        least_cosine: cosine of the angle.
+
+    Returns:
+        (n,).
+    """
+    found = jnp.asarray(False)
+    for a, b in zip(before, after, strict=True):
+        inner = dot(a, b)
+        found = found | (inner < 0.0) | (inner * inner < least_cosine**2 * dot(a, a) * dot(b, b))
+    return found
+
+
+def platform_hit(sides: Array, normal: Array, before: Sequence[Vector], after: Sequence[Vector]) -> Array:
+    """Whether any cable swept over the platform between two instants; see `interference.platform_hit`.
+
+    Args:
+        sides: (6, 2, 3) of `interference.contacts`.
+        normal: (3,) of it.
+        before: of `views`.
+        after: of `views`.
+
+    Returns:
+        (n,).
+    """
+    found, up = jnp.asarray(False), [normal[i] for i in range(3)]
+    for k, (a, b) in enumerate(zip(before, after, strict=True)):
+        one, two = ([sides[k, j, i] for i in range(3)] for j in range(2))
+        high, low = dot(a, up), dot(b, up)
+        weight = combined([(jnp.abs(low), a), (jnp.abs(high), b)])
+        across = dot(cross(one, two), up)
+        inside = (dot(cross(weight, two), up) * across >= 0.0) & (dot(cross(one, weight), up) * across >= 0.0)
+        found = found | ((high * low <= 0.0) & inside)
+    return found

@@ -1,0 +1,135 @@
+"""The slacks of `pose_slacks` for many platforms, one lane a case, and what the first look needs of them."""
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.feasibility.limits import Limits, given
+from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.lanes import cross, dot, smallest
+from cspr_jax.platforms import CABLES, PlatformRobot
+from cspr_jax.robots import centroid, plane_normal
+from cspr_jax.trajectories.pose_lanes import Instant, Kind, State, squared_duration, state
+from cspr_jax.trajectories.pose_segment import PoseSegment
+from cspr_jax.wrench_lanes import Balance, Cables, balance, cable_rates, cables, determinant, inertial_wrench
+
+# Limits on what depends on the motion, beside the tensions, and on the pose alone, beside regularity and depth.
+MOVING = ("tension_min", "tension_max", "cable_speed_max", "cable_acceleration_max")
+STILL = ("floor", "cable_length_max")
+# Where three of the cables are nearly in one plane the fast balance has no digits, whatever the platform does.
+FLAT = 1e-7
+
+
+def _balanced(robot: PlatformRobot, now: State, wires: Cables, squared: Array) -> Balance:
+    def slowed(vector):
+        return tuple(x / squared for x in vector)
+
+    # The moment is of second order in time like the force: omega enters squared.
+    force, moment = inertial_wrench(robot, slowed(now.acceleration), now.turn, now.omega, now.spin)
+    return balance(wires, force, slowed(moment))
+
+
+def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> Array:
+    """The smallest tension at one instant of many segments.
+
+    Args:
+        robot: in its reference axes.
+        segment: leaves (n, ...), of the parity of `arcs`.
+        arcs: () or (n,) number of arcs, a float.
+        now: of these arcs.
+        kind: of the motions.
+
+    Returns:
+        (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign.
+    """
+    here = state(segment, arcs, now, kind)
+    wires = cables(robot, here.position, here.turn)
+    found = _balanced(robot, here, wires, squared_duration(segment, arcs))
+    lowest = smallest([x * jnp.sign(found.denominator) for x in found.numerators])
+    lowest = 6.0 / segment.rate * lowest / jnp.abs(found.denominator)
+    return jnp.where(found.signed * segment.regular > 0.0, lowest, -jnp.inf)
+
+
+def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> list[Array]:
+    """Smallest slacks of the criteria that depend on the motion, at one instant of many segments.
+
+    Args:
+        shared: robot, limits.
+        segment: leaves (n, ...), of the parity of `arcs`.
+        arcs: () or (n,) number of arcs, a float.
+        now: of these arcs.
+        kind: of the motions.
+
+    Returns:
+        (n,) each, in the order of `MOVING`; infinite where the fast balance has no digits.
+    """
+    robot, limits = shared.robot, shared.limits
+    here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
+    wires = cables(robot, here.position, here.turn)
+    found = _balanced(robot, here, wires, squared)
+    # Where three of the cables are nearly in one plane.
+    a, b, c = (wires.rays[k] for k in range(0, CABLES, 2))
+    volume = dot(a, cross(b, c))
+    is_flat = volume * volume < FLAT**2 * dot(a, a) * dot(b, b) * dot(c, c)
+    lowest = 6.0 / segment.rate * smallest([x * jnp.sign(found.denominator) for x in found.numerators])
+    values = [jnp.where(is_flat, jnp.inf, lowest / jnp.abs(found.denominator))]
+    names = _given(limits, MOVING)
+    if not names:
+        return values
+    lengths, rates, bends = cable_rates(wires, here.velocity, here.acceleration, here.omega, here.spin)
+    rates, bends = rates / jnp.sqrt(squared), bends / squared
+    force, weight = robot.mass * jnp.stack(found.numerators) / found.denominator * lengths, robot.mass * robot.gravity
+    slacks = {
+        "tension_min": lambda x, k: (force[k] - x) * 6.0 / weight,
+        "tension_max": lambda x, k: (x - force[k]) * 6.0 / weight,
+        "cable_speed_max": lambda x, k: 1.0 - jnp.abs(rates[k]) / x,
+        "cable_acceleration_max": lambda x, k: 1.0 - jnp.abs(bends[k]) / x,
+    }
+    for name in names:
+        least = smallest([slacks[name](getattr(limits, name)[k], k) for k in range(CABLES)])
+        values.append(jnp.where(is_flat, jnp.inf, least) if name.startswith("tension") else least)
+    return values
+
+
+def still_slacks(shared: PoseShared, segment: PoseSegment, here: State, wires: Cables) -> list[Array]:
+    """Smallest slacks of the criteria that depend on the pose alone, at one instant of many segments.
+
+    Args:
+        shared: robot, limits.
+        segment: leaves (n, ...).
+        here: the state.
+        wires: the cables there.
+
+    Returns:
+        (n,) each, in the order of `STILL`.
+    """
+    robot, limits, z0 = shared.robot, shared.limits, shared.robot.gravity / segment.rate
+    lengths = [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]
+    size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    product = lengths[0]
+    for length in lengths[1:]:
+        product = product * length
+    normal, centre = plane_normal(robot), centroid(robot)
+    below = dot([normal[i] for i in range(3)], [here.position[i] - centre[i] for i in range(3)]) / z0
+    values = [determinant(wires) / (size**3 * product * segment.regular), below]
+    if limits.floor is not None:
+        values.append((limits.floor - here.position[2]) / z0)
+    if limits.cable_length_max is not None:
+        values.append(smallest([1.0 - length / limits.cable_length_max[k] for k, length in enumerate(lengths)]))
+    return values
+
+
+def _given(limits: Limits, names: tuple[str, ...]) -> list[str]:
+    return [name for name in given(limits) if name in names]
+
+
+def order(limits: Limits) -> list[int]:
+    """Where the criteria of `pose_slacks.flags` stand among moving slacks and still ones, one after the other.
+
+    Args:
+        limits: which limits are given.
+
+    Returns:
+        n_criteria indices.
+    """
+    names = ["taut", *_given(limits, MOVING), "regular", "below", *_given(limits, STILL)]
+    return [names.index(name) for name in ("taut", "regular", "below", *given(limits))]

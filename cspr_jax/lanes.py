@@ -1,0 +1,106 @@
+"""Small vectors as tuples of arrays, one lane a case: XLA then makes one loop over the cases of a long formula."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+Vector = Sequence[Array]
+Matrix = Sequence[Vector]
+
+
+def dot(a: Vector, b: Vector) -> Array:
+    """Scalar product.
+
+    Args:
+        a: three arrays (...).
+        b: three arrays.
+
+    Returns:
+        (...).
+    """
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product.
+
+    Args:
+        a: three arrays (...).
+        b: three arrays.
+
+    Returns:
+        three arrays.
+    """
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def combined(terms: Sequence[tuple[Array, Vector]]) -> Vector:
+    """Sum of weighted vectors.
+
+    Args:
+        terms: weight (...) and vector of each.
+
+    Returns:
+        three arrays.
+    """
+    return tuple(sum((w * v[i] for w, v in terms[1:]), terms[0][0] * terms[0][1][i]) for i in range(3))
+
+
+def turned(matrix: Matrix, vector: Vector) -> Vector:
+    """Matrix times vector.
+
+    Args:
+        matrix: three rows.
+        vector: three arrays.
+
+    Returns:
+        three arrays.
+    """
+    return tuple(dot(row, vector) for row in matrix)
+
+
+def turned_back(matrix: Matrix, vector: Vector) -> Vector:
+    """Transposed matrix times vector.
+
+    Args:
+        matrix: three rows.
+        vector: three arrays.
+
+    Returns:
+        three arrays.
+    """
+    return combined([(vector[i], matrix[i]) for i in range(3)])
+
+
+def smallest(values: Sequence[Array]) -> Array:
+    """The smallest of several arrays, case by case; NaN stays NaN.
+
+    Args:
+        values: arrays (...).
+
+    Returns:
+        (...).
+    """
+    least = values[0]
+    for value in values[1:]:
+        least = jnp.minimum(least, value)
+    return least
+
+
+def stored(values: Any, one: Array) -> Any:
+    """The same values, which XLA then computes once.
+
+    On a CPU it computes a cheap value again in every loop that uses it, with all that leads to it. A division is
+    dear to it: its result is stored instead.
+
+    Args:
+        values: pytree of arrays.
+        one: () the number 1, as an argument of the compiled function.
+
+    Returns:
+        the pytree.
+    """
+    return jax.tree.map(lambda x: x / one, values)

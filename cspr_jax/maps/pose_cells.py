@@ -1,0 +1,151 @@
+"""Cells of a sweep of poses: positions and orientations of a grid to the quantities of a result file."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax import problem, rotations
+from cspr_jax.amplitudes import Amplitude
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.feasibility.endpoints import AT_REST, endpoint
+from cspr_jax.feasibility.limits import Limits
+from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
+from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.grids import in_batches
+from cspr_jax.maps.bends import options
+from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
+from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, smallest_arcs
+from cspr_jax.maps.pose_answers import PoseAnswers, settled
+from cspr_jax.platforms import PlatformRobot
+from cspr_jax.reference_pose import aligned, reference_pose
+from cspr_jax.robots import plane_normal
+from cspr_jax.tiles import Grid
+from cspr_jax.wrenches import conditioning
+
+# Cells whose candidates are held at a time.
+CELLS = 8192
+NEVER = np.iinfo(int).max
+TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
+
+
+@jax.jit
+def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
+    # Of each pose (3.91), the interval (3.92), and the determinant over that at the same depth in the middle.
+    def one(position, quaternion, z0):
+        found = endpoint(robot, position, quaternion, z0)
+        middle = jnp.mean(robot.base_points, axis=0).at[2].set(position[2])
+        share = conditioning(robot, position, rotations.matrix(quaternion)) / conditioning(robot, middle, jnp.eye(3))
+        return found.preferred, found.lowest, found.highest, share
+
+    return jax.vmap(one)(*poses)
+
+
+class PoseMap(GridMap[PoseShared]):
+    """The map of a sweep of poses; see `GridMap`."""
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse a point mass, and a start that is no pose."""
+        if not spec.is_platform:
+            raise ConfigError(
+                file, f'robot "{spec.name}" is a point mass: must be a platform on six cables in this map'
+            )
+        self._spec = spec
+        super().__init__(spec, keys, file)
+        start = keys.trajectory.start
+        self._from_rest = start is None or start.rest
+        self._quaternion = problem.given_quaternion(
+            None if start is None else start.quaternion, "trajectory.from.quaternion", file
+        )
+        variable = keys.trajectory.family == "hypocycloid"
+        self._checker = PoseChecker(self._shared, variable=variable, from_rest=self._from_rest, batch=MANY)
+
+    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> PoseShared:
+        robot = problem.build_platform(spec, self._keys.trajectory, self._file)
+        return PoseShared(aligned(robot)[0], limits, amplitude)
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        count = len(cells["z0"])
+        parts = [
+            vars(self._answers({name: x[start : start + CELLS] for name, x in cells.items()}))
+            for start in range(0, count, CELLS)
+        ]
+        found = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        return found | {"beta_hat": found["beta_hat"][:, 1]}
+
+    def _answers(self, cells: dict[str, np.ndarray]) -> PoseAnswers:
+        z0, targets = np.asarray(cells["z0"], float), self._targets(cells)
+        angles = np.stack([cells.get(name, np.zeros(len(z0))) for name in TILT_TORSION], axis=1)
+        poses = (targets, problem.orientations(self._spec, self._centre, targets, angles))
+        preferred, lowest, highest, share = in_batches(partial(_ends, self._shared.robot), (*poses, z0), size=MANY)
+        given = self._keys.trajectory.beta_hat
+        if isinstance(given, float):
+            values = np.full((len(z0), 1), given)
+        else:
+            values = options(preferred, lowest, highest, *([1] if given == "preferred" else []))
+        # No motion ends above the spools, or beyond a singularity.
+        can_end = ((targets - self._centre) @ np.asarray(plane_normal(self._shared.robot)) > 0.0) & (share > 0.0)
+        cell, option = np.nonzero(~np.isnan(values) & can_end[:, None])
+        every = self._candidates(z0, poses, np.where(np.isnan(values), AT_REST, values)[:, 0])
+        trial = every.rows(cell)._replace(group=cell)
+        trial = trial._replace(bends=(trial.bends[0], values[cell, option]))
+        max_arcs = self._keys.trajectory.max_arcs
+        found = smallest_arcs(self._checker, trial, max_arcs=max_arcs)
+        # Each cell has one answer. Several may have been found at once: the one tried first.
+        best = np.flatnonzero(found.arcs > 0)[::-1]
+        arcs, undecided, bends = np.zeros(len(z0), int), np.full(len(z0), NEVER), every.bends[1].copy()
+        arcs[cell[best]], bends[cell[best]] = found.arcs[best], trial.bends[1][best]
+        checks = self._checker.nothing(len(z0))
+        checks.put(cell[best], found.checks.rows(best))
+        np.minimum.at(undecided, cell, np.where(found.undecided > 0, found.undecided, NEVER))
+        undecided = np.where(undecided < NEVER, undecided, 0)
+        every = every._replace(bends=(every.bends[0], bends))
+        tried, none = arcs.copy(), np.flatnonzero(arcs == 0)
+        tried[none] = best_candidates(self._checker, every.rows(none), max_arcs=max_arcs)
+        return settled(self._checker, every, Found(arcs, undecided, checks), tried)
+
+    def _candidates(self, z0: np.ndarray, ends: tuple[np.ndarray, np.ndarray], bends: np.ndarray) -> Candidates:
+        # One of each cell.
+        count, start = len(z0), self._keys.trajectory.start
+        if start is None or start.position is None:
+            hub = self._centre + z0[:, None] * np.array([0.0, 0.0, 1.0])
+            first, bend = (hub, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))), np.full(count, AT_REST)
+        else:
+            depths, own = np.unique(z0, return_inverse=True)
+            place = np.tile(np.asarray(start.position) * self._signs, (len(depths), 1))
+            turned = np.tile(self._quaternion * np.append(1.0, self._signs), (len(depths), 1))
+            if start.tilt_torsion is not None:
+                angles = np.tile(start.tilt_torsion, (len(depths), 1))
+                turned = problem.orientations(self._spec, self._centre, place, angles)
+            found = in_batches(partial(_ends, self._shared.robot), (place, turned, depths), size=MANY)
+            values = options(found[0], found[1], found[2], 1)
+            chosen = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
+            bend = chosen[own] if start.beta_hat is None else np.full(count, start.beta_hat)
+            first = (place[own], turned[own])
+        return Candidates(first, ends, z0, (bend, bends), np.arange(count))
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""
+        self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")
+        errors = []
+        for z0 in grid.axes["z0"]:
+            try:
+                reference_pose(self._shared.robot, float(z0))
+            except InputError as error:
+                errors.append(error)
+        if len(errors) == len(grid.axes["z0"]):
+            raise ConfigError(self._file, f"robot.{errors[0]}") from errors[0]
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        found = answers["arcs"] > 0
+        margins = np.minimum(np.minimum(answers["margin"], answers["limit_margin"]), answers["det_margin"])
+        return {
+            "a feasible cell with a margin below zero": found & ~(margins > 0.0),
+            "an infeasible cell whose verdict is 0": ~found & (answers["verdict"] == 0),
+            "a feasible cell without a duration": found & ~(answers["duration"] > 0.0),
+        }

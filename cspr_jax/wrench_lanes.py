@@ -1,0 +1,162 @@
+"""The wrench balance of many platforms, one lane a case: the fast form of `wrenches`, without a division but the last.
+
+(3.11) is solved by adjugates, the cables in two groups of three; the determinant falls out of the same products.
+"""
+
+import itertools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.lanes import Matrix, Vector, combined, cross, dot, turned, turned_back
+from cspr_jax.platforms import CABLES, PlatformRobot
+
+
+class Cables(NamedTuple):
+    """Where the cables are, one entry a cable.
+
+    Fields:
+        arms: from the mass centre to the attachment points, fixed axes, m.
+        rays: from spool to attachment point, m.
+    """
+
+    arms: Sequence[Vector]
+    rays: Sequence[Vector]
+
+
+class Balance(NamedTuple):
+    """The tensions per mass and length as fractions.
+
+    Fields:
+        numerators: six, of mu.
+        denominator: their common one.
+        signed: a number with the sign of det J.
+    """
+
+    numerators: Sequence[Array]
+    denominator: Array
+    signed: Array
+
+
+def cables(robot: PlatformRobot, position: Vector, turn: Matrix) -> Cables:
+    """The cables, (3.1).
+
+    Args:
+        robot: the robot.
+        position: of the mass centre, m.
+        turn: rows of the rotation matrix.
+
+    Returns:
+        the cables.
+    """
+    arms = [turned(turn, [robot.platform_points[k, j] for j in range(3)]) for k in range(CABLES)]
+    rays = [tuple(position[i] + arm[i] - robot.base_points[k, i] for i in range(3)) for k, arm in enumerate(arms)]
+    return Cables(arms, rays)
+
+
+def inertial_wrench(
+    robot: PlatformRobot, acceleration: Vector, turn: Matrix, omega: Vector, spin: Vector
+) -> tuple[Vector, Vector]:
+    """Right-hand side of (3.11), per mass.
+
+    Args:
+        robot: the robot.
+        acceleration: m/s^2.
+        turn: rows of the rotation matrix.
+        omega: rad/s.
+        spin: rad/s^2.
+
+    Returns:
+        force, m/s^2, and moment, m^2/s^2.
+    """
+    inertia = robot.inertia / robot.mass
+
+    def weighted(vector):
+        own = turned_back(turn, vector)
+        return turned(turn, [dot([inertia[i, j] for j in range(3)], own) for i in range(3)])
+
+    x, y = weighted(spin), cross(omega, weighted(omega))
+    force = (acceleration[0], acceleration[1], acceleration[2] - robot.gravity)
+    return force, tuple(a + b for a, b in zip(x, y, strict=True))
+
+
+def balance(wires: Cables, force: Vector, moment: Vector) -> Balance:
+    """The tensions that give a wrench, (3.11).
+
+    Args:
+        wires: the cables.
+        force: per mass, m/s^2.
+        moment: per mass, m^2/s^2.
+
+    Returns:
+        the tensions per mass and length.
+    """
+    pulls = [tuple(-x for x in ray) for ray in wires.rays]
+    moments = [cross(arm, pull) for arm, pull in zip(wires.arms, pulls, strict=True)]
+    first, second = range(0, CABLES, 2), range(1, CABLES, 2)
+    a, b = [pulls[k] for k in first], [pulls[k] for k in second]
+    adjugate = (cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]))
+    d = dot(a[0], adjugate[0])
+    g = [[dot(row, column) for column in b] for row in adjugate]  # adj(A) B
+    top = [dot(row, force) for row in adjugate]
+    c = [moments[k] for k in first]
+    e = [
+        tuple(d * moments[k][i] - sum(c[j][i] * g[j][n] for j in range(3)) for i in range(3))
+        for n, k in enumerate(second)
+    ]
+    rest = tuple(d * moment[i] - sum(c[j][i] * top[j] for j in range(3)) for i in range(3))
+    inner = (cross(e[1], e[2]), cross(e[2], e[0]), cross(e[0], e[1]))
+    determinant = dot(e[0], inner[0])
+    odd = [dot(row, rest) for row in inner]
+    even = [top[j] * determinant - sum(g[j][n] * odd[n] for n in range(3)) for j in range(3)]
+    numerators = [x for pair in zip(even, [d * x for x in odd], strict=True) for x in pair]
+    # Taking the cables in two groups is an odd permutation.
+    return Balance(numerators, d * determinant, -determinant)
+
+
+def determinant(wires: Cables) -> Array:
+    """Determinant of J, (3.5), in three pairs of cables: the volumes of their forces times those of their moments.
+
+    Args:
+        wires: the cables.
+
+    Returns:
+        (...) m^9.
+    """
+    moments = [cross(arm, ray) for arm, ray in zip(wires.arms, wires.rays, strict=True)]
+    found = jnp.zeros(())
+    for three in itertools.combinations(range(CABLES), 3):
+        others = [k for k in range(CABLES) if k not in three]
+        a, b, c = (wires.rays[k] for k in three)
+        d, e, f = (moments[k] for k in others)
+        # Laplace's expansion by the first three columns.
+        sign = -1.0 if (sum(three) - 3) % 2 else 1.0
+        found = found + sign * dot(a, cross(b, c)) * dot(d, cross(e, f))
+    return found
+
+
+def cable_rates(wires: Cables, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector) -> list[Array]:
+    """Lengths of the cables and their first two derivatives, (3.2) and (3.3).
+
+    Args:
+        wires: the cables.
+        velocity: of the mass centre, per unit of time.
+        acceleration: likewise.
+        omega: angular velocity.
+        spin: angular acceleration.
+
+    Returns:
+        lengths, rates, accelerations, (6, ...) each.
+    """
+    found = []
+    for arm, ray in zip(wires.arms, wires.rays, strict=True):
+        swing = cross(omega, arm)
+        pace = combined([(jnp.ones(()), velocity), (jnp.ones(()), swing)])
+        across, inward = cross(spin, arm), cross(omega, swing)
+        pull = tuple(acceleration[i] + across[i] + inward[i] for i in range(3))
+        length = jnp.sqrt(dot(ray, ray))
+        rate = dot(ray, pace) / length
+        found.append((length, rate, (dot(pace, pace) + dot(ray, pull) - rate * rate) / length))
+    return [jnp.stack(column) for column in zip(*found, strict=True)]
