@@ -13,7 +13,7 @@ from cspr_jax import tensions, wrenches
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.planning import Plan
-from cspr_jax.problem import axis_signs
+from cspr_jax.problem import axis_signs, motion_kind
 from cspr_jax.quantities import TRAJECTORY
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import new_hdf5, set_attributes
@@ -39,16 +39,16 @@ def _point_states(shared, segment, arcs, tau):
     return jax.vmap(one)(tau)
 
 
-@partial(jax.jit, static_argnames="variable")
-def _pose_states(shared, segment, arcs, tau, *, variable):
+@partial(jax.jit, static_argnames="kind")
+def _pose_states(shared, segment, arcs, tau, *, kind):
     def one(t):
-        pose = motion(segment, shared.amplitude, arcs, t, variable=variable)
+        pose = motion(segment, shared.amplitude, arcs, t, kind=kind)
         length, rate, _ = wrenches.cable_motion(shared.robot, pose)
         return {
             "position": pose.position,
             "velocity": pose.velocity,
             "acceleration": pose.acceleration,
-            "quaternion": quaternion_at(segment, shared.amplitude, arcs, t),
+            "quaternion": quaternion_at(segment, shared.amplitude, arcs, t, kind=kind),
             "omega": pose.angular_velocity,
             "omega_dot": pose.angular_acceleration,
             "length": length,
@@ -97,7 +97,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
 
 def _states(plan: Plan, segment, arcs: float, tau: np.ndarray):
     if isinstance(plan.shared, PoseShared):
-        return _pose_states(plan.shared, segment, arcs, tau, variable=plan.keys.family == "hypocycloid")
+        return _pose_states(plan.shared, segment, arcs, tau, kind=motion_kind(plan.keys))
     return _point_states(plan.shared, segment, arcs, tau)
 
 

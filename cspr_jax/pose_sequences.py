@@ -44,13 +44,12 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
             )
         if keys.inclination is not None:
             raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
+        if keys.beat in ("beta_0", "beta_1"):
+            for i, pose in enumerate(keys.pose):
+                if pose.beta_hat is not None:
+                    raise ConfigError(path, f'pose[{i}].beta_hat: must be absent with beat = "{keys.beat}"')
         super().__init__(spec, keys, path)
         self._given = np.array([_orientation(i, pose, path) for i, pose in enumerate(keys.pose)])
-
-    @property
-    def variable(self) -> bool:
-        """Whether positions are hypocycloids of variable amplitude."""
-        return self.keys.family == "hypocycloid"
 
     def quaternions(self, robot, z0: float) -> np.ndarray:
         """Orientations in the kernels' axes.
@@ -88,12 +87,12 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         count, depths = len(self), z0.reshape(-1, len(self))[:, 0]
         points = points.reshape(len(depths), -1, 3)
         quaternions = self.quaternions(shared.robot, float(depths[0]))
-        checker = PoseChecker(shared, variable=self.variable, batch=FEW if len(depths) == 1 else MANY)
+        checker = PoseChecker(shared, problem.motion_kind(self.keys), batch=FEW if len(depths) == 1 else MANY)
         bends = [self._bends(shared, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)]
         if len(depths) == 1:
             self._refuse_slack(bends[0])
         # Every pair of values at the ends of every segment, for every depth.
-        pairs = [[np.meshgrid(own[i], own[i + 1], indexing="ij") for i in range(count)] for own in bends]
+        pairs = [[self._pairs(i, own[i], own[i + 1]) for i in range(count)] for own in bends]
         group = np.concatenate(
             [np.full(pair[0].size, d * count + i) for d, own in enumerate(pairs) for i, pair in enumerate(own)]
         )
@@ -107,6 +106,13 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         none = np.flatnonzero(tried == 0)
         tried[none] = best_candidates(checker, best.rows(none), max_arcs=self._largest)
         return settled(checker, best, Found(arcs, found.undecided[path], found.checks.rows(path)), tried)
+
+    def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        # Values at both ends of segment i, (n_first, n_last) each.
+        starts, ends = np.meshgrid(first, last, indexing="ij")
+        if self.keys.beat == "beta_f":
+            return (starts, starts) if self.keys.pose[i + 1].rest else (ends, ends)
+        return starts, ends
 
     def _candidates(
         self, points: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, group: np.ndarray, bends: tuple
@@ -126,6 +132,9 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         # Values of beta-hat to try at each pose; NaN where none keeps every cable taut.
         found = []
         for pose, position, quaternion in zip(self.keys.pose, points, quaternions, strict=True):
+            if self.keys.beat in ("beta_0", "beta_1"):
+                found.append(np.zeros(1))
+                continue
             if pose.beta_hat is not None or pose.rest:
                 found.append(np.array([AT_REST if pose.beta_hat is None else pose.beta_hat]))
                 continue

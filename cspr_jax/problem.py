@@ -13,6 +13,7 @@ from cspr_jax.numerics import leaf
 from cspr_jax.platforms import PlatformRobot, platform_robot
 from cspr_jax.robots import STANDARD_GRAVITY, PointMassRobot
 from cspr_jax.rotations import UNIT_TOLERANCE, from_tilt_torsion
+from cspr_jax.trajectories.pose_segment import Kind
 
 # A z-up file is turned by half a turn about x: a rotation, so that nothing is mirrored.
 _TURN = {"down": np.array([1.0, 1.0, 1.0]), "up": np.array([1.0, -1.0, -1.0])}
@@ -160,6 +161,19 @@ def build_limits(spec: RobotFile, keys: LimitKeys, floor: float | None, file: ob
         raise ConfigError(file, f"tension_min = {np.asarray(low).tolist()}: must be below tension_max for every cable")
     depth = None if floor is None else leaf(floor * axis_signs(spec)[2])
     return Limits(floor=depth, **found)
+
+
+def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> Kind:
+    """What the motions of a platform are.
+
+    Args:
+        keys: of the plan or sweep.
+        from_rest: whether all start at rest in P0.
+
+    Returns:
+        the kind.
+    """
+    return Kind(keys.family == "hypocycloid", keys.beat == "beta_1", from_rest)
 
 
 def orientations(spec: RobotFile, centre: np.ndarray, points: np.ndarray, angles: np.ndarray) -> np.ndarray:

@@ -212,6 +212,8 @@ def sequence_of(spec: RobotFile, keys: PlanFile, path: Path) -> Hypocycloids | T
     """
     if keys.family not in _FAMILIES:
         raise ConfigError(path, f'family = "{keys.family}": must be one of {", ".join(_FAMILIES)} for a point mass')
+    if keys.beat is not None:
+        raise ConfigError(path, f'beat = "{keys.beat}": must be absent for a point mass')
     for i, pose in enumerate(keys.pose):
         for key in ("tilt_torsion", "quaternion", "beta_hat"):
             if getattr(pose, key) is not None:

@@ -22,7 +22,7 @@ from cspr_jax.feasibility.pose_kernel import smallest_tensions
 from cspr_jax.platforms import pairs_apart, platform_robot
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.trajectories import pose_segment as segments
-from cspr_jax.trajectories.pose_lanes import Kind
+from cspr_jax.trajectories.pose_segment import USUAL, Kind
 
 MSSM = oracle.mssm()
 PLATFORMS = ("laval-mssm", "nist-robocrane", "fast", "greenline")
@@ -59,9 +59,9 @@ def random_pose(rng, *, rest=False):
     return position, oracle.pose_quaternion(position, angles)
 
 
-@functools.partial(jax.jit, static_argnames="variable")
-def states(robot, segment, amplitude, arcs, tau, *, variable=True):
-    return jax.vmap(lambda t: segments.motion(segment, amplitude, arcs, t, variable=variable))(tau)
+@functools.partial(jax.jit, static_argnames="kind")
+def states(robot, segment, amplitude, arcs, tau, *, kind=USUAL):
+    return jax.vmap(lambda t: segments.motion(segment, amplitude, arcs, t, kind=kind))(tau)
 
 
 def made(robot, start, end, z0, bends, p):
@@ -92,7 +92,7 @@ def test_motions_are_the_oracle_s(name, which):
             tau,
         )
         segment = made(robot, start, end, Z0, bends, p)
-        found = states(robot, segment, amplitude[0], float(p), tau, variable=which == "variable")
+        found = states(robot, segment, amplitude[0], float(p), tau, kind=Kind(which == "variable"))
         assert float(segments.duration(segment, float(p))) == pytest.approx(wanted.duration, rel=1e-12)
         np.testing.assert_allclose(found.position, wanted.position, atol=1e-11)
         np.testing.assert_allclose(found.velocity, wanted.velocity, atol=1e-10)
@@ -322,10 +322,10 @@ def test_robots_that_do_not_hang():
         reference_pose(changed(platform_points=ring, base_points=ring), Z0)
 
 
-@pytest.mark.parametrize("variable", [True, False])
+@pytest.mark.parametrize("kind", [USUAL, Kind(variable=False), Kind(plain=True), Kind(from_rest=True)])
 @pytest.mark.parametrize("name", AMPLITUDES)
 @pytest.mark.parametrize("robot", [MSSM, general(2)])
-def test_the_fast_kernel(robot, name, variable):
+def test_the_fast_kernel(robot, name, kind):
     """The smallest tension of many segments as the readable functions give it; -inf past a singularity."""
     package, rng, amplitude = ours(robot), np.random.default_rng(9), AMPLITUDES[name][0]
     rest = (jnp.array([0.0, 0.0, Z0]), jnp.eye(3))
@@ -333,11 +333,18 @@ def test_the_fast_kernel(robot, name, variable):
     for p in (1, 4, 7):
         tau = np.linspace(0.0, 1.0, 32)
         some = [
-            made(package, random_pose(rng, rest=i % 3 == 0), random_pose(rng), Z0, (-1.0, rng.uniform(-5.0, 1.0)), p)
+            made(
+                package,
+                random_pose(rng, rest=i % 3 == 0 or kind.from_rest),
+                random_pose(rng),
+                Z0,
+                (-1.0, rng.uniform(-5.0, 1.0)),
+                p,
+            )
             for i in range(24)
         ]
         batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
-        found = smallest_tensions(package, amplitude, float(p), tau, batch, kind=Kind(variable))
+        found = smallest_tensions(package, amplitude, float(p), tau, batch, kind=kind)
         single = jax.tree.map(lambda x: np.asarray(x, np.float32), (package, amplitude, batch))
         rough = smallest_tensions(
             single[0],
@@ -345,10 +352,10 @@ def test_the_fast_kernel(robot, name, variable):
             np.float32(p),
             tau.astype(np.float32),
             single[2],
-            kind=Kind(variable),
+            kind=kind,
         )
         for i, segment in enumerate(some):
-            at = states(package, segment, amplitude, float(p), tau, variable=variable)
+            at = states(package, segment, amplitude, float(p), tau, kind=kind)
             mu = np.asarray(jax.vmap(lambda *x: wrenches.tensions_per_length(package, wrenches.Pose(*x)))(*at))
             det = np.asarray(jax.vmap(lambda x, r: wrenches.conditioning(package, x, r))(at.position, at.rotation))
             if (det / reference > 1e-4).all():

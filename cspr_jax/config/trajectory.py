@@ -17,6 +17,9 @@ Quaternion = Annotated[list[Component], Field(min_length=4, max_length=4)]
 BetaHat = Annotated[float, Field(ge=-100, le=100)]
 
 
+Beat = Literal["beta_ff", "beta_f", "beta_0", "beta_1"]
+
+
 class NamedAmplitude(Table):
     """An amplitude function with a parameter."""
 
@@ -72,6 +75,12 @@ class TrajectoryKeys(Table):
         description='"quintic" (A2), { name = "effective" or "effective-c3", epsilon = ... }, { polynomial = [...] }; '
         'must meet (2.49), which A1 and A3 do not; for transitions (1.27) and (1.28), which they do; "ideal" (A = tau) '
         "serves for bounds in maps of transitions",
+    )
+    beat: Beat | None = Field(
+        None,
+        description='platforms: time function of the rotation: "beta_ff" (3.93), the default, a beta-hat of its own at '
+        'each end; "beta_f" (3.68), that of the target at both; "beta_0" (3.67), no angular acceleration at the ends; '
+        '"beta_1" (3.66), a cosine',
     )
     inclination: Inclination | None = Field(
         None, description='transitions: inclination v, a number in ]-1, 1[, or "best"; in place of z0'

@@ -27,8 +27,7 @@ from cspr_jax.feasibility.pose_lanes import order
 from cspr_jax.feasibility.pose_slacks import PoseShared, flags
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.grids import in_batches
-from cspr_jax.trajectories.pose_lanes import Kind
-from cspr_jax.trajectories.pose_segment import PoseSegment, duration
+from cspr_jax.trajectories.pose_segment import USUAL, Kind, PoseSegment, duration
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
 FEW, MANY = 256, 1024
@@ -102,14 +101,13 @@ class PoseChecker:
 
     Args:
         shared: robot, limits, amplitude.
-        variable: whether positions are hypocycloids of variable amplitude.
-        from_rest: whether all motions start at rest in P0, which is cheaper.
+        kind: of the motions.
         batch: how many are computed at a time.
     """
 
-    def __init__(self, shared: PoseShared, *, variable: bool = True, from_rest: bool = False, batch: int = FEW) -> None:
+    def __init__(self, shared: PoseShared, kind: Kind = USUAL, *, batch: int = FEW) -> None:
         """Find what can meet."""
-        self.shared, self.kind, self.batch = shared, Kind(variable, from_rest), batch
+        self.shared, self.kind, self.batch = shared, kind, batch
         found = contacts(shared.robot)
         self._platform, self._pairs = (found.sides, found.normal), tuple((int(i), int(j)) for i, j in found.pairs)
         self._flags = flags(shared.limits)

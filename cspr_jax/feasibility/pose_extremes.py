@@ -15,15 +15,15 @@ from cspr_jax.feasibility.pose_checks import SAMPLES
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.grids import in_batches
 from cspr_jax.robots import centroid, plane_normal
-from cspr_jax.trajectories.pose_segment import PoseSegment, motion
+from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, motion
 
 BATCH = 512
 
 
-@partial(jax.jit, static_argnames="variable")
-def _demands(shared: PoseShared, arguments, *, variable: bool) -> Array:
+@partial(jax.jit, static_argnames="kind")
+def _demands(shared: PoseShared, arguments, *, kind: Kind) -> Array:
     def one(segment, arcs, tau):
-        robot, pose = shared.robot, motion(segment, shared.amplitude, arcs, tau, variable=variable)
+        robot, pose = shared.robot, motion(segment, shared.amplitude, arcs, tau, kind=kind)
         per_length = wrenches.tensions_per_length(robot, pose)
         lengths, rates, bends = wrenches.cable_motion(robot, pose)
         force = robot.mass * per_length * lengths
@@ -45,7 +45,7 @@ def _demands(shared: PoseShared, arguments, *, variable: bool) -> Array:
 
 
 def pose_extremes(
-    shared: PoseShared, segments: PoseSegment, arcs: np.ndarray, least_samples: int, *, variable: bool
+    shared: PoseShared, segments: PoseSegment, arcs: np.ndarray, least_samples: int, *, kind: Kind
 ) -> Extremes:
     """What segments ask of the robot: at least 64 samples an arc, narrowed where a value is extreme.
 
@@ -54,7 +54,7 @@ def pose_extremes(
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,).
         least_samples: smallest number of samples of a segment.
-        variable: whether positions are hypocycloids of variable amplitude.
+        kind: of the motions.
 
     Returns:
         the extremes.
@@ -67,7 +67,7 @@ def pose_extremes(
 
         def at(points, segment=segment, p=p):
             items = jax.tree.map(lambda x: np.broadcast_to(x, (len(points), *np.shape(x))), (segment, float(p)))
-            return in_batches(partial(_demands, shared, variable=variable), (*items, points), size=BATCH)
+            return in_batches(partial(_demands, shared, kind=kind), (*items, points), size=BATCH)
 
         smallest = narrowed(at, tau, at(tau))
         found.append(smallest * signs + 0.0)  # no -0

@@ -13,8 +13,8 @@ from cspr_jax.feasibility.pose_lanes import lowest_tension, moving_slacks, still
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.lanes import dot, smallest, stored
 from cspr_jax.platforms import PlatformRobot
-from cspr_jax.trajectories.pose_lanes import Instant, Kind, instant, instant_of_arc, state
-from cspr_jax.trajectories.pose_segment import PoseSegment
+from cspr_jax.trajectories.pose_lanes import Instant, instant, instant_of_arc, state
+from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 from cspr_jax.wrench_lanes import cables
 
 # Steps between which a gap or a cable turns by more than this angle are to be halved.

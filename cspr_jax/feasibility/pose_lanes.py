@@ -8,8 +8,8 @@ from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.lanes import cross, dot, smallest
 from cspr_jax.platforms import CABLES, PlatformRobot
 from cspr_jax.robots import centroid, plane_normal
-from cspr_jax.trajectories.pose_lanes import Instant, Kind, State, squared_duration, state
-from cspr_jax.trajectories.pose_segment import PoseSegment
+from cspr_jax.trajectories.pose_lanes import Instant, State, squared_duration, state
+from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 from cspr_jax.wrench_lanes import Balance, Cables, balance, cable_rates, cables, determinant, inertial_wrench
 
 # Limits on what depends on the motion, beside the tensions, and on the pose alone, beside regularity and depth.

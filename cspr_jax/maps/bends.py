@@ -24,6 +24,7 @@ def options(preferred: np.ndarray, lowest: np.ndarray, highest: np.ndarray, coun
     Returns:
         (n, count) NaN in place of a value; all of a row if none keeps every cable taut.
     """
+    preferred, lowest, highest = (np.asarray(x, float) for x in (preferred, lowest, highest))
     low, high = np.maximum(lowest, -LARGEST)[:, None], np.minimum(highest, LARGEST)[:, None]
     is_inside = ((lowest < preferred) & (preferred < highest))[:, None]
     first = np.where(is_inside, preferred[:, None], np.where(low < high, 0.5 * (low + high), np.nan))

@@ -13,9 +13,9 @@ from cspr_jax.platforms import PlatformRobot
 from cspr_jax.trajectories.pose_segment import PoseSegment, pose_segment
 
 BATCH = 2048
-# Instants of the first look: late ones first, since there most motions fail; then so many an arc; and so many
-# where only the best of bad candidates is looked for.
-LATE = np.linspace(0.7, 1.0, 32)
+# Instants of the first look: in arcs before the end, those at which most motions fail, the most telling ones first;
+# then so many an arc, late ones first; and so many where only the best of bad candidates is looked for.
+TELLING = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
 COARSE, COARSEST = 12, 4
 
 
@@ -127,7 +127,7 @@ def smallest_arcs(
 
 
 def _sieved(checker: PoseChecker, segments: PoseSegment, arcs: int, alive: np.ndarray) -> np.ndarray:
-    for tau in (LATE, np.linspace(0.0, 1.0, COARSE * arcs + 1)):
+    for tau in (np.maximum(1.0 - TELLING / arcs, 0.0), np.linspace(1.0, 0.0, COARSE * arcs + 1)):
         if len(alive):
             some = segments if len(alive) == len(segments.rate) else rows(segments, alive)
             alive = alive[checker.first_look(some, arcs, tau) > -TOLERANCE]

@@ -1,6 +1,7 @@
 """What is said of motions between poses, once their numbers of arcs are known."""
 
 import dataclasses
+import math
 
 import numpy as np
 
@@ -40,6 +41,10 @@ def settled(checker: PoseChecker, candidates: Candidates, found: Found, tried: n
     segments, checks = segments_with(checker.shared.robot, candidates, tried), found.checks
     others = np.flatnonzero(found.arcs == 0)
     checks.put(others, checker.check(rows(segments, others), tried[others]))
+    duration = checker.durations(segments, tried)
+    bends = np.stack(candidates.bends, axis=1)
+    if checker.kind.plain:  # (3.66) has the one that its cosine has
+        bends = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
     doubtful = (found.undecided > 0) & ((found.arcs == 0) | (found.undecided < found.arcs))
     none = np.where(doubtful, Verdict.UNDECIDED.value, checks.verdict | Verdict.NO_ARCS.value)
     less = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
@@ -48,12 +53,12 @@ def settled(checker: PoseChecker, candidates: Candidates, found: Found, tried: n
         arcs=found.arcs,
         tried_arcs=tried,
         verdict=np.where(found.arcs > 0, less, none).astype(np.uint16),
-        duration=checker.durations(segments, tried),
+        duration=duration,
         margin=np.minimum(checks.slack[:, 0], checks.slack[:, 2]),
         margin_bound=nothing,
         limit_margin=checks.slack[:, 3:].min(1, initial=np.inf),
         feasible_at_infinity=nothing,
-        beta_hat=np.stack(candidates.bends, axis=1),
+        beta_hat=bends,
         det_margin=checks.slack[:, 1],
         cable_distance=checks.gap,
     )

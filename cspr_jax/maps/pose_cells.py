@@ -16,7 +16,7 @@ from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.grids import in_batches
-from cspr_jax.maps.bends import options
+from cspr_jax.maps.bends import OPTIONS, options
 from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, settled
@@ -26,8 +26,8 @@ from cspr_jax.robots import plane_normal
 from cspr_jax.tiles import Grid
 from cspr_jax.wrenches import conditioning
 
-# Cells whose candidates are held at a time.
-CELLS = 8192
+# Candidates that are held at a time.
+CANDIDATES = 131_072
 NEVER = np.iinfo(int).max
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 
@@ -56,12 +56,11 @@ class PoseMap(GridMap[PoseShared]):
         self._spec = spec
         super().__init__(spec, keys, file)
         start = keys.trajectory.start
-        self._from_rest = start is None or start.rest
         self._quaternion = problem.given_quaternion(
             None if start is None else start.quaternion, "trajectory.from.quaternion", file
         )
-        variable = keys.trajectory.family == "hypocycloid"
-        self._checker = PoseChecker(self._shared, variable=variable, from_rest=self._from_rest, batch=MANY)
+        from_rest = start is None or start.rest
+        self._checker = PoseChecker(self._shared, problem.motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
 
     def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> PoseShared:
         robot = problem.build_platform(spec, self._keys.trajectory, self._file)
@@ -69,10 +68,10 @@ class PoseMap(GridMap[PoseShared]):
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        count = len(cells["z0"])
+        at_a_time = CANDIDATES // (OPTIONS if self._keys.trajectory.beta_hat is None else 1)
         parts = [
-            vars(self._answers({name: x[start : start + CELLS] for name, x in cells.items()}))
-            for start in range(0, count, CELLS)
+            vars(self._answers({name: x[start : start + at_a_time] for name, x in cells.items()}))
+            for start in range(0, len(cells["z0"]), at_a_time)
         ]
         found = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         return found | {"beta_hat": found["beta_hat"][:, 1]}
@@ -82,8 +81,10 @@ class PoseMap(GridMap[PoseShared]):
         angles = np.stack([cells.get(name, np.zeros(len(z0))) for name in TILT_TORSION], axis=1)
         poses = (targets, problem.orientations(self._spec, self._centre, targets, angles))
         preferred, lowest, highest, share = in_batches(partial(_ends, self._shared.robot), (*poses, z0), size=MANY)
-        given = self._keys.trajectory.beta_hat
-        if isinstance(given, float):
+        given, beat = self._keys.trajectory.beta_hat, self._keys.trajectory.beat
+        if beat in ("beta_0", "beta_1"):
+            values = np.zeros((len(z0), 1))
+        elif isinstance(given, float):
             values = np.full((len(z0), 1), given)
         else:
             values = options(preferred, lowest, highest, *([1] if given == "preferred" else []))
@@ -92,7 +93,7 @@ class PoseMap(GridMap[PoseShared]):
         cell, option = np.nonzero(~np.isnan(values) & can_end[:, None])
         every = self._candidates(z0, poses, np.where(np.isnan(values), AT_REST, values)[:, 0])
         trial = every.rows(cell)._replace(group=cell)
-        trial = trial._replace(bends=(trial.bends[0], values[cell, option]))
+        trial = trial._replace(bends=self._bends(trial.bends[0], values[cell, option]))
         max_arcs = self._keys.trajectory.max_arcs
         found = smallest_arcs(self._checker, trial, max_arcs=max_arcs)
         # Each cell has one answer. Several may have been found at once: the one tried first.
@@ -103,10 +104,13 @@ class PoseMap(GridMap[PoseShared]):
         checks.put(cell[best], found.checks.rows(best))
         np.minimum.at(undecided, cell, np.where(found.undecided > 0, found.undecided, NEVER))
         undecided = np.where(undecided < NEVER, undecided, 0)
-        every = every._replace(bends=(every.bends[0], bends))
+        every = every._replace(bends=self._bends(every.bends[0], bends))
         tried, none = arcs.copy(), np.flatnonzero(arcs == 0)
         tried[none] = best_candidates(self._checker, every.rows(none), max_arcs=max_arcs)
         return settled(self._checker, every, Found(arcs, undecided, checks), tried)
+
+    def _bends(self, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return (first, last) if self._keys.trajectory.beat in (None, "beta_ff") else (last, last)
 
     def _candidates(self, z0: np.ndarray, ends: tuple[np.ndarray, np.ndarray], bends: np.ndarray) -> Candidates:
         # One of each cell.

@@ -108,10 +108,11 @@ def _refuse_poses(keys: SweepFile, path: Path) -> None:
     for name in _POSES:
         if getattr(keys.axes, name) is not None:
             raise ConfigError(path, f'axes.{name}: must be absent in this map; it is for map = "poses"')
-    start, given = keys.trajectory.start, keys.trajectory.beta_hat is not None
-    if given or (start is not None and start.is_pose):
-        key = "trajectory.beta_hat" if given else "trajectory.from"
-        raise ConfigError(path, f'{key}: must be without an orientation or a beta_hat but for map = "poses"')
+    for name in ("beta_hat", "beat"):
+        if getattr(keys.trajectory, name) is not None:
+            raise ConfigError(path, f'trajectory.{name}: must be absent in this map; it is for map = "poses"')
+    if keys.trajectory.start is not None and keys.trajectory.start.is_pose:
+        raise ConfigError(path, 'trajectory.from: must be without orientation and beta_hat but for map = "poses"')
 
 
 def _check_poses(keys: SweepFile, path: Path) -> None:
@@ -126,6 +127,8 @@ def _check_poses(keys: SweepFile, path: Path) -> None:
         raise ConfigError(path, "trajectory.inclination: must be absent in this map")
     if keys.axes.z0 is None:
         raise ConfigError(path, "axes.z0 is missing: depth of P0 below the centroid of the spools, m")
+    if keys.trajectory.beat in ("beta_0", "beta_1") and keys.trajectory.beta_hat is not None:
+        raise ConfigError(path, f'trajectory.beta_hat: must be absent with beat = "{keys.trajectory.beat}"')
 
 
 _CHECKS: dict[str, Callable[[SweepFile, Path], None]] = {

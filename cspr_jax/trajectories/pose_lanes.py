@@ -14,22 +14,10 @@ from jax import Array
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.lanes import Matrix, Vector, combined, cross, dot
 from cspr_jax.numerics import polynomial, sincospi
-from cspr_jax.trajectories.pose_segment import PoseSegment
+from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 
 # Terms of a Chebyshev fit on s in [0, 1] of W = arccos(s) / sqrt(1 - s^2): accurate to 1e-14, its derivatives to 1e-10.
 _TERMS = 24
-
-
-class Kind(NamedTuple):
-    """What a motion is; known when a function is compiled.
-
-    Fields:
-        variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
-        from_rest: whether all segments start at rest in P0.
-    """
-
-    variable: bool = True
-    from_rest: bool = False
 
 
 class Instant(NamedTuple):
@@ -138,10 +126,10 @@ def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> State:
     """
     if kind.from_rest:
         place = _straight(segment, arcs, now, variable=kind.variable)
-        rotation = _about_one_axis(segment, arcs, now)
+        rotation = _about_one_axis(segment, now, _beat(segment, arcs, now, kind))
     else:
         place = _ellipse(segment, arcs, now, variable=kind.variable)
-        rotation = _exponential(*_half_vector(segment, arcs, now))
+        rotation = _exponential(*_half_vector(segment, now, _beat(segment, arcs, now, kind)))
     hub = tuple(segment.hub[:, i] for i in range(3))
     position = tuple(h + c for h, c in zip(hub, place[0], strict=True))
     return State(position, place[1], place[2], *rotation)
@@ -186,11 +174,13 @@ def _ellipse(segment: PoseSegment, arcs: Array, now: Instant, *, variable: bool)
     return tuple(found)
 
 
-def _beat(segment: PoseSegment, arcs: Array, now: Instant) -> tuple[Array, Array, Array]:
+def _beat(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> tuple[Array, Array, Array]:
     # `oscillating_slerp.beat`, at the phase that the instant knows.
     how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
     sine, cosine = segment.sense * now.sine, now.cosine
+    if kind.plain:  # beta_1
+        return cosine, -omega * sine, -omega * omega * cosine
     sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
     slope = (how.end_bend - how.start_bend) * share
     h = how.start_bend * share + slope * now.tau
@@ -200,10 +190,10 @@ def _beat(segment: PoseSegment, arcs: Array, now: Instant) -> tuple[Array, Array
     return value, rate, bend * 0.125
 
 
-def _about_one_axis(segment: PoseSegment, arcs: Array, now: Instant) -> tuple[Matrix, Vector, Vector]:
+def _about_one_axis(segment: PoseSegment, now: Instant, beats: tuple[Array, ...]) -> tuple[Matrix, Vector, Vector]:
     # The envelope leaves the reference orientation along one axis: the angle is 2 beta Theta_env A.
     axis = tuple(segment.turn.across[:, i] for i in range(1, 4))
-    beta, beta1, beta2 = _beat(segment, arcs, now)
+    beta, beta1, beta2 = beats
     whole = 2.0 * segment.turn.angle
     sine, cosine = sincospi(whole * beta * now.a / math.pi)
     rate = whole * (beta1 * now.a + beta * now.a1)
@@ -230,10 +220,9 @@ def _angle_ratio_coefficients() -> list[float]:
 _RATIO = _angle_ratio_coefficients()
 
 
-def _half_vector(segment: PoseSegment, arcs: Array, now: Instant) -> tuple[Vector, Vector, Vector]:
+def _half_vector(segment: PoseSegment, now: Instant, beats: tuple[Array, ...]) -> tuple[Vector, Vector, Vector]:
     # Half of the rotation vector and its derivatives, as in `oscillating_slerp`.
-    how = segment.turn
-    beta, beta1, beta2 = _beat(segment, arcs, now)
+    how, (beta, beta1, beta2) = segment.turn, beats
     sine, cosine = sincospi(how.angle * now.a / math.pi)
     rate, bend = how.angle * now.a1, how.angle * now.a2
     q = [how.start[:, i] * cosine + how.across[:, i] * sine for i in range(4)]

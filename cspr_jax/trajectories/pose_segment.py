@@ -12,6 +12,7 @@ so that the platform stands still at every cusp, not only at the ends as with th
 
 import dataclasses
 import math
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +25,23 @@ from cspr_jax.platforms import PlatformRobot
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn
 from cspr_jax.trajectories.swing_plane import swing_plane
 from cspr_jax.wrenches import Pose, conditioning
+
+
+class Kind(NamedTuple):
+    """What motions are; known when a function is compiled.
+
+    Fields:
+        variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
+        plain: whether orientations beat with beta_1 of (3.66), whatever the bends, or with beta_ff of (3.93).
+        from_rest: whether all segments start at rest in P0.
+    """
+
+    variable: bool = True
+    plain: bool = False
+    from_rest: bool = False
+
+
+USUAL = Kind()
 
 
 @jax.tree_util.register_dataclass
@@ -104,7 +122,7 @@ def _share(segment: PoseSegment, arcs: Array) -> Array:
     return (1.0 - ratio) * (1.0 + ratio)
 
 
-def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, variable: bool = True) -> Pose:
+def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: Kind = USUAL) -> Pose:
     """The state of the platform at one instant.
 
     Args:
@@ -112,15 +130,15 @@ def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, 
         amplitude: A; with a variable amplitude its third derivative enters the acceleration.
         arcs: () number of arcs, a float.
         tau: () normalised time in [0, 1].
-        variable: whether the position is the hypocycloid of variable amplitude (3.44), or the standard one.
+        kind: of the motion.
 
     Returns:
         the state, in time.
     """
     values = derivatives(amplitude, tau, order=3)
     time = duration(segment, arcs)
-    c, c1, c2 = _swing(segment, values, arcs, tau, variable=variable)
-    quaternions = _quaternions(segment, values, arcs, tau)
+    c, c1, c2 = _swing(segment, values, arcs, tau, variable=kind.variable)
+    quaternions = _quaternions(segment, values, arcs, tau, kind)
     omega, omega1 = rates(quaternions)
     return Pose(
         segment.hub + segment.plane @ c,  # (3.43)
@@ -132,7 +150,7 @@ def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, 
     )
 
 
-def quaternion_at(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array) -> Array:
+def quaternion_at(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: Kind = USUAL) -> Array:
     """The orientation at one instant.
 
     Args:
@@ -140,17 +158,20 @@ def quaternion_at(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: 
         amplitude: A.
         arcs: () number of arcs, a float.
         tau: () normalised time in [0, 1].
+        kind: of the motion.
 
     Returns:
         (4,) unit quaternion; continuous along the segment.
     """
-    return _quaternions(segment, derivatives(amplitude, tau, order=3), arcs, tau)[0]
+    return _quaternions(segment, derivatives(amplitude, tau, order=3), arcs, tau, kind)[0]
 
 
 def _quaternions(
-    segment: PoseSegment, values: tuple[Array, ...], arcs: Array, tau: Array
+    segment: PoseSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: Kind
 ) -> tuple[Array, Array, Array]:
-    beats = beat(segment.turn.start_bend, segment.turn.end_bend, _share(segment, arcs), arcs, tau)
+    share = _share(segment, arcs)
+    bends = (-1.0 / share, -1.0 / share) if kind.plain else (segment.turn.start_bend, segment.turn.end_bend)
+    beats = beat(*bends, share, arcs, tau)
     return orientation(segment.turn, values, beats)
 
 
