@@ -1,47 +1,28 @@
 """Cells of a sweep of poses: positions and orientations of a grid to the quantities of a result file."""
 
-from functools import partial
-
-import jax
-import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax import problem, rotations
+from cspr_jax import problem
 from cspr_jax.amplitudes import Amplitude
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.feasibility.endpoints import AT_REST, endpoint
+from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.grids import in_batches
-from cspr_jax.maps.bends import OPTIONS, options
+from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, settled
-from cspr_jax.platforms import PlatformRobot
+from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import aligned, reference_pose
-from cspr_jax.robots import plane_normal
 from cspr_jax.tiles import Grid
-from cspr_jax.wrenches import conditioning
 
 # Candidates that are held at a time.
 CANDIDATES = 131_072
 NEVER = np.iinfo(int).max
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
-
-
-@jax.jit
-def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
-    # Of each pose (3.91), the interval (3.92), and the determinant over that at the same depth in the middle.
-    def one(position, quaternion, z0):
-        found = endpoint(robot, position, quaternion, z0)
-        middle = jnp.mean(robot.base_points, axis=0).at[2].set(position[2])
-        share = conditioning(robot, position, rotations.matrix(quaternion)) / conditioning(robot, middle, jnp.eye(3))
-        return found.preferred, found.lowest, found.highest, share
-
-    return jax.vmap(one)(*poses)
 
 
 class PoseMap(GridMap[PoseShared]):
@@ -80,16 +61,12 @@ class PoseMap(GridMap[PoseShared]):
         z0, targets = np.asarray(cells["z0"], float), self._targets(cells)
         angles = np.stack([cells.get(name, np.zeros(len(z0))) for name in TILT_TORSION], axis=1)
         poses = (targets, problem.orientations(self._spec, self._centre, targets, angles))
-        preferred, lowest, highest, share = in_batches(partial(_ends, self._shared.robot), (*poses, z0), size=MANY)
         given, beat = self._keys.trajectory.beta_hat, self._keys.trajectory.beat
+        values, can_end = end_options(self._shared.robot, *poses, z0, 1 if given == "preferred" else OPTIONS)
         if beat in ("beta_0", "beta_1"):
             values = np.zeros((len(z0), 1))
         elif isinstance(given, float):
             values = np.full((len(z0), 1), given)
-        else:
-            values = options(preferred, lowest, highest, *([1] if given == "preferred" else []))
-        # No motion ends above the spools, or beyond a singularity.
-        can_end = ((targets - self._centre) @ np.asarray(plane_normal(self._shared.robot)) > 0.0) & (share > 0.0)
         cell, option = np.nonzero(~np.isnan(values) & can_end[:, None])
         every = self._candidates(z0, poses, np.where(np.isnan(values), AT_REST, values)[:, 0])
         trial = every.rows(cell)._replace(group=cell)
@@ -125,9 +102,8 @@ class PoseMap(GridMap[PoseShared]):
             if start.tilt_torsion is not None:
                 angles = np.tile(start.tilt_torsion, (len(depths), 1))
                 turned = problem.orientations(self._spec, self._centre, place, angles)
-            found = in_batches(partial(_ends, self._shared.robot), (place, turned, depths), size=MANY)
-            values = options(found[0], found[1], found[2], 1)
-            chosen = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
+            values = end_options(self._shared.robot, place, turned, depths, 1)[0][:, 0]
+            chosen = np.where(np.isnan(values), AT_REST, values)
             bend = chosen[own] if start.beta_hat is None else np.full(count, start.beta_hat)
             first = (place[own], turned[own])
         return Candidates(first, ends, z0, (bend, bends), np.arange(count))

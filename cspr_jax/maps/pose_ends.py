@@ -1,0 +1,52 @@
+"""What many poses allow at the end of a segment: values of beta-hat to try, and whether any motion can end there."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax import rotations
+from cspr_jax.feasibility.endpoints import endpoint
+from cspr_jax.grids import in_batches
+from cspr_jax.maps.bends import options
+from cspr_jax.platforms import PlatformRobot
+from cspr_jax.robots import plane_normal
+from cspr_jax.wrenches import conditioning
+
+BATCH = 1024
+
+
+@jax.jit
+def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
+    # Of each pose (3.91), the interval (3.92), the determinant over that at the same depth in the middle, the depth.
+    def one(position, quaternion, z0):
+        found, centre = endpoint(robot, position, quaternion, z0), jnp.mean(robot.base_points, axis=0)
+        depth = plane_normal(robot) @ (position - centre)
+        here = conditioning(robot, position, rotations.matrix(quaternion))
+        share = here / conditioning(robot, centre.at[2].add(depth), jnp.eye(3))
+        return found.preferred, found.lowest, found.highest, share, depth
+
+    return jax.vmap(one)(*poses)
+
+
+def end_options(
+    robot: PlatformRobot, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values of beta-hat to try at poses.
+
+    Args:
+        robot: in its reference axes.
+        positions: (n, 3) m.
+        quaternions: (n, 4).
+        z0: (n,) m.
+        count: how many values for each.
+
+    Returns:
+        (n, count) of `bends.options`; (n,) whether a motion can end there: below the spools, and not beyond a
+        singularity.
+    """
+    preferred, lowest, highest, share, depth = in_batches(
+        partial(_ends, robot), (positions, quaternions, z0), size=BATCH
+    )
+    return options(preferred, lowest, highest, count), (depth > 0.0) & (share > 0.0)
