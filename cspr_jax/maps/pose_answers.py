@@ -5,10 +5,13 @@ import math
 
 import numpy as np
 
+from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.pose_checks import PoseChecker, rows
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.answers import Answers
-from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, segments_with
+from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
+
+NEVER = np.iinfo(int).max
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,3 +65,38 @@ def settled(checker: PoseChecker, candidates: Candidates, found: Found, tried: n
         det_margin=checks.slack[:, 1],
         cable_distance=checks.gap,
     )
+
+
+def reached(
+    checker: PoseChecker, motions: Candidates, values: np.ndarray, *, max_arcs: int, same: bool = False
+) -> PoseAnswers:
+    """Smallest numbers of arcs of motions, each with several values of beta-hat at its end.
+
+    Args:
+        checker: of the robot.
+        motions: n of them, with the values at their starts.
+        values: (n, n_values) in the order in which they are tried; NaN for none.
+        max_arcs: largest number tried.
+        same: whether the value at the end holds at the start too.
+
+    Returns:
+        the answers; where there is none, those of the first value, or of that at rest.
+    """
+    cell, option = np.nonzero(~np.isnan(values))
+    trial = _with_ends(motions.rows(cell)._replace(group=cell), values[cell, option], same=same)
+    found = smallest_arcs(checker, trial, max_arcs=max_arcs)
+    arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
+    bends = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
+    # Several values of one motion may have passed: the one tried first is last here.
+    best = np.flatnonzero(found.arcs > 0)[::-1]
+    arcs[cell[best]], bends[cell[best]] = found.arcs[best], trial.bends[1][best]
+    checks.put(cell[best], found.checks.rows(best))
+    np.minimum.at(undecided, cell, np.where(found.undecided > 0, found.undecided, NEVER))
+    every = _with_ends(motions, bends, same=same)
+    tried, none = arcs.copy(), np.flatnonzero(arcs == 0)
+    tried[none] = best_candidates(checker, every.rows(none), max_arcs=max_arcs)
+    return settled(checker, every, Found(arcs, np.where(undecided < NEVER, undecided, 0), checks), tried)
+
+
+def _with_ends(motions: Candidates, bends: np.ndarray, *, same: bool) -> Candidates:
+    return motions._replace(bends=(bends if same else motions.bends[0], bends))

@@ -13,15 +13,16 @@ from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
-from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, smallest_arcs
-from cspr_jax.maps.pose_answers import PoseAnswers, settled
+from cspr_jax.maps.minimum_pose_arcs import Candidates
+from cspr_jax.maps.pose_answers import PoseAnswers, reached
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import aligned, reference_pose
 from cspr_jax.tiles import Grid
 
 # Candidates that are held at a time.
 CANDIDATES = 131_072
-NEVER = np.iinfo(int).max
+# Time functions of the rotation with a beta-hat of its own at each end.
+_OWN = (None, "beta_ff")
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 
 
@@ -67,29 +68,11 @@ class PoseMap(GridMap[PoseShared]):
             values = np.zeros((len(z0), 1))
         elif isinstance(given, float):
             values = np.full((len(z0), 1), given)
-        cell, option = np.nonzero(~np.isnan(values) & can_end[:, None])
-        every = self._candidates(z0, poses, np.where(np.isnan(values), AT_REST, values)[:, 0])
-        trial = every.rows(cell)._replace(group=cell)
-        trial = trial._replace(bends=self._bends(trial.bends[0], values[cell, option]))
-        max_arcs = self._keys.trajectory.max_arcs
-        found = smallest_arcs(self._checker, trial, max_arcs=max_arcs)
-        # Each cell has one answer. Several may have been found at once: the one tried first.
-        best = np.flatnonzero(found.arcs > 0)[::-1]
-        arcs, undecided, bends = np.zeros(len(z0), int), np.full(len(z0), NEVER), every.bends[1].copy()
-        arcs[cell[best]], bends[cell[best]] = found.arcs[best], trial.bends[1][best]
-        checks = self._checker.nothing(len(z0))
-        checks.put(cell[best], found.checks.rows(best))
-        np.minimum.at(undecided, cell, np.where(found.undecided > 0, found.undecided, NEVER))
-        undecided = np.where(undecided < NEVER, undecided, 0)
-        every = every._replace(bends=self._bends(every.bends[0], bends))
-        tried, none = arcs.copy(), np.flatnonzero(arcs == 0)
-        tried[none] = best_candidates(self._checker, every.rows(none), max_arcs=max_arcs)
-        return settled(self._checker, every, Found(arcs, undecided, checks), tried)
+        values = np.where(can_end[:, None], values, np.nan)
+        every = self._candidates(z0, poses)
+        return reached(self._checker, every, values, max_arcs=self._keys.trajectory.max_arcs, same=beat not in _OWN)
 
-    def _bends(self, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return (first, last) if self._keys.trajectory.beat in (None, "beta_ff") else (last, last)
-
-    def _candidates(self, z0: np.ndarray, ends: tuple[np.ndarray, np.ndarray], bends: np.ndarray) -> Candidates:
+    def _candidates(self, z0: np.ndarray, ends: tuple[np.ndarray, np.ndarray]) -> Candidates:
         # One of each cell.
         count, start = len(z0), self._keys.trajectory.start
         if start is None or start.position is None:
@@ -106,7 +89,7 @@ class PoseMap(GridMap[PoseShared]):
             chosen = np.where(np.isnan(values), AT_REST, values)
             bend = chosen[own] if start.beta_hat is None else np.full(count, start.beta_hat)
             first = (place[own], turned[own])
-        return Candidates(first, ends, z0, (bend, bends), np.arange(count))
+        return Candidates(first, ends, z0, (bend, bend), np.arange(count))
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""

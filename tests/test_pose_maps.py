@@ -1,0 +1,235 @@
+"""Maps of poses of a platform beside plans of the same poses; the fast forms beside the readable ones; mistakes."""
+
+import itertools
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from test_platform import MSSM, Z0, general, made, ours, random_pose, states
+from test_pose_plans import HEAD, SHORT, cspr, planned
+
+from cspr_jax import wrenches
+from cspr_jax.amplitudes import named
+from cspr_jax.feasibility import contact_lanes, interference
+from cspr_jax.feasibility.limits import Limits
+from cspr_jax.feasibility.pose_lanes import moving_slacks, order, still_slacks
+from cspr_jax.feasibility.pose_slacks import PoseShared, pose_slacks
+from cspr_jax.planning import plan
+from cspr_jax.results import open_result
+from cspr_jax.trajectories.pose_lanes import instant, instant_of_arc, state
+from cspr_jax.trajectories.pose_segment import USUAL, Kind
+from cspr_jax.wrench_lanes import cables
+
+REST = "{ rest = true }"
+POSE = "{ position = [0.6, -0.4, 1.5], tilt_torsion = [0.3, 0.4, -0.2], beta_hat = -2.0 }"
+SWEEP = """schema = 1
+map = "poses"
+robot = "laval-mssm"
+[axes]
+x = [0.9, -0.5]
+y = [0.8]
+z = [1.4]
+tilt_azimuth = [0.5, -1.2]
+tilt = [0.6]
+torsion = [0.0, 0.5]
+z0 = [1.7]
+[trajectory]
+family = "hypocycloid"
+amplitude = {{ name = "effective-c3", epsilon = 0.1 }}
+max_arcs = 12
+from = {start}
+{more}
+"""
+ALL_LIMITS = {
+    "tension_min": 0.01,
+    "tension_max": 3.0,
+    "cable_length_max": 3.0,
+    "cable_speed_max": 2.5,
+    "cable_acceleration_max": 9.0,
+}
+
+
+def swept(folder, start=REST, more="", change=("", "")):
+    (folder / "poses.toml").write_text(SWEEP.format(start=start, more=more).replace(*change))
+    return cspr("run", folder / "poses.toml", "-o", folder / "run")
+
+
+@pytest.mark.parametrize("start", [REST, POSE])
+def test_cells_are_plans(tmp_path, start):
+    """Arcs, duration, beta-hat and margins of each cell as `cspr plan` gives them."""
+    code, out, err = swept(tmp_path, start)
+    assert code == 0, err
+    result = open_result(Path(out.split()[-1]))
+    first = "[[pose]]\nrest = true\n" if start == REST else "[[pose]]\n" + start[2:-2].replace("], ", "]\n") + "\n"
+    head = HEAD.replace("z0 = 1.4", "z0 = 1.7").replace("max_arcs = 20", "max_arcs = 12")
+    cells = itertools.product(*(range(len(result.axes[name])) for name in result.axes))
+    for cell in cells:
+        at = {name: float(result.axes[name][i]) for name, i in zip(result.axes, cell, strict=True)}
+        last = f"[[pose]]\nposition = [{at['x']}, {at['y']}, {at['z']}]\n"
+        last += f"tilt_torsion = [{at['tilt_azimuth']}, {at['tilt']}, {at['torsion']}]\n"
+        (tmp_path / "plan.toml").write_text(head + first + last)
+        with jax.enable_x64(True):
+            answers = plan(tmp_path / "plan.toml").answers
+        assert result.data["arcs"][cell] == answers.arcs[0] and result.data["verdict"][cell] == answers.verdict[0]
+        for name in ("duration", "margin", "det_margin", "cable_distance"):
+            assert result.data[name][cell] == pytest.approx(getattr(answers, name)[0], rel=1e-6, abs=1e-9), name
+        assert result.data["beta_hat"][cell] == pytest.approx(answers.beta_hat[0, 1], rel=1e-9)
+    assert (result.data["arcs"] > 0).any()
+
+
+def test_mirrored_cells(tmp_path):
+    """x -> -x, with the tilt and the torsion mirrored, is the same problem for the MSSM."""
+    _, out, _ = swept(tmp_path, change=("x = [0.9, -0.5]", "x = [0.9]"))
+    plain = open_result(Path(out.split()[-1])).data
+    # phi becomes pi - phi in the cylindrical frame.
+    change = f"x = [-0.9]\ny = [0.8]\nz = [1.4]\ntilt_azimuth = [{np.pi - 0.5}, {np.pi + 1.2}]\ntilt = [0.6]\n"
+    change += "torsion = [0.0, -0.5]"
+    text = SWEEP.format(start=REST, more="")
+    begin, end = text.index("x = ["), text.index("\nz0 = ")
+    (tmp_path / "mirror.toml").write_text(text[:begin] + change + text[end:])
+    _, out, err = cspr("run", tmp_path / "mirror.toml", "-o", tmp_path / "mirror")
+    mirrored = open_result(Path(out.split()[-1])).data
+    assert (mirrored["arcs"] == plain["arcs"]).all(), err
+    for name in ("duration", "margin", "det_margin", "cable_distance", "beta_hat"):
+        np.testing.assert_allclose(mirrored[name], plain[name], rtol=1e-6, atol=1e-8, err_msg=name)
+
+
+@pytest.mark.parametrize("robot", [MSSM, general(2)])
+def test_lanes_are_the_readable_slacks(robot):
+    """Every criterion with every limit, and what meets, at random instants of random motions."""
+    package, rng, amplitude = ours(robot), np.random.default_rng(3), named("quintic")
+    limits = Limits(floor=np.asarray(2.0), **{name: np.full(6, x) for name, x in ALL_LIMITS.items()})
+    shared, near = PoseShared(package, limits, amplitude), interference.contacts(package)
+    p, tau = 5, np.linspace(0.03, 0.97, 9)
+    some = [made(package, random_pose(rng), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p) for _ in range(12)]
+    batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
+    seen = 0
+    for t in tau:
+        now = instant(amplitude, batch.sense, np.full(12, float(p)), np.full(12, t))
+        here = state(batch, np.full(12, float(p)), now, USUAL)
+        wires = cables(package, here.position, here.turn)
+        found = moving_slacks(shared, batch, jnp.full(12, float(p)), now, USUAL) + still_slacks(
+            shared, batch, here, wires
+        )
+        found = np.stack(found)[order(limits)]
+        gaps = np.stack([np.stack(v, -1) for v in contact_lanes.gaps(package.base_points, near.pairs, wires)], 1)
+        views = np.stack([np.stack(v, -1) for v in contact_lanes.views(wires, here.turn)], 1)
+        for i, segment in enumerate(some):
+            at = jax.tree.map(lambda x: x[0], states(package, segment, amplitude, float(p), np.array([t])))
+            pose = wrenches.Pose(*at)
+            wanted = np.asarray(pose_slacks(shared, pose, jnp.asarray(Z0), segment.regular))
+            if abs(wanted[1]) > 1e-3:
+                np.testing.assert_allclose(found[:, i], wanted, rtol=1e-7, atol=1e-8)
+                seen += 1
+            where = (package, pose.position, pose.rotation)
+            wanted_gaps = np.asarray(interference.gaps(package, jnp.asarray(near.pairs), *where[1:]))
+            np.testing.assert_allclose(gaps[i], wanted_gaps, atol=1e-9)
+            own = views[i] / np.linalg.norm(views[i], axis=1, keepdims=True)
+            np.testing.assert_allclose(own, np.asarray(interference.views(*where)), atol=1e-9)
+    assert seen > 40
+
+
+def test_hits_of_lanes():
+    """As `interference.platform_hit`, cable by cable, on random pairs of views."""
+    near, rng = interference.contacts(ours(MSSM)), np.random.default_rng(4)
+    before, after = rng.normal(size=(2, 500, 6, 3))
+    wanted = interference.platform_hit(near.sides, near.normal, before, after).any(1)
+    as_lanes = [[tuple(x[:, k].T) for k in range(6)] for x in (before, after)]
+    assert (np.asarray(contact_lanes.platform_hit(near.sides, near.normal, *as_lanes)) == wanted).all()
+    assert 50 < wanted.sum() < 450
+
+
+def test_instants_of_arcs():
+    """A place within an arc is an instant of the whole."""
+    amplitude, rng = named("effective-c3", 0.2), np.random.default_rng(5)
+    for p in (1, 4, 7):
+        arc, within = rng.integers(0, p, 20).astype(float), jnp.asarray(rng.random())
+        sense = 1.0 if p % 2 else -1.0
+        found = instant_of_arc(amplitude, np.full(20, sense), np.full(20, float(p)), arc, within)
+        wanted = instant(amplitude, np.full(20, sense), np.full(20, float(p)), (arc + within) / p)
+        np.testing.assert_allclose(np.stack(found), np.stack(wanted), atol=1e-12)
+
+
+def test_time_functions_of_the_rotation():
+    """beta_1 is a cosine, beta_0 has no angular acceleration at the ends, beta_f one at both."""
+    robot, amplitude, p = ours(MSSM), named("quintic"), 4
+    start, end = random_pose(np.random.default_rng(6), rest=True), random_pose(np.random.default_rng(7))
+    tau = np.array([0.0, 0.3, 1.0])
+    segment = made(robot, start, end, Z0, (0.0, 0.0), p)
+    still = states(robot, segment, amplitude, float(p), tau)
+    np.testing.assert_allclose(np.asarray(still.angular_acceleration)[[0, 2]], 0.0, atol=1e-9)
+    plain = states(robot, segment, amplitude, float(p), tau, kind=Kind(plain=True))
+    angle = 2.0 * np.arccos(np.clip(abs(end[1][0]), 0.0, 1.0))
+    now = tau**3 * (10 - 15 * tau + 6 * tau**2)
+    wanted = np.cos(np.abs(angle * now * np.cos(np.pi * p * tau)))
+    np.testing.assert_allclose((np.trace(np.asarray(plain.rotation), axis1=1, axis2=2) - 1.0) / 2.0, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("beat", ["beta_f", "beta_0", "beta_1"])
+def test_beats_in_plans_and_maps(tmp_path, beat):
+    """Both take them; beta_f has one beta-hat a segment, beta_0 none, beta_1 that of a cosine."""
+    text = f'beat = "{beat}"\n' + SHORT.replace("beta_hat = -14.6701\n", "").split("[[pose]]", 1)[0]
+    parts = ["rest = true\n", "position = [0.0, 1.2, 1.5]\ntilt_torsion = [1.0, 0.3, 0.1]\n"]
+    (tmp_path / "plan.toml").write_text(text + "".join("[[pose]]\n" + part for part in parts))
+    with jax.enable_x64(True):
+        answers = plan(tmp_path / "plan.toml").answers
+    assert answers.arcs[0] > 0 and answers.beta_hat[0, 0] == answers.beta_hat[0, 1]
+    if beat == "beta_0":
+        assert answers.beta_hat[0, 0] == 0.0
+    if beat == "beta_1":
+        assert answers.beta_hat[0, 0] == pytest.approx(-1.0)  # a transition from rest has theta_h = pi p
+    code, out, err = swept(tmp_path, more=f'beat = "{beat}"')
+    assert code == 0 and (open_result(Path(out.split()[-1])).data["arcs"] > 0).any(), err
+
+
+def test_chosen_depth_and_epsilon(tmp_path):
+    """The fastest z0 is no slower than others, nor the best epsilon; both are feasible."""
+    target = "[[pose]]\nposition = [0.3, 1.4, 1.5]\ntilt_torsion = [1.0, 0.4, 0.2]\n"
+    plain = HEAD + "[[pose]]\nrest = true\n" + target
+    totals = []
+    for z0 in ("1.4", "1.5", "1.6", '{ choose = "mean" }', '{ choose = "fastest" }'):
+        (tmp_path / "plan.toml").write_text(plain.replace("z0 = 1.4", f"z0 = {z0}"))
+        with jax.enable_x64(True):
+            found = plan(tmp_path / "plan.toml")
+        totals.append(found.answers.duration.sum() if found.answers.arcs[0] else np.inf)
+    assert totals[-1] <= min(totals[:-1]) + 1e-9
+    (tmp_path / "plan.toml").write_text(plain.replace("epsilon = 0.1", 'epsilon = "best"'))
+    with jax.enable_x64(True):
+        best = plan(tmp_path / "plan.toml")
+    assert best.answers.arcs[0] > 0 and best.answers.duration.sum() <= totals[0] + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('"laval-mssm"', '"prototype"'), "must be a platform"),
+        (('"hypocycloid"', '"transition"'), 'must be "hypocycloid"'),
+        (("z0 = [1.7]", ""), "z0"),
+        (("tilt = [0.6]", "tilt = [0.6]\ninclination = [0.0]"), "axes.inclination: must be absent"),
+        (("tilt = [0.6]", "tilt = [0.6]\ntau = [0.5]"), "axes.tau: must be absent"),
+        (("z = [1.4]", "z = [-1.4]"), "every point is above the spool plane"),
+        ((REST, "{ rest = true, beta_hat = 1.0 }"), "{ rest = true } alone"),
+        (
+            ("{ rest = true }", "{ position = [0.0, 0.1, 1.4], quaternion = [1.0, 0.1, 0.0, 0.0] }"),
+            "must have length 1",
+        ),
+        (("max_arcs = 12", 'max_arcs = 12\nbeta_hat = "best"'), "beta_hat"),
+        (("max_arcs = 12", 'max_arcs = 12\nbeat = "beta_1"\nbeta_hat = 1.0'), "must be absent with beat"),
+        (("z0 = [1.7]", 'z0 = [1.7]\n[run]\nstore = ["oscillations"]'), "run.store"),
+    ],
+)
+def test_mistakes(tmp_path, change, words):
+    code, out, err = swept(tmp_path, change=change)
+    assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1, err
+    assert not (tmp_path / "run").exists()
+
+
+def test_mistakes_of_plans(tmp_path):
+    """A time function without a free beta-hat refuses one; a point mass refuses all."""
+    code, _, err = planned(tmp_path, 'beat = "beta_0"\n' + SHORT)
+    assert code == 2 and 'beta_hat: must be absent with beat = "beta_0"' in err
+    point = SHORT.replace('"laval-mssm"', '"prototype"').replace('"hypocycloid"', '"hypocycloid-standard"')
+    code, _, err = planned(tmp_path, 'beat = "beta_0"\n' + point)
+    assert code == 2 and "must be absent for a point mass" in err
