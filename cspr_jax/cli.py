@@ -306,15 +306,17 @@ def _table(options: argparse.Namespace) -> int:
 
 def _robots(options: argparse.Namespace) -> int:
     from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
+    from cspr_jax.problem import fault_at_rest
 
-    found = [read_robot(CATALOGUE / f"{name}.toml").model_dump(exclude_none=True) for name in catalogue_names()]
+    specs = [read_robot(CATALOGUE / f"{name}.toml") for name in catalogue_names()]
+    found = [spec.model_dump(exclude_none=True) | {"fault": fault_at_rest(spec)} for spec in specs]
     if options.json:
         _print_json(found)
         return ExitCode.DONE
     from rich.table import Table
 
     table = Table()
-    for head in ("name", "cables", "mass (kg)", "z axis", "limits", "source"):
+    for head in ("name", "cables", "mass (kg)", "z axis", "limits", "source", "at rest"):
         table.add_column(head)
     for robot in found:
         limits = ", ".join(key for key in robot if key.startswith(("tension", "cable")))
@@ -325,6 +327,7 @@ def _robots(options: argparse.Namespace) -> int:
             robot["z_axis"],
             limits,
             robot["source"],
+            robot["fault"] or "taut",
         )
         table.add_row(*row)
     _print(table)

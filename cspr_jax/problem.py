@@ -11,6 +11,7 @@ from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.feasibility.limits import Limits
 from cspr_jax.numerics import leaf
 from cspr_jax.platforms import PlatformRobot, platform_robot
+from cspr_jax.reference_pose import reference_pose
 from cspr_jax.robots import STANDARD_GRAVITY, PointMassRobot
 from cspr_jax.rotations import UNIT_TOLERANCE, from_tilt_torsion
 from cspr_jax.trajectories.pose_segment import Kind
@@ -95,6 +96,27 @@ def build_platform(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Platf
         )
     except InputError as error:
         raise ConfigError(file, f"robot.{error}") from error
+
+
+def fault_at_rest(spec: RobotFile) -> str | None:
+    """Why a robot cannot hang still in its reference orientation, if it cannot.
+
+    Args:
+        spec: the robot; a platform is tried as deep below the centroid of its spools as these are away from it.
+
+    Returns:
+        the reason; None if it hangs with every cable taut.
+    """
+    try:
+        if spec.is_platform:
+            robot = build_platform(spec, TrajectoryKeys(), spec.name)
+            base = np.asarray(robot.base_points)
+            reference_pose(robot, float(np.linalg.norm(base - base.mean(0), axis=1).mean()))
+        else:
+            build_robot(spec, TrajectoryKeys(), spec.name)
+    except (ConfigError, InputError) as error:
+        return str(error)
+    return None
 
 
 def build_amplitude(
