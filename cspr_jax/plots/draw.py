@@ -103,7 +103,9 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     if len(view.across) == 1:
         axis = view.across[0]
         return line_figure(result, view.name, {"": [Line(result.axes[axis], view.data)]}, axis, view.fixed, view.across)
-    name, data, across, fixed = _panelled(result, view, view.across)
+    plane = [axis for axis in ("x", "y") if {"x", "y"} <= set(view.across)]
+    order = plane + [axis for axis in view.across if axis not in plane]
+    name, data, across, fixed = _panelled(result, view, order)
     panels = across[2] if len(across) > 2 else None
     return section_figure(result, name, data if panels else data[..., None], across[:2], panels, fixed)
 

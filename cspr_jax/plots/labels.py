@@ -96,8 +96,20 @@ def notes(result: Result, fixed: list[str], used: list[str]) -> str:
     return ", ".join(dict.fromkeys(found))
 
 
+def columns_of(count: int) -> int:
+    """How many panels stand side by side.
+
+    Args:
+        count: of all panels.
+
+    Returns:
+        at most three, in a full rectangle where that is possible.
+    """
+    return 2 if count == 4 else min(3, count)
+
+
 def panels(figure: Figure, count: int) -> tuple[list[Axes], list[Axes], list[Axes]]:
-    """Panels with common axes, at most three a line.
+    """Panels with common axes.
 
     Args:
         figure: where.
@@ -106,7 +118,7 @@ def panels(figure: Figure, count: int) -> tuple[list[Axes], list[Axes], list[Axe
     Returns:
         all of them, those at the bottom, those at the left.
     """
-    columns = min(3, count)
+    columns = columns_of(count)
     lines = -(-count // columns)
     grid = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
     for panel in grid.flat[count:]:

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, Normalize
 from matplotlib.figure import Figure
 
-from cspr_jax.plots.labels import PANELS, axis_label, chosen, label, notes, panels, start, value
+from cspr_jax.plots.labels import PANELS, axis_label, chosen, columns_of, label, notes, panels, start, value
 from cspr_jax.results import Result
 
 # Quantities of which either sign is as good as the other.
@@ -31,7 +31,7 @@ def section_figure(
         the figure.
     """
     shown = chosen(data.shape[2], PANELS)
-    columns, count = min(3, len(shown)), len(shown)
+    columns, count = columns_of(len(shown)), len(shown)
     size = (3.1 * columns + 1.3, 3.2 * -(-count // columns) + 0.8) if count > 1 else (7.0, 5.6)
     figure = Figure(figsize=size, layout="constrained")
     every, bottom, left = panels(figure, count)
