@@ -116,6 +116,9 @@ def _parser() -> argparse.ArgumentParser:
     table.add_argument("name", nargs="?", help="such as 2.1")
     table.add_argument("--list", action="store_true", help="list the tables")
     table.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    table.add_argument("--definition", choices=("grid", "scan", "equal-volume", "all"), help="3.3, 3.4: accessible set")
+    table.add_argument("--amplitude", choices=("quintic", "effective", "effective-c3", "all"), help="3.3, 3.4")
+    table.add_argument("--fine", action="store_true", help="3.3, 3.4: step pi/64 instead of pi/32")
     robots = add("robots", _robots, "list the catalogue of robots")
     robots.add_argument("--json", action="store_true", help="print one JSON array and nothing else")
     quantities = add("quantities", _quantities, "list the quantities that a result can hold")
@@ -296,12 +299,35 @@ def _table(options: argparse.Namespace) -> int:
         return ExitCode.DONE
     if options.name not in tables.TABLES:
         raise ConfigError("table", f"{shown(options.name)}: must be one of {', '.join(tables.TABLES)}")
-    cells = tables.table_cells(options.name)
+    cells = tables.table_cells(options.name, _choice(options))
     if options.json:
         _print_json(tables.table_object(options.name, cells))
     else:
         _print(tables.table_for_people(options.name, cells))
     return ExitCode.DONE
+
+
+def _choice(options: argparse.Namespace) -> Any:
+    from cspr_jax import orientation_tables, tables
+
+    given = {"--definition": options.definition, "--amplitude": options.amplitude, "--fine": options.fine or None}
+    if not tables.TABLES[options.name].with_choice:
+        for name, value in given.items():
+            if value is not None:
+                raise ConfigError(name, f"must be absent with table {options.name}")
+        return None
+    usual = orientation_tables.Choice()
+    every = {"--definition": orientation_tables.DEFINITIONS, "--amplitude": tuple(orientation_tables.AMPLITUDES)}
+
+    def chosen(name: str, otherwise: tuple[str, ...]) -> tuple[str, ...]:
+        value = given[name]
+        return otherwise if value is None else every[name] if value == "all" else (value,)
+
+    return orientation_tables.Choice(
+        chosen("--definition", usual.definitions),
+        chosen("--amplitude", usual.amplitudes),
+        2 if options.fine else 1,
+    )
 
 
 def _robots(options: argparse.Namespace) -> int:

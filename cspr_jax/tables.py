@@ -5,7 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax import pose_tables, transition_tables
+from cspr_jax import orientation_tables, pose_tables, transition_tables
+from cspr_jax.orientation_tables import Choice
 from cspr_jax.planning import plan
 from cspr_jax.transition_tables import Key
 
@@ -38,12 +39,14 @@ class Source:
     Fields:
         title: of the table, with its source.
         published: known cells, by row, column and variant.
-        compute: () -> computed cells, by row, column and variant.
+        compute: () -> computed cells, by row, column and variant; of a choice, where there is one.
+        with_choice: whether there is one, of definitions, amplitude functions and step.
     """
 
     title: str
     published: dict[Key, float]
-    compute: Callable[[], dict[Key, float | None]]
+    compute: Callable[[], dict[Key, float | None]] | Callable[[Choice], dict[Key, float | None]]
+    with_choice: bool = False
 
 
 def _table_2_1() -> dict[Key, float | None]:
@@ -88,22 +91,36 @@ TABLES = {
         pose_tables.PUBLISHED,
         pose_tables.table_3_2,
     ),
+    "3.3": Source(
+        "Dion-Gauvin thesis, Table 3.3: accessible and attainable orientations at four places, z0 = z = 1.7 m",
+        orientation_tables.PUBLISHED["3.3"],
+        orientation_tables.table_3_3,
+        with_choice=True,
+    ),
+    "3.4": Source(
+        "Dion-Gauvin thesis, Table 3.4: smallest proportion (%) of attainable orientations from 1.5b to 3b, z0 = z",
+        orientation_tables.PUBLISHED["3.4"],
+        orientation_tables.table_3_4,
+        with_choice=True,
+    ),
 }
 
 
-def table_cells(name: str) -> list[Cell]:
+def table_cells(name: str, choice: Choice | None = None) -> list[Cell]:
     """Compute a table.
 
     Args:
         name: one of `TABLES`.
+        choice: for those that have one; None: the usual one.
 
     Returns:
         its cells, row by row.
     """
     source = TABLES[name]
+    computed = source.compute(choice or Choice()) if source.with_choice else source.compute()  # type: ignore[call-arg]
     return [
         Cell(row, column, value, source.published.get((row, column, variant)), variant)
-        for (row, column, variant), value in source.compute().items()
+        for (row, column, variant), value in computed.items()
     ]
 
 

@@ -15,7 +15,7 @@ PACKAGE = ROOT / "cspr_jax"
 # From the bottom up, as docs/architecture.md draws them; a package stands for its modules, a longer name goes first.
 LAYERS = (
     ("errors", "numerics", "bounds", "grids", "lanes"),
-    ("amplitudes", "robots", "platforms", "rotations"),
+    ("amplitudes", "robots", "platforms", "rotations", "orientations", "symmetries"),
     ("tensions", "wrenches", "wrench_lanes", "reference_pose"),
     ("trajectories",),
     ("feasibility",),
@@ -26,7 +26,7 @@ LAYERS = (
     ("sweep.checks", "sweep.definition", "sweep.signals", "sweep.environment"),
     ("sweep.work", "sweep.claims", "sweep.inspection", "sweep.tile"),
     ("sweep", "planning", "choices", "sequences", "pose_sequences", "api"),
-    ("bench", "transition_tables", "pose_tables", "tables", "reports", "motions", "plots"),
+    ("bench", "transition_tables", "pose_tables", "orientation_tables", "tables", "reports", "motions", "plots"),
     ("cli", "__main__"),
 )
 KERNELS = tuple(name for layer in LAYERS[:6] for name in layer)

@@ -1,0 +1,114 @@
+"""Accessible orientations of a platform at a place, thesis section 3.10.2, by three definitions.
+
+"grid": those multiples of the step of tilt and torsion that neighbours join to the reference orientation. "scan":
+Bonev's scan as the thesis describes it, rays from a moving centre. "equal-volume": like "grid", on cells of equal
+volume of SO(3), the only one whose count is a fraction of something.
+"""
+
+import functools
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from cspr_jax.feasibility.sights import Watch
+from cspr_jax.orientations import OrientationGrid, equal_volume_grid, quaternions, tilt_torsion_grid
+from cspr_jax.platforms import PlatformRobot
+
+DEFINITIONS = ("grid", "scan", "equal-volume")
+WHOLE = 8.0 * math.pi**2  # of SO(3), in the measure sin(theta) d phi d theta d sigma
+
+
+class Accessible(NamedTuple):
+    """Accessible orientations of one place.
+
+    Fields:
+        angles: (n, 3) tilt and torsion in the cylindrical frame of the place, rad.
+        volume: (n,) part of SO(3) that each stands for.
+        of_points: part of all grid points; NaN for a scan, which has no grid.
+    """
+
+    angles: np.ndarray
+    volume: np.ndarray
+    of_points: float
+
+
+@functools.lru_cache(maxsize=8)
+def _grid(definition: str, divisions: int) -> OrientationGrid:
+    return (tilt_torsion_grid if definition == "grid" else equal_volume_grid)(divisions)
+
+
+def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisions: int) -> Accessible:
+    """The accessible orientations of a place.
+
+    Args:
+        robot: in its reference axes.
+        place: (3,) m.
+        definition: one of `DEFINITIONS`.
+        divisions: of pi; the step is pi over it.
+
+    Returns:
+        the orientations; none where the reference orientation itself is singular, or the place above the spools.
+    """
+    watch = Watch(robot, place)
+    offset = np.asarray(place) - np.asarray(robot.base_points).mean(0)
+    towards = np.array([math.atan2(offset[1], offset[0]), 0.0, 0.0])  # (3.98)
+    if definition == "scan":
+        parts = list(_scan(watch, towards, divisions))
+        angles, volume = (np.concatenate(x) for x in zip(*parts, strict=True))
+        return Accessible(angles, volume, np.nan)
+    grid = _grid(definition, divisions)
+    sights = watch.at(quaternions(grid.angles + towards))
+    first, last = grid.neighbours[watch.edges(sights, grid.neighbours)].T
+    count = len(grid.angles)
+    links = coo_matrix((np.ones(len(first), bool), (first, last)), shape=(count, count))
+    part = connected_components(links, directed=False)[1]
+    inside = (part == part[grid.start]) & watch.regular(sights)
+    return Accessible(grid.angles[inside], grid.volume[inside], float(inside.mean()))
+
+
+def _scan(watch: Watch, towards: np.ndarray, divisions: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    # Sections of constant torsion, from 0 up and from 0 down; each starts at the centre of the one before.
+    step = math.pi / divisions
+    part, first = _section(watch, towards, np.zeros(2), 0.0, divisions)
+    yield part
+    for sign in (1.0, -1.0):
+        centre = first
+        for k in range(1, divisions + 1):
+            torsion = sign * k * step
+            there = _angles(np.stack([centre, centre]), np.array([torsion - sign * step, torsion]))
+            sights = watch.at(quaternions(there + towards))
+            if not watch.passable(sights.rows(np.array([0])), sights.rows(np.array([1])))[0]:
+                break
+            part, centre = _section(watch, towards, centre, torsion, divisions)
+            yield part
+
+
+def _section(
+    watch: Watch, towards: np.ndarray, centre: np.ndarray, torsion: float, divisions: int
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    # Along rays in the polar plane (theta cos phi, theta sin phi), up to the first step that cannot be made.
+    step, count = math.pi / divisions, 2 * divisions
+    azimuth = np.arange(count) * step
+    rays = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
+    far = np.arange(count + 1) * step
+    angles = _angles(centre + far[None, :, None] * rays[:, None, :], np.asarray(torsion))
+    sights = watch.at(quaternions(angles.reshape(-1, 3) + towards))
+    index = np.arange(angles[..., 0].size).reshape(count, -1)
+    free = watch.passable(sights.rows(index[:, :-1].ravel()), sights.rows(index[:, 1:].ravel())).reshape(count, -1)
+    free &= angles[:, 1:, 1] < math.pi
+    free = np.cumprod(free, axis=1).astype(bool)
+    ends = centre + (free.sum(1) * step)[:, None] * rays
+    found = angles[:, 1:][free]
+    # Of a sector of the plane, where the measure is sin(theta) / theta.
+    volume = np.broadcast_to(far[1:], free.shape)[free] * np.sinc(found[:, 1] / math.pi) * step**3 / WHOLE
+    return (found, volume), ends.mean(0)
+
+
+def _angles(points: np.ndarray, torsion: np.ndarray) -> np.ndarray:
+    # Of points of the polar plane.
+    tilt = np.hypot(points[..., 0], points[..., 1])
+    return np.stack([np.arctan2(points[..., 1], points[..., 0]), tilt, np.broadcast_to(torsion, tilt.shape)], axis=-1)

@@ -1,0 +1,134 @@
+"""Tables 3.3 and 3.4 of the thesis: accessible orientations of a place, and how many of them are attainable."""
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+
+from cspr_jax import problem
+from cspr_jax.amplitudes import named
+from cspr_jax.config.robot import resolve_robot
+from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.feasibility.limits import Limits
+from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
+from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.maps.accessible import DEFINITIONS, accessible
+from cspr_jax.maps.attainable import attainable
+from cspr_jax.reference_pose import aligned
+from cspr_jax.symmetries import folded, symmetries
+from cspr_jax.trajectories.pose_segment import Kind
+from cspr_jax.transition_tables import Key
+
+RADIUS = 0.86  # b of (3.95), m
+MAX_ARCS = 20
+DIVISIONS = 32  # of pi
+AMPLITUDES: dict[str, tuple[str, float | None]] = {
+    "quintic": ("quintic", None),
+    "effective": ("effective", 0.1),
+    "effective-c3": ("effective-c3", 0.1),
+}
+_PLACES = {"x = 1.5b": (1.5, 0.0), "x = 3b": (3.0, 0.0), "y = 1.5b": (0.0, 1.5), "y = 3b": (0.0, 3.0)}
+_DEPTH = 1.7
+_DEPTHS = (1.0, 1.4, 1.7, 2.0, 2.4)
+_RADII, _AZIMUTHS = (1.5, 2.0, 2.5, 3.0), np.radians(np.arange(0.0, 61.0, 10.0))
+
+
+@dataclasses.dataclass(frozen=True)
+class Choice:
+    """What a table of orientations is computed with.
+
+    Fields:
+        definitions: of the accessible set, of `maps.accessible.DEFINITIONS`.
+        amplitudes: of `AMPLITUDES`.
+        finer: how many times as fine the step is as pi / 32.
+    """
+
+    definitions: tuple[str, ...] = ("scan",)
+    amplitudes: tuple[str, ...] = ("effective-c3",)
+    finer: int = 1
+
+
+def variant(definition: str, amplitude: str) -> str:
+    """How a cell was computed.
+
+    Args:
+        definition: of the accessible set.
+        amplitude: key of `AMPLITUDES`.
+
+    Returns:
+        the words.
+    """
+    epsilon = AMPLITUDES[amplitude][1]
+    return f"amplitude = {amplitude}{f' {epsilon:g}' if epsilon else ''}; definition = {definition}"
+
+
+def _checker(amplitude: str) -> PoseChecker:
+    here = Path(__file__)
+    robot = problem.build_platform(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
+    shared = PoseShared(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
+    return PoseChecker(shared, Kind(from_rest=True), batch=MANY)
+
+
+def table_3_3(choice: Choice) -> dict[Key, float | None]:
+    """Counts and proportions at four places.
+
+    Args:
+        choice: definitions, amplitude functions, step.
+
+    Returns:
+        cells; proportions in percent.
+    """
+    found: dict[Key, float | None] = {}
+    for amplitude in choice.amplitudes:
+        checker = _checker(amplitude)
+        for definition in choice.definitions:
+            for row, (x, y) in _PLACES.items():
+                place, name = np.array([x * RADIUS, y * RADIUS, _DEPTH]), variant(definition, amplitude)
+                inside = accessible(checker.shared.robot, place, definition, DIVISIONS * choice.finer)
+                answers = attainable(checker, place, inside.angles, _DEPTH, max_arcs=MAX_ARCS)
+                counts = len(inside.angles), int((answers.arcs > 0).sum())
+                found[row, "accessible", name], found[row, "attainable", name] = (float(n) for n in counts)
+                found[row, "proportion", name] = 100.0 * counts[1] / counts[0]
+    return found
+
+
+def table_3_4(choice: Choice) -> dict[Key, float | None]:
+    """Smallest proportions in an annulus, at five heights.
+
+    Args:
+        choice: definitions, amplitude functions, step.
+
+    Returns:
+        cells, in percent.
+    """
+    found: dict[Key, float | None] = {}
+    for amplitude in choice.amplitudes:
+        checker = _checker(amplitude)
+        robot = checker.shared.robot
+        azimuths = np.unique(np.round(folded(symmetries(robot), _AZIMUTHS), 9))
+        for definition in choice.definitions:
+            for depth in _DEPTHS:
+                shares = []
+                for radius in _RADII:
+                    for azimuth in azimuths:
+                        level = RADIUS * radius * np.array([math.cos(azimuth), math.sin(azimuth)])
+                        place = np.append(level, depth)
+                        inside = accessible(robot, place, definition, DIVISIONS * choice.finer)
+                        answers = attainable(checker, place, inside.angles, depth, max_arcs=MAX_ARCS)
+                        shares.append(float((answers.arcs > 0).mean()))
+                found[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * min(shares)
+    return found
+
+
+_PRINTED = {"x = 1.5b": (27610, 26816, 97.1), "y = 1.5b": (25788, 25482, 98.8)}
+_EVERY = [variant(definition, amplitude) for definition in DEFINITIONS for amplitude in AMPLITUDES]
+PUBLISHED: dict[str, dict[Key, float]] = {
+    "3.3": {
+        (row, column, name): value
+        for name in _EVERY
+        for row, cells in _PRINTED.items()
+        for column, value in zip(("accessible", "attainable", "proportion"), cells, strict=True)
+    },
+    "3.4": {("2", "proportion", name): 92.8 for name in _EVERY},
+}

@@ -1,0 +1,126 @@
+"""Grids of orientations with their neighbours: tilt and torsion, and cells of equal volume in SO(3)."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+# Orientations are neighbours up to this many steps apart on the grid of equal volumes.
+NEAR = 1.5
+
+
+class OrientationGrid(NamedTuple):
+    """Orientations and which of them are neighbours.
+
+    Fields:
+        angles: (n, 3) tilt and torsion (phi, theta, sigma), rad.
+        volume: (n,) part of SO(3) that each stands for.
+        neighbours: (m, 2) indices.
+        start: index of the reference orientation.
+    """
+
+    angles: np.ndarray
+    volume: np.ndarray
+    neighbours: np.ndarray
+    start: int
+
+
+def quaternions(angles: np.ndarray) -> np.ndarray:
+    """Tilt and torsion as unit quaternions, scalar first; see `rotations.from_tilt_torsion`.
+
+    Args:
+        angles: (n, 3) rad.
+
+    Returns:
+        (n, 4).
+    """
+    azimuth, half_tilt, half_torsion = angles[:, 0], 0.5 * angles[:, 1], 0.5 * angles[:, 2]
+    across = azimuth - half_torsion
+    return np.stack(
+        [
+            np.cos(half_tilt) * np.cos(half_torsion),
+            np.sin(half_tilt) * np.cos(across),
+            np.sin(half_tilt) * np.sin(across),
+            np.cos(half_tilt) * np.sin(half_torsion),
+        ],
+        axis=1,
+    )
+
+
+def tilt_torsion_grid(divisions: int) -> OrientationGrid:
+    """All multiples of pi / divisions of the three angles, theta below pi; at theta = 0 one for each torsion.
+
+    The volume of SO(3) is sin(theta) d phi d theta d sigma / (8 pi^2): the angles are Euler angles ZXZ, and sigma is
+    the sum of the outer two.
+
+    Args:
+        divisions: of pi.
+
+    Returns:
+        the grid; neighbours differ by one step in one angle.
+    """
+    count, step = 2 * divisions, math.pi / divisions
+    turn = np.arange(count) * step
+    torsion = np.where(turn > math.pi, turn - 2.0 * math.pi, turn)
+    tilts = np.arange(1, divisions) * step
+    # Index of (tilt, azimuth, torsion), after the untilted ones.
+    index = count + np.arange(len(tilts) * count * count).reshape(len(tilts), count, count)
+    mesh = np.meshgrid(tilts, turn, torsion, indexing="ij")
+    tilted = np.stack([mesh[1].ravel(), mesh[0].ravel(), mesh[2].ravel()], axis=1)
+    upright = np.stack([np.zeros(count), np.zeros(count), torsion], axis=1)
+    steps = [
+        (index[:-1], index[1:]),
+        (index, np.roll(index, -1, axis=1)),
+        (index, np.roll(index, -1, axis=2)),
+        (np.broadcast_to(np.arange(count), (count, count)), index[0]),
+        (np.arange(count), np.roll(np.arange(count), -1)),
+    ]
+    neighbours = np.concatenate([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in steps])
+    # Of bands of tilt around each value.
+    area = np.cos(tilts - 0.5 * step) - np.cos(tilts + 0.5 * step)
+    volume = np.repeat(area * step**2 / (8.0 * math.pi**2), count * count)
+    cap = (1.0 - math.cos(0.5 * step)) * 2.0 * math.pi * step / (8.0 * math.pi**2)
+    return OrientationGrid(np.concatenate([upright, tilted]), np.append(np.full(count, cap), volume), neighbours, 0)
+
+
+def equal_volume_grid(divisions: int) -> OrientationGrid:
+    """Cells of equal volume, nearly as wide as they are long, pi / divisions apart.
+
+    Cells of equal area on the sphere of tilts (bands of equal cells) times equal torsions: by the metric of SO(3) a
+    torsion moves at a right angle to the tilts.
+
+    Args:
+        divisions: of pi.
+
+    Returns:
+        the grid; neighbours are up to 1.5 steps apart.
+    """
+    count, step = 2 * divisions, math.pi / divisions
+    cells = [1]  # around the vertical, then band by band
+    cap = math.acos(1.0 - 2.0 / (4.0 * math.pi / step**2))
+    bands = max(1, round((math.pi - 2.0 * cap) / step))
+    height = (math.pi - 2.0 * cap) / bands
+    for i in range(bands):
+        area = math.cos(cap + i * height) - math.cos(cap + (i + 1) * height)
+        cells.append(max(1, round(2.0 * math.pi * area / step**2)))
+    cells.append(1)
+    edges = np.concatenate([[0], np.cumsum(cells)]) / sum(cells)
+    # Bands are moved so that all cells have the same area; each stands at the middle of its area.
+    middle = np.arccos(1.0 - (edges[:-1] + edges[1:]))
+    middle[0], middle[-1] = 0.0, math.pi
+    tilt = np.repeat(middle, cells)
+    azimuth = np.concatenate([(np.arange(n) + 0.5 * (i % 2)) * 2.0 * math.pi / n for i, n in enumerate(cells)])
+    turn = np.arange(count) * step
+    torsion = np.where(turn > math.pi, turn - 2.0 * math.pi, turn)
+    angles = np.stack([np.repeat(azimuth, count), np.repeat(tilt, count), np.tile(torsion, len(tilt))], axis=1)
+    return OrientationGrid(angles, np.full(len(angles), 1.0 / len(angles)), _near(angles, NEAR * step), 0)
+
+
+def _near(angles: np.ndarray, angle: float) -> np.ndarray:
+    # Both quaternions of an orientation are in the tree; each pair is counted once.
+    own = quaternions(angles)
+    tree = cKDTree(np.concatenate([own, -own]))
+    pairs = tree.query_pairs(2.0 * math.sin(0.25 * angle), output_type="ndarray") % len(own)
+    pairs = np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1)
+    return np.unique(pairs, axis=0)

@@ -1,0 +1,83 @@
+"""Turns and mirrors about the vertical that leave a platform robot what it is: found by trying, not assumed."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.platforms import PlatformRobot
+
+LARGEST_FOLD = 6
+# Of the robot's size: points nearer than this are the same.
+SAME = 1e-9
+ROUNDING = 1e-9
+
+
+class Symmetries(NamedTuple):
+    """What leaves a robot unchanged, but for the order of its cables.
+
+    Fields:
+        fold: largest k for which a turn by 2 pi / k about the vertical through the centroid does.
+        mirrors: directions (azimuths in [0, pi[) of the vertical planes through it that do.
+    """
+
+    fold: int
+    mirrors: tuple[float, ...]
+
+
+def symmetries(robot: PlatformRobot) -> Symmetries:
+    """The symmetries of a robot.
+
+    Args:
+        robot: in its reference axes.
+
+    Returns:
+        those found.
+    """
+    fold = next(k for k in range(LARGEST_FOLD, 0, -1) if _maps(robot, _turn(2.0 * math.pi / k)))
+    # A mirror plane goes through a spool or halves the angle between two.
+    base = np.asarray(robot.base_points)[:, :2] - np.asarray(robot.base_points)[:, :2].mean(0)
+    azimuth = np.arctan2(base[:, 1], base[:, 0])
+    halves = np.unique(np.round((0.5 * (azimuth[:, None] + azimuth[None, :])) % math.pi, 12))
+    every = sorted({float(x) for h in halves for x in (h, (h + 0.5 * math.pi) % math.pi)})
+    mirrors: list[float] = []
+    for x in every:
+        if _maps(robot, _mirror(x)) and all(abs(math.sin(x - y)) > 1e-6 for y in mirrors):
+            mirrors.append(x)
+    return Symmetries(fold, tuple(mirrors))
+
+
+def folded(found: Symmetries, azimuths: np.ndarray) -> np.ndarray:
+    """Azimuths that stand for others, at which the robot can do the same.
+
+    Args:
+        found: symmetries of the robot.
+        azimuths: (n,) directions from the vertical through the centroid, rad.
+
+    Returns:
+        (n,) equal for directions that symmetries take into each other.
+    """
+    width = 2.0 * math.pi / found.fold
+    images = np.mod(np.stack([azimuths, *(2.0 * mirror - azimuths for mirror in found.mirrors)]), width)
+    return np.where(width - images < ROUNDING, 0.0, images).min(0)
+
+
+def _turn(angle: float) -> np.ndarray:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _mirror(azimuth: float) -> np.ndarray:
+    return _turn(azimuth) @ np.diag([1.0, -1.0, 1.0]) @ _turn(-azimuth)
+
+
+def _maps(robot: PlatformRobot, change: np.ndarray) -> bool:
+    # Whether the changed robot has the same cables and the same inertia.
+    base, points = np.asarray(robot.base_points), np.asarray(robot.platform_points)
+    own = np.concatenate([base - base.mean(0), points], axis=1)
+    other = np.concatenate([(base - base.mean(0)) @ change.T, points @ change.T], axis=1)
+    size = np.abs(own).max()
+    apart = np.linalg.norm(own[:, None] - other[None, :], axis=2)
+    inertia = np.asarray(robot.inertia)
+    moved = change @ inertia @ change.T - inertia
+    return bool((apart.min(0) <= SAME * size).all() and np.abs(moved).max() <= SAME * np.abs(inertia).max())

@@ -1,0 +1,181 @@
+"""Accessible and attainable orientations: grids, steps between neighbours beside the oracle, symmetries, tables."""
+
+import itertools
+import json
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from oracles import platform as oracle
+from scipy.spatial.transform import Rotation
+from test_platform import MSSM, ours
+from test_pose_plans import cspr
+
+from cspr_jax import orientation_tables
+from cspr_jax.amplitudes import named
+from cspr_jax.feasibility.limits import Limits
+from cspr_jax.feasibility.pose_checks import PoseChecker
+from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.sights import Watch
+from cspr_jax.maps.accessible import DEFINITIONS, accessible
+from cspr_jax.maps.attainable import attainable
+from cspr_jax.orientations import equal_volume_grid, quaternions, tilt_torsion_grid
+from cspr_jax.rotations import from_tilt_torsion
+from cspr_jax.symmetries import folded, symmetries
+from cspr_jax.trajectories.pose_segment import Kind
+
+B = 0.86
+
+
+@pytest.fixture(autouse=True)
+def _64_bits():
+    with jax.enable_x64(True):
+        yield
+
+
+def place(radius, azimuth, depth=1.7):
+    return np.array([radius * B * math.cos(azimuth), radius * B * math.sin(azimuth), depth])
+
+
+def test_quaternions_are_those_of_the_kernels():
+    angles = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 3))
+    np.testing.assert_allclose(quaternions(angles), np.asarray(from_tilt_torsion(*jnp.asarray(angles.T))), atol=1e-12)
+
+
+def rotations(angles):
+    return Rotation.from_quat(quaternions(angles), scalar_first=True)
+
+
+def test_the_volume_of_tilt_and_torsion():
+    """Random orientations of SO(3) fall into ranges of tilt and torsion as sin(theta) says; the grid's volumes too."""
+    some = Rotation.random(200_000, random_state=1).as_quat(scalar_first=True)
+    some = np.where(some[:, :1] < 0.0, -some, some)
+    tilt = 2.0 * np.arctan2(np.hypot(some[:, 1], some[:, 2]), np.hypot(some[:, 0], some[:, 3]))
+    torsion = 2.0 * np.arctan2(some[:, 3], some[:, 0])
+    # Halfway between points of the grid.
+    most = 11.5 * math.pi / 32.0, 7.5 * math.pi / 32.0
+    wanted = (1.0 - math.cos(most[0])) / 2.0 * most[1] / math.pi
+    inside = (tilt < most[0]) & (np.abs(torsion) < most[1])
+    assert inside.mean() == pytest.approx(wanted, abs=4.0 * math.sqrt(wanted / len(some)))
+    grid = tilt_torsion_grid(32)
+    near = (grid.angles[:, 1] < most[0]) & (np.abs(grid.angles[:, 2]) < most[1])
+    assert grid.volume[near].sum() == pytest.approx(wanted, rel=1e-9)
+    assert grid.volume.sum() == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("make", [tilt_torsion_grid, equal_volume_grid])
+def test_grids_of_orientations(make):
+    """No orientation twice, the reference one first, neighbours near, everything connected."""
+    grid, step = make(8), math.pi / 8
+    assert np.abs(grid.angles[grid.start]).max() == 0.0
+    turns = rotations(grid.angles)
+    first, last = grid.neighbours.T
+    apart = (turns[first].inv() * turns[last]).magnitude()
+    assert apart.min() > 1e-6 and apart.max() <= (1.5 if make is equal_volume_grid else 2.0) * step + 1e-9
+    pairs = np.sort(grid.neighbours, axis=1)
+    assert len(np.unique(pairs, axis=0)) == len(pairs)
+    reached, edge = {grid.start}, [grid.start]
+    lists = {i: set() for i in range(len(grid.angles))}
+    for a, b in grid.neighbours:
+        lists[a].add(int(b))
+        lists[b].add(int(a))
+    while edge:
+        edge = [b for a in edge for b in lists[a] if b not in reached and not reached.add(b)]
+    assert len(reached) == len(grid.angles)
+    if make is equal_volume_grid:
+        assert np.ptp(grid.volume) == 0.0
+        # Each of many random orientations is about as near to a cell as the step says.
+        some = Rotation.random(500, random_state=2).as_quat(scalar_first=True)
+        nearest = np.abs(some @ quaternions(grid.angles).T).max(1)
+        assert (2.0 * np.arccos(np.clip(nearest, 0, 1))).max() < step
+
+
+def test_steps_between_neighbours():
+    """Regular, cables that meet, the platform: as the oracle says, for random neighbours at a far place."""
+    rng, there = np.random.default_rng(3), place(1.5, 0.4)
+    angles = np.stack([rng.uniform(-3, 3, 400), rng.uniform(0, 2.2, 400), rng.uniform(-2, 2, 400)], axis=1)
+    other = angles + rng.normal(size=angles.shape) * 0.15
+    watch = Watch(ours(MSSM), there)
+    before, after = (watch.at(quaternions(x)) for x in (angles, other))
+    found = watch.passable(before, after)
+    seen = {True: 0, False: 0}
+    for i, (a, b) in enumerate(zip(angles, other, strict=True)):
+        position = np.stack([there, there])
+        turns = np.stack([oracle.matrix(quaternions(x[None])[0]) for x in (a, b)])
+        det = oracle.relative_determinant(MSSM, position, turns, there[2])
+        if np.abs(det).min() < 1e-4:
+            continue
+        vectors = oracle.cable_vectors(MSSM, position, turns)[0]
+        met = ((vectors[0] * vectors[1]).sum(-1) <= 0.0).any()
+        wanted = det.min() > 0.0 and not met and not np.any(oracle.platform_hit(MSSM, position, turns))
+        assert found[i] == wanted, i
+        seen[bool(wanted)] += 1
+    assert min(seen.values()) > 50
+
+
+@pytest.mark.parametrize("definition", DEFINITIONS)
+def test_symmetric_places_have_equal_sets(definition):
+    """The mirror x -> -x and 120 degrees: equal counts for tilt and torsion, equal volumes within a step otherwise."""
+    robot = ours(MSSM)
+    plain = accessible(robot, place(1.6, 0.3), definition, 8)
+    for azimuth in (math.pi - 0.3, 0.3 + 2.0 * math.pi / 3.0):
+        other = accessible(robot, place(1.6, azimuth), definition, 8)
+        if definition == "equal-volume":
+            assert other.volume.sum() == pytest.approx(plain.volume.sum(), rel=0.05)
+        else:
+            assert len(other.angles) == len(plain.angles)
+            assert other.volume.sum() == pytest.approx(plain.volume.sum(), rel=1e-9)
+
+
+def test_definitions_agree():
+    """On the volume, within what the step lets expect; the scan counts no orientation outside of the other two."""
+    robot = ours(MSSM)
+    for radius in (0.5, 2.0):
+        found = {name: accessible(robot, place(radius, 0.2), name, 16).volume.sum() for name in DEFINITIONS}
+        for a, b in itertools.combinations(found.values(), 2):
+            assert a == pytest.approx(b, rel=0.06), found
+
+
+def test_nothing_is_accessible_above_the_spools():
+    for definition in DEFINITIONS:
+        assert len(accessible(ours(MSSM), place(1.0, 0.0, -0.5), definition, 8).angles) == 0
+
+
+def test_attained_orientations():
+    """More arcs allowed attain no fewer, and the same numbers where found; margins are positive where attained."""
+    robot = ours(MSSM)
+    checker = PoseChecker(PoseShared(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    there = place(1.5, 0.0)
+    inside = accessible(robot, there, "scan", 8)
+    found = {p: attainable(checker, there, inside.angles, 1.7, max_arcs=p, values=4) for p in (3, 8)}
+    assert ((found[3].arcs > 0) <= (found[8].arcs > 0)).all() and (found[8].arcs > 0).mean() > 0.8
+    assert (found[3].arcs[found[3].arcs > 0] == found[8].arcs[found[3].arcs > 0]).all()
+    good = found[8].arcs > 0
+    assert (found[8].margin[good] > 0).all() and (found[8].det_margin[good] > 0).all()
+    assert (found[8].verdict[~good] != 0).all()
+
+
+def test_symmetries_of_robots():
+    robot = ours(MSSM)
+    found = symmetries(robot)
+    assert found.fold == 3 and np.degrees(found.mirrors) == pytest.approx([30.0, 90.0, 150.0])
+    azimuths = np.radians([10.0, 50.0, 130.0, 170.0, 250.0, -70.0])
+    np.testing.assert_allclose(folded(found, azimuths), np.radians(10.0), atol=1e-9)
+
+
+def test_tables_of_orientations(tmp_path, monkeypatch):
+    """Their cells, with a coarse step; options that do not belong are refused."""
+    monkeypatch.setattr(orientation_tables, "DIVISIONS", 8)
+    code, out, err = cspr("table", "3.3", "--json", "--definition", "grid")
+    assert code == 0, err
+    cells = json.loads(out)["cells"]
+    assert len(cells) == 12 and {c["variant"]["definition"] for c in cells} == {"grid"}
+    by = {(c["row"], c["column"]): c for c in cells}
+    for row in ("x = 1.5b", "y = 1.5b"):
+        share = by[row, "attainable"]["computed"] / by[row, "accessible"]["computed"]
+        assert 100.0 * share == pytest.approx(by[row, "proportion"]["computed"])
+        assert by[row, "proportion"]["computed"] == pytest.approx(by[row, "proportion"]["published"], abs=4.0)
+    code, _, err = cspr("table", "2.1", "--fine")
+    assert code == 2 and err == "cspr: --fine: must be absent with table 2.1\n"
