@@ -70,6 +70,12 @@ def _checker(amplitude: str) -> PoseChecker:
     return PoseChecker(shared, Kind(from_rest=True), batch=MANY)
 
 
+def _attained(checker: PoseChecker, place: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    # By horizontal transitions; the centroid of the spools is the origin.
+    places, z0 = np.tile(place, (len(angles), 1)), np.full(len(angles), place[2])
+    return attainable(checker, places, angles, z0, max_arcs=MAX_ARCS).arcs > 0
+
+
 def table_3_3(choice: Choice) -> dict[Key, float | None]:
     """Counts and proportions at four places.
 
@@ -86,8 +92,7 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
             for row, (x, y) in _PLACES.items():
                 place, name = np.array([x * RADIUS, y * RADIUS, _DEPTH]), variant(definition, amplitude)
                 inside = accessible(checker.shared.robot, place, definition, DIVISIONS * choice.finer)
-                answers = attainable(checker, place, inside.angles, _DEPTH, max_arcs=MAX_ARCS)
-                counts = len(inside.angles), int((answers.arcs > 0).sum())
+                counts = len(inside.angles), int(_attained(checker, place, inside.angles).sum())
                 found[row, "accessible", name], found[row, "attainable", name] = (float(n) for n in counts)
                 found[row, "proportion", name] = 100.0 * counts[1] / counts[0]
     return found
@@ -115,8 +120,7 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
                         level = RADIUS * radius * np.array([math.cos(azimuth), math.sin(azimuth)])
                         place = np.append(level, depth)
                         inside = accessible(robot, place, definition, DIVISIONS * choice.finer)
-                        answers = attainable(checker, place, inside.angles, depth, max_arcs=MAX_ARCS)
-                        shares.append(float((answers.arcs > 0).mean()))
+                        shares.append(float(_attained(checker, place, inside.angles).mean()))
                 found[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * min(shares)
     return found
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from cspr_jax.feasibility.verdicts import SENTENCES
+from cspr_jax.feasibility.verdicts import SENTENCES, Verdict
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,6 +54,20 @@ AXES = {
         Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
     )
 }
+
+# Why accessible orientations are not attained, by the best candidate's flags.
+REFUSALS = {
+    "refused_slack": Verdict.SLACK_CABLE,
+    "refused_singular": Verdict.SINGULAR,
+    "refused_cable_cable": Verdict.CABLE_CABLE,
+    "refused_cable_platform": Verdict.CABLE_PLATFORM,
+}
+_REFUSED = (
+    "the best motion asks a cable to push.",
+    "the best motion passes a singularity.",
+    "two cables touch on the best motion.",
+    "a cable touches the platform on the best motion.",
+)
 
 QUANTITIES = {
     q.name: q
@@ -153,6 +167,41 @@ QUANTITIES = {
             "Of those that can meet: that share neither spool nor platform point.",
         ),
         Quantity("beta_hat", "1", "beta-hat at the target", "Of the motion that the other quantities belong to."),
+        Quantity(
+            "accessible",
+            "1",
+            "accessible orientations",
+            "Number of orientations joined to the reference one without interference or singularity.",
+        ),
+        Quantity(
+            "accessible_points",
+            "1",
+            "accessible part of the grid points",
+            "Of all orientations of the grid; NaN for a scan, which has no grid.",
+        ),
+        Quantity("accessible_volume", "1", "accessible part of SO(3)", "By volume (Haar measure)."),
+        Quantity(
+            "accessible_error", "1", "its error", "Difference of the accessible volume from that with twice the step."
+        ),
+        Quantity("largest_tilt", "rad", "largest accessible tilt", "Over all accessible orientations."),
+        Quantity(
+            "attainable", "1", "attainable orientations", "Number that a horizontal transition from rest attains."
+        ),
+        Quantity(
+            "attainable_fraction", "1", "attainable part of the accessible orientations", "By number; NaN for none."
+        ),
+        Quantity("attainable_volume", "1", "attainable part of the accessible volume", "By volume; NaN for none."),
+        Quantity(
+            "attainable_error", "1", "its error", "Difference of the attainable fraction from that with twice the step."
+        ),
+        Quantity("mean_arcs", "1", "mean smallest number of arcs", "Over the attainable orientations."),
+        Quantity("undecided_fraction", "1", "undecided part", "Of the accessible orientations."),
+        *(
+            Quantity(
+                name, "1", f"refused: {flag.text.replace('_', ' ')}", f"Part of the accessible orientations: {words}"
+            )
+            for (name, flag), words in zip(REFUSALS.items(), _REFUSED, strict=True)
+        ),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination asks for."),
     )
 }
@@ -178,12 +227,24 @@ _OF_POSES = (
     "limit_margin",
     "beta_hat",
 )
+_OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
+_OF_ATTAINED = (
+    "attainable",
+    "attainable_fraction",
+    "attainable_volume",
+    "attainable_error",
+    "mean_arcs",
+    "undecided_fraction",
+    *REFUSALS,
+)
 # What each kind of map can store.
 OF_MAP = {
     "minimum-arcs": ("arcs", "tried_arcs", *_COMMON),
     "minimum-oscillations": (*_OF_OSCILLATIONS, *_COMMON),
     "transition-envelopes": _OF_INSTANTS,
     "poses": _OF_POSES,
+    "orientation-workspace": _OF_PLACES,
+    "attainability": (*_OF_PLACES, *_OF_ATTAINED),
 }
 TRAJECTORY = {
     q.name: q
@@ -218,12 +279,16 @@ DEFAULT_STORE = {
     ),
     "transition-envelopes": _OF_INSTANTS,
     "poses": ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat"),
+    "orientation-workspace": _OF_PLACES,
+    "attainability": (*_OF_PLACES, *_OF_ATTAINED),
 }
 TITLES = {
     "minimum-arcs": "Smallest number of arcs",
     "minimum-oscillations": "Smallest number of oscillations",
     "transition-envelopes": "Envelopes of the pseudotensions along transitions",
     "poses": "Smallest number of arcs to poses",
+    "orientation-workspace": "Accessible orientations",
+    "attainability": "Accessible and attainable orientations",
 }
 
 

@@ -9,16 +9,17 @@ import numpy as np
 LARGEST_TILE = 65536
 
 
-def tile_shape(shape: tuple[int, ...]) -> tuple[int, ...]:
+def tile_shape(shape: tuple[int, ...], most: int = LARGEST_TILE) -> tuple[int, ...]:
     """Shape of the tiles of a grid: whole trailing axes as long as they fit.
 
     Args:
         shape: of the grid.
+        most: cells of a tile.
 
     Returns:
-        a shape with at most 65,536 cells.
+        a shape with at most so many cells.
     """
-    tile, room = [], LARGEST_TILE
+    tile, room = [], most
     for length in reversed(shape):
         tile.append(max(1, min(length, room)))
         room //= tile[-1]

@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +23,7 @@ from cspr_jax.feasibility.sights import Watch
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.maps.attainable import attainable
 from cspr_jax.orientations import equal_volume_grid, quaternions, tilt_torsion_grid
+from cspr_jax.results import open_result
 from cspr_jax.rotations import from_tilt_torsion
 from cspr_jax.symmetries import folded, symmetries
 from cspr_jax.trajectories.pose_segment import Kind
@@ -149,7 +151,8 @@ def test_attained_orientations():
     checker = PoseChecker(PoseShared(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
     there = place(1.5, 0.0)
     inside = accessible(robot, there, "scan", 8)
-    found = {p: attainable(checker, there, inside.angles, 1.7, max_arcs=p, values=4) for p in (3, 8)}
+    many, z0 = np.tile(there, (len(inside.angles), 1)), np.full(len(inside.angles), 1.7)
+    found = {p: attainable(checker, many, inside.angles, z0, max_arcs=p, values=4) for p in (3, 8)}
     assert ((found[3].arcs > 0) <= (found[8].arcs > 0)).all() and (found[8].arcs > 0).mean() > 0.8
     assert (found[3].arcs[found[3].arcs > 0] == found[8].arcs[found[3].arcs > 0]).all()
     good = found[8].arcs > 0
@@ -179,3 +182,64 @@ def test_tables_of_orientations(tmp_path, monkeypatch):
         assert by[row, "proportion"]["computed"] == pytest.approx(by[row, "proportion"]["published"], abs=4.0)
     code, _, err = cspr("table", "2.1", "--fine")
     assert code == 2 and err == "cspr: --fine: must be absent with table 2.1\n"
+
+
+SWEEP = """schema = 1
+map = "attainability"
+robot = "laval-mssm"
+[axes]
+z = [1.7]
+radius = [1.29]
+azimuth = [0.2, 0.8471975511965976, 1.5]
+[trajectory]
+family = "hypocycloid"
+amplitude = { name = "effective-c3", epsilon = 0.1 }
+max_arcs = 8
+[orientations]
+divisions = 6
+values = 4
+"""
+
+
+def swept(folder, *change):
+    (folder / "places.toml").write_text(SWEEP.replace(*change) if change else SWEEP)
+    return cspr("run", folder / "places.toml", "-o", folder / "run")
+
+
+def test_maps_of_places(tmp_path):
+    """Cells are what the functions give; the mirrored place has the same numbers."""
+    code, out, err = swept(tmp_path)
+    assert code == 0, err
+    data = {name: values[0, 0] for name, values in open_result(Path(out.split()[-1])).data.items()}
+    checker = PoseChecker(PoseShared(ours(MSSM), Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    for i, azimuth in enumerate((0.2, 0.8471975511965976, 1.5)):
+        there = place(1.5, azimuth)
+        inside = accessible(ours(MSSM), there, "scan", 6)
+        many, z0 = np.tile(there, (len(inside.angles), 1)), np.full(len(inside.angles), 1.7)
+        good = attainable(checker, many, inside.angles, z0, max_arcs=8, values=4).arcs > 0
+        assert data["accessible"][i] == len(good) and data["attainable"][i] == good.sum()
+        assert data["accessible_volume"][i] == pytest.approx(inside.volume.sum(), rel=1e-9)
+        assert data["attainable_fraction"][i] == pytest.approx(good.mean())
+    for values in data.values():
+        assert values[0] == pytest.approx(values[1], nan_ok=True)  # 0.847 is 60 degrees less 0.2
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('"laval-mssm"', '"prototype"'), "must be a platform"),
+        (("z = [1.7]", "z = [1.7]\ntilt = [0.1]"), "axes.tilt: must be absent"),
+        (("max_arcs = 8", "max_arcs = 8\nfrom = { position = [0.0, 0.1, 1.0] }"), "trajectory.from: must be"),
+        (('"hypocycloid"', '"transition"'), "trajectory.family"),
+        (("divisions = 6", "divisions = 1"), "orientations.divisions = 1"),
+        (('map = "attainability"', 'map = "poses"'), "orientations: must be absent"),
+        (("z = [1.7]", "z = [-1.7]"), "every point is above the spool plane"),
+        (('map = "attainability"', 'map = "orientation-workspace"\n'), None),
+    ],
+)
+def test_mistakes(tmp_path, change, words):
+    code, out, err = swept(tmp_path, *change)
+    if words is None:
+        assert code == 0 and "attainable" not in open_result(Path(out.split()[-1])).data
+        return
+    assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1, err

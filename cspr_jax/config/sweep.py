@@ -104,6 +104,19 @@ class SweepTrajectory(TrajectoryKeys):
     )
 
 
+class Orientations(Table):
+    """Orientations of each place."""
+
+    definition: Literal["grid", "scan", "equal-volume"] = Field(
+        "scan",
+        description='accessible set: "grid" of tilt and torsion, "scan" (Bonev, as in the thesis), or "equal-volume"',
+    )
+    divisions: Annotated[int, Field(ge=4, le=128)] = Field(32, description="of pi: the step is pi / divisions")
+    values: Annotated[int, Field(ge=1, le=100)] | None = Field(
+        None, description="attainability: values of beta-hat tried at each orientation; absent: 20"
+    )
+
+
 class SweepLimits(LimitKeys):
     """Limits of every cell."""
 
@@ -135,14 +148,25 @@ class SweepFile(Table):
     """A sweep."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
-    map: Literal["minimum-arcs", "minimum-oscillations", "transition-envelopes", "poses"] = Field(
+    map: Literal[
+        "minimum-arcs",
+        "minimum-oscillations",
+        "transition-envelopes",
+        "poses",
+        "orientation-workspace",
+        "attainability",
+    ] = Field(
         description='kind of map: "minimum-arcs"; of transitions "minimum-oscillations", or "transition-envelopes": '
-        'what each instant asks for; of platforms "poses": smallest numbers of arcs'
+        'what each instant asks for; of platforms "poses": smallest numbers of arcs, '
+        '"orientation-workspace": accessible orientations of places, "attainability": which of them are attained'
     )
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
     axes: Axes = Field(
         description="[axes] x, y (or radius, azimuth), z and z0 (or inclination), each { start, stop, count } or a list"
     )
     trajectory: SweepTrajectory = Field(description="[trajectory] with family, amplitude, max_arcs and from")
+    orientations: Orientations | None = Field(
+        None, description="[orientations] of orientation-workspace and attainability: definition, divisions, values"
+    )
     limits: SweepLimits = Field(default_factory=SweepLimits, description="[limits]")
     run: Run = Field(default_factory=Run, description="[run] dtype, tile, store")

@@ -29,6 +29,18 @@ class PoseAnswers(Answers):
     cable_distance: np.ndarray
 
 
+def joined(parts: list[PoseAnswers]) -> PoseAnswers:
+    """Answers one after the other.
+
+    Args:
+        parts: at least one.
+
+    Returns:
+        the answers of all.
+    """
+    return PoseAnswers(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
+
+
 def settled(checker: PoseChecker, candidates: Candidates, found: Found, tried: np.ndarray) -> PoseAnswers:
     """Answers with all margins.
 

@@ -13,14 +13,12 @@ from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
-from cspr_jax.maps.minimum_pose_arcs import Candidates
-from cspr_jax.maps.pose_answers import PoseAnswers, reached
+from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
+from cspr_jax.maps.pose_answers import PoseAnswers, joined, reached
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import aligned, reference_pose
 from cspr_jax.tiles import Grid
 
-# Candidates that are held at a time.
-CANDIDATES = 131_072
 # Time functions of the rotation with a beta-hat of its own at each end.
 _OWN = (None, "beta_ff")
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
@@ -51,12 +49,13 @@ class PoseMap(GridMap[PoseShared]):
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         at_a_time = CANDIDATES // (OPTIONS if self._keys.trajectory.beta_hat is None else 1)
-        parts = [
-            vars(self._answers({name: x[start : start + at_a_time] for name, x in cells.items()}))
-            for start in range(0, len(cells["z0"]), at_a_time)
-        ]
-        found = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        return found | {"beta_hat": found["beta_hat"][:, 1]}
+        found = joined(
+            [
+                self._answers({name: x[start : start + at_a_time] for name, x in cells.items()})
+                for start in range(0, len(cells["z0"]), at_a_time)
+            ]
+        )
+        return vars(found) | {"beta_hat": found.beta_hat[:, 1]}
 
     def _answers(self, cells: dict[str, np.ndarray]) -> PoseAnswers:
         z0, targets = np.asarray(cells["z0"], float), self._targets(cells)

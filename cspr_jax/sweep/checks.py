@@ -10,6 +10,7 @@ from cspr_jax.errors import ConfigError, shown
 
 _START = ("from_x", "from_y", "from_z")
 _INSTANTS = ("tau", "cable")
+_OF_ORIENTATIONS = ("orientation-workspace", "attainability")
 _POSES = ("tilt_azimuth", "tilt", "torsion")
 
 
@@ -28,6 +29,8 @@ def check_map(keys: SweepFile, path: Path) -> None:
         raise ConfigError(path, f"axes: {', '.join(given) or 'no targets'}: must be x and y, or radius and azimuth")
     if keys.map != "poses":
         _refuse_poses(keys, path)
+    if keys.orientations is not None and keys.map not in _OF_ORIENTATIONS:
+        raise ConfigError(path, "orientations: must be absent in this map")
     _CHECKS[keys.map](keys, path)
 
 
@@ -131,9 +134,25 @@ def _check_poses(keys: SweepFile, path: Path) -> None:
         raise ConfigError(path, f'trajectory.beta_hat: must be absent with beat = "{keys.trajectory.beat}"')
 
 
+def _check_orientations(keys: SweepFile, path: Path) -> None:
+    if keys.trajectory.family == "transition":
+        raise ConfigError(
+            path, 'trajectory.family = "transition": must be "hypocycloid" or "hypocycloid-standard" in this map'
+        )
+    for name in (*_START, *_INSTANTS, "inclination", *(["z0"] if keys.map == "orientation-workspace" else [])):
+        if getattr(keys.axes, name) is not None:
+            raise ConfigError(path, f"axes.{name}: must be absent in this map")
+    if keys.trajectory.inclination is not None:
+        raise ConfigError(path, "trajectory.inclination: must be absent in this map")
+    if keys.trajectory.start is not None and not keys.trajectory.start.rest:
+        raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
+
+
 _CHECKS: dict[str, Callable[[SweepFile, Path], None]] = {
     "minimum-arcs": _check_arcs,
     "minimum-oscillations": _check_oscillations,
     "transition-envelopes": _check_envelopes,
     "poses": _check_poses,
+    "orientation-workspace": _check_orientations,
+    "attainability": _check_orientations,
 }

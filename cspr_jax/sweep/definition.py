@@ -24,6 +24,8 @@ from cspr_jax.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 # Each tile is a file.
 LARGEST_TILES = 100_000
 LARGEST_RESULT = 1 << 46  # bytes; what is free on the disk is looked at when a run starts
+# Cells of a tile of maps whose cells take long.
+LONG_CELLS = {"orientation-workspace": 64, "attainability": 16}
 LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
 
 
@@ -113,7 +115,7 @@ def _points(axis: AxisRange | list[float]) -> np.ndarray:
 def _tile(keys: SweepFile, shape: tuple[int, ...], path: Path) -> tuple[int, ...]:
     tile = keys.run.tile
     if tile is None:
-        return tile_shape(shape)
+        return tile_shape(shape, LONG_CELLS.get(keys.map, LARGEST_TILE))
     if len(tile) != len(shape) or float(np.prod(tile, dtype=float)) > LARGEST_TILE:
         raise ConfigError(
             path, f"run.tile = {shown(tile)}: must be {len(shape)} integers whose product is at most {LARGEST_TILE}"

@@ -14,6 +14,7 @@ from cspr_jax.identity import digest
 from cspr_jax.maps.cells import CellMap
 from cspr_jax.maps.envelope_cells import EnvelopeMap
 from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.maps.orientation_cells import AccessibleMap, AttainableMap
 from cspr_jax.maps.oscillation_cells import OscillationMap
 from cspr_jax.maps.pose_cells import PoseMap
 from cspr_jax.store.shards import Shard
@@ -26,6 +27,8 @@ MAPS: dict[str, Callable[[RobotFile, SweepFile, object], GridMap]] = {
     "minimum-oscillations": OscillationMap,
     "transition-envelopes": EnvelopeMap,
     "poses": PoseMap,
+    "orientation-workspace": AccessibleMap,
+    "attainability": AttainableMap,
 }
 # Margins so near zero can change sign with the processor; how many there are stands in the result.
 NEAR_ZERO = 1e-9

@@ -1,0 +1,147 @@
+"""Cells of sweeps over places: which orientations a platform can take there, and which of them it attains from rest."""
+
+import numpy as np
+
+from cspr_jax import problem
+from cspr_jax.amplitudes import Amplitude
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import Orientations, SweepFile
+from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.limits import Limits, given
+from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
+from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.maps.accessible import Accessible, accessible
+from cspr_jax.maps.attainable import VALUES, attainable
+from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
+from cspr_jax.quantities import REFUSALS
+from cspr_jax.reference_pose import aligned
+from cspr_jax.symmetries import folded, symmetries
+from cspr_jax.tiles import Grid
+
+# Digits of a place, m, up to which two cells are at the same one.
+DIGITS = 12
+
+
+class AccessibleMap(GridMap[PoseShared]):
+    """The map of accessible orientations; see `GridMap`."""
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse a point mass."""
+        if not spec.is_platform:
+            raise ConfigError(
+                file, f'robot "{spec.name}" is a point mass: must be a platform on six cables in this map'
+            )
+        super().__init__(spec, keys, file)
+        self._orientations = keys.orientations or Orientations()
+        self._symmetries = symmetries(self._shared.robot)
+
+    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> PoseShared:
+        robot = problem.build_platform(spec, self._keys.trajectory, self._file)
+        return PoseShared(aligned(robot)[0], limits, amplitude)
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`. Places that symmetries join are computed once."""
+        places, depths = self._targets(cells), self._depths(cells)
+        if not given(self._shared.limits):
+            offset = places - self._centre
+            radius = np.hypot(offset[:, 0], offset[:, 1])
+            azimuth = folded(self._symmetries, np.arctan2(offset[:, 1], offset[:, 0]))
+            level = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth)], axis=1)
+            places = np.concatenate([self._centre[:2] + level, places[:, 2:]], axis=1)
+        every, own = np.unique(np.round(np.c_[places, depths], DIGITS), axis=0, return_inverse=True)
+        found = self._places(every[:, :3], every[:, 3])
+        return {name: values[own.ravel()] for name, values in found.items()}
+
+    def _depths(self, cells: dict[str, np.ndarray]) -> np.ndarray:
+        # z0 of horizontal transitions, where none is given; not needed for what is accessible.
+        depth = self._targets(cells)[:, 2] - self._centre[2]
+        return np.asarray(cells.get("z0", depth), float)
+
+    def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
+        return _of_sets(*(self._sets(places, k) for k in (1, 2)))
+
+    def _sets(self, places: np.ndarray, coarser: int) -> list[Accessible]:
+        definition, divisions = self._orientations.definition, self._orientations.divisions
+        return [accessible(self._shared.robot, place, definition, divisions // coarser) for place in places]
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse places that are all out of reach; see `GridMap.refuse_hopeless`."""
+        self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        volume = answers["accessible_volume"]
+        return {
+            "a volume outside of [0, 1]": ~((volume >= 0.0) & (volume <= 1.0)),
+            "orientations without a volume": (answers["accessible"] > 0) & ~(volume > 0.0),
+        }
+
+
+class AttainableMap(AccessibleMap):
+    """The map of attainable orientations; see `GridMap`."""
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Build the checker of motions from rest."""
+        super().__init__(spec, keys, file)
+        kind = problem.motion_kind(keys.trajectory, from_rest=True)
+        self._checker = PoseChecker(self._shared, kind, batch=MANY)
+
+    def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
+        fine, coarse = (self._sets(places, k) for k in (1, 2))
+        # All places together, with both steps: full batches.
+        every = [*fine, *coarse]
+        counts = [len(inside.angles) for inside in every]
+        own = np.repeat(np.tile(np.arange(len(places)), 2), counts)
+        own = np.where((z0 > 0.0)[own], own, -1)
+        verdicts, arcs = np.full(len(own), Verdict.NO_ARCS.value), np.zeros(len(own), int)
+        some = np.flatnonzero(own >= 0)
+        if len(some):
+            answers = attainable(
+                self._checker,
+                places[own[some]],
+                np.concatenate([inside.angles for inside in every])[some],
+                z0[own[some]],
+                max_arcs=self._keys.trajectory.max_arcs,
+                values=self._orientations.values or VALUES,
+            )
+            verdicts[some], arcs[some] = answers.verdict, answers.arcs
+        stops = np.cumsum(counts)[:-1]
+        pieces = zip(every, np.split(arcs, stops), np.split(verdicts, stops), strict=True)
+        rows = [_of_attained(*piece) for piece in pieces]
+        columns = {name: np.array([row[name] for row in rows[: len(places)]]) for name in rows[0]}
+        rough = np.array([row["attainable_fraction"] for row in rows[len(places) :]])
+        error = np.abs(columns["attainable_fraction"] - rough)
+        return _of_sets(fine, coarse) | columns | {"attainable_error": error}
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        more = answers["attainable"] > answers["accessible"]
+        return super().contradictions(answers) | {"more orientations attainable than accessible": more}
+
+
+def _of_sets(fine: list[Accessible], coarse: list[Accessible]) -> dict[str, np.ndarray]:
+    volume, rough = (np.array([inside.volume.sum() for inside in sets]) for sets in (fine, coarse))
+    return {
+        "accessible": np.array([len(inside.angles) for inside in fine], float),
+        "accessible_points": np.array([inside.of_points for inside in fine]),
+        "accessible_volume": volume,
+        "accessible_error": np.abs(volume - rough),
+        "largest_tilt": np.array([inside.angles[:, 1].max(initial=0.0) for inside in fine]),
+    }
+
+
+def _of_attained(inside: Accessible, arcs: np.ndarray, verdicts: np.ndarray) -> dict[str, float]:
+    # Of one place; NaN where nothing is accessible.
+    count, good = len(arcs), arcs > 0
+    if not count:
+        names = ("attainable_fraction", "attainable_volume", "mean_arcs", "undecided_fraction", *REFUSALS)
+        return {"attainable": 0.0, **dict.fromkeys(names, np.nan)}
+    return {
+        "attainable": float(good.sum()),
+        "attainable_fraction": float(good.mean()),
+        "attainable_volume": float(inside.volume[good].sum() / inside.volume.sum()),
+        "mean_arcs": float(arcs[good].mean()) if good.any() else np.nan,
+        "undecided_fraction": float(((verdicts & Verdict.UNDECIDED.value) != 0).mean()),
+        **{name: float((~good & ((verdicts & flag) != 0)).mean()) for name, flag in REFUSALS.items()},
+    }
