@@ -93,3 +93,31 @@ def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
     move = 0.5 * (left - right) / jnp.where(bend > 0.0, bend, 1.0)
     move = jnp.clip(jnp.where(bend > 0.0, move, jnp.sign(left - right)), -1.0, 1.0)
     return move, middle + 0.5 * move * (right - left) + 0.5 * move**2 * bend
+
+
+def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
+    """Solution of a small linear system, and the determinant, by elimination with pivots.
+
+    In place of `jnp.linalg`: XLA calls LAPACK for that, and in jaxlib 0.10 batches of such calls can wait for ever for
+    the threads that they occupy themselves.
+
+    Args:
+        matrix: (n, n).
+        right: (n, m) right-hand sides.
+
+    Returns:
+        (n, m), not finite where the matrix is singular; () determinant.
+    """
+    count = matrix.shape[0]
+    rows, index = jnp.concatenate([matrix, right], axis=1), jnp.arange(count)
+    determinant = jnp.ones((), matrix.dtype)
+    for k in range(count):
+        size = jnp.where(index < k, -1.0, jnp.abs(rows[:, k]))
+        place = jnp.argmax(size)
+        is_pivot = index == place
+        pivot_row = jnp.sum(jnp.where(is_pivot[:, None], rows, 0.0), axis=0)
+        rows = jnp.where(is_pivot[:, None], rows[k], rows)
+        determinant = determinant * pivot_row[k] * jnp.where(place == k, 1.0, -1.0)
+        pivot_row = pivot_row / pivot_row[k]
+        rows = jnp.where((index == k)[:, None], pivot_row, rows - rows[:, k, None] * pivot_row)
+    return rows[:, count:], determinant

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.platforms import PlatformRobot
+from cspr_jax.numerics import solved
+from cspr_jax.platforms import CABLES, PlatformRobot
 
 
 class Pose(NamedTuple):
@@ -88,7 +89,7 @@ def conditioning(robot: PlatformRobot, position: Array, rotation: Array) -> Arra
     cables, arms = rays(robot, position, rotation)
     units = cables / jnp.linalg.norm(cables, axis=1, keepdims=True)
     size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
-    return jnp.linalg.det(jnp.concatenate([units, jnp.cross(arms / size, units)], axis=1))
+    return solved(jnp.concatenate([units, jnp.cross(arms / size, units)], axis=1), jnp.zeros((CABLES, 0)))[1]
 
 
 def inertial_wrench(robot: PlatformRobot, pose: Pose) -> Array:
@@ -116,7 +117,8 @@ def tensions_per_length(robot: PlatformRobot, pose: Pose) -> Array:
     Returns:
         (6,) in cable order, 1/s^2. Not clipped: a negative entry is a push that a cable cannot give.
     """
-    return jnp.linalg.solve(-jacobian(robot, pose.position, pose.rotation).T, inertial_wrench(robot, pose))
+    right = inertial_wrench(robot, pose)[:, None]
+    return solved(-jacobian(robot, pose.position, pose.rotation).T, right)[0][:, 0]
 
 
 def tensions(robot: PlatformRobot, pose: Pose) -> Array:

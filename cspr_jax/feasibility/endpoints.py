@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax import rotations
-from cspr_jax.numerics import length
+from cspr_jax.numerics import length, solved
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.wrenches import jacobian, rays
 
@@ -57,7 +57,7 @@ def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array
     spin = eta * rotation @ robot.inertia @ _angle_vector(quaternion) / robot.mass  # (3.80)
     still = jnp.zeros(3)
     right = jnp.stack([jnp.concatenate([-eta * from_centroid, still]), jnp.concatenate([still, spin])], axis=1)
-    offset, slope = jnp.linalg.solve(matrix, right).T  # (3.79)
+    offset, slope = solved(matrix, right)[0].T  # (3.79)
     # Of (3.13): the combined tension that the translation asks for; eta where both centroids are at the origin.
     cables, _ = rays(robot, position, rotation)
     pull = jnp.mean(cables, axis=0)
