@@ -28,8 +28,8 @@ AMPLITUDES: dict[str, tuple[str, float | None]] = {
     "effective": ("effective", 0.1),
     "effective-c3": ("effective-c3", 0.1),
 }
-_PLACES = {"x = 1.5b": (1.5, 0.0), "x = 3b": (3.0, 0.0), "y = 1.5b": (0.0, 1.5), "y = 3b": (0.0, 3.0)}
-_DEPTH = 1.7
+PLACES = {"x = 1.5b": (1.5, 0.0), "x = 3b": (3.0, 0.0), "y = 1.5b": (0.0, 1.5), "y = 3b": (0.0, 3.0)}
+DEPTH = 1.7
 _DEPTHS = (1.0, 1.4, 1.7, 2.0, 2.4)
 _RADII, _AZIMUTHS = (1.5, 2.0, 2.5, 3.0), np.radians(np.arange(0.0, 61.0, 10.0))
 
@@ -63,15 +63,32 @@ def variant(definition: str, amplitude: str) -> str:
     return f"amplitude = {amplitude}{f' {epsilon:g}' if epsilon else ''}; definition = {definition}"
 
 
-def _checker(amplitude: str) -> PoseChecker:
+def checker_of(amplitude: str) -> PoseChecker:
+    """What checks the tables' motions.
+
+    Args:
+        amplitude: key of `AMPLITUDES`.
+
+    Returns:
+        the checker, of motions of the MSSM from rest.
+    """
     here = Path(__file__)
     robot = problem.build_platform(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
     shared = PoseShared(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
     return PoseChecker(shared, Kind(from_rest=True), batch=MANY)
 
 
-def _attained(checker: PoseChecker, place: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    # By horizontal transitions; the centroid of the spools is the origin.
+def attained(checker: PoseChecker, place: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Which orientations horizontal transitions attain; the centroid of the spools is the origin.
+
+    Args:
+        checker: of `checker_of`.
+        place: (3,) m.
+        angles: (n, 3) tilt and torsion in the cylindrical frame, rad.
+
+    Returns:
+        (n,).
+    """
     places, z0 = np.tile(place, (len(angles), 1)), np.full(len(angles), place[2])
     return attainable(checker, places, angles, z0, max_arcs=MAX_ARCS).arcs > 0
 
@@ -87,12 +104,12 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
     """
     found: dict[Key, float | None] = {}
     for amplitude in choice.amplitudes:
-        checker = _checker(amplitude)
+        checker = checker_of(amplitude)
         for definition in choice.definitions:
-            for row, (x, y) in _PLACES.items():
-                place, name = np.array([x * RADIUS, y * RADIUS, _DEPTH]), variant(definition, amplitude)
+            for row, (x, y) in PLACES.items():
+                place, name = np.array([x * RADIUS, y * RADIUS, DEPTH]), variant(definition, amplitude)
                 inside = accessible(checker.shared.robot, place, definition, DIVISIONS * choice.finer)
-                counts = len(inside.angles), int(_attained(checker, place, inside.angles).sum())
+                counts = len(inside.angles), int(attained(checker, place, inside.angles).sum())
                 found[row, "accessible", name], found[row, "attainable", name] = (float(n) for n in counts)
                 found[row, "proportion", name] = 100.0 * counts[1] / counts[0]
     return found
@@ -109,7 +126,7 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
     """
     found: dict[Key, float | None] = {}
     for amplitude in choice.amplitudes:
-        checker = _checker(amplitude)
+        checker = checker_of(amplitude)
         robot = checker.shared.robot
         azimuths = np.unique(np.round(folded(symmetries(robot), _AZIMUTHS), 9))
         for definition in choice.definitions:
@@ -120,7 +137,7 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
                         level = RADIUS * radius * np.array([math.cos(azimuth), math.sin(azimuth)])
                         place = np.append(level, depth)
                         inside = accessible(robot, place, definition, DIVISIONS * choice.finer)
-                        shares.append(float(_attained(checker, place, inside.angles).mean()))
+                        shares.append(float(attained(checker, place, inside.angles).mean()))
                 found[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * min(shares)
     return found
 

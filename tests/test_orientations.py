@@ -243,3 +243,29 @@ def test_mistakes(tmp_path, change, words):
         assert code == 0 and "attainable" not in open_result(Path(out.split()[-1])).data
         return
     assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1, err
+
+
+@pytest.mark.soak
+def test_verdicts_are_the_oracle_s():
+    """2,000 random orientations: what is found passes the oracle's four tests, one arc fewer or no arcs does not."""
+    robot, rng, undecided = ours(MSSM), np.random.default_rng(21), 0
+    checker = PoseChecker(PoseShared(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True), batch=1024)
+    for radius, azimuth in ((1.5, 0.0), (3.0, 0.0), (1.5, math.pi / 2.0), (2.2, 0.4)):
+        there = place(radius, azimuth)
+        angles = accessible(robot, there, "scan", 32).angles
+        angles = angles[rng.choice(len(angles), 500, replace=False)]
+        found = attainable(checker, np.tile(there, (500, 1)), angles, np.full(500, 1.7), max_arcs=12, values=6)
+        turned = quaternions(angles + np.array([azimuth, 0.0, 0.0]))
+        for i in range(500):
+            segment = oracle.Segment(
+                np.array([0.0, 0.0, 1.7]), there, 1.7, np.eye(4)[0], turned[i], amplitude=oracle.effective_c3(0.1)
+            )
+            bends, p = tuple(found.beta_hat[i]), int(found.arcs[i])
+            if p:
+                assert oracle.check_motion(MSSM, segment, p, bends)["feasible"], (radius, i)
+            for fewer in [p - 1] if p > 1 else [] if p else range(1, 13):
+                judged = oracle.check_motion(MSSM, segment, fewer, bends, 4001)
+                # The oracle samples: nearly feasible motions may look so.
+                undecided += judged["feasible"]
+                assert not judged["feasible"] or judged["mu_hat_min"] < 0.01, (radius, i, fewer)
+    assert undecided < 10

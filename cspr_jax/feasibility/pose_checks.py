@@ -103,11 +103,16 @@ class PoseChecker:
         shared: robot, limits, amplitude.
         kind: of the motions.
         batch: how many are computed at a time.
+
+    Fields:
+        instants: how many instants of motions were looked at so far, in the first look and in checks.
+        checked: how many motions were checked.
     """
 
     def __init__(self, shared: PoseShared, kind: Kind = USUAL, *, batch: int = FEW) -> None:
         """Find what can meet."""
         self.shared, self.kind, self.batch = shared, kind, batch
+        self.instants, self.checked = {"first look": 0, "checks": 0}, 0
         found = contacts(shared.robot)
         self._platform, self._pairs = (found.sides, found.normal), tuple((int(i), int(j)) for i, j in found.pairs)
         self._flags = flags(shared.limits)
@@ -149,6 +154,7 @@ class PoseChecker:
                 break
             kernel = partial(smallest_tensions, shared.robot, shared.amplitude, float(arcs), chunk, kind=self.kind)
             some = segments if len(alive) == len(lowest) else rows(segments, alive)
+            self.instants["first look"] += len(alive) * CHUNK
             found = in_batches(kernel, some, size=FIRST * self.batch)
             lowest[alive] = np.minimum(lowest[alive], np.where(np.isnan(found), -np.inf, found))
         return lowest
@@ -167,6 +173,7 @@ class PoseChecker:
         found = self.nothing(len(arcs))
         if not len(arcs):
             return found
+        self.checked += len(arcs)
         moving = self._moving(segments, arcs)
         is_open = whole | (moving > -TOLERANCE).all(0)
         found.verdict[~is_open] = Verdict.SLACK_CABLE.value
@@ -229,6 +236,7 @@ class PoseChecker:
         row = np.repeat(np.arange(len(arcs)), arcs)
         arc = np.arange(len(row)) - np.repeat(np.cumsum(arcs) - arcs, arcs)
         within = np.linspace(0.0, 1.0, samples + 1)
+        self.instants["checks"] += len(row) * (samples + 1)
 
         def batch(items):
             own, which = items
