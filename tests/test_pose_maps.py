@@ -233,3 +233,11 @@ def test_mistakes_of_plans(tmp_path):
     point = SHORT.replace('"laval-mssm"', '"prototype"').replace('"hypocycloid"', '"hypocycloid-standard"')
     code, _, err = planned(tmp_path, 'beat = "beta_0"\n' + point)
     assert code == 2 and "must be absent for a point mass" in err
+
+
+def test_pictures(tmp_path):
+    """Planes of positions, and polar sections of orientations, are drawn whatever the order of the axes."""
+    _, out, _ = swept(tmp_path, change=("tilt = [0.6]", "tilt = [0.3, 0.6]"))
+    for at in ((), ("--at", "x=0.9")):
+        code, path, err = cspr("plot", out.split()[-1], "-o", tmp_path / "picture.png", *at)
+        assert code == 0 and Path(path.strip()).stat().st_size > 10_000, err

@@ -10,11 +10,13 @@ from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.plots.labels import PANELS, chosen, value
 from cspr_jax.plots.lines import Line, line_figure, lines_of, overlaid
 from cspr_jax.plots.motion import motion_figure
-from cspr_jax.plots.sections import section_figure
+from cspr_jax.plots.sections import POLAR, section_figure
 from cspr_jax.results import Result, open_result
 
 # What a map is asked for first.
-FIRST = ("arcs", "oscillations", "lower_envelope")
+FIRST = ("arcs", "oscillations", "lower_envelope", "attainable_fraction", "accessible_volume")
+# Pairs of axes that belong into one plane; the last one is drawn in polar coordinates.
+PLANES = (("x", "y"), POLAR)
 
 
 class View(NamedTuple):
@@ -103,8 +105,8 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     if len(view.across) == 1:
         axis = view.across[0]
         return line_figure(result, view.name, {"": [Line(result.axes[axis], view.data)]}, axis, view.fixed, view.across)
-    plane = [axis for axis in ("x", "y") if {"x", "y"} <= set(view.across)]
-    order = plane + [axis for axis in view.across if axis not in plane]
+    plane = next((pair for pair in PLANES if set(pair) <= set(view.across)), ())
+    order = [*plane, *(axis for axis in view.across if axis not in plane)]
     name, data, across, fixed = _panelled(result, view, order)
     panels = across[2] if len(across) > 2 else None
     return section_figure(result, name, data if panels else data[..., None], across[:2], panels, fixed)

@@ -108,19 +108,21 @@ def columns_of(count: int) -> int:
     return 2 if count == 4 else min(3, count)
 
 
-def panels(figure: Figure, count: int) -> tuple[list[Axes], list[Axes], list[Axes]]:
+def panels(figure: Figure, count: int, *, polar: bool = False) -> tuple[list[Axes], list[Axes], list[Axes]]:
     """Panels with common axes.
 
     Args:
         figure: where.
         count: how many.
+        polar: whether in polar coordinates.
 
     Returns:
         all of them, those at the bottom, those at the left.
     """
     columns = columns_of(count)
     lines = -(-count // columns)
-    grid = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
+    kind = {"projection": "polar"} if polar else {}
+    grid = figure.subplots(lines, columns, squeeze=False, sharex=not polar, sharey=not polar, subplot_kw=kind)
     for panel in grid.flat[count:]:
         panel.set_visible(False)
     return list(grid.flat[:count]), list(grid[-1]), list(grid[:, 0])

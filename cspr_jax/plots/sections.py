@@ -5,12 +5,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
 
 from cspr_jax.plots.labels import PANELS, axis_label, chosen, columns_of, label, notes, panels, start, value
 from cspr_jax.results import Result
 
 # Quantities of which either sign is as good as the other.
 SIGNED = ("used_inclination",)
+# Azimuth and tilt of an orientation: a polar plane.
+POLAR = ("tilt_azimuth", "tilt")
 NONE_COLOUR = "#d0d0d0"
 
 
@@ -34,7 +37,8 @@ def section_figure(
     columns, count = columns_of(len(shown)), len(shown)
     size = (3.1 * columns + 1.3, 3.2 * -(-count // columns) + 0.8) if count > 1 else (7.0, 5.6)
     figure = Figure(figsize=size, layout="constrained")
-    every, bottom, left = panels(figure, count)
+    polar = tuple(across) == POLAR
+    every, bottom, left = panels(figure, count, polar=polar)
     colours, norm = _colours(data[:, :, shown], signed=name in SIGNED)
     for panel, i in zip(every, shown, strict=True):
         image = _section(panel, result, data[:, :, i], across, colours, norm)
@@ -42,9 +46,9 @@ def section_figure(
             _loci(panel, result, data[:, :, i], across)
         if over is not None:
             panel.set_title(value(result, over, result.axes[over][i], digits=3), fontsize=10)
-    for panel in bottom:
+    for panel in bottom if not polar else []:
         panel.set_xlabel(axis_label(result, across[0]))
-    for panel in left:
+    for panel in left if not polar else []:
         panel.set_ylabel(axis_label(result, across[1]))
     bar = figure.colorbar(image, ax=every, shrink=0.9, label=label(result, name))
     if data.dtype.kind == "i":
@@ -52,6 +56,8 @@ def section_figure(
     handles, labels = every[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside lower left", ncols=len(handles), fontsize=9, frameon=False)
+    if polar:
+        fixed = [*fixed, f"around: {across[0]}, outward: {across[1]} (rad)"]
     used = [*across, *([over] if over else [])]
     figure.suptitle(f"{result.attributes['robot']}: {result.labels[name]}\n{notes(result, fixed, used)}", fontsize=11)
     return figure
@@ -59,6 +65,10 @@ def section_figure(
 
 def _section(panel: Axes, result: Result, values: np.ndarray, across: list[str], colours, norm):
     x, y = (_edges(result.axes[axis]) for axis in across)
+    if isinstance(panel, PolarAxes):
+        panel.grid(False)
+        panel.set_rlabel_position(270.0)
+        y = np.maximum(y, 0.0)
     image = panel.pcolormesh(x, y, values.T, cmap=colours, norm=norm, rasterized=True)
     if all(result.units[axis] == "m" for axis in across):
         panel.set_aspect("equal")
