@@ -136,6 +136,12 @@ def test_kernels_know_no_files_and_pictures(name):
     assert not heavy & {"h5py", "matplotlib", "rich", "pydantic", "argparse", "tomllib"}
 
 
+def test_no_compiled_function_calls_lapack():
+    """In jaxlib 0.10 batches of such calls can wait for ever for the threads that they occupy; see `numerics.solved`."""
+    calls = re.compile(r"jnp\.linalg\.(?!norm\b)|jax\.scipy\.linalg|lax\.linalg")
+    assert [path.name for path in PACKAGE.rglob("*.py") if calls.search(path.read_text("utf-8"))] == []
+
+
 def test_files_side_loads_no_jax_and_the_command_line_nothing_heavy():
     code = f"""
 import importlib, sys
