@@ -3,9 +3,10 @@
 import math
 from typing import cast
 
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
+from jax import Array, lax
 
 # Terms that keep the truncation below half a unit in the last place on |x| <= pi / 2.
 _SINE_TERMS = {"float64": 11, "float32": 7}
@@ -95,6 +96,7 @@ def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
     return move, middle + 0.5 * move * (right - left) + 0.5 * move**2 * bend
 
 
+@jax.jit
 def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
     """Solution of a small linear system, and the determinant, by elimination with pivots.
 
@@ -109,15 +111,21 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
         (n, m), not finite where the matrix is singular; () determinant.
     """
     count = matrix.shape[0]
-    rows, index = jnp.concatenate([matrix, right], axis=1), jnp.arange(count)
-    determinant = jnp.ones((), matrix.dtype)
-    for k in range(count):
-        size = jnp.where(index < k, -1.0, jnp.abs(rows[:, k]))
-        place = jnp.argmax(size)
-        is_pivot = index == place
+    index = jnp.arange(count)
+
+    def eliminate(carry, k):
+        rows, determinant = carry
+        column, row = lax.dynamic_index_in_dim(rows, k, 1, keepdims=False), lax.dynamic_index_in_dim(rows, k, 0, False)
+        place = jnp.argmax(jnp.where(index < k, -1.0, jnp.abs(column)))
+        is_pivot, is_next = index == place, index == k
         pivot_row = jnp.sum(jnp.where(is_pivot[:, None], rows, 0.0), axis=0)
-        rows = jnp.where(is_pivot[:, None], rows[k], rows)
-        determinant = determinant * pivot_row[k] * jnp.where(place == k, 1.0, -1.0)
-        pivot_row = pivot_row / pivot_row[k]
-        rows = jnp.where((index == k)[:, None], pivot_row, rows - rows[:, k, None] * pivot_row)
+        pivot = jnp.sum(jnp.where(is_pivot, column, 0.0))
+        # The two rows change places.
+        rows, column = jnp.where(is_pivot[:, None], row, rows), jnp.where(is_pivot, column[k], column)
+        determinant = determinant * pivot * jnp.where(place == k, 1.0, -1.0)
+        pivot_row = pivot_row / pivot
+        return (jnp.where(is_next[:, None], pivot_row, rows - column[:, None] * pivot_row), determinant), None
+
+    start = jnp.concatenate([matrix, right], axis=1), jnp.ones((), matrix.dtype)
+    rows, determinant = lax.scan(eliminate, start, index)[0]
     return rows[:, count:], determinant

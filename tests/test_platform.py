@@ -322,6 +322,18 @@ def test_robots_that_do_not_hang():
         reference_pose(changed(platform_points=ring, base_points=ring), Z0)
 
 
+@jax.jit
+def readable(package, poses):
+    """Tensions per mass and length, and determinants, of many poses."""
+
+    def one(*x):
+        pose = wrenches.Pose(*x)
+        found = wrenches.tensions_per_length(package, pose)
+        return found, wrenches.conditioning(package, pose.position, pose.rotation)
+
+    return jax.vmap(one)(*poses)
+
+
 @pytest.mark.parametrize("kind", [USUAL, Kind(variable=False), Kind(plain=True), Kind(from_rest=True)])
 @pytest.mark.parametrize("name", AMPLITUDES)
 @pytest.mark.parametrize("robot", [MSSM, general(2)])
@@ -356,8 +368,7 @@ def test_the_fast_kernel(robot, name, kind):
         )
         for i, segment in enumerate(some):
             at = states(package, segment, amplitude, float(p), tau, kind=kind)
-            mu = np.asarray(jax.vmap(lambda *x: wrenches.tensions_per_length(package, wrenches.Pose(*x)))(*at))
-            det = np.asarray(jax.vmap(lambda x, r: wrenches.conditioning(package, x, r))(at.position, at.rotation))
+            mu, det = (np.asarray(x) for x in readable(package, at))
             if (det / reference > 1e-4).all():
                 wanted = 6.0 * Z0 / 9.81 * mu.min()
                 assert float(found[i]) == pytest.approx(wanted, rel=1e-8, abs=1e-9)
