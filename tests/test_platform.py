@@ -64,11 +64,28 @@ def states(robot, segment, amplitude, arcs, tau, *, kind=USUAL):
     return jax.vmap(lambda t: segments.motion(segment, amplitude, arcs, t, kind=kind))(tau)
 
 
+@jax.jit
+def _made(robot, start, end, z0, bends, odd):
+    return segments.pose_segment(robot, start, end, z0, bends, odd=odd)
+
+
 def made(robot, start, end, z0, bends, p):
     """A segment of the package."""
     as_arrays = [tuple(jnp.asarray(x) for x in pose) for pose in (start, end)]
     odd = jnp.asarray(p % 2 == 1)
-    return segments.pose_segment(robot, *as_arrays, jnp.asarray(z0), tuple(jnp.asarray(b) for b in bends), odd=odd)
+    return _made(robot, *as_arrays, jnp.asarray(z0), tuple(jnp.asarray(float(b)) for b in bends), odd)
+
+
+def _lowest(chosen, robot, amplitude, poses, p):
+    z0, *bends = chosen
+    # A rest pose moves with z0.
+    poses = [(jnp.where(jnp.isnan(x), jnp.stack([z0 * 0.0, z0 * 0.0, z0]), x), q) for x, q in poses]
+    one = _made(robot, *poses, z0, tuple(bends), p % 2.0 == 1.0)
+    at = jax.vmap(lambda t: segments.motion(one, amplitude, p, t))(jnp.linspace(0.0, 1.0, 201))
+    return jnp.min(jax.vmap(lambda *leaves: wrenches.tensions(robot, wrenches.Pose(*leaves)))(*at))
+
+
+lowest, slopes = jax.jit(_lowest), jax.jit(jax.grad(_lowest))
 
 
 @pytest.mark.parametrize("which", ["variable", "standard"])
@@ -130,37 +147,26 @@ def test_angles_near_zero_and_half_a_turn(start):
         np.testing.assert_allclose(found.angular_velocity[1:-1], omega, atol=2e-7)
         bend = (np.asarray(after.angular_velocity) - np.asarray(before.angular_velocity)) / (2.0 * step * time)
         np.testing.assert_allclose(found.angular_acceleration[1:-1], bend, atol=2e-5)
-
-        def smallest(z0, bend, poses=poses, p=p, tau=tau):
-            one, arcs = made(robot, *poses, z0, (bend, -1.0), p), jnp.asarray(float(p))
-            at = jax.vmap(lambda t: segments.motion(one, amplitude, arcs, t))(tau)
-            return jnp.min(jax.vmap(lambda *leaves: wrenches.tensions(robot, wrenches.Pose(*leaves)))(*at))
-
-        gradient = jax.grad(smallest, (0, 1))(jnp.asarray(Z0), jnp.asarray(-2.0))
+        gradient = slopes((jnp.asarray(Z0), jnp.asarray(-2.0), jnp.asarray(-1.0)), robot, amplitude, poses, float(p))
         assert np.isfinite(gradient).all()
 
 
 def test_gradients_are_differences():
     """Of the smallest tension with respect to z0 and beta-hat, from rest and between poses."""
     robot, amplitude, rng = ours(MSSM), named("quintic"), np.random.default_rng(4)
-    tau = np.linspace(0.0, 1.0, 201)
     for rest in (True, False):
         end, start = random_pose(rng), random_pose(rng)
-
-        @jax.jit
-        def smallest(z0, bend, start=start, end=end, rest=rest):
-            hub = jnp.zeros(3).at[2].set(z0)
-            first = (hub, jnp.asarray([1.0, 0.0, 0.0, 0.0])) if rest else start
-            one = made(robot, first, end, z0, (-1.0, bend), 7)
-            at = jax.vmap(lambda t: segments.motion(one, amplitude, jnp.asarray(7.0), t))(tau)
-            return jnp.min(jax.vmap(lambda *leaves: wrenches.tensions(robot, wrenches.Pose(*leaves)))(*at))
-
-        place = (jnp.asarray(Z0), jnp.asarray(-1.7))
-        found = jax.grad(smallest, (0, 1))(*place)
-        for i in range(2):
+        if rest:
+            start = (np.full(3, np.nan), np.array([1.0, 0.0, 0.0, 0.0]))
+        place, rest_of_it = (
+            (jnp.asarray(Z0), jnp.asarray(-1.0), jnp.asarray(-1.7)),
+            (robot, amplitude, [start, end], 7.0),
+        )
+        found = slopes(place, *rest_of_it)
+        for i in (0, 2):
             h = 1e-6
-            shifted = [[x + s * h * (j == i) for j, x in enumerate(place)] for s in (-1.0, 1.0)]
-            slope = (smallest(*shifted[1]) - smallest(*shifted[0])) / (2.0 * h)
+            shifted = [tuple(x + s * h * (j == i) for j, x in enumerate(place)) for s in (-1.0, 1.0)]
+            slope = (lowest(shifted[1], *rest_of_it) - lowest(shifted[0], *rest_of_it)) / (2.0 * h)
             assert float(found[i]) == pytest.approx(float(slope), rel=1e-5, abs=1e-7)
 
 

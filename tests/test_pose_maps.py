@@ -180,6 +180,7 @@ def test_beats_in_plans_and_maps(tmp_path, beat):
         assert answers.beta_hat[0, 0] == 0.0
     if beat == "beta_1":
         assert answers.beta_hat[0, 0] == pytest.approx(-1.0)  # a transition from rest has theta_h = pi p
+        return  # its map would compile everything once more
     code, out, err = swept(tmp_path, more=f'beat = "{beat}"')
     assert code == 0 and (open_result(Path(out.split()[-1])).data["arcs"] > 0).any(), err
 
