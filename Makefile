@@ -27,6 +27,9 @@ bench: $(STAMP)
 	$(BIN)/cspr bench
 	$(BIN)/python benchmarks/million_targets.py
 	$(BIN)/python benchmarks/million_transitions.py
+	$(BIN)/python benchmarks/million_segments.py
+	$(BIN)/python benchmarks/attainability.py
+	$(BIN)/python benchmarks/effective_amplitude.py
 	$(BIN)/python benchmarks/store_cost.py
 
 docs: $(STAMP)
