@@ -12,6 +12,15 @@ settings.register_profile("default", deadline=None, derandomize=True, suppress_h
 settings.load_profile("default")
 
 
+# Files that take long go first, so that both processes end together.
+_LONG = ("test_platform", "test_transition_plans", "test_pose_plans", "test_pose_maps", "test_workers", "test_crashes")
+
+
+def pytest_collection_modifyitems(items):
+    """Long files first."""
+    items.sort(key=lambda item: item.path.stem not in _LONG)
+
+
 def equilateral(radius: float) -> np.ndarray:
     """Spools of (2.17) to (2.19)."""
     half = np.sqrt(3.0) / 2.0

@@ -167,7 +167,7 @@ def test_time_functions_of_the_rotation():
     np.testing.assert_allclose((np.trace(np.asarray(plain.rotation), axis1=1, axis2=2) - 1.0) / 2.0, wanted, atol=1e-9)
 
 
-@pytest.mark.parametrize("beat", ["beta_f", "beta_0", "beta_1"])
+@pytest.mark.parametrize("beat", ["beta_f", "beta_0", pytest.param("beta_1", marks=pytest.mark.soak)])
 def test_beats_in_plans_and_maps(tmp_path, beat):
     """Both take them; beta_f has one beta-hat a segment, beta_0 none, beta_1 that of a cosine."""
     text = f'beat = "{beat}"\n' + SHORT.replace("beta_hat = -14.6701\n", "").split("[[pose]]", 1)[0]

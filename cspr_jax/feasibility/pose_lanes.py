@@ -28,6 +28,13 @@ def _balanced(robot: PlatformRobot, now: State, wires: Cables, squared: Array) -
     return balance(wires, force, slowed(moment))
 
 
+def _is_flat(wires: Cables) -> Array:
+    # Where three of the cables are nearly in one plane.
+    a, b, c = (wires.rays[k] for k in range(0, CABLES, 2))
+    volume = dot(a, cross(b, c))
+    return volume * volume < FLAT**2 * dot(a, a) * dot(b, b) * dot(c, c)
+
+
 def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> Array:
     """The smallest tension at one instant of many segments.
 
@@ -39,14 +46,16 @@ def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now:
         kind: of the motions.
 
     Returns:
-        (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign.
+        (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign, infinite
+        where the fast balance has no digits.
     """
     here = state(segment, arcs, now, kind)
     wires = cables(robot, here.position, here.turn)
     found = _balanced(robot, here, wires, squared_duration(segment, arcs))
     lowest = smallest([x * jnp.sign(found.denominator) for x in found.numerators])
     lowest = 6.0 / segment.rate * lowest / jnp.abs(found.denominator)
-    return jnp.where(found.signed * segment.regular > 0.0, lowest, -jnp.inf)
+    lowest = jnp.where(found.signed * segment.regular > 0.0, lowest, -jnp.inf)
+    return jnp.where(_is_flat(wires), jnp.inf, lowest)
 
 
 def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> list[Array]:
@@ -66,10 +75,7 @@ def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: In
     here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
     wires = cables(robot, here.position, here.turn)
     found = _balanced(robot, here, wires, squared)
-    # Where three of the cables are nearly in one plane.
-    a, b, c = (wires.rays[k] for k in range(0, CABLES, 2))
-    volume = dot(a, cross(b, c))
-    is_flat = volume * volume < FLAT**2 * dot(a, a) * dot(b, b) * dot(c, c)
+    is_flat = _is_flat(wires)
     lowest = 6.0 / segment.rate * smallest([x * jnp.sign(found.denominator) for x in found.numerators])
     values = [jnp.where(is_flat, jnp.inf, lowest / jnp.abs(found.denominator))]
     names = _given(limits, MOVING)
