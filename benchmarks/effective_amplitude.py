@@ -57,9 +57,9 @@ def candidates(robot, rng: np.random.Generator, count: int) -> Candidates:
     first = end_options(robot, *start, depth, 1)[0][:, 0]
     values, can_end = end_options(robot, *end, depth, OPTIONS)
     can_start = end_options(robot, *start, depth, 1)[1]
-    group, option = np.nonzero(~np.isnan(values) & (can_end & can_start & ~np.isnan(first))[:, None])
-    bends = (np.where(at_rest, -1.0, first)[group], values[group, option])
-    return Candidates((start[0][group], start[1][group]), (end[0][group], end[1][group]), depth[group], bends, group)
+    motion, option = np.nonzero(~np.isnan(values) & (can_end & can_start & ~np.isnan(first))[:, None])
+    bends = (np.where(at_rest, -1.0, first)[motion], values[motion, option])
+    return Candidates(start, end, depth, motion, bends)
 
 
 def main() -> None:
@@ -78,7 +78,7 @@ def main() -> None:
         found = smallest_arcs(PoseChecker(PoseShared(robot, Limits(), amplitude), batch=MANY), some, max_arcs=MAX_ARCS)
         least = np.zeros(options.segments, int)
         best = np.flatnonzero(found.arcs > 0)
-        least[some.group[best]] = found.arcs[best]
+        least[some.motion[best]] = found.arcs[best]
         arcs[amplitude.name] = least
         print(
             f"{amplitude.name:30s} {np.count_nonzero(least):5d} feasible  {time.perf_counter() - begun:6.1f} s",

@@ -93,15 +93,13 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
             self._refuse_slack(bends[0])
         # Every pair of values at the ends of every segment, for every depth.
         pairs = [[self._pairs(i, own[i], own[i + 1]) for i in range(count)] for own in bends]
-        group = np.concatenate(
-            [np.full(pair[0].size, d * count + i) for d, own in enumerate(pairs) for i, pair in enumerate(own)]
-        )
-        values = tuple(np.concatenate([pair[k].ravel() for own in pairs for pair in own]) for k in (0, 1))
-        trial = self._candidates(points, quaternions, z0, group, values)
+        motion = np.repeat(np.arange(len(z0)), [pair[0].size for own in pairs for pair in own])
+        first, last = (np.concatenate([pair[k].ravel() for own in pairs for pair in own]) for k in (0, 1))
+        trial = self._candidates(points, quaternions, z0, motion, (first, last))
         fixed = np.tile(self._arcs, len(depths))
         found = smallest_arcs(checker, trial, max_arcs=self._largest, fixed=fixed, beyond=BEYOND)
         path = _best_paths(found.arcs, pairs)
-        best, arcs = trial.rows(path)._replace(group=np.arange(len(path))), found.arcs[path]
+        best, arcs = trial.rows(path), found.arcs[path]
         tried = np.where(arcs > 0, arcs, fixed)
         none = np.flatnonzero(tried == 0)
         tried[none] = best_candidates(checker, best.rows(none), max_arcs=self._largest)
@@ -115,12 +113,12 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         return starts, ends
 
     def _candidates(
-        self, points: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, group: np.ndarray, bends: tuple
+        self, points: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, motion: np.ndarray, bends: tuple
     ) -> Candidates:
-        # Of the segments `group`, counted over all depths.
-        depth, i = np.divmod(group, len(self))
+        # The motions are the segments, counted over all depths.
+        depth, i = np.divmod(np.arange(len(z0)), len(self))
         start, end = ((points[depth, i + k], quaternions[i + k]) for k in (0, 1))
-        return Candidates(start, end, z0[group], bends, group)
+        return Candidates(start, end, z0, motion, bends)
 
     def segments(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray, answers: PoseAnswers) -> PoseSegment:
         """The segments; see `Sequence.segments`."""

@@ -150,7 +150,7 @@ def test_steps_are_halved_where_cables_turn(checker, monkeypatch):
     ]
     flags = Verdict.CABLE_CABLE.value | Verdict.CABLE_PLATFORM.value
     first = [int(checked(checker, *case).verdict[0]) & flags for case in cases]
-    monkeypatch.setattr("cspr_jax.feasibility.pose_checks.STILL_SAMPLES", 4)
+    monkeypatch.setattr("cspr_jax.feasibility.pose_checks.SAMPLES", 4)
     for case, before in zip(cases, first, strict=True):
         assert int(checked(checker, *case).verdict[0]) & flags == before
         seen += before > 0
@@ -160,7 +160,7 @@ def test_steps_are_halved_where_cables_turn(checker, monkeypatch):
 def test_what_stays_undecided_is_said(checker, monkeypatch):
     """A smaller number of arcs that cannot be told leaves a flag; where nothing else is found, it is the answer."""
     start, end = (random_pose(np.random.default_rng(1), rest=True), (np.array([1.0, 0.0, 1.4]), np.eye(4)[0]))
-    one = Candidates(*jax.tree.map(lambda x: np.asarray(x)[None], (start, end, Z0, (-1.0, -1.0), 0)))
+    one = Candidates(*jax.tree.map(lambda x: np.asarray(x)[None], (start, end, Z0, 0, (-1.0, -1.0))))
     plain = smallest_arcs(checker, one, max_arcs=8)
     p = int(plain.arcs[0])
     assert p > 0 and not plain.undecided.any()

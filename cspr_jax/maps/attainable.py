@@ -51,5 +51,5 @@ def _part(
     hub = centre + z0[:, None] * np.array([0.0, 0.0, 1.0])
     start = (hub, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
     rest = np.full(count, AT_REST)
-    motions = Candidates(start, ends, z0, (rest, rest), np.arange(count))
+    motions = Candidates(start, ends, z0, np.arange(count), (rest, rest))
     return reached(checker, motions, np.where(can_end[:, None], bends, np.nan), max_arcs=max_arcs)

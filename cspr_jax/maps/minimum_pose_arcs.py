@@ -1,9 +1,11 @@
 """Smallest numbers of arcs between many pairs of poses, over values of beta-hat at their ends."""
 
+import dataclasses
 from functools import partial
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.feasibility.pose_checks import TOLERANCE, PoseChecker, PoseChecks, rows
@@ -22,32 +24,33 @@ COARSE, COARSEST = 12, 4
 
 
 class Candidates(NamedTuple):
-    """Motions whose smallest number of arcs is asked for; those of one group are alternatives.
+    """Motions whose smallest number of arcs is asked for, with values of beta-hat to be tried.
 
     Fields:
-        start: position (n, 3) m and quaternion (n, 4).
+        start: position (m, 3) m and quaternion (m, 4) of each motion.
         end: likewise.
-        z0: (n,) m.
+        z0: (m,) m.
+        motion: (n,) which motion each candidate is of, in any order; those of one motion that are tried first come
+            first.
         bends: beta-hat at the start (n,) and at the end (n,).
-        group: (n,) from 0 on, in any order; within a group those tried first come first.
     """
 
     start: tuple[np.ndarray, np.ndarray]
     end: tuple[np.ndarray, np.ndarray]
     z0: np.ndarray
+    motion: np.ndarray
     bends: tuple[np.ndarray, np.ndarray]
-    group: np.ndarray
 
     def rows(self, which: np.ndarray) -> "Candidates":
         """Some of them: indices, or (n,) a mask."""
-        return jax.tree.map(lambda x: x[which], self)
+        return self._replace(motion=self.motion[which], bends=(self.bends[0][which], self.bends[1][which]))
 
 
 class Found(NamedTuple):
     """Smallest numbers of arcs.
 
     Fields:
-        arcs: (n,) 0 where none passes all tests, or none was asked for any more; several of a group may have one.
+        arcs: (n,) 0 where none passes all tests, or none was asked for any more; several of a motion may have one.
         undecided: (n,) the smallest number that stayed undecided; 0: none did.
         checks: of the motions with `arcs`; all else is to be ignored.
     """
@@ -58,25 +61,27 @@ class Found(NamedTuple):
 
 
 @jax.jit
-def _segments(robot: PlatformRobot, odd, candidates: Candidates) -> PoseSegment:
-    def one(start, end, z0, bends):
-        return pose_segment(robot, start, end, z0, bends, odd=odd)
+def _motions(robot: PlatformRobot, odd, motions) -> PoseSegment:
+    def one(start, end, z0):
+        return pose_segment(robot, start, end, z0, (jnp.zeros_like(z0), jnp.zeros_like(z0)), odd=odd)
 
-    return jax.vmap(one)(*candidates[:-1])
+    return jax.vmap(one)(*motions)
 
 
-def segments_of(robot: PlatformRobot, candidates: Candidates, arcs: int) -> PoseSegment:
-    """The segments for a number of arcs.
+class _Segments:
+    # Of candidates: all but beta-hat is of the motion, and is found once for each parity of the number of arcs.
 
-    Args:
-        robot: the robot.
-        candidates: n motions.
-        arcs: their number.
+    def __init__(self, robot: PlatformRobot, candidates: Candidates) -> None:
+        self._candidates = candidates
+        self._of_motions = [
+            in_batches(partial(_motions, robot, np.asarray(odd)), candidates[:3], size=BATCH) for odd in (False, True)
+        ]
 
-    Returns:
-        leaves (n, ...).
-    """
-    return in_batches(partial(_segments, robot, np.asarray(arcs % 2 == 1)), candidates, size=BATCH)
+    def __call__(self, arcs: int, which: np.ndarray) -> PoseSegment:
+        # (k,) indices of candidates.
+        motion, (first, last) = self._candidates.motion[which], self._candidates.bends
+        found = rows(self._of_motions[arcs % 2], motion)
+        return dataclasses.replace(found, turn=found.turn._replace(start_bend=first[which], end_bend=last[which]))
 
 
 def smallest_arcs(
@@ -88,51 +93,46 @@ def smallest_arcs(
 
     Args:
         checker: of the robot.
-        candidates: n motions in groups.
+        candidates: n of them.
         max_arcs: largest number tried.
-        fixed: (n_groups,) a fixed number of arcs, 0 where free; None: all free.
-        beyond: how many arcs beyond the smallest one of a group are tried for its others; -1: the first motion of a
-            group that passes is enough.
+        fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
+        beyond: how many arcs beyond the smallest one of a motion are tried for its other candidates; -1: the first
+            one that passes is enough.
 
     Returns:
         what was found.
     """
-    group = candidates.group
-    found, undecided, checks = np.zeros(len(group), int), np.zeros(len(group), int), checker.nothing(len(group))
-    last = np.full(int(group.max(initial=-1)) + 1, max_arcs)
+    motion, count = candidates.motion, len(candidates.motion)
+    found, undecided, checks = np.zeros(count, int), np.zeros(count, int), checker.nothing(count)
+    if not count:
+        return Found(found, undecided, checks)
+    last = np.full(len(candidates.z0), max_arcs)
     only = np.zeros(len(last), int) if fixed is None else fixed
-    # Both parities, of those still open when half of them had been closed.
-    kept, parities = np.arange(len(group)), {k: segments_of(checker.shared.robot, candidates, k) for k in (0, 1)}
+    segments = _Segments(checker.shared.robot, candidates)
     for arcs in range(1, max_arcs + 1):
         if not (last >= arcs).any():
             break
-        is_open = (found[kept] == 0) & (last[group[kept]] >= arcs)
-        if is_open.sum() < 0.5 * len(kept):
-            kept, parities = kept[is_open], {k: rows(x, is_open) for k, x in parities.items()}
-            is_open = np.ones(len(kept), bool)
-        is_open &= (only[group[kept]] == 0) | (only[group[kept]] == arcs)
-        segments = parities[arcs % 2]
-        alive = _sieved(checker, segments, arcs, np.flatnonzero(is_open))
-        first = np.unique(group[kept[alive]], return_index=True)[1] if beyond < 0 else slice(None)
-        # The first motion of each group, then all others of groups where it fails: few and large batches.
+        is_open = (last >= arcs) & ((only == 0) | (only == arcs))
+        alive = _sieved(checker, segments, arcs, np.flatnonzero((found == 0) & is_open[motion]))
+        first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
+        # The first candidate of each motion, then all others of motions where it fails: few and large batches.
         for turn in (alive[first], np.delete(alive, first)):
-            turn = turn[last[group[kept[turn]]] >= arcs]
-            got = checker.check(rows(segments, turn), np.full(len(turn), arcs), whole=False)
-            verdict = got.verdict
-            checks.put(kept[turn], got)
-            passed = kept[turn[verdict == 0]]
+            turn = turn[last[motion[turn]] >= arcs]
+            if not len(turn):
+                continue
+            got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False)
+            checks.put(turn, got)
+            passed, unsure = (turn[got.verdict == verdict] for verdict in (0, Verdict.UNDECIDED))
             found[passed] = arcs
-            unsure = kept[turn[verdict == Verdict.UNDECIDED]]
             undecided[unsure] = np.where(undecided[unsure] > 0, undecided[unsure], arcs)
-            last[group[passed]] = np.minimum(last[group[passed]], arcs + beyond)
+            last[motion[passed]] = np.minimum(last[motion[passed]], arcs + beyond)
     return Found(found, undecided, checks)
 
 
-def _sieved(checker: PoseChecker, segments: PoseSegment, arcs: int, alive: np.ndarray) -> np.ndarray:
+def _sieved(checker: PoseChecker, segments: _Segments, arcs: int, alive: np.ndarray) -> np.ndarray:
     for tau in (np.maximum(1.0 - TELLING / arcs, 0.0), np.linspace(1.0, 0.0, COARSE * arcs + 1)):
         if len(alive):
-            some = segments if len(alive) == len(segments.rate) else rows(segments, alive)
-            alive = alive[checker.first_look(some, arcs, tau) > -TOLERANCE]
+            alive = alive[checker.first_look(segments(arcs, alive), arcs, tau) > -TOLERANCE]
     return alive
 
 
@@ -141,19 +141,20 @@ def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: i
 
     Args:
         checker: of the robot.
-        candidates: n motions.
+        candidates: n of them.
         max_arcs: largest number tried.
 
     Returns:
         (n,).
     """
-    best, highest = np.ones(len(candidates.z0), int), np.full(len(candidates.z0), -np.inf)
+    every = np.arange(len(candidates.motion))
+    best, highest = np.ones(len(every), int), np.full(len(every), -np.inf)
     if not len(best):
         return best
-    parities = {k: segments_of(checker.shared.robot, candidates, k) for k in (0, 1)}
+    segments = _Segments(checker.shared.robot, candidates)
     for arcs in range(1, max_arcs + 1):
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
-        lowest = checker.first_look(parities[arcs % 2], arcs, tau, whole=True)
+        lowest = checker.first_look(segments(arcs, every), arcs, tau, whole=True)
         best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)
     return best
 
@@ -163,11 +164,12 @@ def segments_with(robot: PlatformRobot, candidates: Candidates, arcs: np.ndarray
 
     Args:
         robot: the robot.
-        candidates: n motions.
+        candidates: n of them.
         arcs: (n,).
 
     Returns:
         leaves (n, ...), each of the parity of its number of arcs.
     """
-    even, odd = (segments_of(robot, candidates, k) for k in (0, 1))
+    segments, every = _Segments(robot, candidates), np.arange(len(arcs))
+    even, odd = (segments(k, every) for k in (0, 1))
     return jax.tree.map(lambda a, b: np.where((arcs % 2 == 1).reshape(-1, *[1] * (a.ndim - 1)), b, a), even, odd)

@@ -46,7 +46,7 @@ def settled(checker: PoseChecker, candidates: Candidates, found: Found, tried: n
 
     Args:
         checker: of the robot.
-        candidates: n motions.
+        candidates: one of each of n motions.
         found: of these; its checks are completed.
         tried: (n,) the numbers of arcs found, else those of the best candidates.
 
@@ -86,7 +86,7 @@ def reached(
 
     Args:
         checker: of the robot.
-        motions: n of them, with the values at their starts.
+        motions: n of them, one candidate each, with the values at their starts.
         values: (n, n_values) in the order in which they are tried; NaN for none.
         max_arcs: largest number tried.
         same: whether the value at the end holds at the start too.
@@ -95,7 +95,7 @@ def reached(
         the answers; where there is none, those of the first value, or of that at rest.
     """
     cell, option = np.nonzero(~np.isnan(values))
-    trial = _with_ends(motions.rows(cell)._replace(group=cell), values[cell, option], same=same)
+    trial = _with_ends(motions.rows(cell), values[cell, option], same=same)
     found = smallest_arcs(checker, trial, max_arcs=max_arcs)
     arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
     bends = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])

@@ -88,7 +88,7 @@ class PoseMap(GridMap[PoseShared]):
             chosen = np.where(np.isnan(values), AT_REST, values)
             bend = chosen[own] if start.beta_hat is None else np.full(count, start.beta_hat)
             first = (place[own], turned[own])
-        return Candidates(first, ends, z0, (bend, bend), np.arange(count))
+        return Candidates(first, ends, z0, np.arange(count), (bend, bend))
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""
