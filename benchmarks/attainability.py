@@ -16,7 +16,7 @@ def main() -> None:
 
     jax.config.update("jax_enable_x64", True)
     from cspr_jax import orientation_tables as tables
-    from cspr_jax.feasibility.pose_checks import SAMPLES, STILL_SAMPLES
+    from cspr_jax.feasibility.pose_checks import SAMPLES
     from cspr_jax.maps.accessible import accessible
     from cspr_jax.maps.attainable import VALUES
 
@@ -31,7 +31,7 @@ def main() -> None:
             f"{time.perf_counter() - began:5.1f} s since the start"
         )
     arcs = 0.5 * (tables.MAX_ARCS + 1)
-    every = motions * arcs * (SAMPLES + STILL_SAMPLES + 2)
+    every = motions * arcs * 2 * (SAMPLES + 1)
     done = sum(checker.instants.values())
     print(f"motions: {motions:,} candidates, {checker.checked:,} checked in full ({checker.checked / motions:.2%})")
     print(f"instants: {every:,.0f} if all were, {done:,} done ({done / every:.2%}): {checker.instants}")

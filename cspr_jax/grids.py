@@ -10,16 +10,17 @@ import jax
 import numpy as np
 
 
-def in_batches(function: Callable, arguments, *, size: int):
+def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
     """Apply a compiled function to arrays of any length, in batches of one length.
 
     Args:
         function: takes one pytree whose leaves have leading dimension `size`, returns a pytree likewise.
         arguments: pytree of NumPy arrays (n, ...), n >= 0.
         size: length of a batch.
+        axis: along which the results of a batch lie.
 
     Returns:
-        pytree of NumPy arrays (n, ...); None if n is 0.
+        pytree of NumPy arrays, n long along that axis; None if n is 0.
     """
     leaves = jax.tree.leaves(arguments)
     count = len(leaves[0])
@@ -30,7 +31,11 @@ def in_batches(function: Callable, arguments, *, size: int):
         for start in range(0, count, size)
     ]
     parts = [jax.tree.map(np.asarray, part) for part in pending]
-    return jax.tree.map(lambda *pieces: np.concatenate(pieces)[:count], *parts)
+
+    def whole(*pieces):
+        return np.concatenate(pieces, axis=axis)[(*[slice(None)] * (axis % pieces[0].ndim), slice(count))]
+
+    return jax.tree.map(whole, *parts)
 
 
 def padded(arguments, size: int):

@@ -90,7 +90,7 @@ def smallest(values: Sequence[Array]) -> Array:
     return least
 
 
-def stored(values: Any, one: Array) -> Any:
+def stored(values: Any, one: Array | None) -> Any:
     """The same values, which XLA then computes once.
 
     On a CPU it computes a cheap value again in every loop that uses it, with all that leads to it. A division is
@@ -98,9 +98,9 @@ def stored(values: Any, one: Array) -> Any:
 
     Args:
         values: pytree of arrays.
-        one: () the number 1, as an argument of the compiled function.
+        one: () the number 1, as an argument of the compiled function; None: not stored.
 
     Returns:
         the pytree.
     """
-    return jax.tree.map(lambda x: x / one, values)
+    return values if one is None else jax.tree.map(lambda x: x / one, values)

@@ -33,8 +33,7 @@ from cspr_jax.trajectories.pose_segment import USUAL, Kind, PoseSegment, duratio
 FEW, MANY = 256, 1024
 # Instants of one call of the first look, and how many more are looked at than checked at a time.
 CHUNK, FIRST = 8, 4
-# An arc: of what depends on the motion, and of what depends on the pose alone.
-SAMPLES, STILL_SAMPLES = 64, 16
+SAMPLES = 64  # an arc
 HALVINGS = 12
 TOLERANCE = 1e-7
 TOUCH = 1e-6  # of the platform's size
@@ -196,8 +195,8 @@ class PoseChecker:
     def _still(self, segments: PoseSegment, arcs: np.ndarray, moving: np.ndarray) -> PoseChecks:
         # With what depends on the pose alone; `moving` is of `_moving`.
         kernel = partial(look_along, self.shared, self._platform, pairs=self._pairs, kind=self.kind)
-        row, arc, looks = self._along(kernel, STILL_SAMPLES, segments, arcs)
-        still = self._narrowed(segments, arcs, STILL_SAMPLES, (row, arc, np.asarray(looks.values)), self._pairs)
+        row, arc, looks = self._along(kernel, segments, arcs)
+        still = self._narrowed(segments, arcs, (row, arc, looks.values), self._pairs)
         nearest, least = still[-1], np.concatenate([moving, still[:-1]])[order(self.shared.limits)]
         is_finite = np.isfinite(least).all(0) & ~np.isnan(nearest) & (self.durations(segments, arcs) > 0.0)
         verdict = np.zeros(len(arcs), int)
@@ -205,7 +204,7 @@ class PoseChecker:
             verdict |= np.where(value <= -TOLERANCE, flag.value, 0)
             verdict |= np.where(np.abs(value) <= TOLERANCE, Verdict.UNDECIDED.value, 0)
         step, item = np.nonzero(looks.wide)
-        ends = [(arc[item] + (step + k) / STILL_SAMPLES) / arcs[row[item]] for k in (0, 1)]
+        ends = [(arc[item] + (step + k) / SAMPLES) / arcs[row[item]] for k in (0, 1)]
         met, hit = self._followed(segments, arcs, row[item], ends)
         hit[row[looks.hit]] = True
         verdict |= Verdict.CABLE_CABLE.value * met | Verdict.CABLE_PLATFORM.value * hit
@@ -221,36 +220,30 @@ class PoseChecker:
     def _moving(self, segments: PoseSegment, arcs: np.ndarray) -> np.ndarray:
         # (n_values, n) smallest values of the criteria that depend on the motion.
         kernel = partial(moving_along, self.shared, kind=self.kind)
-        seen = self._along(kernel, SAMPLES, segments, arcs)
-        least = self._narrowed(segments, arcs, SAMPLES, seen, None)
+        least = self._narrowed(segments, arcs, self._along(kernel, segments, arcs), None)
         # The motion may jump at a knot.
         places = np.meshgrid(np.arange(len(least)), np.arange(len(arcs)), self._knots, indexing="ij")
         which, row, tau = (x.ravel() for x in places)
         self._lower(least, segments, arcs, (which, row, tau, np.zeros(len(row))), None)
         return least
 
-    def _along(
-        self, kernel: Callable, samples: int, segments: PoseSegment, arcs: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, Any]:
+    def _along(self, kernel: Callable, segments: PoseSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray, Any]:
         # Arc by arc: whose it is, which one, and what the kernel says, which has the arcs last.
         row = np.repeat(np.arange(len(arcs)), arcs)
         arc = np.arange(len(row)) - np.repeat(np.cumsum(arcs) - arcs, arcs)
-        within = np.linspace(0.0, 1.0, samples + 1)
-        self.instants["checks"] += len(row) * (samples + 1)
+        within = np.linspace(0.0, 1.0, SAMPLES + 1)
+        self.instants["checks"] += len(row) * (SAMPLES + 1)
 
         def batch(items):
             own, which = items
-            found = kernel(within, (rows(segments, own), arcs[own].astype(float), which.astype(float)))
-            return jax.tree.map(lambda x: np.moveaxis(np.asarray(x), -1, 0), found)
+            return kernel(within, (rows(segments, own), arcs[own].astype(float), which.astype(float)))
 
-        found = in_batches(batch, (row, arc), size=self.batch)
-        return row, arc, jax.tree.map(lambda x: np.moveaxis(x, 0, -1), found)
+        return row, arc, in_batches(batch, (row, arc), size=self.batch, axis=-1)
 
     def _narrowed(
         self,
         segments: PoseSegment,
         arcs: np.ndarray,
-        samples: int,
         seen: tuple[np.ndarray, np.ndarray, np.ndarray],
         pairs: tuple | None,
     ) -> np.ndarray:
@@ -258,8 +251,8 @@ class PoseChecker:
         row, arc, values = seen
         least = np.minimum.reduceat(values.min(0), np.cumsum(arcs) - arcs, axis=1)
         place, which, item = _low_points(values, least[:, row])
-        tau = (arc[item] + place / samples) / arcs[row[item]]
-        self._lower(least, segments, arcs, (which, row[item], tau, 1.0 / (samples * arcs[row[item]])), pairs)
+        tau = (arc[item] + place / SAMPLES) / arcs[row[item]]
+        self._lower(least, segments, arcs, (which, row[item], tau, 1.0 / (SAMPLES * arcs[row[item]])), pairs)
         return least
 
     def _lower(

@@ -89,14 +89,14 @@ def _seen(
 ) -> tuple[Array, list, list]:
     # (n_values, n): the still slacks, and the smallest distance between cables; the vectors between cables; the views.
     one = jnp.where(shared.robot.mass > 0.0, 1.0, 2.0).astype(segments.rate.dtype)
-    here = stored(state(segments, arcs, now, kind), one)
+    here = state(segments, arcs, now, kind, one)
     wires = cables(shared.robot, here.position, here.turn)
     wires = wires._replace(rays=stored(wires.rays, one))
-    apart = stored(contact_lanes.gaps(shared.robot.base_points, pairs, wires), one)
+    apart = contact_lanes.gaps(shared.robot.base_points, pairs, wires)
     squares = [dot(gap, gap) for gap in apart]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
     values = jnp.stack([*still_slacks(shared, segments, here, wires), nearest])
-    return values, apart, stored(contact_lanes.views(wires, here.turn), one)
+    return values, apart, contact_lanes.views(wires, here.turn)
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))
@@ -127,12 +127,12 @@ def look_along(
         wide = contact_lanes.turns_much(before[0], gaps, LEAST_COSINE)
         wide |= contact_lanes.turns_much(before[1], views, LEAST_COSINE)
         hit = contact_lanes.platform_hit(*platform, before[1], views)
-        return (gaps, views), (values, hit & ~wide, wide)
+        return (gaps, views), (values, hit, wide)
 
     shapes = jax.eval_shape(lambda: seen(within[0])[1:])
     _, (values, hit, wide) = lax.scan(step, jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes), within)
     # There is no step before the first place.
-    return Look(values, hit[1:].any(0), wide[1:])
+    return Look(values, (hit & ~wide)[1:].any(0), wide[1:])
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))

@@ -12,7 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.amplitudes import Amplitude, derivatives
-from cspr_jax.lanes import Matrix, Vector, combined, cross, dot
+from cspr_jax.lanes import Matrix, Vector, combined, cross, dot, stored
 from cspr_jax.numerics import polynomial, sincospi
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 
@@ -112,7 +112,7 @@ def squared_duration(segment: PoseSegment, arcs: Array) -> Array:
     return (math.pi * arcs) ** 2 * (1.0 - nu) * (1.0 + nu) / segment.rate
 
 
-def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> State:
+def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind, one: Array | None = None) -> State:
     """The state of the platform.
 
     Args:
@@ -120,19 +120,21 @@ def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> State:
         arcs: () or (n,) number of arcs, a float.
         now: of these arcs.
         kind: of the motions.
+        one: () the number 1 as an argument of what is compiled, where all of the state is to be stored; see
+            `lanes.stored`.
 
     Returns:
         the state.
     """
     if kind.from_rest:
         place = _straight(segment, arcs, now, variable=kind.variable)
-        rotation = _about_one_axis(segment, now, _beat(segment, arcs, now, kind))
+        rotation = _about_one_axis(segment, now, _beat(segment, arcs, now, kind), one)
     else:
         place = _ellipse(segment, arcs, now, variable=kind.variable)
         rotation = _exponential(*_half_vector(segment, now, _beat(segment, arcs, now, kind)))
     hub = tuple(segment.hub[:, i] for i in range(3))
     position = tuple(h + c for h, c in zip(hub, place[0], strict=True))
-    return State(position, place[1], place[2], *rotation)
+    return stored(State(position, place[1], place[2], *rotation), one)
 
 
 def _straight(segment: PoseSegment, arcs: Array, now: Instant, *, variable: bool) -> tuple[Vector, ...]:
@@ -190,12 +192,14 @@ def _beat(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> tuple[
     return value, rate, bend * 0.125
 
 
-def _about_one_axis(segment: PoseSegment, now: Instant, beats: tuple[Array, ...]) -> tuple[Matrix, Vector, Vector]:
+def _about_one_axis(
+    segment: PoseSegment, now: Instant, beats: tuple[Array, ...], one: Array | None
+) -> tuple[Matrix, Vector, Vector]:
     # The envelope leaves the reference orientation along one axis: the angle is 2 beta Theta_env A.
     axis = tuple(segment.turn.across[:, i] for i in range(1, 4))
     beta, beta1, beta2 = beats
     whole = 2.0 * segment.turn.angle
-    sine, cosine = sincospi(whole * beta * now.a / math.pi)
+    sine, cosine = stored(sincospi(whole * beta * now.a / math.pi), one)
     rate = whole * (beta1 * now.a + beta * now.a1)
     bend = whole * (beta2 * now.a + 2.0 * beta1 * now.a1 + beta * now.a2)
     part = 1.0 - cosine
