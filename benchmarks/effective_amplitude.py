@@ -37,7 +37,7 @@ def poses(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]
     radius, azimuth = 3.0 * np.sqrt(rng.random(count)), rng.uniform(-np.pi, np.pi, count)
     position = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), rng.uniform(1.0, 2.0, count)], axis=1)
     angles = rng.uniform([-np.pi, 0.0, -np.pi / 4.0], [np.pi, np.pi / 3.0, np.pi / 4.0], (count, 3))
-    return position, np.array(from_tilt_torsion(*angles.T))
+    return position, from_tilt_torsion(angles)
 
 
 def candidates(robot, rng: np.random.Generator, count: int) -> Candidates:

@@ -113,7 +113,8 @@ def _fastest_depth(shared: Shared, sequence: Sequence) -> float:
         cost = np.where(answers.arcs > 0, answers.duration, np.inf).reshape(DEPTHS, -1).sum(1)
         best = int(np.argmin(cost))
         if not np.isfinite(cost[best]):
-            best = int(np.argmax(answers.margin.reshape(DEPTHS, -1).min(1)))
+            worst = np.nan_to_num(answers.margin, nan=-np.inf).reshape(DEPTHS, -1).min(1)
+            best = int(np.argmax(worst))
         chosen = float(trial[best])
         trial = np.linspace(trial[max(best - 1, 0)], chosen, DEPTHS)
     return chosen

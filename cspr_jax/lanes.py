@@ -75,6 +75,23 @@ def turned_back(matrix: Matrix, vector: Vector) -> Vector:
     return combined([(vector[i], matrix[i]) for i in range(3)])
 
 
+def rotation(quaternion: Sequence[Array]) -> Matrix:
+    """The rotation matrix of a unit quaternion; see `rotations.matrix`.
+
+    Args:
+        quaternion: four arrays, scalar first.
+
+    Returns:
+        rows.
+    """
+    w, x, y, z = quaternion
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+
+
 def smallest(values: Sequence[Array]) -> Array:
     """The smallest of several arrays, case by case; NaN stays NaN.
 

@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from cspr_jax.rotations import from_tilt_torsion
+
 # Orientations are neighbours up to this many steps apart on the grid of equal volumes.
 NEAR = 1.5
 
@@ -24,28 +26,6 @@ class OrientationGrid(NamedTuple):
     volume: np.ndarray
     neighbours: np.ndarray
     start: int
-
-
-def quaternions(angles: np.ndarray) -> np.ndarray:
-    """Tilt and torsion as unit quaternions, scalar first; see `rotations.from_tilt_torsion`.
-
-    Args:
-        angles: (n, 3) rad.
-
-    Returns:
-        (n, 4).
-    """
-    azimuth, half_tilt, half_torsion = angles[:, 0], 0.5 * angles[:, 1], 0.5 * angles[:, 2]
-    across = azimuth - half_torsion
-    return np.stack(
-        [
-            np.cos(half_tilt) * np.cos(half_torsion),
-            np.sin(half_tilt) * np.cos(across),
-            np.sin(half_tilt) * np.sin(across),
-            np.cos(half_tilt) * np.sin(half_torsion),
-        ],
-        axis=1,
-    )
 
 
 def tilt_torsion_grid(divisions: int) -> OrientationGrid:
@@ -119,7 +99,7 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
 
 def _near(angles: np.ndarray, angle: float) -> np.ndarray:
     # Both quaternions of an orientation are in the tree; each pair is counted once.
-    own = quaternions(angles)
+    own = from_tilt_torsion(angles)
     tree = cKDTree(np.concatenate([own, -own]))
     pairs = tree.query_pairs(2.0 * math.sin(0.25 * angle), output_type="ndarray") % len(own)
     pairs = np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1)

@@ -9,19 +9,14 @@ import numpy as np
 from cspr_jax import problem, rotations
 from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.endpoints import AT_REST, endpoint
 from cspr_jax.feasibility.interference import contacts, gaps
 from cspr_jax.feasibility.pose_checks import FEW, MANY, TOUCH, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.bends import BEYOND, cheapest_path, options
-from cspr_jax.maps.minimum_pose_arcs import (
-    Candidates,
-    Found,
-    best_candidates,
-    segments_with,
-    smallest_arcs,
-)
+from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, segments_with, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, settled
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import centroid, plane_normal
@@ -44,7 +39,7 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
             )
         if keys.inclination is not None:
             raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
-        if keys.beat in ("beta_0", "beta_1"):
+        if keys.beat in WITHOUT_BETA_HAT:
             for i, pose in enumerate(keys.pose):
                 if pose.beta_hat is not None:
                     raise ConfigError(path, f'pose[{i}].beta_hat: must be absent with beat = "{keys.beat}"')
@@ -99,11 +94,8 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         fixed = np.tile(self._arcs, len(depths))
         found = smallest_arcs(checker, trial, max_arcs=self._largest, fixed=fixed, beyond=BEYOND)
         path = _best_paths(found.arcs, pairs)
-        best, arcs = trial.rows(path), found.arcs[path]
-        tried = np.where(arcs > 0, arcs, fixed)
-        none = np.flatnonzero(tried == 0)
-        tried[none] = best_candidates(checker, best.rows(none), max_arcs=self._largest)
-        return settled(checker, best, Found(arcs, found.undecided[path], found.checks.rows(path)), tried)
+        best = Found(found.arcs[path], found.undecided[path], found.checks.rows(path))
+        return settled(checker, trial.rows(path), best, max_arcs=self._largest, fixed=fixed)
 
     def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Values at both ends of segment i, (n_first, n_last) each.
@@ -130,7 +122,7 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         # Values of beta-hat to try at each pose; NaN where none keeps every cable taut.
         found = []
         for pose, position, quaternion in zip(self.keys.pose, points, quaternions, strict=True):
-            if self.keys.beat in ("beta_0", "beta_1"):
+            if self.keys.beat in WITHOUT_BETA_HAT:
                 found.append(np.zeros(1))
                 continue
             if pose.beta_hat is not None or pose.rest:

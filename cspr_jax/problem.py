@@ -1,6 +1,5 @@
 """From checked files to what the kernels take: robot, limits, amplitude function, axes."""
 
-import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import amplitudes, robots
@@ -213,8 +212,7 @@ def orientations(spec: RobotFile, centre: np.ndarray, points: np.ndarray, angles
     signs = axis_signs(spec)
     own = (points - centre) * signs
     towards = np.arctan2(own[:, 1], own[:, 0])
-    azimuth, tilt, torsion = (jnp.asarray(x) for x in (angles[:, 0] + towards, angles[:, 1], angles[:, 2]))
-    return np.asarray(from_tilt_torsion(azimuth, tilt, torsion)) * np.concatenate([[1.0], signs])
+    return from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])) * np.append(1.0, signs)
 
 
 def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> np.ndarray:

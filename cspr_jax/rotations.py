@@ -1,31 +1,30 @@
 """Orientations as unit quaternions, scalar first."""
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 # Largest deviation of a given quaternion's length from 1 that is mended.
 UNIT_TOLERANCE = 1e-6
 
 
-def from_tilt_torsion(azimuth: Array, tilt: Array, torsion: Array) -> Array:
-    """The orientation of tilt-and-torsion angles, Z_phi X_theta Z_(sigma - phi), thesis section 3.10.2.
+def from_tilt_torsion(angles: np.ndarray) -> np.ndarray:
+    """Orientations of tilt-and-torsion angles, Z_phi X_theta Z_(sigma - phi), thesis section 3.10.2.
 
     Args:
-        azimuth: (...) phi, direction of the axis of the tilt from x, rad.
-        tilt: (...) theta, rad.
-        torsion: (...) sigma, rad.
+        angles: (..., 3) azimuth phi of the axis of the tilt from x, tilt theta, torsion sigma, rad.
 
     Returns:
-        (..., 4) unit quaternion.
+        (..., 4) unit quaternions.
     """
-    half_tilt, half_torsion = 0.5 * tilt, 0.5 * torsion
-    across = azimuth - half_torsion
-    return jnp.stack(
+    half_tilt, half_torsion = 0.5 * angles[..., 1], 0.5 * angles[..., 2]
+    across = angles[..., 0] - half_torsion
+    return np.stack(
         [
-            jnp.cos(half_tilt) * jnp.cos(half_torsion),
-            jnp.sin(half_tilt) * jnp.cos(across),
-            jnp.sin(half_tilt) * jnp.sin(across),
-            jnp.cos(half_tilt) * jnp.sin(half_torsion),
+            np.cos(half_tilt) * np.cos(half_torsion),
+            np.sin(half_tilt) * np.cos(across),
+            np.sin(half_tilt) * np.sin(across),
+            np.cos(half_tilt) * np.sin(half_torsion),
         ],
         axis=-1,
     )

@@ -39,13 +39,13 @@ class Source:
     Fields:
         title: of the table, with its source.
         published: known cells, by row, column and variant.
-        compute: () -> computed cells, by row, column and variant; of a choice, where there is one.
+        compute: () -> computed cells, by row, column and variant; of a `Choice`, where there is one.
         with_choice: whether there is one, of definitions, amplitude functions and step.
     """
 
     title: str
     published: dict[Key, float]
-    compute: Callable[[], dict[Key, float | None]] | Callable[[Choice], dict[Key, float | None]]
+    compute: Callable[..., dict[Key, float | None]]
     with_choice: bool = False
 
 
@@ -117,7 +117,7 @@ def table_cells(name: str, choice: Choice | None = None) -> list[Cell]:
         its cells, row by row.
     """
     source = TABLES[name]
-    computed = source.compute(choice or Choice()) if source.with_choice else source.compute()  # type: ignore[call-arg]
+    computed = source.compute(choice or Choice()) if source.with_choice else source.compute()
     return [
         Cell(row, column, value, source.published.get((row, column, variant)), variant)
         for (row, column, variant), value in computed.items()
@@ -169,7 +169,7 @@ def table_for_people(name: str, cells: list[Cell]):
         table.add_column(head, justify="left" if head in ("column", "reading") else "right")
     for cell in cells:
         known = cell.published is not None and cell.computed is not None
-        difference = f"{cell.computed - cell.published:+.4f}" if known else "-"  # type: ignore[operator]
+        difference = f"{(cell.computed or 0.0) - (cell.published or 0.0):+.4f}" if known else "-"
         numbers = _number(cell.published), _number(cell.computed), difference
         table.add_row(cell.row, cell.column, *([cell.variant] if several else []), *numbers)
     return table

@@ -4,6 +4,7 @@
 """
 
 import itertools
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -135,6 +136,21 @@ def determinant(wires: Cables) -> Array:
         sign = -1.0 if (sum(three) - 3) % 2 else 1.0
         found = found + sign * dot(a, cross(b, c)) * dot(d, cross(e, f))
     return found
+
+
+def conditioning(robot: PlatformRobot, wires: Cables) -> Array:
+    """Determinant of J with unit cables and the platform's size as unit; see `wrenches.conditioning`.
+
+    Args:
+        robot: the robot.
+        wires: the cables.
+
+    Returns:
+        (...).
+    """
+    lengths = [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]
+    size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    return determinant(wires) / (size**3 * math.prod(lengths[1:], start=lengths[0]))
 
 
 def cable_rates(wires: Cables, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector) -> list[Array]:

@@ -6,7 +6,7 @@ from pydantic import BaseModel
 
 from cspr_jax.config.plan import Choice, PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import Axes, AxisRange, From, Run, SweepFile, SweepLimits, SweepTrajectory
+from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepLimits, SweepTrajectory
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.errors import ExitCode
 from cspr_jax.feasibility.verdicts import SENTENCES
@@ -30,6 +30,7 @@ FILES = {
         ("an axis", AxisRange),
         ("[trajectory]", SweepTrajectory),
         ("trajectory.from", From),
+        ("[orientations]", Orientations),
         ("[limits]", SweepLimits),
         ("[run]", Run),
     ],

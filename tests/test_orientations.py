@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from oracles import platform as oracle
@@ -22,7 +21,7 @@ from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.sights import Watch
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.maps.attainable import attainable
-from cspr_jax.orientations import equal_volume_grid, quaternions, tilt_torsion_grid
+from cspr_jax.orientations import equal_volume_grid, tilt_torsion_grid
 from cspr_jax.results import open_result
 from cspr_jax.rotations import from_tilt_torsion
 from cspr_jax.symmetries import folded, symmetries
@@ -41,13 +40,8 @@ def place(radius, azimuth, depth=1.7):
     return np.array([radius * B * math.cos(azimuth), radius * B * math.sin(azimuth), depth])
 
 
-def test_quaternions_are_those_of_the_kernels():
-    angles = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 3))
-    np.testing.assert_allclose(quaternions(angles), np.asarray(from_tilt_torsion(*jnp.asarray(angles.T))), atol=1e-12)
-
-
 def rotations(angles):
-    return Rotation.from_quat(quaternions(angles), scalar_first=True)
+    return Rotation.from_quat(from_tilt_torsion(angles), scalar_first=True)
 
 
 def test_the_volume_of_tilt_and_torsion():
@@ -90,7 +84,7 @@ def test_grids_of_orientations(make):
         assert np.ptp(grid.volume) == 0.0
         # Each of many random orientations is about as near to a cell as the step says.
         some = Rotation.random(500, random_state=2).as_quat(scalar_first=True)
-        nearest = np.abs(some @ quaternions(grid.angles).T).max(1)
+        nearest = np.abs(some @ from_tilt_torsion(grid.angles).T).max(1)
         assert (2.0 * np.arccos(np.clip(nearest, 0, 1))).max() < step
 
 
@@ -100,12 +94,12 @@ def test_steps_between_neighbours():
     angles = np.stack([rng.uniform(-3, 3, 400), rng.uniform(0, 2.2, 400), rng.uniform(-2, 2, 400)], axis=1)
     other = angles + rng.normal(size=angles.shape) * 0.15
     watch = Watch(ours(MSSM), there)
-    before, after = (watch.at(quaternions(x)) for x in (angles, other))
-    found = watch.passable(before, after)
+    sights = watch.at(from_tilt_torsion(np.concatenate([angles, other])))
+    found = watch.passable(sights, np.arange(400), np.arange(400, 800))
     seen = {True: 0, False: 0}
     for i, (a, b) in enumerate(zip(angles, other, strict=True)):
         position = np.stack([there, there])
-        turns = np.stack([oracle.matrix(quaternions(x[None])[0]) for x in (a, b)])
+        turns = np.stack([oracle.matrix(from_tilt_torsion(x[None])[0]) for x in (a, b)])
         det = oracle.relative_determinant(MSSM, position, turns, there[2])
         if np.abs(det).min() < 1e-4:
             continue
@@ -232,17 +226,28 @@ def test_maps_of_places(tmp_path):
         (("max_arcs = 8", "max_arcs = 8\nfrom = { position = [0.0, 0.1, 1.0] }"), "trajectory.from: must be"),
         (('"hypocycloid"', '"transition"'), "trajectory.family"),
         (("divisions = 6", "divisions = 1"), "orientations.divisions = 1"),
+        (("divisions = 6", "divisions = 7"), "orientations.divisions = 7: must be a multiple of 2"),
+        (('map = "attainability"', 'map = "orientation-workspace"'), "orientations.values: must be absent"),
+        (
+            ('map = "attainability"', 'map = "orientation-workspace"\nlimits = { floor = 3.0 }'),
+            "limits: must be absent",
+        ),
         (('map = "attainability"', 'map = "poses"'), "orientations: must be absent"),
         (("z = [1.7]", "z = [-1.7]"), "every point is above the spool plane"),
-        (('map = "attainability"', 'map = "orientation-workspace"\n'), None),
     ],
 )
 def test_mistakes(tmp_path, change, words):
     code, out, err = swept(tmp_path, *change)
-    if words is None:
-        assert code == 0 and "attainable" not in open_result(Path(out.split()[-1])).data
-        return
     assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1, err
+
+
+def test_a_map_of_what_is_accessible(tmp_path):
+    text = SWEEP.replace('"attainability"', '"orientation-workspace"').replace("values = 4\n", "")
+    (tmp_path / "places.toml").write_text(text)
+    code, out, err = cspr("run", tmp_path / "places.toml", "-o", tmp_path / "run")
+    assert code == 0, err
+    data = open_result(Path(out.split()[-1])).data
+    assert "attainable" not in data and (data["accessible"] > 0).all()
 
 
 @pytest.mark.soak
@@ -255,7 +260,7 @@ def test_verdicts_are_the_oracle_s():
         angles = accessible(robot, there, "scan", 32).angles
         angles = angles[rng.choice(len(angles), 500, replace=False)]
         found = attainable(checker, np.tile(there, (500, 1)), angles, np.full(500, 1.7), max_arcs=12, values=6)
-        turned = quaternions(angles + np.array([azimuth, 0.0, 0.0]))
+        turned = from_tilt_torsion(angles + np.array([azimuth, 0.0, 0.0]))
         for i in range(500):
             segment = oracle.Segment(
                 np.array([0.0, 0.0, 1.7]), there, 1.7, np.eye(4)[0], turned[i], amplitude=oracle.effective_c3(0.1)

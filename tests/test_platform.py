@@ -252,7 +252,7 @@ def test_ends(robot):
 
 @given(*[st.floats(-7.0, 7.0)] * 3)
 def test_tilt_and_torsion(azimuth, tilt, torsion):
-    q = rotations.from_tilt_torsion(jnp.asarray(azimuth), jnp.asarray(tilt), jnp.asarray(torsion))
+    q = jnp.asarray(rotations.from_tilt_torsion(np.array([azimuth, tilt, torsion])))
     assert float(jnp.linalg.norm(q)) == pytest.approx(1.0, abs=1e-14)
     wanted = oracle.tilt_torsion_matrix(azimuth, tilt, torsion)
     np.testing.assert_allclose(rotations.matrix(q), wanted, atol=1e-14)

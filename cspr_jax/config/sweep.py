@@ -111,7 +111,9 @@ class Orientations(Table):
         "scan",
         description='accessible set: "grid" of tilt and torsion, "scan" (Bonev, as in the thesis), or "equal-volume"',
     )
-    divisions: Annotated[int, Field(ge=4, le=128)] = Field(32, description="of pi: the step is pi / divisions")
+    divisions: Annotated[int, Field(ge=4, le=128, multiple_of=2)] = Field(
+        32, description="of pi: the step is pi / divisions; even, for errors are estimated with twice the step"
+    )
     values: Annotated[int, Field(ge=1, le=100)] | None = Field(
         None, description="attainability: values of beta-hat tried at each orientation; absent: 20"
     )

@@ -50,6 +50,20 @@ def views(wires: Cables, turn: Matrix) -> list[Vector]:
     return [turned_back(turn, tuple(-x for x in ray)) for ray in wires.rays]
 
 
+def as_arrays(between: Sequence[Vector], seen: Sequence[Vector]) -> tuple[Array, Array]:
+    """What `interference` takes.
+
+    Args:
+        between: of `gaps`, (n,) each.
+        seen: of `views`.
+
+    Returns:
+        (n, n_pairs, 3) and (n, 6, 3).
+    """
+    arrays = [jnp.stack([jnp.stack(v, -1) for v in vectors], 1) for vectors in (between, seen) if vectors]
+    return arrays[0] if between else jnp.zeros((len(arrays[-1]), 0, 3)), arrays[-1]
+
+
 def turns_much(before: Sequence[Vector], after: Sequence[Vector], least_cosine: float) -> Array:
     """Whether any of some vectors turns by more than an angle between two instants.
 

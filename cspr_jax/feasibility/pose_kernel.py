@@ -199,6 +199,4 @@ def glances(shared: PoseShared, items, *, pairs: tuple, kind: Kind) -> tuple[Arr
     """
     segments, arcs, tau = items
     now = instant(shared.amplitude, segments.sense, arcs, tau)
-    _, gaps, views = _seen(shared, pairs, segments, arcs, now, kind)
-    stacked = [jnp.stack([jnp.stack(v, -1) for v in vectors], 1) for vectors in (gaps, views) if vectors]
-    return stacked[0] if gaps else jnp.zeros((len(tau), 0, 3)), stacked[-1]
+    return contact_lanes.as_arrays(*_seen(shared, pairs, segments, arcs, now, kind)[1:])

@@ -10,7 +10,7 @@ from cspr_jax.platforms import CABLES, PlatformRobot
 from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.trajectories.pose_lanes import Instant, State, squared_duration, state
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
-from cspr_jax.wrench_lanes import Balance, Cables, balance, cable_rates, cables, determinant, inertial_wrench
+from cspr_jax.wrench_lanes import Balance, Cables, balance, cable_rates, cables, conditioning, inertial_wrench
 
 # Limits on what depends on the motion, beside the tensions, and on the pose alone, beside regularity and depth.
 MOVING = ("tension_min", "tension_max", "cable_speed_max", "cable_acceleration_max")
@@ -35,6 +35,12 @@ def _is_flat(wires: Cables) -> Array:
     return volume * volume < FLAT**2 * dot(a, a) * dot(b, b) * dot(c, c)
 
 
+def _smallest_tension(segment: PoseSegment, found: Balance) -> Array:
+    # Over its value at rest in P0 if all were equal.
+    lowest = smallest([x * jnp.sign(found.denominator) for x in found.numerators])
+    return 6.0 / segment.rate * lowest / jnp.abs(found.denominator)
+
+
 def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> Array:
     """The smallest tension at one instant of many segments.
 
@@ -52,9 +58,7 @@ def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now:
     here = state(segment, arcs, now, kind)
     wires = cables(robot, here.position, here.turn)
     found = _balanced(robot, here, wires, squared_duration(segment, arcs))
-    lowest = smallest([x * jnp.sign(found.denominator) for x in found.numerators])
-    lowest = 6.0 / segment.rate * lowest / jnp.abs(found.denominator)
-    lowest = jnp.where(found.signed * segment.regular > 0.0, lowest, -jnp.inf)
+    lowest = jnp.where(found.signed * segment.regular > 0.0, _smallest_tension(segment, found), -jnp.inf)
     return jnp.where(_is_flat(wires), jnp.inf, lowest)
 
 
@@ -76,8 +80,7 @@ def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: In
     wires = cables(robot, here.position, here.turn)
     found = _balanced(robot, here, wires, squared)
     is_flat = _is_flat(wires)
-    lowest = 6.0 / segment.rate * smallest([x * jnp.sign(found.denominator) for x in found.numerators])
-    values = [jnp.where(is_flat, jnp.inf, lowest / jnp.abs(found.denominator))]
+    values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment, found))]
     names = _given(limits, MOVING)
     if not names:
         return values
@@ -109,17 +112,13 @@ def still_slacks(shared: PoseShared, segment: PoseSegment, here: State, wires: C
         (n,) each, in the order of `STILL`.
     """
     robot, limits, z0 = shared.robot, shared.limits, shared.robot.gravity / segment.rate
-    lengths = [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]
-    size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
-    product = lengths[0]
-    for length in lengths[1:]:
-        product = product * length
     normal, centre = plane_normal(robot), centroid(robot)
     below = dot([normal[i] for i in range(3)], [here.position[i] - centre[i] for i in range(3)]) / z0
-    values = [determinant(wires) / (size**3 * product * segment.regular), below]
+    values = [conditioning(robot, wires) / segment.regular, below]
     if limits.floor is not None:
         values.append((limits.floor - here.position[2]) / z0)
     if limits.cable_length_max is not None:
+        lengths = [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]
         values.append(smallest([1.0 - length / limits.cable_length_max[k] for k, length in enumerate(lengths)]))
     return values
 

@@ -8,13 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax import wrench_lanes
 from cspr_jax.feasibility import contact_lanes
 from cspr_jax.feasibility.interference import Contacts, cables_cross, contacts, platform_hit
 from cspr_jax.grids import in_batches
-from cspr_jax.lanes import dot, stored
+from cspr_jax.lanes import rotation, stored
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import centroid, plane_normal
-from cspr_jax.wrench_lanes import cables, determinant
+from cspr_jax.wrench_lanes import cables
 from cspr_jax.wrenches import conditioning
 
 BATCH = 4096
@@ -39,32 +40,16 @@ class Sights(NamedTuple):
     gaps: np.ndarray
     views: np.ndarray
 
-    def rows(self, which: np.ndarray) -> "Sights":
-        """Some of them: indices, or (n,) a mask."""
-        return Sights(*(x[which] for x in self))
-
 
 @partial(jax.jit, static_argnames="pairs")
 def _sights(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) -> tuple[Array, Array, Array]:
     places, quaternions = poses
     one = jnp.where(robot.mass > 0.0, 1.0, 2.0)
-    w, x, y, z = (quaternions[:, i] for i in range(4))
-    turn = stored(
-        (
-            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
-            (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
-            (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-        ),
-        one,
-    )
+    turn = stored(rotation([quaternions[:, i] for i in range(4)]), one)
     wires = cables(robot, [places[:, i] for i in range(3)], turn)
     wires = wires._replace(rays=stored(wires.rays, one))
-    product = jnp.sqrt(jnp.prod(jnp.stack([dot(ray, ray) for ray in wires.rays]), axis=0))
-    size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
     apart, seen = contact_lanes.gaps(robot.base_points, pairs, wires), contact_lanes.views(wires, turn)
-    stacked = [jnp.stack([jnp.stack(v, -1) for v in vectors], 1) for vectors in (apart, seen) if vectors]
-    gaps = stacked[0] if apart else jnp.zeros((len(w), 0, 3))
-    return determinant(wires) / (size**3 * product), gaps, stacked[-1]
+    return wrench_lanes.conditioning(robot, wires), *contact_lanes.as_arrays(apart, seen)
 
 
 def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
@@ -125,37 +110,23 @@ class Watch:
         """
         return sights.share > SINGULAR
 
-    def passable(self, before: Sights, after: Sights) -> np.ndarray:
-        """Whether one can go from one orientation to a neighbouring one.
+    def passable(self, sights: Sights, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+        """Which steps from one orientation to a neighbouring one can be made.
 
         Args:
-            before: of n orientations.
-            after: of n orientations.
+            sights: of all orientations.
+            first: (n,) indices.
+            last: (n,) indices.
 
         Returns:
             (n,) whether both are regular, no cables cross, and no cable sweeps over the platform.
         """
-        ways = np.flatnonzero(self.regular(before) & self.regular(after))
-        free = np.zeros(len(before.share), bool)
+        is_regular = self.regular(sights)
+        ways = np.flatnonzero(is_regular[first] & is_regular[last])
+        free = np.zeros(len(first), bool)
         for some in np.array_split(ways, max(1, -(-len(ways) // STEPS))):
-            one, two = before.rows(some), after.rows(some)
-            met = cables_cross(one.gaps, two.gaps).any(1)
-            hit = platform_hit(self._contacts.sides, self._contacts.normal, one.views, two.views).any(1)
-            free[some] = ~met & ~hit
-        return free
-
-    def edges(self, sights: Sights, pairs: np.ndarray) -> np.ndarray:
-        """Which steps between neighbours can be made.
-
-        Args:
-            sights: of all orientations.
-            pairs: (m, 2) indices of neighbours.
-
-        Returns:
-            (m,).
-        """
-        both = self.regular(sights)[pairs].all(1)
-        free = np.zeros(len(pairs), bool)
-        for some in np.array_split(np.flatnonzero(both), max(1, -(-int(both.sum()) // STEPS))):
-            free[some] = self.passable(sights.rows(pairs[some, 0]), sights.rows(pairs[some, 1]))
+            one, two = first[some], last[some]
+            met = cables_cross(sights.gaps[one], sights.gaps[two]).any(1)
+            hit = platform_hit(self._contacts.sides, self._contacts.normal, sights.views[one], sights.views[two])
+            free[some] = ~met & ~hit.any(1)
         return free

@@ -15,8 +15,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from cspr_jax.feasibility.sights import Watch
-from cspr_jax.orientations import OrientationGrid, equal_volume_grid, quaternions, tilt_torsion_grid
+from cspr_jax.orientations import OrientationGrid, equal_volume_grid, tilt_torsion_grid
 from cspr_jax.platforms import PlatformRobot
+from cspr_jax.rotations import from_tilt_torsion
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
 WHOLE = 8.0 * math.pi**2  # of SO(3), in the measure sin(theta) d phi d theta d sigma
@@ -61,8 +62,8 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
         angles, volume = (np.concatenate(x) for x in zip(*parts, strict=True))
         return Accessible(angles, volume, np.nan)
     grid = _grid(definition, divisions)
-    sights = watch.at(quaternions(grid.angles + towards))
-    first, last = grid.neighbours[watch.edges(sights, grid.neighbours)].T
+    sights = watch.at(from_tilt_torsion(grid.angles + towards))
+    first, last = grid.neighbours[watch.passable(sights, *grid.neighbours.T)].T
     count = len(grid.angles)
     links = coo_matrix((np.ones(len(first), bool), (first, last)), shape=(count, count))
     part = connected_components(links, directed=False)[1]
@@ -80,8 +81,8 @@ def _scan(watch: Watch, towards: np.ndarray, divisions: int) -> Iterator[tuple[n
         for k in range(1, divisions + 1):
             torsion = sign * k * step
             there = _angles(np.stack([centre, centre]), np.array([torsion - sign * step, torsion]))
-            sights = watch.at(quaternions(there + towards))
-            if not watch.passable(sights.rows(np.array([0])), sights.rows(np.array([1])))[0]:
+            sights = watch.at(from_tilt_torsion(there + towards))
+            if not watch.passable(sights, np.array([0]), np.array([1]))[0]:
                 break
             part, centre = _section(watch, towards, centre, torsion, divisions)
             yield part
@@ -96,9 +97,9 @@ def _section(
     rays = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
     far = np.arange(count + 1) * step
     angles = _angles(centre + far[None, :, None] * rays[:, None, :], np.asarray(torsion))
-    sights = watch.at(quaternions(angles.reshape(-1, 3) + towards))
+    sights = watch.at(from_tilt_torsion(angles.reshape(-1, 3) + towards))
     index = np.arange(angles[..., 0].size).reshape(count, -1)
-    free = watch.passable(sights.rows(index[:, :-1].ravel()), sights.rows(index[:, 1:].ravel())).reshape(count, -1)
+    free = watch.passable(sights, index[:, :-1].ravel(), index[:, 1:].ravel()).reshape(count, -1)
     free &= angles[:, 1:, 1] < math.pi
     free = np.cumprod(free, axis=1).astype(bool)
     ends = centre + (free.sum(1) * step)[:, None] * rays

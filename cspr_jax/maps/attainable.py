@@ -7,7 +7,7 @@ from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
 from cspr_jax.maps.pose_answers import PoseAnswers, joined, reached
 from cspr_jax.maps.pose_ends import end_options
-from cspr_jax.orientations import quaternions
+from cspr_jax.rotations import from_tilt_torsion
 
 # Values of beta-hat tried at the target.
 VALUES = 20
@@ -46,7 +46,7 @@ def _part(
     robot, count = checker.shared.robot, len(angles)
     centre = np.asarray(robot.base_points).mean(0)
     towards = np.arctan2(*(places - centre).T[1::-1])  # (3.98)
-    ends = (places, quaternions(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
+    ends = (places, from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
     bends, can_end = end_options(robot, *ends, z0, values)
     hub = centre + z0[:, None] * np.array([0.0, 0.0, 1.0])
     start = (hub, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))

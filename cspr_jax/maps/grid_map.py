@@ -14,6 +14,7 @@ from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.reference_pose import aligned
 from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.tiles import Grid
 
@@ -118,6 +119,22 @@ class GridMap(abc.ABC, Generic[SharedKind]):
             raise ConfigError(self._file, f"{key}: every point is above the spool plane: must be some below it")
         if floor is not None and not (points[:, 2] <= np.asarray(floor)).any():
             raise ConfigError(self._file, f"{key}: every point is below the floor: must be some above it")
+
+
+class PlatformMap(GridMap[PoseShared]):
+    """The map of a sweep of a platform; see `GridMap`."""
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse a point mass."""
+        if not spec.is_platform:
+            raise ConfigError(
+                file, f'robot "{spec.name}" is a point mass: must be a platform on six cables in this map'
+            )
+        super().__init__(spec, keys, file)
+
+    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> PoseShared:
+        robot = problem.build_platform(spec, self._keys.trajectory, self._file)
+        return PoseShared(aligned(robot)[0], limits, amplitude)
 
 
 class PointMassMap(GridMap[Shared]):

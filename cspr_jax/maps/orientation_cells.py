@@ -3,19 +3,15 @@
 import numpy as np
 
 from cspr_jax import problem
-from cspr_jax.amplitudes import Amplitude
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Orientations, SweepFile
-from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.limits import Limits, given
+from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
-from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.accessible import Accessible, accessible
 from cspr_jax.maps.attainable import VALUES, attainable
-from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
+from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.quantities import REFUSALS
-from cspr_jax.reference_pose import aligned
 from cspr_jax.symmetries import folded, symmetries
 from cspr_jax.tiles import Grid
 
@@ -23,22 +19,14 @@ from cspr_jax.tiles import Grid
 DIGITS = 12
 
 
-class AccessibleMap(GridMap[PoseShared]):
+class AccessibleMap(PlatformMap):
     """The map of accessible orientations; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse a point mass."""
-        if not spec.is_platform:
-            raise ConfigError(
-                file, f'robot "{spec.name}" is a point mass: must be a platform on six cables in this map'
-            )
+        """Find the robot's symmetries."""
         super().__init__(spec, keys, file)
         self._orientations = keys.orientations or Orientations()
         self._symmetries = symmetries(self._shared.robot)
-
-    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> PoseShared:
-        robot = problem.build_platform(spec, self._keys.trajectory, self._file)
-        return PoseShared(aligned(robot)[0], limits, amplitude)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`. Places that symmetries join are computed once."""

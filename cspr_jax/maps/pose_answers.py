@@ -41,18 +41,25 @@ def joined(parts: list[PoseAnswers]) -> PoseAnswers:
     return PoseAnswers(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 
-def settled(checker: PoseChecker, candidates: Candidates, found: Found, tried: np.ndarray) -> PoseAnswers:
+def settled(
+    checker: PoseChecker, candidates: Candidates, found: Found, *, max_arcs: int, fixed: np.ndarray | None = None
+) -> PoseAnswers:
     """Answers with all margins.
 
     Args:
         checker: of the robot.
         candidates: one of each of n motions.
         found: of these; its checks are completed.
-        tried: (n,) the numbers of arcs found, else those of the best candidates.
+        max_arcs: largest number tried.
+        fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
 
     Returns:
         the answers; nothing is proved, and (2.55) does not apply: NaN.
     """
+    tried = found.arcs if fixed is None else np.where(found.arcs > 0, found.arcs, fixed)
+    none = np.flatnonzero(tried == 0)
+    tried = tried.copy()
+    tried[none] = best_candidates(checker, candidates.rows(none), max_arcs=max_arcs)
     segments, checks = segments_with(checker.shared.robot, candidates, tried), found.checks
     others = np.flatnonzero(found.arcs == 0)
     checks.put(others, checker.check(rows(segments, others), tried[others]))
@@ -61,13 +68,13 @@ def settled(checker: PoseChecker, candidates: Candidates, found: Found, tried: n
     if checker.kind.plain:  # (3.66) has the one that its cosine has
         bends = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
     doubtful = (found.undecided > 0) & ((found.arcs == 0) | (found.undecided < found.arcs))
-    none = np.where(doubtful, Verdict.UNDECIDED.value, checks.verdict | Verdict.NO_ARCS.value)
+    refused = np.where(doubtful, Verdict.UNDECIDED.value, checks.verdict | Verdict.NO_ARCS.value)
     less = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
     nothing = np.full(len(tried), np.nan)
     return PoseAnswers(
         arcs=found.arcs,
         tried_arcs=tried,
-        verdict=np.where(found.arcs > 0, less, none).astype(np.uint16),
+        verdict=np.where(found.arcs > 0, less, refused).astype(np.uint16),
         duration=duration,
         margin=np.minimum(checks.slack[:, 0], checks.slack[:, 2]),
         margin_bound=nothing,
@@ -104,10 +111,8 @@ def reached(
     arcs[cell[best]], bends[cell[best]] = found.arcs[best], trial.bends[1][best]
     checks.put(cell[best], found.checks.rows(best))
     np.minimum.at(undecided, cell, np.where(found.undecided > 0, found.undecided, NEVER))
-    every = _with_ends(motions, bends, same=same)
-    tried, none = arcs.copy(), np.flatnonzero(arcs == 0)
-    tried[none] = best_candidates(checker, every.rows(none), max_arcs=max_arcs)
-    return settled(checker, every, Found(arcs, np.where(undecided < NEVER, undecided, 0), checks), tried)
+    best_found = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
+    return settled(checker, _with_ends(motions, bends, same=same), best_found, max_arcs=max_arcs)
 
 
 def _with_ends(motions: Candidates, bends: np.ndarray, *, same: bool) -> Candidates:

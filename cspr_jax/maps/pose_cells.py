@@ -3,20 +3,18 @@
 import numpy as np
 
 from cspr_jax import problem
-from cspr_jax.amplitudes import Amplitude
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
+from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.endpoints import AT_REST
-from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
-from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.bends import OPTIONS
-from cspr_jax.maps.grid_map import OF_TARGETS, GridMap
+from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
 from cspr_jax.maps.pose_answers import PoseAnswers, joined, reached
 from cspr_jax.maps.pose_ends import end_options
-from cspr_jax.reference_pose import aligned, reference_pose
+from cspr_jax.reference_pose import reference_pose
 from cspr_jax.tiles import Grid
 
 # Time functions of the rotation with a beta-hat of its own at each end.
@@ -24,15 +22,11 @@ _OWN = (None, "beta_ff")
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 
 
-class PoseMap(GridMap[PoseShared]):
+class PoseMap(PlatformMap):
     """The map of a sweep of poses; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse a point mass, and a start that is no pose."""
-        if not spec.is_platform:
-            raise ConfigError(
-                file, f'robot "{spec.name}" is a point mass: must be a platform on six cables in this map'
-            )
+        """Refuse a start that is no pose."""
         self._spec = spec
         super().__init__(spec, keys, file)
         start = keys.trajectory.start
@@ -41,10 +35,6 @@ class PoseMap(GridMap[PoseShared]):
         )
         from_rest = start is None or start.rest
         self._checker = PoseChecker(self._shared, problem.motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
-
-    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> PoseShared:
-        robot = problem.build_platform(spec, self._keys.trajectory, self._file)
-        return PoseShared(aligned(robot)[0], limits, amplitude)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -63,7 +53,7 @@ class PoseMap(GridMap[PoseShared]):
         poses = (targets, problem.orientations(self._spec, self._centre, targets, angles))
         given, beat = self._keys.trajectory.beta_hat, self._keys.trajectory.beat
         values, can_end = end_options(self._shared.robot, *poses, z0, 1 if given == "preferred" else OPTIONS)
-        if beat in ("beta_0", "beta_1"):
+        if beat in WITHOUT_BETA_HAT:
             values = np.zeros((len(z0), 1))
         elif isinstance(given, float):
             values = np.full((len(z0), 1), given)

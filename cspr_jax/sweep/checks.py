@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.config.sweep import SweepFile
+from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError, shown
 
 _START = ("from_x", "from_y", "from_z")
@@ -130,7 +131,7 @@ def _check_poses(keys: SweepFile, path: Path) -> None:
         raise ConfigError(path, "trajectory.inclination: must be absent in this map")
     if keys.axes.z0 is None:
         raise ConfigError(path, "axes.z0 is missing: depth of P0 below the centroid of the spools, m")
-    if keys.trajectory.beat in ("beta_0", "beta_1") and keys.trajectory.beta_hat is not None:
+    if keys.trajectory.beat in WITHOUT_BETA_HAT and keys.trajectory.beta_hat is not None:
         raise ConfigError(path, f'trajectory.beta_hat: must be absent with beat = "{keys.trajectory.beat}"')
 
 
@@ -146,6 +147,11 @@ def _check_orientations(keys: SweepFile, path: Path) -> None:
         raise ConfigError(path, "trajectory.inclination: must be absent in this map")
     if keys.trajectory.start is not None and not keys.trajectory.start.rest:
         raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
+    if keys.map == "orientation-workspace":
+        if keys.limits.model_fields_set:
+            raise ConfigError(path, 'limits: must be absent in this map; they are for map = "attainability"')
+        if keys.orientations is not None and keys.orientations.values is not None:
+            raise ConfigError(path, 'orientations.values: must be absent in this map; it is for map = "attainability"')
 
 
 _CHECKS: dict[str, Callable[[SweepFile, Path], None]] = {

@@ -12,7 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.amplitudes import Amplitude, derivatives
-from cspr_jax.lanes import Matrix, Vector, combined, cross, dot, stored
+from cspr_jax.lanes import Matrix, Vector, combined, cross, dot, rotation, stored
 from cspr_jax.numerics import polynomial, sincospi
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 
@@ -263,10 +263,4 @@ def _exponential(v: Vector, v1: Vector, v2: Vector) -> tuple[Matrix, Vector, Vec
         across = cross(left[1:], q[1:])
         return tuple(2.0 * (q[0] * left[i + 1] - left[0] * q[i + 1] - across[i]) for i in range(3))
 
-    w, x, yy, z = q
-    turn = (
-        (1.0 - 2.0 * (yy * yy + z * z), 2.0 * (x * yy - w * z), 2.0 * (x * z + w * yy)),
-        (2.0 * (x * yy + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (yy * z - w * x)),
-        (2.0 * (x * z - w * yy), 2.0 * (yy * z + w * x), 1.0 - 2.0 * (x * x + yy * yy)),
-    )
-    return turn, vector_part(q1), vector_part(q2)
+    return rotation(q), vector_part(q1), vector_part(q2)
