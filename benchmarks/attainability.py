@@ -32,9 +32,10 @@ def main() -> None:
         )
     arcs = 0.5 * (tables.MAX_ARCS + 1)
     every = motions * arcs * 2 * (SAMPLES + 1)
-    done = sum(checker.instants.values())
-    print(f"motions: {motions:,} candidates, {checker.checked:,} checked in full ({checker.checked / motions:.2%})")
-    print(f"instants: {every:,.0f} if all were, {done:,} done ({done / every:.2%}): {checker.instants}")
+    done = checker.done
+    instants = done["first look"] + done["checks"]
+    print(f"motions: {motions:,} candidates, {done['motions']:,} checked in full ({done['motions'] / motions:.2%})")
+    print(f"instants: {every:,.0f} if all were, {instants:,} done ({instants / every:.2%}): {done}")
 
 
 if __name__ == "__main__":

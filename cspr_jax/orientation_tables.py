@@ -90,7 +90,8 @@ def attained(checker: PoseChecker, place: np.ndarray, angles: np.ndarray) -> np.
         (n,).
     """
     places, z0 = np.tile(place, (len(angles), 1)), np.full(len(angles), place[2])
-    return attainable(checker, places, angles, z0, max_arcs=MAX_ARCS).arcs > 0
+    found = symmetries(checker.shared.robot)
+    return attainable(checker, places, angles, z0, max_arcs=MAX_ARCS, found=found).arcs > 0
 
 
 def table_3_3(choice: Choice) -> dict[Key, float | None]:

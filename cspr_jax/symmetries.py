@@ -11,6 +11,7 @@ LARGEST_FOLD = 6
 # Of the robot's size: points nearer than this are the same.
 SAME = 1e-9
 ROUNDING = 1e-9
+KEY_DIGITS = 9
 
 
 class Symmetries(NamedTuple):
@@ -23,6 +24,9 @@ class Symmetries(NamedTuple):
 
     fold: int
     mirrors: tuple[float, ...]
+
+
+NONE = Symmetries(1, ())
 
 
 def symmetries(robot: PlatformRobot) -> Symmetries:
@@ -60,6 +64,31 @@ def folded(found: Symmetries, azimuths: np.ndarray) -> np.ndarray:
     width = 2.0 * math.pi / found.fold
     images = np.mod(np.stack([azimuths, *(2.0 * mirror - azimuths for mirror in found.mirrors)]), width)
     return np.where(width - images < ROUNDING, 0.0, images).min(0)
+
+
+def alike(found: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Orientations that stand for others: where a place lies on a mirror plane, the plane joins them in pairs.
+
+    Args:
+        found: symmetries of the robot.
+        places: (n, m) x and y from the vertical through the centroid, and whatever else tells places apart.
+        angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad.
+
+    Returns:
+        (n,) index of the first orientation that the robot can take in the same way.
+    """
+    azimuths, stands = np.arctan2(places[:, 1], places[:, 0]), np.arange(len(places))
+    mirrored = np.flatnonzero((np.abs(np.sin(azimuths[:, None] - np.asarray(found.mirrors))) < ROUNDING).any(1))
+    if not len(mirrored):
+        return stands
+    # The axis of the tilt is no vector: phi becomes pi - phi, and sigma -sigma.
+    both = np.concatenate([angles[mirrored], np.array([math.pi, 0.0, 0.0]) + angles[mirrored] * [-1.0, 1.0, -1.0]])
+    turns = [f(both[:, i]) for i in (0, 2) for f in (np.cos, np.sin)]
+    keys = np.round(np.stack([*turns, both[:, 1], *np.tile(places[mirrored], (2, 1)).T], axis=1), KEY_DIGITS) + 0.0
+    same = np.unique(keys, axis=0, return_inverse=True)[1].reshape(2, -1).min(0)
+    _, first, own = np.unique(same, return_index=True, return_inverse=True)
+    stands[mirrored] = mirrored[first[own]]
+    return stands
 
 
 def _turn(angle: float) -> np.ndarray:

@@ -7,6 +7,7 @@ within the tolerance of zero is undecided: nothing here is a proof.
 """
 
 import dataclasses
+import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -19,6 +20,7 @@ from cspr_jax.feasibility.pose_kernel import (
     LEAST_COSINE,
     glances,
     look_along,
+    lowest_by_product,
     moving_along,
     narrowed,
     smallest_tensions,
@@ -104,20 +106,24 @@ class PoseChecker:
         batch: how many are computed at a time.
 
     Fields:
-        instants: how many instants of motions were looked at so far, in the first look and in checks.
-        checked: how many motions were checked.
+        done: how many instants of motions were looked at so far, in the first look and in checks, and how many motions
+            were checked.
     """
 
     def __init__(self, shared: PoseShared, kind: Kind = USUAL, *, batch: int = FEW) -> None:
         """Find what can meet."""
         self.shared, self.kind, self.batch = shared, kind, batch
-        self.instants, self.checked = {"first look": 0, "checks": 0}, 0
+        self.done, self._lock = {"first look": 0, "checks": 0, "motions": 0}, threading.Lock()
         found = contacts(shared.robot)
         self._platform, self._pairs = (found.sides, found.normal), tuple((int(i), int(j)) for i, j in found.pairs)
         self._flags = flags(shared.limits)
         self._size = float(np.linalg.norm(np.asarray(shared.robot.platform_points), axis=1).max())
         knots = np.asarray(shared.amplitude.knots)
         self._knots = np.sort(np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT]))
+
+    def _count(self, what: str, many: int) -> None:
+        with self._lock:
+            self.done[what] += many
 
     def durations(self, segments: PoseSegment, arcs: np.ndarray) -> np.ndarray:
         """Durations of segments.
@@ -153,7 +159,7 @@ class PoseChecker:
                 break
             kernel = partial(smallest_tensions, shared.robot, shared.amplitude, float(arcs), chunk, kind=self.kind)
             some = segments if len(alive) == len(lowest) else rows(segments, alive)
-            self.instants["first look"] += len(alive) * CHUNK
+            self._count("first look", len(alive) * CHUNK)
             found = in_batches(kernel, some, size=FIRST * self.batch)
             lowest[alive] = np.minimum(lowest[alive], np.where(np.isnan(found), -np.inf, found))
         return lowest
@@ -172,13 +178,14 @@ class PoseChecker:
         found = self.nothing(len(arcs))
         if not len(arcs):
             return found
-        self.checked += len(arcs)
-        moving = self._moving(segments, arcs)
+        self._count("motions", len(arcs))
+        moving, tensions = self._moving(segments, arcs)
         is_open = whole | (moving > -TOLERANCE).all(0)
         found.verdict[~is_open] = Verdict.SLACK_CABLE.value
         rest = np.flatnonzero(is_open)
         if len(rest):
-            found.put(rest, self._still(rows(segments, rest), arcs[rest], moving[:, rest]))
+            own = tensions[:, np.repeat(is_open, arcs)]
+            found.put(rest, self._still(rows(segments, rest), arcs[rest], moving[:, rest], own))
         return found
 
     def nothing(self, count: int) -> PoseChecks:
@@ -192,11 +199,12 @@ class PoseChecker:
         """
         return PoseChecks(np.zeros(count, int), np.full((count, len(self._flags)), np.nan), np.full(count, np.nan))
 
-    def _still(self, segments: PoseSegment, arcs: np.ndarray, moving: np.ndarray) -> PoseChecks:
-        # With what depends on the pose alone; `moving` is of `_moving`.
+    def _still(self, segments: PoseSegment, arcs: np.ndarray, moving: np.ndarray, tensions: np.ndarray) -> PoseChecks:
+        # With what depends on the pose alone; `moving` and `tensions` are of `_moving`.
         kernel = partial(look_along, self.shared, self._platform, pairs=self._pairs, kind=self.kind)
         row, arc, looks = self._along(kernel, segments, arcs)
         still = self._narrowed(segments, arcs, (row, arc, looks.values), self._pairs)
+        self._dip(segments, arcs, (row, arc, tensions * looks.values[:, 0]), moving)
         nearest, least = still[-1], np.concatenate([moving, still[:-1]])[order(self.shared.limits)]
         is_finite = np.isfinite(least).all(0) & ~np.isnan(nearest) & (self.durations(segments, arcs) > 0.0)
         verdict = np.zeros(len(arcs), int)
@@ -217,22 +225,35 @@ class PoseChecker:
             np.where(is_finite, nearest, np.nan),
         )
 
-    def _moving(self, segments: PoseSegment, arcs: np.ndarray) -> np.ndarray:
-        # (n_values, n) smallest values of the criteria that depend on the motion.
+    def _moving(self, segments: PoseSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        # (n_values, n) smallest values of the criteria that depend on the motion, and the tensions of `_along`.
         kernel = partial(moving_along, self.shared, kind=self.kind)
-        least = self._narrowed(segments, arcs, self._along(kernel, segments, arcs), None)
+        seen = self._along(kernel, segments, arcs)
+        least = self._narrowed(segments, arcs, seen, None)
         # The motion may jump at a knot.
         places = np.meshgrid(np.arange(len(least)), np.arange(len(arcs)), self._knots, indexing="ij")
         which, row, tau = (x.ravel() for x in places)
         self._lower(least, segments, arcs, (which, row, tau, np.zeros(len(row))), None)
-        return least
+        return least, seen[-1][:, 0]
+
+    def _dip(self, segments: PoseSegment, arcs: np.ndarray, seen: tuple, moving: np.ndarray) -> None:
+        # Beside a singularity tensions change too fast for samples. Times the determinant they do not, and where that
+        # product could be negative between samples, the smallest tension is looked for by it.
+        row, arc, product = seen
+        place, _, item = _low_points(product[:, None], np.zeros((1, len(row))))
+        if len(item):
+            which = row[item]
+            tau, width = (arc[item] + place / SAMPLES) / arcs[which], 1.0 / (SAMPLES * arcs[which])
+            kernel = partial(lowest_by_product, self.shared, kind=self.kind)
+            items = (rows(segments, which), arcs[which].astype(float), tau, width)
+            np.minimum.at(moving[0], which, in_batches(kernel, items, size=self.batch))
 
     def _along(self, kernel: Callable, segments: PoseSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray, Any]:
         # Arc by arc: whose it is, which one, and what the kernel says, which has the arcs last.
         row = np.repeat(np.arange(len(arcs)), arcs)
         arc = np.arange(len(row)) - np.repeat(np.cumsum(arcs) - arcs, arcs)
         within = np.linspace(0.0, 1.0, SAMPLES + 1)
-        self.instants["checks"] += len(row) * (SAMPLES + 1)
+        self._count("checks", len(row) * (SAMPLES + 1))
 
         def batch(items):
             own, which = items
@@ -297,9 +318,9 @@ class PoseChecker:
         return gap, view / np.linalg.norm(view, axis=2, keepdims=True)
 
 
-def _low_points(values: np.ndarray, least: np.ndarray) -> tuple[np.ndarray, ...]:
-    # Samples (m, n_values, n) no larger than their neighbours, where a parabola of twice the bend could reach the
-    # smallest value (n_values, n).
+def _low_points(values: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, ...]:
+    # Samples (m, n_values, n) no larger than their neighbours, where a parabola of twice the bend could reach so low,
+    # (n_values, n).
     falls = values[1:] < values[:-1]
     side = np.ones_like(falls[:1])
     is_low = np.concatenate([side, falls]) & np.concatenate([~falls, side])
@@ -308,7 +329,7 @@ def _low_points(values: np.ndarray, least: np.ndarray) -> tuple[np.ndarray, ...]
     here, last = values[place, which, row], len(values) - 1
     before, after = (values[np.clip(place + k, 0, last), which, row] for k in (-1, 1))
     bend = before - 2.0 * here + after
-    reaches = np.isfinite(bend) & (here - 0.25 * bend <= least[which, row])
+    reaches = np.isfinite(bend) & (here - 0.25 * bend <= reach[which, row])
     return place[reaches], which[reaches], row[reaches]
 
 

@@ -1,5 +1,6 @@
 """The compiled functions that look at many motions of a platform at once, one lane a segment."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -9,7 +10,7 @@ from jax import Array, lax
 
 from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility import contact_lanes
-from cspr_jax.feasibility.pose_lanes import lowest_tension, moving_slacks, still_slacks
+from cspr_jax.feasibility.pose_lanes import lowest_tension, moving_slacks, product_and_tension, still_slacks
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.lanes import dot, smallest, stored
 from cspr_jax.platforms import PlatformRobot
@@ -79,15 +80,16 @@ def moving_along(shared: PoseShared, within: Array, arcs, *, kind: Kind) -> Arra
 
     def at(place):
         now = instant_of_arc(shared.amplitude, segments.sense, count, arc, place)
-        return jnp.stack(moving_slacks(shared, segments, count, now, kind))
+        return moving_slacks(shared, segments, count, now, kind)
 
-    return lax.map(at, within)
+    # Stacked once they are there: within a loop XLA would compute all of them for each, a thousand times slower.
+    return jnp.stack(lax.map(at, within), axis=1)
 
 
 def _seen(
     shared: PoseShared, pairs: tuple, segments: PoseSegment, arcs: Array, now: Instant, kind: Kind
-) -> tuple[Array, list, list]:
-    # (n_values, n): the still slacks, and the smallest distance between cables; the vectors between cables; the views.
+) -> tuple[list[Array], list, list]:
+    # (n,) each: the still slacks, and the smallest distance between cables; the vectors between cables; the views.
     one = jnp.where(shared.robot.mass > 0.0, 1.0, 2.0).astype(segments.rate.dtype)
     here = state(segments, arcs, now, kind, one)
     wires = cables(shared.robot, here.position, here.turn)
@@ -95,7 +97,7 @@ def _seen(
     apart = contact_lanes.gaps(shared.robot.base_points, pairs, wires)
     squares = [dot(gap, gap) for gap in apart]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
-    values = jnp.stack([*still_slacks(shared, segments, here, wires), nearest])
+    values = [*still_slacks(shared, segments, here, wires), nearest]
     return values, apart, contact_lanes.views(wires, here.turn)
 
 
@@ -132,7 +134,7 @@ def look_along(
     shapes = jax.eval_shape(lambda: seen(within[0])[1:])
     _, (values, hit, wide) = lax.scan(step, jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes), within)
     # There is no step before the first place.
-    return Look(values, (hit & ~wide)[1:].any(0), wide[1:])
+    return Look(jnp.stack(values, axis=1), (hit & ~wide)[1:].any(0), wide[1:])
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))
@@ -154,22 +156,56 @@ def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind) -> A
     def at(points):
         now = instant(shared.amplitude, segments.sense, arcs, points)
         if pairs is None:
-            values = jnp.stack(moving_slacks(shared, segments, arcs, now, kind))
+            values = moving_slacks(shared, segments, arcs, now, kind)
         else:
             values = _seen(shared, pairs, segments, arcs, now, kind)[0]
-        found = jnp.take_along_axis(values, which[None, :], axis=0)[0]
-        return jnp.where(jnp.isnan(found), jnp.inf, found)
+        found = values[0]
+        for k, value in enumerate(values[1:], start=1):
+            found = jnp.where(which == k, value, found)
+        return (found,)
+
+    return _sections(at, tau, width)[0]
+
+
+@partial(jax.jit, static_argnames="kind")
+def lowest_by_product(shared: PoseShared, items, *, kind: Kind) -> Array:
+    """The smallest tension met in search of the smallest product of tension and determinant, by golden sections.
+
+    Args:
+        shared: robot, amplitude.
+        items: segments (leaves (n, ...)), arcs (n,), instants (n,), half the width of the bracket (n,).
+        kind: of the motions.
+
+    Returns:
+        (n,) of `pose_lanes.moving_slacks`.
+    """
+    segments, arcs, tau, width = items
+
+    def at(points):
+        return product_and_tension(
+            shared, segments, arcs, instant(shared.amplitude, segments.sense, arcs, points), kind
+        )
+
+    return _sections(at, tau, width)[1]
+
+
+def _sections(at: Callable[[Array], tuple[Array, ...]], tau: Array, width: Array) -> tuple[Array, ...]:
+    # The smallest of each of some values met on the way to the smallest of the first, between instants.
+    def seen(points):
+        return tuple(jnp.where(jnp.isnan(x), jnp.inf, x) for x in at(points))
 
     low, high = jnp.maximum(tau - width, 0.0), jnp.minimum(tau + width, 1.0)
     left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_left, at_right = lax.map(at, jnp.stack([left, right]))
+    both = lax.map(seen, jnp.stack([left, right]))
+    at_left, at_right = both[0]
 
     def section(_, carry):
         (low, high, left, right, at_left, at_right), least = carry
         go_left = at_left < at_right
         low, high = jnp.where(go_left, low, left), jnp.where(go_left, right, high)
         fresh = jnp.where(go_left, high - _GOLDEN * (high - low), low + _GOLDEN * (high - low))
-        value = at(fresh)
+        met = seen(fresh)
+        value = met[0]
         new = (
             low,
             high,
@@ -178,9 +214,9 @@ def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind) -> A
             jnp.where(go_left, value, at_right),
             jnp.where(go_left, at_left, value),
         )
-        return new, jnp.minimum(least, value)
+        return new, tuple(jnp.minimum(a, b) for a, b in zip(least, met, strict=True))
 
-    start = (low, high, left, right, at_left, at_right), jnp.minimum(at_left, at_right)
+    start = (low, high, left, right, at_left, at_right), tuple(x.min(0) for x in both)
     return lax.fori_loop(0, _SECTIONS, section, start)[1]
 
 

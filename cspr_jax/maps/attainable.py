@@ -5,9 +5,10 @@ import numpy as np
 from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
-from cspr_jax.maps.pose_answers import PoseAnswers, joined, reached
+from cspr_jax.maps.pose_answers import PoseAnswers, in_parts, reached
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.rotations import from_tilt_torsion
+from cspr_jax.symmetries import NONE, Symmetries, alike
 
 # Values of beta-hat tried at the target.
 VALUES = 20
@@ -21,6 +22,7 @@ def attainable(
     *,
     max_arcs: int,
     values: int = VALUES,
+    found: Symmetries = NONE,
 ) -> PoseAnswers:
     """Smallest numbers of arcs from rest to orientations of places.
 
@@ -31,20 +33,31 @@ def attainable(
         z0: (n,) m.
         max_arcs: largest number tried.
         values: of beta-hat, the preferred one first.
+        found: symmetries of the robot; orientations that they join are computed once.
 
     Returns:
         the answers.
     """
-    size = CANDIDATES // values
-    parts = [slice(i, i + size) for i in range(0, len(z0), size)]
-    return joined([_part(checker, places[k], angles[k], z0[k], max_arcs, values) for k in parts])
+    centre = np.asarray(checker.shared.robot.base_points).mean(0)
+    some, own = np.unique(alike(found, np.c_[places - centre, z0], angles), return_inverse=True)
+
+    def part(which):
+        which = some[which]
+        return _part(checker, centre, places[which], angles[which], z0[which], max_arcs, values)
+
+    return in_parts(part, len(some), CANDIDATES // values).rows(own.ravel())
 
 
 def _part(
-    checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, max_arcs: int, values: int
+    checker: PoseChecker,
+    centre: np.ndarray,
+    places: np.ndarray,
+    angles: np.ndarray,
+    z0: np.ndarray,
+    max_arcs: int,
+    values: int,
 ) -> PoseAnswers:
     robot, count = checker.shared.robot, len(angles)
-    centre = np.asarray(robot.base_points).mean(0)
     towards = np.arctan2(*(places - centre).T[1::-1])  # (3.98)
     ends = (places, from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
     bends, can_end = end_options(robot, *ends, z0, values)

@@ -12,7 +12,7 @@ from cspr_jax.maps.accessible import Accessible, accessible
 from cspr_jax.maps.attainable import VALUES, attainable
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.quantities import REFUSALS
-from cspr_jax.symmetries import folded, symmetries
+from cspr_jax.symmetries import NONE, folded, symmetries
 from cspr_jax.tiles import Grid
 
 # Digits of a place, m, up to which two cells are at the same one.
@@ -26,17 +26,17 @@ class AccessibleMap(PlatformMap):
         """Find the robot's symmetries."""
         super().__init__(spec, keys, file)
         self._orientations = keys.orientations or Orientations()
-        self._symmetries = symmetries(self._shared.robot)
+        # Limits may differ from cable to cable.
+        self._alike = NONE if given(self._shared.limits) else symmetries(self._shared.robot)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`. Places that symmetries join are computed once."""
         places, depths = self._targets(cells), self._depths(cells)
-        if not given(self._shared.limits):
-            offset = places - self._centre
-            radius = np.hypot(offset[:, 0], offset[:, 1])
-            azimuth = folded(self._symmetries, np.arctan2(offset[:, 1], offset[:, 0]))
-            level = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth)], axis=1)
-            places = np.concatenate([self._centre[:2] + level, places[:, 2:]], axis=1)
+        offset = places - self._centre
+        radius, azimuth = np.hypot(offset[:, 0], offset[:, 1]), np.arctan2(offset[:, 1], offset[:, 0])
+        azimuth = folded(self._alike, azimuth)
+        level = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth)], axis=1)
+        places = np.concatenate([self._centre[:2] + level, places[:, 2:]], axis=1)
         every, own = np.unique(np.round(np.c_[places, depths], DIGITS), axis=0, return_inverse=True)
         found = self._places(every[:, :3], every[:, 3])
         return {name: values[own.ravel()] for name, values in found.items()}
@@ -92,6 +92,7 @@ class AttainableMap(AccessibleMap):
                 z0[own[some]],
                 max_arcs=self._keys.trajectory.max_arcs,
                 values=self._orientations.values or VALUES,
+                found=self._alike,
             )
             verdicts[some], arcs[some] = answers.verdict, answers.arcs
         stops = np.cumsum(counts)[:-1]

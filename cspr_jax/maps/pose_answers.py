@@ -2,7 +2,10 @@
 
 import dataclasses
 import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
+import jax
 import numpy as np
 
 from cspr_jax.feasibility.endpoints import AT_REST
@@ -12,6 +15,7 @@ from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
 
 NEVER = np.iinfo(int).max
+THREADS = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,16 +32,33 @@ class PoseAnswers(Answers):
     det_margin: np.ndarray
     cable_distance: np.ndarray
 
+    def rows(self, which: np.ndarray) -> "PoseAnswers":
+        """Some of them: indices, or (n,) a mask."""
+        return PoseAnswers(**{name: values[which] for name, values in vars(self).items()})
 
-def joined(parts: list[PoseAnswers]) -> PoseAnswers:
-    """Answers one after the other.
+
+def in_parts(function: Callable[[slice], PoseAnswers], count: int, size: int) -> PoseAnswers:
+    """Answers of many cases, so many at a time.
+
+    Two threads work: what one does outside of XLA, and what XLA does on one core, goes beside the other's.
 
     Args:
-        parts: at least one.
+        function: gives those of a range of cases; it is called from several threads.
+        count: of cases, at least one.
+        size: of a range.
 
     Returns:
         the answers of all.
     """
+    wide = jax.config.read("jax_enable_x64")
+
+    def part(start: int) -> PoseAnswers:
+        # The setting may be the caller's thread's own.
+        with jax.enable_x64(wide):
+            return function(slice(start, start + size))
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        parts = list(pool.map(part, range(0, count, size)))
     return PoseAnswers(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 

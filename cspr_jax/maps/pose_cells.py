@@ -12,7 +12,7 @@ from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
-from cspr_jax.maps.pose_answers import PoseAnswers, joined, reached
+from cspr_jax.maps.pose_answers import PoseAnswers, in_parts, reached
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.tiles import Grid
@@ -39,12 +39,11 @@ class PoseMap(PlatformMap):
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         at_a_time = CANDIDATES // (OPTIONS if self._keys.trajectory.beta_hat is None else 1)
-        found = joined(
-            [
-                self._answers({name: x[start : start + at_a_time] for name, x in cells.items()})
-                for start in range(0, len(cells["z0"]), at_a_time)
-            ]
-        )
+
+        def part(which: slice) -> PoseAnswers:
+            return self._answers({name: x[which] for name, x in cells.items()})
+
+        found = in_parts(part, len(cells["z0"]), at_a_time)
         return vars(found) | {"beta_hat": found.beta_hat[:, 1]}
 
     def _answers(self, cells: dict[str, np.ndarray]) -> PoseAnswers:
