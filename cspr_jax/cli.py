@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
+from cspr_jax.progress import progress
 
 EPILOGUE = (
     "exit codes: 0 done; 1 answered, not all feasible; 2 bad input; 3 refused; 4 I/O error or damaged file; "
@@ -111,6 +112,9 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
     plot.add_argument("--quantity", help="quantity of a map (default arcs or oscillations); see `cspr quantities`")
     plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
+    plot.add_argument(
+        "--envelope", action="store_true", help='outlines of all orientations of a place, of map = "orientations"'
+    )
     plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
@@ -157,7 +161,7 @@ def _run(options: argparse.Namespace) -> int:
     sweep = read_sweep(options.sweep)
     directory = options.output or run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
-    with stop_signals() as stop, _progress() as on_tile:
+    with stop_signals() as stop, progress() as on_tile:
         hooks = engine.Hooks(stop, on_tile, warn=_warn)
         work = engine.Run(sweep, directory, choices, hooks)
         path = work.finished()
@@ -227,26 +231,6 @@ def _verify(options: argparse.Namespace) -> int:
     return ExitCode.INPUT_OUTPUT if found["faults"] else ExitCode.DONE
 
 
-@contextlib.contextmanager
-def _progress() -> Iterator[Callable[[int, int], None]]:
-    if not sys.stderr.isatty():
-        yield lambda done, total: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("cells", total=None, rate="compiling")
-
-        def on_tile(done: int, total: int) -> None:
-            elapsed = progress.tasks[0].elapsed or 0.0
-            rate = f"{done / elapsed:,.0f} cells/s" if done and elapsed else "compiling"
-            progress.update(task, completed=done, total=total, rate=rate)
-
-        yield on_tile
-
-
 def _plan(options: argparse.Namespace) -> int:
     if options.output is not None and options.output.suffix not in (".csv", ".h5"):
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
@@ -285,7 +269,8 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or options.result[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
-    plot(options.result, output, quantity=options.quantity, at=at, lines=options.lines)
+    chosen = {"quantity": options.quantity, "at": at, "lines": options.lines, "envelope": options.envelope}
+    plot(options.result, output, **chosen)
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE
 

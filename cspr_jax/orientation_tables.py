@@ -95,13 +95,13 @@ def attained(checker: PoseChecker, place: np.ndarray, angles: np.ndarray) -> np.
 
 
 def table_3_3(choice: Choice) -> dict[Key, float | None]:
-    """Counts and proportions at four places.
+    """Counts and proportions at four places; errors are differences from twice the step.
 
     Args:
         choice: definitions, amplitude functions, step.
 
     Returns:
-        cells; proportions in percent.
+        cells; proportions, volumes (accessible of SO(3), attainable of that) and errors in percent.
     """
     found: dict[Key, float | None] = {}
     for amplitude in choice.amplitudes:
@@ -109,11 +109,22 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
         for definition in choice.definitions:
             for row, (x, y) in PLACES.items():
                 place, name = np.array([x * RADIUS, y * RADIUS, DEPTH]), variant(definition, amplitude)
-                inside = accessible(checker.shared.robot, place, definition, DIVISIONS * choice.finer)
-                counts = len(inside.angles), int(attained(checker, place, inside.angles).sum())
-                found[row, "accessible", name], found[row, "attainable", name] = (float(n) for n in counts)
-                found[row, "proportion", name] = 100.0 * counts[1] / counts[0]
+                fine, coarse = (_cells(checker, place, definition, DIVISIONS * choice.finer // k) for k in (1, 2))
+                errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
+                found |= {(row, column, name): value for column, value in (fine | errors).items()}
     return found
+
+
+def _cells(checker: PoseChecker, place: np.ndarray, definition: str, divisions: int) -> dict[str, float]:
+    inside = accessible(checker.shared.robot, place, definition, divisions)
+    good, volume = attained(checker, place, inside.angles), inside.volume
+    return {
+        "accessible": float(len(good)),
+        "attainable": float(good.sum()),
+        "proportion": 100.0 * good.mean(),
+        "accessible volume": 100.0 * volume.sum(),
+        "attainable volume": 100.0 * volume[good].sum() / volume.sum(),
+    }
 
 
 def table_3_4(choice: Choice) -> dict[Key, float | None]:

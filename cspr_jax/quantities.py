@@ -196,6 +196,13 @@ QUANTITIES = {
         ),
         Quantity("mean_arcs", "1", "mean smallest number of arcs", "Over the attainable orientations."),
         Quantity("undecided_fraction", "1", "undecided part", "Of the accessible orientations."),
+        Quantity(
+            "main_reason",
+            "1",
+            "main reason",
+            "Why most of the accessible orientations that are not attained are not: a verdict's flag; 0: all are.",
+            "uint16",
+        ),
         *(
             Quantity(
                 name, "1", f"refused: {flag.text.replace('_', ' ')}", f"Part of the accessible orientations: {words}"
@@ -235,6 +242,7 @@ _OF_ATTAINED = (
     "attainable_error",
     "mean_arcs",
     "undecided_fraction",
+    "main_reason",
     *REFUSALS,
 )
 # What each kind of map can store.
@@ -243,6 +251,7 @@ OF_MAP = {
     "minimum-oscillations": (*_OF_OSCILLATIONS, *_COMMON),
     "transition-envelopes": _OF_INSTANTS,
     "poses": _OF_POSES,
+    "orientations": _OF_POSES,
     "orientation-workspace": _OF_PLACES,
     "attainability": (*_OF_PLACES, *_OF_ATTAINED),
 }
@@ -279,6 +288,7 @@ DEFAULT_STORE = {
     ),
     "transition-envelopes": _OF_INSTANTS,
     "poses": ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat"),
+    "orientations": ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat"),
     "orientation-workspace": _OF_PLACES,
     "attainability": (*_OF_PLACES, *_OF_ATTAINED),
 }
@@ -287,6 +297,7 @@ TITLES = {
     "minimum-oscillations": "Smallest number of oscillations",
     "transition-envelopes": "Envelopes of the pseudotensions along transitions",
     "poses": "Smallest number of arcs to poses",
+    "orientations": "Smallest number of arcs to accessible orientations",
     "orientation-workspace": "Accessible orientations",
     "attainability": "Accessible and attainable orientations",
 }

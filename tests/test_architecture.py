@@ -24,6 +24,7 @@ LAYERS = (
     ("problem", "store", "results"),
     (
         "maps.cells",
+        "maps.each_orientation",
         "maps.envelope_cells",
         "maps.grid_map",
         "maps.orientation_cells",
@@ -33,12 +34,23 @@ LAYERS = (
     ("sweep.checks", "sweep.definition", "sweep.signals", "sweep.environment"),
     ("sweep.work", "sweep.claims", "sweep.inspection", "sweep.tile"),
     ("sweep", "planning", "choices", "sequences", "pose_sequences", "api"),
-    ("bench", "transition_tables", "pose_tables", "orientation_tables", "tables", "reports", "motions", "plots"),
+    (
+        "bench",
+        "transition_tables",
+        "pose_tables",
+        "orientation_tables",
+        "tables",
+        "reports",
+        "motions",
+        "plots",
+        "progress",
+    ),
     ("cli", "__main__"),
 )
 KERNELS = tuple(name for layer in LAYERS[:6] for name in layer)
 WITHOUT_JAX = (
     "cli",
+    "progress",
     "errors",
     "config.plan",
     "config.reading",

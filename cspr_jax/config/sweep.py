@@ -109,13 +109,14 @@ class Orientations(Table):
 
     definition: Literal["grid", "scan", "equal-volume"] = Field(
         "scan",
-        description='accessible set: "grid" of tilt and torsion, "scan" (Bonev, as in the thesis), or "equal-volume"',
+        description='accessible set: "grid" of tilt and torsion, "scan" (Bonev, as in the thesis), or "equal-volume"; '
+        'map = "orientations" has "grid" only',
     )
     divisions: Annotated[int, Field(ge=4, le=128, multiple_of=2)] = Field(
         32, description="of pi: the step is pi / divisions; even, for errors are estimated with twice the step"
     )
     values: Annotated[int, Field(ge=1, le=100)] | None = Field(
-        None, description="attainability: values of beta-hat tried at each orientation; absent: 20"
+        None, description="orientations, attainability: values of beta-hat tried at each orientation; absent: 20"
     )
 
 
@@ -155,11 +156,13 @@ class SweepFile(Table):
         "minimum-oscillations",
         "transition-envelopes",
         "poses",
+        "orientations",
         "orientation-workspace",
         "attainability",
     ] = Field(
         description='kind of map: "minimum-arcs"; of transitions "minimum-oscillations", or "transition-envelopes": '
         'what each instant asks for; of platforms "poses": smallest numbers of arcs, '
+        '"orientations": the same for all accessible orientations of places, '
         '"orientation-workspace": accessible orientations of places, "attainability": which of them are attained'
     )
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
@@ -168,7 +171,9 @@ class SweepFile(Table):
     )
     trajectory: SweepTrajectory = Field(description="[trajectory] with family, amplitude, max_arcs and from")
     orientations: Orientations | None = Field(
-        None, description="[orientations] of orientation-workspace and attainability: definition, divisions, values"
+        None,
+        description="[orientations] of orientations, orientation-workspace and attainability: definition, divisions, "
+        "values",
     )
     limits: SweepLimits = Field(default_factory=SweepLimits, description="[limits]")
     run: Run = Field(default_factory=Run, description="[run] dtype, tile, store")

@@ -21,6 +21,7 @@ class Verdict(enum.IntFlag):
     UNDECIDED = 2048
     CABLE_OVER_ACCELERATION = 4096
     FEWER_ARCS_UNDECIDED = 8192
+    NOT_ACCESSIBLE = 16384
 
     @property
     def text(self) -> str:
@@ -43,4 +44,5 @@ SENTENCES = {
     Verdict.UNDECIDED: "The margin is within the stated tolerance of zero: neither proved nor refuted.",
     Verdict.CABLE_OVER_ACCELERATION: "A cable exceeds its largest acceleration.",
     Verdict.FEWER_ARCS_UNDECIDED: "Feasible as stated, but a smaller number of arcs could not be refuted.",
+    Verdict.NOT_ACCESSIBLE: "No way leads there from the reference orientation without interference or singularity.",
 }

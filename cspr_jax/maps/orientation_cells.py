@@ -99,6 +99,7 @@ class AttainableMap(AccessibleMap):
         pieces = zip(every, np.split(arcs, stops), np.split(verdicts, stops), strict=True)
         rows = [_of_attained(*piece) for piece in pieces]
         columns = {name: np.array([row[name] for row in rows[: len(places)]]) for name in rows[0]}
+        columns["main_reason"] = columns["main_reason"].astype(np.uint16)
         rough = np.array([row["attainable_fraction"] for row in rows[len(places) :]])
         error = np.abs(columns["attainable_fraction"] - rough)
         return _of_sets(fine, coarse) | columns | {"attainable_error": error}
@@ -125,12 +126,15 @@ def _of_attained(inside: Accessible, arcs: np.ndarray, verdicts: np.ndarray) -> 
     count, good = len(arcs), arcs > 0
     if not count:
         names = ("attainable_fraction", "attainable_volume", "mean_arcs", "undecided_fraction", *REFUSALS)
-        return {"attainable": 0.0, **dict.fromkeys(names, np.nan)}
+        return {"attainable": 0.0, "main_reason": 0, **dict.fromkeys(names, np.nan)}
+    refused = {flag: float((~good & ((verdicts & flag) != 0)).mean()) for flag in REFUSALS.values()}
+    main = max(refused, key=lambda flag: refused[flag])
     return {
         "attainable": float(good.sum()),
         "attainable_fraction": float(good.mean()),
         "attainable_volume": float(inside.volume[good].sum() / inside.volume.sum()),
         "mean_arcs": float(arcs[good].mean()) if good.any() else np.nan,
         "undecided_fraction": float(((verdicts & Verdict.UNDECIDED.value) != 0).mean()),
-        **{name: float((~good & ((verdicts & flag) != 0)).mean()) for name, flag in REFUSALS.items()},
+        "main_reason": main.value if refused[main] > 0.0 else 0,
+        **{name: refused[flag] for name, flag in REFUSALS.items()},
     }

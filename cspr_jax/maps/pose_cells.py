@@ -12,7 +12,7 @@ from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
-from cspr_jax.maps.pose_answers import PoseAnswers, in_parts, reached
+from cspr_jax.maps.pose_answers import PoseAnswers, contradictions, in_parts, reached
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.tiles import Grid
@@ -93,10 +93,4 @@ class PoseMap(PlatformMap):
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        found = answers["arcs"] > 0
-        margins = np.minimum(np.minimum(answers["margin"], answers["limit_margin"]), answers["det_margin"])
-        return {
-            "a feasible cell with a margin below zero": found & ~(margins > 0.0),
-            "an infeasible cell whose verdict is 0": ~found & (answers["verdict"] == 0),
-            "a feasible cell without a duration": found & ~(answers["duration"] > 0.0),
-        }
+        return contradictions(answers)

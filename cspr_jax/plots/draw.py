@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cspr_jax.errors import ConfigError, InputError, StoreError
+from cspr_jax.plots.envelope import AXES, envelope_figure
 from cspr_jax.plots.labels import PANELS, chosen, value
 from cspr_jax.plots.lines import Line, line_figure, lines_of, overlaid
 from cspr_jax.plots.motion import motion_figure
@@ -42,6 +43,7 @@ def plot(
     quantity: str | None = None,
     at: dict[str, float] | None = None,
     lines: str | None = None,
+    envelope: bool = False,
 ) -> None:
     """Draw one result file, or several maps as lines in one picture.
 
@@ -51,6 +53,7 @@ def plot(
         quantity: which one of a map; None: "arcs", or the first there is.
         at: fixed values of axes, the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
+        envelope: whether to draw all orientations of one place, in three dimensions.
 
     Raises:
         StoreError: a file cannot be read, or the picture cannot be written.
@@ -58,7 +61,9 @@ def plot(
     """
     results = [open_result(path) for path in paths]
     try:
-        if len(results) > 1:
+        if envelope:
+            figure = _envelope(results, quantity, at or {}, lines)
+        elif len(results) > 1:
             figure = _overlay(paths, results, quantity, at or {}, lines)
         elif results[0].is_map:
             figure = _map_figure(results[0], quantity, at or {}, lines)
@@ -78,6 +83,20 @@ def _refuse_choices(quantity: str | None, at: dict[str, float] | None, lines: st
     for key, given in (("--quantity", quantity), ("--at", at), ("--lines", lines)):
         if given:
             raise InputError(key, given, "absent for a motion")
+
+
+def _envelope(results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None) -> Figure:
+    result = results[0]
+    if len(results) > 1 or not result.is_map or not set(AXES) <= set(result.axes) or "verdict" not in result.data:
+        raise InputError("--envelope", "no orientations", 'of one result of map = "orientations" that holds verdicts')
+    for key, given in (("--quantity", quantity), ("--lines", lines)):
+        if given:
+            raise InputError(key, given, "absent with --envelope")
+    elsewhere = {axis: points[0] for axis, points in result.axes.items() if axis not in AXES and len(points) > 1}
+    view = _view(result, "verdict", elsewhere | at)
+    if set(view.across) != set(AXES):
+        raise InputError("--at", sorted(at), "no axis of " + ", ".join(AXES))
+    return envelope_figure(result, view.data.transpose([view.across.index(axis) for axis in AXES]), view.fixed)
 
 
 def _overlay(

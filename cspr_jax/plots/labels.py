@@ -122,7 +122,7 @@ def panels(figure: Figure, count: int, *, polar: bool = False) -> tuple[list[Axe
     columns = columns_of(count)
     lines = -(-count // columns)
     kind = {"projection": "polar"} if polar else {}
-    grid = figure.subplots(lines, columns, squeeze=False, sharex=not polar, sharey=not polar, subplot_kw=kind)
+    grid = figure.subplots(lines, columns, squeeze=False, sharex=not polar, sharey=True, subplot_kw=kind)
     for panel in grid.flat[count:]:
         panel.set_visible(False)
     return list(grid.flat[:count]), list(grid[-1]), list(grid[:, 0])

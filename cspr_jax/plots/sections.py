@@ -7,11 +7,15 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 
+from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.plots.labels import PANELS, axis_label, chosen, columns_of, label, notes, panels, start, value
+from cspr_jax.plots.reasons import colours_of, reasons
 from cspr_jax.results import Result
 
 # Quantities of which either sign is as good as the other.
 SIGNED = ("used_inclination",)
+# Quantities that are flags of a verdict.
+VERDICTS = ("verdict", "main_reason")
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
 NONE_COLOUR = "#d0d0d0"
@@ -33,34 +37,59 @@ def section_figure(
     Returns:
         the figure.
     """
-    shown = chosen(data.shape[2], PANELS)
+    tells = _tells(name, data)
+    told = np.flatnonzero(tells.any((0, 1)))
+    shown = told[chosen(len(told), PANELS)] if len(told) else chosen(data.shape[2], PANELS)
     columns, count = columns_of(len(shown)), len(shown)
     size = (3.1 * columns + 1.3, 3.2 * -(-count // columns) + 0.8) if count > 1 else (7.0, 5.6)
     figure = Figure(figsize=size, layout="constrained")
     polar = tuple(across) == POLAR
     every, bottom, left = panels(figure, count, polar=polar)
-    colours, norm = _colours(data[:, :, shown], signed=name in SIGNED)
-    for panel, i in zip(every, shown, strict=True):
-        image = _section(panel, result, data[:, :, i], across, colours, norm)
+    data = data[:, :, shown]
+    words: list[str] = []
+    if name in VERDICTS:
+        data, words, used = reasons(data)
+        colours, norm = colours_of(used)
+    else:
+        colours, norm = _colours(data, signed=name in SIGNED)
+    for k, (panel, i) in enumerate(zip(every, shown, strict=True)):
+        image = _section(panel, result, data[:, :, k], across, colours, norm)
         if name == "least_oscillations":
-            _loci(panel, result, data[:, :, i], across)
+            _loci(panel, result, data[:, :, k], across)
         if over is not None:
             panel.set_title(value(result, over, result.axes[over][i], digits=3), fontsize=10)
-    for panel in bottom if not polar else []:
-        panel.set_xlabel(axis_label(result, across[0]))
-    for panel in left if not polar else []:
-        panel.set_ylabel(axis_label(result, across[1]))
+    if polar and len(told):
+        farthest = np.flatnonzero(tells[:, :, shown].any((0, 2)))[-1]
+        every[0].set_ylim(0.0, _edges(result.axes[across[1]])[farthest + 1])
+        fixed = [*fixed, f"around: {across[0]}, outward: {across[1]} (rad)"]
+    elif not polar:
+        _name_axes(result, across, bottom, left)
     bar = figure.colorbar(image, ax=every, shrink=0.9, label=label(result, name))
-    if data.dtype.kind == "i":
-        _count_ticks(bar, int(data[:, :, shown].max()))
+    if words:
+        bar.set_ticks(range(len(words)), labels=words)
+        bar.ax.minorticks_off()
+    elif data.dtype.kind == "i":
+        _count_ticks(bar, int(data.max()))
     handles, labels = every[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside lower left", ncols=len(handles), fontsize=9, frameon=False)
-    if polar:
-        fixed = [*fixed, f"around: {across[0]}, outward: {across[1]} (rad)"]
     used = [*across, *([over] if over else [])]
     figure.suptitle(f"{result.attributes['robot']}: {result.labels[name]}\n{notes(result, fixed, used)}", fontsize=11)
     return figure
+
+
+def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list[Axes]) -> None:
+    for panel in bottom:
+        panel.set_xlabel(axis_label(result, across[0]))
+    for panel in left:
+        panel.set_ylabel(axis_label(result, across[1]))
+
+
+def _tells(name: str, data: np.ndarray) -> np.ndarray:
+    # Cells that say more than that there is nothing.
+    if name in VERDICTS:
+        return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0
+    return data > 0 if data.dtype.kind == "i" else np.isfinite(data)
 
 
 def _section(panel: Axes, result: Result, values: np.ndarray, across: list[str], colours, norm):

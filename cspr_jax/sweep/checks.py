@@ -11,7 +11,7 @@ from cspr_jax.errors import ConfigError, shown
 
 _START = ("from_x", "from_y", "from_z")
 _INSTANTS = ("tau", "cable")
-_OF_ORIENTATIONS = ("orientation-workspace", "attainability")
+_OF_ORIENTATIONS = ("orientations", "orientation-workspace", "attainability")
 _POSES = ("tilt_azimuth", "tilt", "torsion")
 
 
@@ -147,10 +147,14 @@ def _check_orientations(keys: SweepFile, path: Path) -> None:
         raise ConfigError(path, "trajectory.inclination: must be absent in this map")
     if keys.trajectory.start is not None and not keys.trajectory.start.rest:
         raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
+    given = keys.orientations
+    definition = given.definition if given is not None and "definition" in given.model_fields_set else "grid"
+    if keys.map == "orientations" and definition != "grid":
+        raise ConfigError(path, f'orientations.definition = "{definition}": must be "grid" in this map')
     if keys.map == "orientation-workspace":
         if keys.limits.model_fields_set:
             raise ConfigError(path, 'limits: must be absent in this map; they are for map = "attainability"')
-        if keys.orientations is not None and keys.orientations.values is not None:
+        if given is not None and given.values is not None:
             raise ConfigError(path, 'orientations.values: must be absent in this map; it is for map = "attainability"')
 
 
@@ -159,6 +163,7 @@ _CHECKS: dict[str, Callable[[SweepFile, Path], None]] = {
     "minimum-oscillations": _check_oscillations,
     "transition-envelopes": _check_envelopes,
     "poses": _check_poses,
+    "orientations": _check_orientations,
     "orientation-workspace": _check_orientations,
     "attainability": _check_orientations,
 }

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import math
 import os
 import shutil
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from cspr_jax import __version__
 from cspr_jax.config.reading import checked, parse_toml, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
-from cspr_jax.config.sweep import AxisRange, SweepFile
+from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.quantities import DEFAULT_STORE, OF_MAP, TITLES
@@ -86,7 +87,10 @@ def read_sweep(path: Path) -> Sweep:
     keys = checked(SweepFile, data, path)
     robot = resolve_robot(keys.robot, path, path.parent)
     check_map(keys, path)
+    # All orientations are this map's own axes.
+    own = _orientation_axes(keys) if keys.map == "orientations" else {}
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
+    counts |= {name: len(points) for name, points in own.items()}
     store = list(keys.run.store or DEFAULT_STORE[keys.map])
     for name in store:
         if name not in OF_MAP[keys.map]:
@@ -95,6 +99,7 @@ def read_sweep(path: Path) -> Sweep:
     _check_size(counts, tile, store, keys.run.dtype, path)
     axes = {name: _points(getattr(keys.axes, name)) for name in data["axes"]}
     check_points(axes, path)
+    axes |= own
     # What is not given decides nothing: a key that a later version adds leaves old identities as they are.
     settings = keys.model_dump(mode="json", by_alias=True, exclude_none=True)
     settings |= {"robot": robot.model_dump(mode="json", exclude_none=True), "dimensions": list(axes)}
@@ -110,6 +115,16 @@ def _points(axis: AxisRange | list[float]) -> np.ndarray:
     if isinstance(axis, AxisRange):
         return np.linspace(axis.start, axis.stop, axis.count)
     return np.asarray(axis, float)
+
+
+def _orientation_axes(keys: SweepFile) -> dict[str, np.ndarray]:
+    count = (keys.orientations or Orientations()).divisions
+    step = math.pi / count
+    return {
+        "torsion": np.arange(1 - count, count + 1) * step,
+        "tilt_azimuth": np.arange(2 * count) * step,
+        "tilt": np.arange(count) * step,
+    }
 
 
 def _tile(keys: SweepFile, shape: tuple[int, ...], path: Path) -> tuple[int, ...]:

@@ -12,6 +12,7 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ResourceError, SelfCheckError
 from cspr_jax.identity import digest
 from cspr_jax.maps.cells import CellMap
+from cspr_jax.maps.each_orientation import EachOrientationMap
 from cspr_jax.maps.envelope_cells import EnvelopeMap
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.maps.orientation_cells import AccessibleMap, AttainableMap
@@ -27,6 +28,7 @@ MAPS: dict[str, Callable[[RobotFile, SweepFile, object], GridMap]] = {
     "minimum-oscillations": OscillationMap,
     "transition-envelopes": EnvelopeMap,
     "poses": PoseMap,
+    "orientations": EachOrientationMap,
     "orientation-workspace": AccessibleMap,
     "attainability": AttainableMap,
 }

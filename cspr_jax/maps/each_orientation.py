@@ -1,0 +1,80 @@
+"""Cells of sweeps over all orientations of places: which are accessible, and which a motion from rest attains."""
+
+import math
+
+import numpy as np
+
+from cspr_jax import problem
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.maps.accessible import accessible
+from cspr_jax.maps.attainable import VALUES, attainable
+from cspr_jax.maps.orientation_cells import DIGITS, AccessibleMap
+from cspr_jax.maps.pose_answers import contradictions
+from cspr_jax.maps.pose_cells import TILT_TORSION
+
+FLOATS = ("duration", "margin", "limit_margin", "beta_hat", "det_margin", "cable_distance")
+
+
+class EachOrientationMap(AccessibleMap):
+    """The map of the orientations of tilt and torsion; see `GridMap`."""
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Build the checker of motions from rest."""
+        super().__init__(spec, keys, file)
+        kind = problem.motion_kind(keys.trajectory, from_rest=True)
+        self._checker = PoseChecker(self._shared, kind, batch=MANY)
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        places, z0 = self._targets(cells), self._depths(cells)
+        # An axis of the file turned over turns phi and sigma around.
+        angles = np.stack([cells[name] for name in TILT_TORSION], axis=1)
+        angles = angles * np.array([self._signs[1], 1.0, self._signs[2]])
+        some = np.flatnonzero(self._accessible(places, angles) & (z0 > 0.0))
+        count, found = len(z0), {}
+        if len(some):
+            found = vars(
+                attainable(
+                    self._checker,
+                    places[some],
+                    angles[some],
+                    z0[some],
+                    max_arcs=self._keys.trajectory.max_arcs,
+                    values=self._orientations.values or VALUES,
+                    found=self._alike,
+                )
+            )
+            found = found | {"beta_hat": found["beta_hat"][:, 1]}
+        verdict, arcs = np.full(count, Verdict.NOT_ACCESSIBLE.value, np.uint16), np.zeros(count, int)
+        every = {"arcs": arcs, "tried_arcs": arcs.copy(), "verdict": verdict}
+        every |= {name: np.full(count, np.nan) for name in FLOATS}
+        for name, values in every.items():
+            if len(some):
+                values[some] = found[name]
+        return every
+
+    def _accessible(self, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        # (n,) whether each orientation is, on the grid of which the angles are points.
+        divisions = self._orientations.divisions
+        every, own = np.unique(np.round(places, DIGITS), axis=0, return_inverse=True)
+        index, inside = _index(angles, divisions), np.zeros(len(places), bool)
+        for k, place in enumerate(every):
+            free = np.zeros((2 * divisions, divisions, 2 * divisions), bool)
+            free[_index(accessible(self._shared.robot, place, "grid", divisions).angles, divisions)] = True
+            free[:, 0] = free[0, 0]  # without a tilt its azimuth says nothing
+            which = own.ravel() == k
+            inside[which] = free[tuple(i[which] for i in index)]
+        return inside
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        return contradictions(answers)
+
+
+def _index(angles: np.ndarray, divisions: int) -> tuple[np.ndarray, ...]:
+    # Places of (phi, theta, sigma) on the grid.
+    phi, theta, sigma = np.round(angles.T * (divisions / math.pi)).astype(int)
+    return phi % (2 * divisions), theta, sigma % (2 * divisions)

@@ -1,0 +1,68 @@
+"""The orientations of one place in three dimensions: tilt around its azimuth, torsion upward."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from cspr_jax.errors import InputError
+from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.plots.labels import COLOURS, notes
+from cspr_jax.results import Result
+
+AXES = ("torsion", "tilt_azimuth", "tilt")
+SECTIONS = 17
+_ACCESSIBLE, _ATTAINED = "#9e9e9e", COLOURS[0]
+
+
+def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> Figure:
+    """Outlines of what is accessible and of what is attained, at some torsions.
+
+    Args:
+        result: gives axes, labels and constants.
+        verdicts: (n_torsions, n_azimuths, n_tilts) flags.
+        fixed: what was fixed for the picture.
+
+    Returns:
+        the figure.
+
+    Raises:
+        InputError: nothing is accessible.
+    """
+    torsion, azimuth, tilt = (result.axes[name] for name in AXES)
+    flags = verdicts.astype(int)
+    accessible = (flags & Verdict.NOT_ACCESSIBLE.value) == 0
+    attained = (flags & ~Verdict.FEWER_ARCS_UNDECIDED.value) == 0
+    levels = np.flatnonzero(accessible.any((1, 2)))
+    if not len(levels):
+        raise InputError("--envelope", "nothing is accessible", "a place with accessible orientations")
+    shown = levels[np.unique(np.linspace(0, len(levels) - 1, min(SECTIONS, len(levels))).round().astype(int))]
+    # Around: the first azimuth again; outward: one tilt beyond, so that outlines close.
+    around = np.append(azimuth, azimuth[0] + 2.0 * np.pi)
+    outward = np.degrees(np.append(tilt, 2.0 * tilt[-1] - tilt[-2]))
+    x, y = (np.outer(f(around), outward) for f in (np.cos, np.sin))
+    figure = Figure(figsize=(11.0, 5.6), layout="constrained")
+    reach = np.degrees(tilt[accessible.any((0, 1))].max()) + 10.0
+    for place, view in enumerate(((22.0, -60.0), (12.0, 30.0)), start=1):
+        panel = figure.add_subplot(1, 2, place, projection="3d", elev=view[0], azim=view[1])
+        for which, colour, width in ((accessible, _ACCESSIBLE, 0.9), (attained, _ATTAINED, 1.4)):
+            for level in shown:
+                inside = np.pad(which[level].astype(float), ((0, 1), (0, 1)))
+                inside[-1] = inside[0]
+                if inside.any():
+                    height = float(np.degrees(torsion[level]))
+                    panel.contour(
+                        x, y, inside, levels=[0.5], colors=[colour], linewidths=width, zdir="z", offset=height
+                    )
+        panel.set(
+            xlim=(-reach, reach),
+            ylim=(-reach, reach),
+            zlim=(np.degrees(torsion[levels[0]]), np.degrees(torsion[levels[-1]])),
+            xlabel="tilt · cos azimuth (°)",
+            ylabel="tilt · sin azimuth (°)",
+            zlabel="torsion (°)",
+        )
+    handles = [Line2D([], [], color=_ACCESSIBLE), Line2D([], [], color=_ATTAINED)]
+    figure.legend(handles, ["accessible", "attained from rest"], loc="outside lower center", ncols=2, frameon=False)
+    title = f"{result.attributes['robot']}: orientations of a place"
+    figure.suptitle(f"{title}\n{notes(result, fixed, list(AXES))}", fontsize=11)
+    return figure

@@ -1,0 +1,57 @@
+"""Verdicts as colours: one reason a cell, the first of those that its flags name."""
+
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
+
+from cspr_jax.feasibility.verdicts import Verdict
+
+# In this order: what lies deeper comes first. The colours are Okabe and Ito's, and greys.
+REASONS = {
+    Verdict.NOT_ACCESSIBLE: ("not accessible", "#f4f4f4"),
+    Verdict.UNDECIDED: ("undecided", "#F0E442"),
+    Verdict.NOT_FINITE: ("not finite", "#000000"),
+    Verdict.ABOVE_SPOOLS: ("above the spools", "#9e9e9e"),
+    Verdict.BELOW_FLOOR: ("below the floor", "#6f6f6f"),
+    Verdict.SINGULAR: ("singular", "#D55E00"),
+    Verdict.CABLE_CABLE: ("cables touch", "#CC79A7"),
+    Verdict.CABLE_PLATFORM: ("cable touches platform", "#E69F00"),
+    Verdict.SLACK_CABLE: ("slack cable", "#56B4E9"),
+    Verdict.OVER_TENSION: ("too much tension", "#0072B2"),
+    Verdict.CABLE_TOO_LONG: ("cable too long", "#8c6d31"),
+    Verdict.CABLE_TOO_FAST: ("cable too fast", "#7b4173"),
+    Verdict.CABLE_OVER_ACCELERATION: ("cable acceleration", "#bd9e39"),
+}
+FEASIBLE = ("feasible", "#009E73")
+# Flags that do not stand in the way.
+NO_REASON = Verdict.FEWER_ARCS_UNDECIDED | Verdict.NO_ARCS
+
+
+def reasons(verdicts: np.ndarray) -> tuple[np.ndarray, list[str], list[str]]:
+    """Verdicts as numbers of reasons.
+
+    Args:
+        verdicts: (...) flags.
+
+    Returns:
+        (...) number of the reason, from 0 on; the words of those that occur; their colours.
+    """
+    flags = verdicts.astype(int) & ~NO_REASON.value
+    found = np.zeros(flags.shape, int)
+    for number, flag in reversed(list(enumerate(REASONS, start=1))):
+        found = np.where(flags & flag.value, number, found)
+    used = np.unique(found)
+    every = [FEASIBLE, *REASONS.values()]
+    words, colours = zip(*(every[number] for number in used), strict=True)
+    return np.searchsorted(used, found), list(words), list(colours)
+
+
+def colours_of(colours: list[str]) -> tuple[ListedColormap, BoundaryNorm]:
+    """Their colour map.
+
+    Args:
+        colours: of `reasons`.
+
+    Returns:
+        the map, and its bounds.
+    """
+    return ListedColormap(colours), BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
