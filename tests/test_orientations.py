@@ -9,6 +9,9 @@ import jax
 import numpy as np
 import pytest
 from oracles import platform as oracle
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from test_platform import MSSM, ours
 from test_pose_plans import cspr
@@ -135,6 +138,35 @@ def test_definitions_agree():
         found = {name: accessible(robot, place(radius, 0.2), name, 16).volume.sum() for name in DEFINITIONS}
         for a, b in itertools.combinations(found.values(), 2):
             assert a == pytest.approx(b, rel=0.06), found
+
+
+def test_no_way_leads_through_touching_cables():
+    """Steps of pi / 12 and pi / 24 have orientations where cables just touch, with gaps of rounding errors."""
+    robot, there = ours(MSSM), place(1.5, 0.0)
+    plain = accessible(robot, there, "grid", 16).volume.sum()
+    for definition, divisions in (("grid", 12), ("grid", 24), ("equal-volume", 24)):
+        assert accessible(robot, there, definition, divisions).volume.sum() == pytest.approx(plain, rel=0.03)
+
+
+def test_the_accessible_volume_beside_random_orientations():
+    """A random roadmap, which knows no grid: its part of 20,000 orientations is the volume, within its error."""
+    count, robot = 20_000, ours(MSSM)
+    some = Rotation.random(count - 1, random_state=3).as_quat(scalar_first=True)
+    every = np.concatenate([np.eye(4)[:1], some])
+    step = (8.0 * math.pi**2 / count) ** (1.0 / 3.0)
+    tree = cKDTree(np.concatenate([every, -every]))
+    pairs = tree.query_pairs(2.0 * math.sin(0.25 * 1.5 * step), output_type="ndarray") % count
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    for there in (place(1.5, 0.0), place(3.0, 1.2)):
+        watch = Watch(robot, there)
+        sights = watch.at(every)
+        way = pairs[watch.passable(sights, *pairs.T)]
+        links = coo_matrix((np.ones(len(way), bool), way.T), shape=(count, count))
+        part = connected_components(links, directed=False)[1]
+        share = ((part == part[0]) & watch.regular(sights)).mean()
+        error = math.sqrt(share * (1.0 - share) / count)
+        volume = accessible(robot, there, "equal-volume", 32).volume.sum()
+        assert share == pytest.approx(volume, abs=3.0 * error)
 
 
 def test_nothing_is_accessible_above_the_spools():

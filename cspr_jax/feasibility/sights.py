@@ -22,6 +22,8 @@ BATCH = 4096
 # Determinants below this part of that of the reference orientation count as singular, of whichever sign rounding makes
 # them.
 SINGULAR = 1e-6
+# Gaps between cables below this part of the platform's size are none.
+TOUCHING = 1e-9
 # Steps between neighbours that are held at a time.
 STEPS = 65536
 
@@ -83,6 +85,7 @@ class Watch:
         self._contacts: Contacts = contacts(robot)
         self._pairs = tuple((int(i), int(j)) for i, j in self._contacts.pairs)
         self._reference = reference_share(robot, self._place)
+        self._size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
 
     def at(self, quaternions: np.ndarray) -> Sights:
         """What is seen of orientations.
@@ -97,7 +100,10 @@ class Watch:
         found = in_batches(
             partial(_sights, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), size=BATCH
         )
-        return Sights(found[0] / self._reference, *found[1:])
+        share, gaps, views = found
+        # Cables that touch have a gap of rounding errors, whose direction means nothing.
+        gaps[np.linalg.norm(gaps, axis=2) < TOUCHING * self._size] = 0.0
+        return Sights(share / self._reference, gaps, views)
 
     def regular(self, sights: Sights) -> np.ndarray:
         """Orientations that are not beyond a singularity.
