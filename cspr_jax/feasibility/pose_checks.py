@@ -20,7 +20,6 @@ from cspr_jax.feasibility.pose_kernel import (
     LEAST_COSINE,
     glances,
     look_along,
-    lowest_by_product,
     moving_along,
     narrowed,
     smallest_tensions,
@@ -37,6 +36,8 @@ FEW, MANY = 256, 1024
 CHUNK, FIRST = 8, 4
 SAMPLES = 64  # an arc
 HALVINGS = 12
+# Where the determinant changes by more than this factor from sample to sample, so many pieces are narrowed down.
+STEEP, PIECES = 1.25, 16
 TOLERANCE = 1e-7
 TOUCH = 1e-6  # of the platform's size
 # Values that spread less along a motion are not narrowed.
@@ -179,13 +180,12 @@ class PoseChecker:
         if not len(arcs):
             return found
         self._count("motions", len(arcs))
-        moving, tensions = self._moving(segments, arcs)
+        moving = self._moving(segments, arcs)
         is_open = whole | (moving > -TOLERANCE).all(0)
         found.verdict[~is_open] = Verdict.SLACK_CABLE.value
         rest = np.flatnonzero(is_open)
         if len(rest):
-            own = tensions[:, np.repeat(is_open, arcs)]
-            found.put(rest, self._still(rows(segments, rest), arcs[rest], moving[:, rest], own))
+            found.put(rest, self._still(rows(segments, rest), arcs[rest], moving[:, rest]))
         return found
 
     def nothing(self, count: int) -> PoseChecks:
@@ -199,12 +199,12 @@ class PoseChecker:
         """
         return PoseChecks(np.zeros(count, int), np.full((count, len(self._flags)), np.nan), np.full(count, np.nan))
 
-    def _still(self, segments: PoseSegment, arcs: np.ndarray, moving: np.ndarray, tensions: np.ndarray) -> PoseChecks:
-        # With what depends on the pose alone; `moving` and `tensions` are of `_moving`.
+    def _still(self, segments: PoseSegment, arcs: np.ndarray, moving: np.ndarray) -> PoseChecks:
+        # With what depends on the pose alone; `moving` is of `_moving`.
         kernel = partial(look_along, self.shared, self._platform, pairs=self._pairs, kind=self.kind)
         row, arc, looks = self._along(kernel, segments, arcs)
         still = self._narrowed(segments, arcs, (row, arc, looks.values), self._pairs)
-        self._dip(segments, arcs, (row, arc, tensions * looks.values[:, 0]), moving)
+        self._beside_singularities(segments, arcs, (row, arc, looks.values[:, 0]), moving)
         nearest, least = still[-1], np.concatenate([moving, still[:-1]])[order(self.shared.limits)]
         is_finite = np.isfinite(least).all(0) & ~np.isnan(nearest) & (self.durations(segments, arcs) > 0.0)
         verdict = np.zeros(len(arcs), int)
@@ -225,28 +225,26 @@ class PoseChecker:
             np.where(is_finite, nearest, np.nan),
         )
 
-    def _moving(self, segments: PoseSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # (n_values, n) smallest values of the criteria that depend on the motion, and the tensions of `_along`.
+    def _moving(self, segments: PoseSegment, arcs: np.ndarray) -> np.ndarray:
+        # (n_values, n) smallest values of the criteria that depend on the motion.
         kernel = partial(moving_along, self.shared, kind=self.kind)
-        seen = self._along(kernel, segments, arcs)
-        least = self._narrowed(segments, arcs, seen, None)
+        least = self._narrowed(segments, arcs, self._along(kernel, segments, arcs), None)
         # The motion may jump at a knot.
         places = np.meshgrid(np.arange(len(least)), np.arange(len(arcs)), self._knots, indexing="ij")
         which, row, tau = (x.ravel() for x in places)
         self._lower(least, segments, arcs, (which, row, tau, np.zeros(len(row))), None)
-        return least, seen[-1][:, 0]
+        return least
 
-    def _dip(self, segments: PoseSegment, arcs: np.ndarray, seen: tuple, moving: np.ndarray) -> None:
-        # Beside a singularity tensions change too fast for samples. Times the determinant they do not, and where that
-        # product could be negative between samples, the smallest tension is looked for by it.
-        row, arc, product = seen
-        place, _, item = _low_points(product[:, None], np.zeros((1, len(row))))
-        if len(item):
-            which = row[item]
-            tau, width = (arc[item] + place / SAMPLES) / arcs[which], 1.0 / (SAMPLES * arcs[which])
-            kernel = partial(lowest_by_product, self.shared, kind=self.kind)
-            items = (rows(segments, which), arcs[which].astype(float), tau, width)
-            np.minimum.at(moving[0], which, in_batches(kernel, items, size=self.batch))
+    def _beside_singularities(self, segments: PoseSegment, arcs: np.ndarray, seen: tuple, moving: np.ndarray) -> None:
+        # Tensions have the determinant below the line: between samples in which that changes by much they are looked
+        # for in smaller steps. `moving` is of `_moving`, and is written into.
+        row, arc, determinant = seen
+        low, high = (f(determinant[1:], determinant[:-1]) for f in (np.minimum, np.maximum))
+        place, item = np.nonzero((low > 0.0) & (high > STEEP * low))
+        which, pieces = np.repeat(row[item], PIECES), (np.arange(PIECES) + 0.5) / PIECES
+        within = arc[item][:, None] + (place[:, None] + pieces) / SAMPLES
+        tau, width = within.ravel() / arcs[which], 0.5 / (PIECES * SAMPLES * arcs[which])
+        self._lower(moving, segments, arcs, (np.zeros(len(which), int), which, tau, width), None)
 
     def _along(self, kernel: Callable, segments: PoseSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray, Any]:
         # Arc by arc: whose it is, which one, and what the kernel says, which has the arcs last.

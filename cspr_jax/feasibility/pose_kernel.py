@@ -1,6 +1,5 @@
 """The compiled functions that look at many motions of a platform at once, one lane a segment."""
 
-from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ from jax import Array, lax
 
 from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility import contact_lanes
-from cspr_jax.feasibility.pose_lanes import lowest_tension, moving_slacks, product_and_tension, still_slacks
+from cspr_jax.feasibility.pose_lanes import lowest_tension, moving_slacks, still_slacks
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.lanes import dot, smallest, stored
 from cspr_jax.platforms import PlatformRobot
@@ -162,50 +161,18 @@ def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind) -> A
         found = values[0]
         for k, value in enumerate(values[1:], start=1):
             found = jnp.where(which == k, value, found)
-        return (found,)
-
-    return _sections(at, tau, width)[0]
-
-
-@partial(jax.jit, static_argnames="kind")
-def lowest_by_product(shared: PoseShared, items, *, kind: Kind) -> Array:
-    """The smallest tension met in search of the smallest product of tension and determinant, by golden sections.
-
-    Args:
-        shared: robot, amplitude.
-        items: segments (leaves (n, ...)), arcs (n,), instants (n,), half the width of the bracket (n,).
-        kind: of the motions.
-
-    Returns:
-        (n,) of `pose_lanes.moving_slacks`.
-    """
-    segments, arcs, tau, width = items
-
-    def at(points):
-        return product_and_tension(
-            shared, segments, arcs, instant(shared.amplitude, segments.sense, arcs, points), kind
-        )
-
-    return _sections(at, tau, width)[1]
-
-
-def _sections(at: Callable[[Array], tuple[Array, ...]], tau: Array, width: Array) -> tuple[Array, ...]:
-    # The smallest of each of some values met on the way to the smallest of the first, between instants.
-    def seen(points):
-        return tuple(jnp.where(jnp.isnan(x), jnp.inf, x) for x in at(points))
+        return jnp.where(jnp.isnan(found), jnp.inf, found)
 
     low, high = jnp.maximum(tau - width, 0.0), jnp.minimum(tau + width, 1.0)
     left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    both = lax.map(seen, jnp.stack([left, right]))
-    at_left, at_right = both[0]
+    at_left, at_right = lax.map(at, jnp.stack([left, right]))
 
     def section(_, carry):
         (low, high, left, right, at_left, at_right), least = carry
         go_left = at_left < at_right
         low, high = jnp.where(go_left, low, left), jnp.where(go_left, right, high)
         fresh = jnp.where(go_left, high - _GOLDEN * (high - low), low + _GOLDEN * (high - low))
-        met = seen(fresh)
-        value = met[0]
+        value = at(fresh)
         new = (
             low,
             high,
@@ -214,9 +181,9 @@ def _sections(at: Callable[[Array], tuple[Array, ...]], tau: Array, width: Array
             jnp.where(go_left, value, at_right),
             jnp.where(go_left, at_left, value),
         )
-        return new, tuple(jnp.minimum(a, b) for a, b in zip(least, met, strict=True))
+        return new, jnp.minimum(least, value)
 
-    start = (low, high, left, right, at_left, at_right), tuple(x.min(0) for x in both)
+    start = (low, high, left, right, at_left, at_right), jnp.minimum(at_left, at_right)
     return lax.fori_loop(0, _SECTIONS, section, start)[1]
 
 

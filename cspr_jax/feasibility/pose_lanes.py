@@ -5,7 +5,7 @@ from jax import Array
 
 from cspr_jax.feasibility.limits import Limits, given
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.lanes import cross, dot, smallest, stored
+from cspr_jax.lanes import cross, dot, smallest
 from cspr_jax.platforms import CABLES, PlatformRobot
 from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.trajectories.pose_lanes import Instant, State, squared_duration, state
@@ -60,30 +60,6 @@ def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now:
     found = _balanced(robot, here, wires, squared_duration(segment, arcs))
     lowest = jnp.where(found.signed * segment.regular > 0.0, _smallest_tension(segment, found), -jnp.inf)
     return jnp.where(_is_flat(wires), jnp.inf, lowest)
-
-
-def product_and_tension(
-    shared: PoseShared, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind
-) -> tuple[Array, Array]:
-    """The smallest tension at one instant of many segments, and before it the same times the determinant.
-
-    Args:
-        shared: robot.
-        segment: leaves (n, ...), of the parity of `arcs`.
-        arcs: () or (n,) number of arcs, a float.
-        now: of these arcs.
-        kind: of the motions.
-
-    Returns:
-        (n,) that changes slowly beside a singularity; (n,) of `moving_slacks`.
-    """
-    robot, one = shared.robot, jnp.where(shared.robot.mass > 0.0, 1.0, 2.0)
-    here = state(segment, arcs, now, kind, one)
-    wires = cables(robot, here.position, here.turn)
-    found = _balanced(robot, here, wires, squared_duration(segment, arcs))
-    lowest = stored(_smallest_tension(segment, found), one)
-    tension = jnp.where(_is_flat(wires), jnp.inf, lowest)
-    return tension * jnp.abs(conditioning(robot, wires)), tension
 
 
 def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> list[Array]:
