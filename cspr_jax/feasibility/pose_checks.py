@@ -37,7 +37,7 @@ CHUNK, FIRST = 8, 4
 SAMPLES = 64  # an arc
 HALVINGS = 12
 # Where the determinant changes by more than this factor from sample to sample, so many pieces are narrowed down.
-STEEP, PIECES = 1.25, 16
+STEEP, PIECES = 1.25, 4
 TOLERANCE = 1e-7
 TOUCH = 1e-6  # of the platform's size
 # Values that spread less along a motion are not narrowed.
