@@ -123,19 +123,25 @@ def _parser() -> argparse.ArgumentParser:
     table.add_argument("--definition", choices=("grid", "scan", "equal-volume", "all"), help="3.3, 3.4: accessible set")
     table.add_argument("--amplitude", choices=("quintic", "effective", "effective-c3", "all"), help="3.3, 3.4")
     table.add_argument("--fine", action="store_true", help="3.3, 3.4: step pi/64 instead of pi/32")
+    bench = add("bench", _bench, "measure checks per second beside a NumPy version of the same check")
+    bench.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    for sub in (run, plan, table, bench):
+        sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
     robots = add("robots", _robots, "list the catalogue of robots")
     robots.add_argument("--json", action="store_true", help="print one JSON array and nothing else")
     quantities = add("quantities", _quantities, "list the quantities that a result can hold")
     quantities.add_argument("--json", action="store_true", help="print one JSON array and nothing else")
-    bench = add("bench", _bench, "measure checks per second beside a NumPy version of the same check")
-    bench.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
 
 
-def _use_64_bits() -> None:
+def _start_jax(options: argparse.Namespace) -> None:
+    from cspr_jax import xla
+
+    xla.prepare(options.device)
     import jax
 
     jax.config.update("jax_enable_x64", True)
+    xla.check_device(options.device)
 
 
 def _print_json(value: Any) -> None:
@@ -180,9 +186,14 @@ def _warn(line: str) -> None:
 
 @contextlib.contextmanager
 def _executor(options: argparse.Namespace, sweep: Any, stop: Any) -> Iterator[Any]:
+    from cspr_jax import xla
     from cspr_jax.sweep import executors
+
+    if options.scheduler is None:  # the workers of a scheduler have settings of their own
+        xla.prepare(options.device)
     from cspr_jax.sweep.tile import TileMap
 
+    xla.check_device(options.device)
     tile_map = TileMap(sweep)  # refuses a hopeless sweep before anything is made
     if options.scheduler is not None:
         from cspr_jax.sweep.distributed import Scheduler
@@ -236,7 +247,7 @@ def _plan(options: argparse.Namespace) -> int:
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
     if options.rate is not None and not 0.0 < options.rate < float("inf"):
         raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
-    _use_64_bits()
+    _start_jax(options)
     from cspr_jax import motions, planning, reports
 
     plan = planning.plan(options.plan)
@@ -276,7 +287,7 @@ def _plot(options: argparse.Namespace) -> int:
 
 
 def _table(options: argparse.Namespace) -> int:
-    _use_64_bits()
+    _start_jax(options)
     from cspr_jax import tables
 
     if options.list:
@@ -367,7 +378,7 @@ def _quantities(options: argparse.Namespace) -> int:
 
 
 def _bench(options: argparse.Namespace) -> int:
-    _use_64_bits()
+    _start_jax(options)
     from cspr_jax.bench import bench
 
     found = bench()

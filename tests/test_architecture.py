@@ -32,7 +32,7 @@ LAYERS = (
         "maps.pose_cells",
     ),
     ("sweep.checks", "sweep.definition", "sweep.signals", "sweep.environment"),
-    ("sweep.work", "sweep.claims", "sweep.inspection", "sweep.tile"),
+    ("sweep.work", "sweep.claims", "sweep.inspection", "sweep.tile", "compiled"),
     ("sweep", "planning", "choices", "sequences", "pose_sequences", "api"),
     (
         "bench",
@@ -44,6 +44,7 @@ LAYERS = (
         "motions",
         "plots",
         "progress",
+        "xla",
     ),
     ("cli", "__main__"),
 )

@@ -161,7 +161,8 @@ class PoseChecker:
             kernel = partial(smallest_tensions, shared.robot, shared.amplitude, float(arcs), chunk, kind=self.kind)
             some = segments if len(alive) == len(lowest) else rows(segments, alive)
             self._count("first look", len(alive) * CHUNK)
-            found = in_batches(kernel, some, size=FIRST * self.batch)
+            size = FIRST * self.batch if len(alive) > self.batch else self.batch // 2
+            found = in_batches(kernel, some, size=size)
             lowest[alive] = np.minimum(lowest[alive], np.where(np.isnan(found), -np.inf, found))
         return lowest
 

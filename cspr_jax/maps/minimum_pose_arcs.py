@@ -113,11 +113,13 @@ def smallest_arcs(
         if not (last >= arcs).any():
             break
         is_open = (last >= arcs) & ((only == 0) | (only == arcs))
-        alive = _sieved(checker, segments, arcs, np.flatnonzero((found == 0) & is_open[motion]))
+        alive = np.flatnonzero((found == 0) & is_open[motion])
+        alive = _sieved(checker, segments, arcs, alive, np.maximum(1.0 - TELLING / arcs, 0.0))
         first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
         # The first candidate of each motion, then all others of motions where it fails: few and large batches.
         for turn in (alive[first], np.delete(alive, first)):
             turn = turn[last[motion[turn]] >= arcs]
+            turn = _sieved(checker, segments, arcs, turn, np.linspace(1.0, 0.0, COARSE * arcs + 1))
             if not len(turn):
                 continue
             got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False)
@@ -129,11 +131,11 @@ def smallest_arcs(
     return Found(found, undecided, checks)
 
 
-def _sieved(checker: PoseChecker, segments: _Segments, arcs: int, alive: np.ndarray) -> np.ndarray:
-    for tau in (np.maximum(1.0 - TELLING / arcs, 0.0), np.linspace(1.0, 0.0, COARSE * arcs + 1)):
-        if len(alive):
-            alive = alive[checker.first_look(segments(arcs, alive), arcs, tau) > -TOLERANCE]
-    return alive
+def _sieved(checker: PoseChecker, segments: _Segments, arcs: int, alive: np.ndarray, tau: np.ndarray) -> np.ndarray:
+    # Those that some instants do not refute.
+    if not len(alive):
+        return alive
+    return alive[checker.first_look(segments(arcs, alive), arcs, tau) > -TOLERANCE]
 
 
 def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:

@@ -1,0 +1,119 @@
+"""What the command line sets before jax starts: vector width, where compiled code is kept, device.
+
+All of it is in environment variables, which processes that are started from here inherit. What the user has set wins,
+and the library itself never comes here.
+"""
+
+import contextlib
+import hashlib
+import importlib.metadata
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from cspr_jax import compiled
+from cspr_jax.errors import ConfigError
+
+# Twice as fast where the processor has it; XLA's own choice is half of it.
+WIDE, NEEDS = "--xla_cpu_prefer_vector_width=512", "avx512f"
+DEVICES = ("cpu", "gpu")
+PROBE_SECONDS = 120
+_PROBE = "import jax; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
+_KEPT = {
+    # Else the name of the folder is part of what entries are known by.
+    "JAX_PERSISTENT_CACHE_ENABLE_XLA_CACHES": "none",
+    "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.05",
+    "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
+}
+
+
+def prepare(device: str | None = None) -> None:
+    """Set what jax reads when it is imported; nothing if it has been.
+
+    Args:
+        device: "cpu"; "gpu" and None leave the choice to jax.
+    """
+    if "jax" in sys.modules:
+        return
+    if device == "cpu":
+        os.environ["JAX_PLATFORMS"] = "cpu"
+    folder = _folder()
+    if folder is None:
+        return
+    os.environ["XLA_FLAGS"] = _flags(folder, os.environ.get("XLA_FLAGS", ""))
+    if "JAX_COMPILATION_CACHE_DIR" not in os.environ:
+        with contextlib.suppress(OSError):
+            os.environ["JAX_COMPILATION_CACHE_DIR"] = str(compiled.opened(folder))
+            for name, value in _KEPT.items():
+                os.environ.setdefault(name, value)
+
+
+def check_device(device: str | None) -> None:
+    """Refuse a device that is not there; starts jax.
+
+    Args:
+        device: "cpu", "gpu" or None.
+
+    Raises:
+        ConfigError: jax has none.
+    """
+    import jax
+
+    found = jax.devices()[0].platform
+    if device == "gpu" and found != "gpu":
+        raise ConfigError("--device", f"gpu: must be cpu here, since jax finds no GPU (it has {found})")
+
+
+def _folder() -> Path | None:
+    # Of this processor, this jaxlib and this Python: code compiled for another one must not run here.
+    given = os.environ.get("CSPR_CACHE_DIR")
+    if given == "":
+        return None
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    here = (importlib.metadata.version("jax"), importlib.metadata.version("jaxlib"), sys.version, *_processor())
+    folder = Path(given or Path(home) / "cspr_jax") / hashlib.sha256(repr(here).encode()).hexdigest()[:16]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK) else None
+
+
+def _processor() -> tuple[str, ...]:
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        return ()
+    return tuple(sorted(next((line for line in lines if line.startswith(("flags", "Features"))), "").split()))
+
+
+def _flags(folder: Path, given: str) -> str:
+    # Of two settings of one flag XLA takes the last.
+    if NEEDS not in _processor() or not _is_known(folder, WIDE):
+        return given
+    return f"{WIDE} {given}".strip()
+
+
+def _is_known(folder: Path, flag: str) -> bool:
+    # XLA ends the process that names a flag it does not know: another one tries, once.
+    record = folder / "flags.json"
+    try:
+        known = json.loads(record.read_text("utf-8"))
+    except (OSError, ValueError):
+        known = {}
+    if isinstance(known, dict) and isinstance(known.get(flag), bool):
+        return known[flag]
+    settings = os.environ | {"XLA_FLAGS": flag, "JAX_PLATFORMS": "cpu"}
+    try:
+        done = subprocess.run([sys.executable, "-c", _PROBE], env=settings, capture_output=True, timeout=PROBE_SECONDS)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    partial = record.with_suffix(f".{os.getpid()}")
+    try:
+        partial.write_text(json.dumps({flag: done.returncode == 0}), "utf-8")
+        partial.replace(record)
+    except OSError:
+        return False
+    return done.returncode == 0

@@ -1,0 +1,111 @@
+"""What the command line sets before jax starts: flags, kept compiled code, device. In processes of their own."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from cspr_jax import compiled, xla
+
+ROOT = Path(__file__).parent.parent
+PLAN = ROOT / "sweeps" / "table_2_1.toml"
+
+
+def told(folder, code, **settings):
+    """What a fresh process prints, with its cache in a folder."""
+    names = ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS")
+    here = {name: value for name, value in os.environ.items() if name not in names}
+    here |= {"CSPR_CACHE_DIR": str(folder)} | settings
+    done = subprocess.run([sys.executable, "-c", code], env=here, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+SEEN = """
+import json, os
+from cspr_jax import xla
+xla.prepare({device})
+print(json.dumps({{k: os.environ.get(k) for k in ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS")}}))
+"""
+
+
+def test_settings_of_the_user_win(tmp_path):
+    """Ours stand before theirs, so that XLA takes theirs; their folder and an empty CSPR_CACHE_DIR are left alone."""
+    code = SEEN.format(device=None)
+    plain = json.loads(told(tmp_path, code))
+    wide = plain["XLA_FLAGS"] == xla.WIDE
+    assert wide or plain["XLA_FLAGS"] == ""
+    assert Path(plain["JAX_COMPILATION_CACHE_DIR"]).is_relative_to(tmp_path) and plain["JAX_PLATFORMS"] is None
+    theirs = "--xla_cpu_prefer_vector_width=256"
+    given = json.loads(told(tmp_path, code, XLA_FLAGS=theirs, JAX_COMPILATION_CACHE_DIR="/elsewhere"))
+    assert given["XLA_FLAGS"].endswith(theirs) and given["JAX_COMPILATION_CACHE_DIR"] == "/elsewhere"
+    nothing = json.loads(told("", SEEN.format(device='"cpu"')))
+    assert nothing == {"XLA_FLAGS": None, "JAX_COMPILATION_CACHE_DIR": None, "JAX_PLATFORMS": "cpu"}
+
+
+def test_a_flag_is_tried_once_and_refused_ones_are_left_out(tmp_path, monkeypatch):
+    """XLA ends the process that names a flag it does not know; the record saves the second try."""
+    tries = []
+    whole = subprocess.run
+
+    def counted(*arguments, **keys):
+        tries.append(arguments)
+        return whole(*arguments, **keys)
+
+    monkeypatch.setattr(subprocess, "run", counted)
+    assert not xla._is_known(tmp_path, "--xla_no_such_flag=1") and not xla._is_known(tmp_path, "--xla_no_such_flag=1")
+    assert len(tries) == 1
+    (tmp_path / "flags.json").write_text("{ half a rec")
+    assert not xla._is_known(tmp_path, "--xla_no_such_flag=1") and len(tries) == 2
+
+
+def test_the_library_sets_nothing(tmp_path):
+    """Where jax has been imported, somebody else has decided."""
+    code = 'import os, jax, cspr_jax; from cspr_jax import xla; xla.prepare(); print(os.environ.get("XLA_FLAGS"))'
+    assert told(tmp_path, code).strip() == "None" and not list(tmp_path.iterdir())
+
+
+def test_the_second_run_compiles_nothing(tmp_path):
+    """A run hands its compiled code over when it ends; one that was killed leaves nothing that is read."""
+    code = f"""
+import sys
+from cspr_jax.cli import main
+code = main(["plan", {str(PLAN)!r}, "--json"])
+sys.exit(code == 70)
+"""
+    first = told(tmp_path, code)
+    (whole,) = tmp_path.glob("*/whole")
+    entries = {entry.name: entry.stat().st_mtime_ns for entry in whole.iterdir()}
+    assert entries and not list(tmp_path.glob("*/run-*"))
+    assert told(tmp_path, code) == first
+    assert {entry.name: entry.stat().st_mtime_ns for entry in whole.iterdir()} == entries
+
+
+def test_what_killed_runs_left_is_swept(tmp_path):
+    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True)
+    left = tmp_path / f"run-{compiled.socket.gethostname()}-{gone.stdout.strip()}"
+    alive = tmp_path / f"run-{compiled.socket.gethostname()}-{os.getppid()}"
+    for place in (left, alive):
+        place.mkdir()
+        (place / "entry").write_text("half")
+    (tmp_path / "whole").mkdir()
+    (tmp_path / "whole" / "known").write_text("whole")
+    own = compiled.opened(tmp_path)
+    assert not left.exists() and alive.exists() and [entry.name for entry in own.iterdir()] == ["known"]
+    (own / "new").write_text("new")
+    compiled._hand_over(tmp_path / "whole", own, os.getpid())
+    assert {entry.name for entry in (tmp_path / "whole").iterdir()} == {"known", "new"} and not own.exists()
+
+
+def test_a_device_that_is_not_there_is_refused():
+    import jax
+
+    if any(device.platform == "gpu" for device in jax.devices()):
+        pytest.skip("there is a GPU")
+    with pytest.raises(xla.ConfigError, match=r"--device: gpu: must be cpu here"):
+        xla.check_device("gpu")
+    xla.check_device("cpu")
+    xla.check_device(None)
