@@ -1,5 +1,10 @@
 """Settings for every test: 64 bits, repeatable examples; robots that many tests share."""
 
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
 import jax
 import numpy as np
 import pytest
@@ -7,13 +12,26 @@ from hypothesis import HealthCheck, settings
 
 from cspr_jax import robots
 
+# What one process has compiled, those beside it and those that tests start need not; it goes with the run.
+COMPILED = Path(tempfile.gettempdir()) / f"cspr-tests-{os.environ.get('PYTEST_XDIST_TESTRUNUID', os.getpid())}"
+os.environ["CSPR_CACHE_DIR"] = str(COMPILED)
 jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_compilation_cache_dir", str(COMPILED / "tests"))
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+jax.config.update("jax_persistent_cache_enable_xla_caches", "none")
 settings.register_profile("default", deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 settings.load_profile("default")
 
 
 # Files that take long go first, so that both processes end together.
 _LONG = ("test_platform", "test_transition_plans", "test_pose_plans", "test_pose_maps", "test_workers", "test_crashes")
+
+
+def pytest_sessionfinish(session):
+    """The last process takes the compiled code away."""
+    if not hasattr(session.config, "workerinput"):
+        shutil.rmtree(COMPILED, ignore_errors=True)
 
 
 def pytest_collection_modifyitems(items):
