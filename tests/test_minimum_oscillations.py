@@ -83,6 +83,7 @@ def real(robot, targets, z0, name="quintic"):
     return minimum_oscillations(shared, transitions_to(shared, targets, depth), depth, max_arcs=2)
 
 
+@pytest.mark.soak
 def test_symmetries():
     """Planar: as many to either side and at either inclination. Spatial: twelve-fold, with the best inclination too."""
     x = np.linspace(0.1, 3.0, 20)

@@ -56,7 +56,7 @@ def swept(folder, start=REST, more="", change=("", "")):
     return cspr("run", folder / "poses.toml", "-o", folder / "run")
 
 
-@pytest.mark.parametrize("start", [REST, POSE])
+@pytest.mark.parametrize("start", [REST, pytest.param(POSE, marks=pytest.mark.soak)])
 def test_cells_are_plans(tmp_path, start):
     """Arcs, duration, beta-hat and margins of each cell as `cspr plan` gives them."""
     code, out, err = swept(tmp_path, start)

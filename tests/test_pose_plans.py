@@ -374,6 +374,7 @@ def test_an_upward_z_axis(tmp_path):
         assert a["z_lowest"] == pytest.approx(-b["z_lowest"])
 
 
+@pytest.mark.soak
 def test_jumps_are_named(tmp_path):
     text = SHORT.replace('"effective-c3"', '"effective"')
     code, _, err = planned(tmp_path, text)
