@@ -153,7 +153,7 @@ def conditioning(robot: PlatformRobot, wires: Cables) -> Array:
     return determinant(wires) / (size**3 * math.prod(lengths[1:], start=lengths[0]))
 
 
-def cable_rates(wires: Cables, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector) -> list[Array]:
+def cable_rates(wires: Cables, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector) -> list[list[Array]]:
     """Lengths of the cables and their first two derivatives, (3.2) and (3.3).
 
     Args:
@@ -164,7 +164,7 @@ def cable_rates(wires: Cables, velocity: Vector, acceleration: Vector, omega: Ve
         spin: angular acceleration.
 
     Returns:
-        lengths, rates, accelerations, (6, ...) each.
+        lengths, rates, accelerations: six arrays (...) each.
     """
     found = []
     for arm, ray in zip(wires.arms, wires.rays, strict=True):
@@ -175,4 +175,4 @@ def cable_rates(wires: Cables, velocity: Vector, acceleration: Vector, omega: Ve
         length = jnp.sqrt(dot(ray, ray))
         rate = dot(ray, pace) / length
         found.append((length, rate, (dot(pace, pace) + dot(ray, pull) - rate * rate) / length))
-    return [jnp.stack(column) for column in zip(*found, strict=True)]
+    return [list(column) for column in zip(*found, strict=True)]

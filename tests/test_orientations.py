@@ -1,9 +1,7 @@
 """Accessible and attainable orientations: grids, steps between neighbours beside the oracle, symmetries, tables."""
 
 import itertools
-import json
 import math
-from pathlib import Path
 
 import jax
 import numpy as np
@@ -14,21 +12,16 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from test_platform import MSSM, ours
-from test_pose_plans import cspr
 
-from cspr_jax import orientation_tables
 from cspr_jax.amplitudes import named
 from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.sights import Watch
-from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.maps.attainable import attainable
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.orientations import equal_volume_grid, tilt_torsion_grid
-from cspr_jax.plots.reasons import reasons
-from cspr_jax.results import open_result
 from cspr_jax.rotations import from_tilt_torsion
 from cspr_jax.symmetries import NONE, alike, folded, symmetries
 from cspr_jax.trajectories.pose_segment import Kind
@@ -229,187 +222,6 @@ def test_a_dip_beside_a_singularity():
     judged = {p: oracle.check_motion(MSSM, segment, p, tuple(found.beta_hat[0]), 20001) for p in (4, 5)}
     assert judged[4]["mu_hat_min"] < -0.5 and judged[5]["feasible"]
     assert found.arcs[0] == 5 and found.margin[0] == pytest.approx(judged[5]["mu_hat_min"], abs=1e-4)
-
-
-def test_tables_of_orientations(tmp_path, monkeypatch):
-    """Their cells, with a coarse step; options that do not belong are refused."""
-    monkeypatch.setattr(orientation_tables, "DIVISIONS", 8)
-    code, out, err = cspr("table", "3.3", "--json", "--definition", "grid")
-    assert code == 0, err
-    cells = json.loads(out)["cells"]
-    assert len(cells) == 32 and {c["variant"]["definition"] for c in cells} == {"grid"}
-    by = {(c["row"], c["column"]): c for c in cells}
-    for row in ("x = 1.5b", "y = 1.5b"):
-        share = by[row, "attainable"]["computed"] / by[row, "accessible"]["computed"]
-        assert 100.0 * share == pytest.approx(by[row, "proportion"]["computed"])
-        assert by[row, "proportion"]["computed"] == pytest.approx(by[row, "proportion"]["published"], abs=4.0)
-    code, _, err = cspr("table", "2.1", "--fine")
-    assert code == 2 and err == "cspr: --fine: must be absent with table 2.1\n"
-
-
-SWEEP = """schema = 1
-map = "attainability"
-robot = "laval-mssm"
-[axes]
-z = [1.7]
-radius = [1.29]
-azimuth = [0.2, 0.8471975511965976, 1.5]
-[trajectory]
-family = "hypocycloid"
-amplitude = { name = "effective-c3", epsilon = 0.1 }
-max_arcs = 8
-[orientations]
-divisions = 6
-values = 4
-"""
-
-
-def swept(folder, *change):
-    (folder / "places.toml").write_text(SWEEP.replace(*change) if change else SWEEP)
-    return cspr("run", folder / "places.toml", "-o", folder / "run")
-
-
-def test_maps_of_places(tmp_path):
-    """Cells are what the functions give; the mirrored place has the same numbers."""
-    code, out, err = swept(tmp_path)
-    assert code == 0, err
-    data = {name: values[0, 0] for name, values in open_result(Path(out.split()[-1])).data.items()}
-    checker = PoseChecker(PoseShared(ours(MSSM), Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
-    for i, azimuth in enumerate((0.2, 0.8471975511965976, 1.5)):
-        there = place(1.5, azimuth)
-        inside = accessible(ours(MSSM), there, "scan", 6)
-        many, z0 = np.tile(there, (len(inside.angles), 1)), np.full(len(inside.angles), 1.7)
-        good = attainable(checker, many, inside.angles, z0, max_arcs=8, values=4).arcs > 0
-        assert data["accessible"][i] == len(good) and data["attainable"][i] == good.sum()
-        assert data["accessible_volume"][i] == pytest.approx(inside.volume.sum(), rel=1e-9)
-        assert data["attainable_fraction"][i] == pytest.approx(good.mean())
-    for values in data.values():
-        assert values[0] == pytest.approx(values[1], nan_ok=True)  # 0.847 is 60 degrees less 0.2
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (('"laval-mssm"', '"prototype"'), "must be a platform"),
-        (("z = [1.7]", "z = [1.7]\ntilt = [0.1]"), "axes.tilt: must be absent"),
-        (("max_arcs = 8", "max_arcs = 8\nfrom = { position = [0.0, 0.1, 1.0] }"), "trajectory.from: must be"),
-        (('"hypocycloid"', '"transition"'), "trajectory.family"),
-        (("divisions = 6", "divisions = 1"), "orientations.divisions = 1"),
-        (("divisions = 6", "divisions = 7"), "orientations.divisions = 7: must be a multiple of 2"),
-        (('map = "attainability"', 'map = "orientation-workspace"'), "orientations.values: must be absent"),
-        (
-            ('map = "attainability"', 'map = "orientation-workspace"\nlimits = { floor = 3.0 }'),
-            "limits: must be absent",
-        ),
-        (('map = "attainability"', 'map = "poses"'), "orientations: must be absent"),
-        (("z = [1.7]", "z = [-1.7]"), "every point is above the spool plane"),
-    ],
-)
-def test_mistakes(tmp_path, change, words):
-    code, out, err = swept(tmp_path, *change)
-    assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1, err
-
-
-EACH = """schema = 1
-map = "orientations"
-robot = {robot}
-[axes]
-x = [{x}]
-y = [{y}]
-z = [{z}]
-[trajectory]
-family = "hypocycloid"
-amplitude = {{ name = "effective-c3", epsilon = 0.1 }}
-max_arcs = 8
-[orientations]
-divisions = 6
-values = 4
-"""
-
-
-def every_orientation(folder, name, **keys):
-    (folder / f"{name}.toml").write_text(EACH.format(**keys))
-    code, out, err = cspr("run", folder / f"{name}.toml", "-o", folder / name)
-    assert code == 0, err
-    return Path(out.split()[-1])
-
-
-def test_a_map_of_every_orientation(tmp_path):
-    """Its cells are those of the functions; in axes turned over phi and sigma are turned around."""
-    there = place(1.5, 0.7)
-    at = dict(zip("xyz", there, strict=True))
-    result = open_result(every_orientation(tmp_path, "down", robot='"laval-mssm"', **at))
-    assert list(result.axes) == ["x", "y", "z", "torsion", "tilt_azimuth", "tilt"]
-    arcs, verdict = (result.data[name][0, 0, 0] for name in ("arcs", "verdict"))
-    assert verdict.shape == (12, 12, 6)
-    inside = accessible(ours(MSSM), there, "grid", 6)
-    seen = (verdict & Verdict.NOT_ACCESSIBLE.value) == 0
-    assert seen[:, :, 1:].sum() + seen[:, 0, 0].sum() == len(inside.angles)
-    sigma, phi, theta = (result.axes[name] for name in ("torsion", "tilt_azimuth", "tilt"))
-    checker = PoseChecker(PoseShared(ours(MSSM), Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
-    some = np.argwhere(seen)[::7]
-    angles = np.array([[phi[j], theta[k], sigma[i]] for i, j, k in some])
-    many, z0 = np.tile(there, (len(some), 1)), np.full(len(some), 1.7)
-    found = attainable(checker, many, angles, z0, max_arcs=8, values=4)
-    assert (found.arcs == arcs[tuple(some.T)]).all() and (found.verdict == verdict[tuple(some.T)]).all()
-    assert (arcs > 0).sum() > 0.8 * seen.sum()
-    # The same robot, z up: phi becomes -phi, sigma -sigma.
-    up = open_result(every_orientation(tmp_path, "up", robot=_turned_over(), x=at["x"], y=-at["y"], z=-at["z"]))
-    around, mirrored = -np.arange(12) % 12, np.array([*range(10, -1, -1), 11])
-    assert (up.data["arcs"][0, 0, 0][mirrored][:, around] == arcs).all()
-
-
-def _turned_over():
-    over = np.array([1.0, -1.0, -1.0])
-    base, points = ((np.asarray(x) * over).tolist() for x in (MSSM.base, MSSM.platform))
-    inertia = (np.asarray(MSSM.inertia) * np.outer(over, over)).tolist()
-    return (
-        f'{{ name = "over", z_axis = "up", base_points = {base}, platform_points = {points}, '
-        f"mass = {float(MSSM.mass)}, inertia = {inertia} }}"
-    )
-
-
-def test_pictures_of_every_orientation(tmp_path):
-    path = every_orientation(tmp_path, "down", robot='"laval-mssm"', x=1.0, y=0.5, z=1.7)
-    for options in (["--envelope"], ["--quantity", "verdict"], ["--envelope", "--at", "x=1.0"], []):
-        picture = tmp_path / "picture.png"
-        code, _, err = cspr("plot", path, "-o", picture, *options)
-        assert code == 0 and picture.stat().st_size > 20_000, err
-    for options, words in (
-        (["--envelope", "--quantity", "arcs"], "--quantity"),
-        (["--envelope", "--at", "tilt=0.1"], "--at"),
-        (["--envelope", "--lines", "tilt"], "--lines"),
-    ):
-        code, _, err = cspr("plot", path, "-o", picture, *options)
-        assert code == 2 and words in err and len(err.splitlines()) == 1, err
-
-
-def test_a_map_of_every_orientation_has_its_own_grid(tmp_path):
-    text = EACH.format(robot='"laval-mssm"', x=1.0, y=0.5, z=1.7)
-    for change, words in (
-        (("divisions = 6", 'divisions = 6\ndefinition = "scan"'), 'orientations.definition = "scan": must be "grid"'),
-        (("z = [1.7]", "z = [1.7]\ntilt = [0.1]"), "axes.tilt: must be absent"),
-    ):
-        (tmp_path / "wrong.toml").write_text(text.replace(*change))
-        code, out, err = cspr("run", tmp_path / "wrong.toml", "-o", tmp_path / "run")
-        assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1, err
-
-
-def test_reasons_are_told_apart():
-    """One colour and word a cell, what lies deeper first."""
-    flags = [0, Verdict.NO_ARCS | Verdict.SLACK_CABLE, Verdict.SLACK_CABLE | Verdict.SINGULAR, Verdict.NOT_ACCESSIBLE]
-    found, words, colours = reasons(np.array([int(flag) for flag in [*flags, Verdict.FEWER_ARCS_UNDECIDED]]))
-    assert [words[i] for i in found] == ["feasible", "slack cable", "singular", "not accessible", "feasible"]
-    assert len(set(colours)) == len(colours) == 4
-
-
-def test_a_map_of_what_is_accessible(tmp_path):
-    text = SWEEP.replace('"attainability"', '"orientation-workspace"').replace("values = 4\n", "")
-    (tmp_path / "places.toml").write_text(text)
-    code, out, err = cspr("run", tmp_path / "places.toml", "-o", tmp_path / "run")
-    assert code == 0, err
-    data = open_result(Path(out.split()[-1])).data
-    assert "attainable" not in data and (data["accessible"] > 0).all()
 
 
 @pytest.mark.soak

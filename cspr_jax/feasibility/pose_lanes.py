@@ -85,13 +85,13 @@ def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: In
     if not names:
         return values
     lengths, rates, bends = cable_rates(wires, here.velocity, here.acceleration, here.omega, here.spin)
-    rates, bends = rates / jnp.sqrt(squared), bends / squared
-    force, weight = robot.mass * jnp.stack(found.numerators) / found.denominator * lengths, robot.mass * robot.gravity
+    pace, weight = jnp.sqrt(squared), robot.mass * robot.gravity
+    force = [robot.mass * x / found.denominator * y for x, y in zip(found.numerators, lengths, strict=True)]
     slacks = {
         "tension_min": lambda x, k: (force[k] - x) * 6.0 / weight,
         "tension_max": lambda x, k: (x - force[k]) * 6.0 / weight,
-        "cable_speed_max": lambda x, k: 1.0 - jnp.abs(rates[k]) / x,
-        "cable_acceleration_max": lambda x, k: 1.0 - jnp.abs(bends[k]) / x,
+        "cable_speed_max": lambda x, k: 1.0 - jnp.abs(rates[k]) / pace / x,
+        "cable_acceleration_max": lambda x, k: 1.0 - jnp.abs(bends[k]) / squared / x,
     }
     for name in names:
         least = smallest([slacks[name](getattr(limits, name)[k], k) for k in range(CABLES)])
