@@ -164,6 +164,8 @@ def _run(options: argparse.Namespace) -> int:
         raise ConfigError("--workers", f"{options.workers}: must be an integer from 1 to {LARGEST_WORKERS}")
     if options.scheduler is not None and options.workers != 1:
         raise ConfigError("--workers", f"{options.workers}: must be absent beside --scheduler")
+    if options.scheduler is not None and options.device is not None:
+        raise ConfigError("--device", f"{options.device}: must be absent beside --scheduler, whose workers choose")
     sweep = read_sweep(options.sweep)
     directory = options.output or run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))

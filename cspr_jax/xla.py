@@ -18,7 +18,6 @@ from cspr_jax.errors import ConfigError
 
 # Twice as fast where the processor has it; XLA's own choice is half of it.
 WIDE, NEEDS = "--xla_cpu_prefer_vector_width=512", "avx512f"
-DEVICES = ("cpu", "gpu")
 PROBE_SECONDS = 120
 _PROBE = "import jax; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
 _KEPT = {

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, settings
 from cspr_jax import robots
 
 # What one process has compiled, those beside it and those that tests start need not; it goes with the run.
-COMPILED = Path(tempfile.gettempdir()) / f"cspr-tests-{os.environ.get('PYTEST_XDIST_TESTRUNUID', os.getpid())}"
+COMPILED = Path(os.environ.setdefault("CSPR_TESTS_COMPILED", f"{tempfile.gettempdir()}/cspr-tests-{os.getpid()}"))
 os.environ["CSPR_CACHE_DIR"] = str(COMPILED)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_compilation_cache_dir", str(COMPILED / "tests"))
@@ -29,7 +29,7 @@ _LONG = ("test_platform", "test_transition_plans", "test_pose_plans", "test_pose
 
 
 def pytest_sessionfinish(session):
-    """The last process takes the compiled code away."""
+    """The process that began takes the compiled code away; those that work for it know the folder from it."""
     if not hasattr(session.config, "workerinput"):
         shutil.rmtree(COMPILED, ignore_errors=True)
 

@@ -4,11 +4,15 @@ import json
 import os
 import subprocess
 import sys
+import types
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
 from cspr_jax import compiled, xla
+from cspr_jax.cli import main
+from cspr_jax.errors import ConfigError
 
 ROOT = Path(__file__).parent.parent
 
@@ -100,12 +104,16 @@ def test_what_killed_runs_left_is_swept(tmp_path):
     assert {entry.name for entry in (tmp_path / "whole").iterdir()} == {"known", "new"} and not own.exists()
 
 
-def test_a_device_that_is_not_there_is_refused():
-    import jax
+def test_a_device_that_is_not_there_is_refused(monkeypatch):
+    for found, refused in (("cpu", True), ("gpu", False)):
+        monkeypatch.setattr("jax.devices", lambda found=found: [types.SimpleNamespace(platform=found)])
+        xla.check_device("cpu")
+        xla.check_device(None)
+        with pytest.raises(ConfigError, match="--device: gpu: must be cpu here") if refused else nullcontext():
+            xla.check_device("gpu")
 
-    if any(device.platform == "gpu" for device in jax.devices()):
-        pytest.skip("there is a GPU")
-    with pytest.raises(xla.ConfigError, match=r"--device: gpu: must be cpu here"):
-        xla.check_device("gpu")
-    xla.check_device("cpu")
-    xla.check_device(None)
+
+def test_workers_of_a_scheduler_choose_their_device(capsys):
+    sweep = ROOT / "sweeps" / "demo.toml"
+    assert main(["run", str(sweep), "--scheduler", "tcp://localhost:1", "--device", "cpu"]) == 2
+    assert capsys.readouterr().err.startswith("cspr: --device: cpu: must be absent beside --scheduler")

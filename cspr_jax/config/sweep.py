@@ -107,10 +107,10 @@ class SweepTrajectory(TrajectoryKeys):
 class Orientations(Table):
     """Orientations of each place."""
 
-    definition: Literal["grid", "scan", "equal-volume"] = Field(
-        "scan",
+    definition: Literal["grid", "scan", "equal-volume"] | None = Field(
+        None,
         description='accessible set: "grid" of tilt and torsion, "scan" (Bonev, as in the thesis), or "equal-volume"; '
-        'map = "orientations" has "grid" only',
+        'absent: "scan", but "grid" in map = "orientations", which has no other',
     )
     divisions: Annotated[int, Field(ge=4, le=128, multiple_of=2)] = Field(
         32, description="of pi: the step is pi / divisions; even, for errors are estimated with twice the step"

@@ -161,7 +161,8 @@ class PoseChecker:
             kernel = partial(smallest_tensions, shared.robot, shared.amplitude, float(arcs), chunk, kind=self.kind)
             some = segments if len(alive) == len(lowest) else rows(segments, alive)
             self._count("first look", len(alive) * CHUNK)
-            size = FIRST * self.batch if len(alive) > self.batch else self.batch // 2
+            # Few are not padded to many; where values are compared, not only refuted, all have one shape.
+            size = FIRST * self.batch if whole or len(alive) > self.batch else self.batch // 2
             found = in_batches(kernel, some, size=size)
             lowest[alive] = np.minimum(lowest[alive], np.where(np.isnan(found), -np.inf, found))
         return lowest
@@ -317,9 +318,9 @@ class PoseChecker:
         return gap, view / np.linalg.norm(view, axis=2, keepdims=True)
 
 
-def _low_points(values: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, ...]:
-    # Samples (m, n_values, n) no larger than their neighbours, where a parabola of twice the bend could reach so low,
-    # (n_values, n).
+def _low_points(values: np.ndarray, least: np.ndarray) -> tuple[np.ndarray, ...]:
+    # Samples (m, n_values, n) no larger than their neighbours, where a parabola of twice the bend could reach the
+    # smallest value (n_values, n).
     falls = values[1:] < values[:-1]
     side = np.ones_like(falls[:1])
     is_low = np.concatenate([side, falls]) & np.concatenate([~falls, side])
@@ -328,7 +329,7 @@ def _low_points(values: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, ...]
     here, last = values[place, which, row], len(values) - 1
     before, after = (values[np.clip(place + k, 0, last), which, row] for k in (-1, 1))
     bend = before - 2.0 * here + after
-    reaches = np.isfinite(bend) & (here - 0.25 * bend <= reach[which, row])
+    reaches = np.isfinite(bend) & (here - 0.25 * bend <= least[which, row])
     return place[reaches], which[reaches], row[reaches]
 
 

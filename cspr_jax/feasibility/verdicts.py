@@ -29,6 +29,8 @@ class Verdict(enum.IntFlag):
         return "+".join(flag.name.lower() for flag in type(self) if flag & self and flag.name) or "feasible"
 
 
+# Flags that do not say what stands in the way.
+NO_REASON = Verdict.FEWER_ARCS_UNDECIDED | Verdict.NO_ARCS
 SENTENCES = {
     Verdict.SLACK_CABLE: "A cable would have to push, or falls below its smallest tension.",
     Verdict.OVER_TENSION: "A cable exceeds its largest tension.",

@@ -4,28 +4,19 @@ import math
 
 import numpy as np
 
-from cspr_jax import problem
-from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import SweepFile
-from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.accessible import accessible
-from cspr_jax.maps.attainable import VALUES, attainable
-from cspr_jax.maps.orientation_cells import DIGITS, AccessibleMap
+from cspr_jax.maps.orientation_cells import DIGITS, AttainableMap
 from cspr_jax.maps.pose_answers import contradictions
 from cspr_jax.maps.pose_cells import TILT_TORSION
+from cspr_jax.quantities import OF_MAP, QUANTITIES
 
-FLOATS = ("duration", "margin", "limit_margin", "beta_hat", "det_margin", "cable_distance")
+# What has no value where nothing is accessible.
+FLOATS = tuple(name for name in OF_MAP["orientations"] if QUANTITIES[name].kind == "float")
 
 
-class EachOrientationMap(AccessibleMap):
+class EachOrientationMap(AttainableMap):
     """The map of the orientations of tilt and torsion; see `GridMap`."""
-
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
-        """Build the checker of motions from rest."""
-        super().__init__(spec, keys, file)
-        kind = problem.motion_kind(keys.trajectory, from_rest=True)
-        self._checker = PoseChecker(self._shared, kind, batch=MANY)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -33,26 +24,14 @@ class EachOrientationMap(AccessibleMap):
         # An axis of the file turned over turns phi and sigma around.
         angles = np.stack([cells[name] for name in TILT_TORSION], axis=1)
         angles = angles * np.array([self._signs[1], 1.0, self._signs[2]])
-        some = np.flatnonzero(self._accessible(places, angles) & (z0 > 0.0))
-        count, found = len(z0), {}
+        some, count = np.flatnonzero(self._accessible(places, angles) & (z0 > 0.0)), len(z0)
+        every = {name: np.full(count, np.nan) for name in FLOATS}
+        every |= {"arcs": np.zeros(count, int), "tried_arcs": np.zeros(count, int)}
+        every["verdict"] = np.full(count, Verdict.NOT_ACCESSIBLE.value, np.uint16)
         if len(some):
-            found = vars(
-                attainable(
-                    self._checker,
-                    places[some],
-                    angles[some],
-                    z0[some],
-                    max_arcs=self._keys.trajectory.max_arcs,
-                    values=self._orientations.values or VALUES,
-                    found=self._alike,
-                )
-            )
-            found = found | {"beta_hat": found["beta_hat"][:, 1]}
-        verdict, arcs = np.full(count, Verdict.NOT_ACCESSIBLE.value, np.uint16), np.zeros(count, int)
-        every = {"arcs": arcs, "tried_arcs": arcs.copy(), "verdict": verdict}
-        every |= {name: np.full(count, np.nan) for name in FLOATS}
-        for name, values in every.items():
-            if len(some):
+            answers = self._attainable(places[some], angles[some], z0[some])
+            found = vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
+            for name, values in every.items():
                 values[some] = found[name]
         return every
 

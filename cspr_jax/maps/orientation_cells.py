@@ -7,10 +7,11 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Orientations, SweepFile
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
-from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.feasibility.verdicts import NO_REASON, SENTENCES, Verdict
 from cspr_jax.maps.accessible import Accessible, accessible
 from cspr_jax.maps.attainable import VALUES, attainable
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
+from cspr_jax.maps.pose_answers import PoseAnswers
 from cspr_jax.quantities import REFUSALS
 from cspr_jax.symmetries import NONE, folded, symmetries
 from cspr_jax.tiles import Grid
@@ -50,7 +51,7 @@ class AccessibleMap(PlatformMap):
         return _of_sets(*(self._sets(places, k) for k in (1, 2)))
 
     def _sets(self, places: np.ndarray, coarser: int) -> list[Accessible]:
-        definition, divisions = self._orientations.definition, self._orientations.divisions
+        definition, divisions = self._orientations.definition or "scan", self._orientations.divisions
         return [accessible(self._shared.robot, place, definition, divisions // coarser) for place in places]
 
     def refuse_hopeless(self, grid: Grid) -> None:
@@ -75,6 +76,11 @@ class AttainableMap(AccessibleMap):
         kind = problem.motion_kind(keys.trajectory, from_rest=True)
         self._checker = PoseChecker(self._shared, kind, batch=MANY)
 
+    def _attainable(self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray) -> PoseAnswers:
+        # Of (n, 3) angles at (n, 3) places, both in the kernels' axes.
+        values, most = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
+        return attainable(self._checker, places, angles, z0, max_arcs=most, values=values, found=self._alike)
+
     def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
         fine, coarse = (self._sets(places, k) for k in (1, 2))
         # All places together, with both steps: full batches.
@@ -85,15 +91,8 @@ class AttainableMap(AccessibleMap):
         verdicts, arcs = np.full(len(own), Verdict.NO_ARCS.value), np.zeros(len(own), int)
         some = np.flatnonzero(own >= 0)
         if len(some):
-            answers = attainable(
-                self._checker,
-                places[own[some]],
-                np.concatenate([inside.angles for inside in every])[some],
-                z0[own[some]],
-                max_arcs=self._keys.trajectory.max_arcs,
-                values=self._orientations.values or VALUES,
-                found=self._alike,
-            )
+            angles = np.concatenate([inside.angles for inside in every])[some]
+            answers = self._attainable(places[own[some]], angles, z0[own[some]])
             verdicts[some], arcs[some] = answers.verdict, answers.arcs
         stops = np.cumsum(counts)[:-1]
         pieces = zip(every, np.split(arcs, stops), np.split(verdicts, stops), strict=True)
@@ -127,7 +126,7 @@ def _of_attained(inside: Accessible, arcs: np.ndarray, verdicts: np.ndarray) -> 
     if not count:
         names = ("attainable_fraction", "attainable_volume", "mean_arcs", "undecided_fraction", *REFUSALS)
         return {"attainable": 0.0, "main_reason": 0, **dict.fromkeys(names, np.nan)}
-    refused = {flag: float((~good & ((verdicts & flag) != 0)).mean()) for flag in REFUSALS.values()}
+    refused = {flag: float((~good & ((verdicts & flag) != 0)).mean()) for flag in SENTENCES if flag not in NO_REASON}
     main = max(refused, key=lambda flag: refused[flag])
     return {
         "attainable": float(good.sum()),

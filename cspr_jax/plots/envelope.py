@@ -6,7 +6,7 @@ from matplotlib.lines import Line2D
 
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.plots.labels import COLOURS, notes
+from cspr_jax.plots.labels import COLOURS, chosen, notes
 from cspr_jax.results import Result
 
 AXES = ("torsion", "tilt_azimuth", "tilt")
@@ -35,24 +35,14 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> F
     levels = np.flatnonzero(accessible.any((1, 2)))
     if not len(levels):
         raise InputError("--envelope", "nothing is accessible", "a place with accessible orientations")
-    shown = levels[np.unique(np.linspace(0, len(levels) - 1, min(SECTIONS, len(levels))).round().astype(int))]
-    # Around: the first azimuth again; outward: one tilt beyond, so that outlines close.
-    around = np.append(azimuth, azimuth[0] + 2.0 * np.pi)
-    outward = np.degrees(np.append(tilt, 2.0 * tilt[-1] - tilt[-2]))
-    x, y = (np.outer(f(around), outward) for f in (np.cos, np.sin))
+    shown = levels[chosen(len(levels), SECTIONS)]
     figure = Figure(figsize=(11.0, 5.6), layout="constrained")
     reach = np.degrees(tilt[accessible.any((0, 1))].max()) + 10.0
     for place, view in enumerate(((22.0, -60.0), (12.0, 30.0)), start=1):
         panel = figure.add_subplot(1, 2, place, projection="3d", elev=view[0], azim=view[1])
         for which, colour, width in ((accessible, _ACCESSIBLE, 0.9), (attained, _ATTAINED, 1.4)):
             for level in shown:
-                inside = np.pad(which[level].astype(float), ((0, 1), (0, 1)))
-                inside[-1] = inside[0]
-                if inside.any():
-                    height = float(np.degrees(torsion[level]))
-                    panel.contour(
-                        x, y, inside, levels=[0.5], colors=[colour], linewidths=width, zdir="z", offset=height
-                    )
+                _outline(panel, azimuth, tilt, which[level], float(np.degrees(torsion[level])), (colour, width))
         panel.set(
             xlim=(-reach, reach),
             ylim=(-reach, reach),
@@ -66,3 +56,16 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> F
     title = f"{result.attributes['robot']}: orientations of a place"
     figure.suptitle(f"{title}\n{notes(result, fixed, list(AXES))}", fontsize=11)
     return figure
+
+
+def _outline(
+    panel, azimuth: np.ndarray, tilt: np.ndarray, inside: np.ndarray, height: float, look: tuple[str, float]
+) -> None:
+    # Of (n_azimuths, n_tilts) cells. Around: the first azimuth again; outward: one tilt beyond, so that it closes.
+    around = np.append(azimuth, azimuth[0] + 2.0 * np.pi)
+    outward = np.degrees(np.append(tilt, 2.0 * tilt[-1] - tilt[-2]))
+    x, y = (np.outer(f(around), outward) for f in (np.cos, np.sin))
+    closed = np.pad(inside.astype(float), ((0, 1), (0, 1)))
+    closed[-1] = closed[0]
+    if closed.any():
+        panel.contour(x, y, closed, levels=[0.5], colors=[look[0]], linewidths=look[1], zdir="z", offset=height)

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.feasibility.verdicts import NO_REASON, Verdict
 
 # In this order: what lies deeper comes first. The colours are Okabe and Ito's, and greys.
 REASONS = {
@@ -22,8 +22,6 @@ REASONS = {
     Verdict.CABLE_OVER_ACCELERATION: ("cable acceleration", "#bd9e39"),
 }
 FEASIBLE = ("feasible", "#009E73")
-# Flags that do not stand in the way.
-NO_REASON = Verdict.FEWER_ARCS_UNDECIDED | Verdict.NO_ARCS
 
 
 def reasons(verdicts: np.ndarray) -> tuple[np.ndarray, list[str], list[str]]:

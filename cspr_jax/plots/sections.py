@@ -37,13 +37,14 @@ def section_figure(
     Returns:
         the figure.
     """
-    tells = _tells(name, data)
+    polar = tuple(across) == POLAR
+    # Most of all orientations are none that a robot can take.
+    tells = _tells(name, data) if polar else np.ones(data.shape, bool)
     told = np.flatnonzero(tells.any((0, 1)))
     shown = told[chosen(len(told), PANELS)] if len(told) else chosen(data.shape[2], PANELS)
     columns, count = columns_of(len(shown)), len(shown)
     size = (3.1 * columns + 1.3, 3.2 * -(-count // columns) + 0.8) if count > 1 else (7.0, 5.6)
     figure = Figure(figsize=size, layout="constrained")
-    polar = tuple(across) == POLAR
     every, bottom, left = panels(figure, count, polar=polar)
     data = data[:, :, shown]
     words: list[str] = []

@@ -148,9 +148,8 @@ def _check_orientations(keys: SweepFile, path: Path) -> None:
     if keys.trajectory.start is not None and not keys.trajectory.start.rest:
         raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
     given = keys.orientations
-    definition = given.definition if given is not None and "definition" in given.model_fields_set else "grid"
-    if keys.map == "orientations" and definition != "grid":
-        raise ConfigError(path, f'orientations.definition = "{definition}": must be "grid" in this map')
+    if keys.map == "orientations" and given is not None and given.definition not in (None, "grid"):
+        raise ConfigError(path, f'orientations.definition = "{given.definition}": must be "grid" in this map')
     if keys.map == "orientation-workspace":
         if keys.limits.model_fields_set:
             raise ConfigError(path, 'limits: must be absent in this map; they are for map = "attainability"')
