@@ -153,7 +153,9 @@ def conditioning(robot: PlatformRobot, wires: Cables) -> Array:
     return determinant(wires) / (size**3 * math.prod(lengths[1:], start=lengths[0]))
 
 
-def cable_rates(wires: Cables, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector) -> list[list[Array]]:
+def cable_rates(
+    wires: Cables, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector
+) -> list[list[Array]]:
     """Lengths of the cables and their first two derivatives, (3.2) and (3.3).
 
     Args:
