@@ -11,7 +11,7 @@ from jax import Array
 from cspr_jax import wrenches
 from cspr_jax.feasibility.extremes import Extremes
 from cspr_jax.feasibility.narrowing import narrowed
-from cspr_jax.feasibility.pose_checks import SAMPLES
+from cspr_jax.feasibility.pose_samples import SAMPLES
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.grids import in_batches
 from cspr_jax.robots import centroid, plane_normal

@@ -20,7 +20,7 @@ from cspr_jax.wrench_lanes import cables
 # Steps between which a gap or a cable turns by more than this angle are to be halved.
 LEAST_COSINE = 0.8
 # The golden section, and how often: the bracket shrinks to a 500th.
-_GOLDEN, _SECTIONS = 0.6180339887498949, 13
+_GOLDEN, SECTIONS = 0.6180339887498949, 13
 
 
 class Look(NamedTuple):
@@ -102,15 +102,15 @@ def _seen(
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))
 def look_along(
-    shared: PoseShared, platform: tuple[Array, Array], within: Array, arcs, *, pairs: tuple, kind: Kind
+    shared: PoseShared, within: Array, arcs, *, platform: tuple[Array, Array], pairs: tuple, kind: Kind
 ) -> Look:
     """The criteria that depend on the pose alone, and what meets, along arcs of many segments.
 
     Args:
         shared: robot, limits, amplitude.
-        platform: sides (6, 2, 3) and normal (3,) of `interference.Contacts`.
         within: (m,) increasing places within an arc, from 0 to 1.
         arcs: segments (leaves (n, ...)), their numbers of arcs (n,), and which of them (n,), from 0 on.
+        platform: sides (6, 2, 3) and normal (3,) of `interference.Contacts`.
         pairs: of cables that can meet.
         kind: of the motions.
 
@@ -136,8 +136,8 @@ def look_along(
     return Look(jnp.stack(values, axis=1), (hit & ~wide)[1:].any(0), wide[1:])
 
 
-@partial(jax.jit, static_argnames=("pairs", "kind"))
-def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind) -> Array:
+@partial(jax.jit, static_argnames=("pairs", "kind", "sections"))
+def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind, sections: int = SECTIONS) -> Array:
     """The smallest value of one criterion around a sample, by golden sections.
 
     Args:
@@ -146,6 +146,7 @@ def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind) -> A
             value (n,) of `moving_along`, or of `look_along`.
         pairs: of cables that can meet; None: for `moving_along`.
         kind: of the motions.
+        sections: how many; 0: the smaller value of two points inside.
 
     Returns:
         (n,) a value that is attained.
@@ -184,7 +185,7 @@ def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind) -> A
         return new, jnp.minimum(least, value)
 
     start = (low, high, left, right, at_left, at_right), jnp.minimum(at_left, at_right)
-    return lax.fori_loop(0, _SECTIONS, section, start)[1]
+    return lax.fori_loop(0, sections, section, start)[1]
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))

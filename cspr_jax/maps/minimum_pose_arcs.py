@@ -8,7 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.feasibility.pose_checks import TOLERANCE, PoseChecker, PoseChecks, rows
+from cspr_jax.feasibility.pose_checks import TOLERANCE, PoseChecker, PoseChecks
+from cspr_jax.feasibility.pose_samples import rows
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.grids import in_batches
 from cspr_jax.platforms import PlatformRobot
@@ -16,7 +17,7 @@ from cspr_jax.trajectories.pose_segment import PoseSegment, pose_segment
 
 BATCH = 2048
 # So many candidates are held at a time.
-CANDIDATES = 131_072
+CANDIDATES = 262_144
 # Instants of the first look: in arcs before the end, those at which most motions fail, the most telling ones first;
 # then so many an arc, late ones first; and so many where only the best of bad candidates is looked for.
 TELLING = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0

@@ -9,7 +9,8 @@ import jax
 import numpy as np
 
 from cspr_jax.feasibility.endpoints import AT_REST
-from cspr_jax.feasibility.pose_checks import PoseChecker, rows
+from cspr_jax.feasibility.pose_checks import PoseChecker
+from cspr_jax.feasibility.pose_samples import rows
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs

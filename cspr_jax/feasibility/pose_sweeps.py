@@ -1,0 +1,63 @@
+"""Cables between samples: followed in steps that are halved until they turn little."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from cspr_jax.feasibility.interference import cables_cross, platform_hit
+from cspr_jax.feasibility.pose_kernel import LEAST_COSINE
+
+HALVINGS = 12
+
+Glance = tuple[np.ndarray, np.ndarray]  # vectors between cables (k, n_pairs, 3), views (k, 6, 3)
+
+
+def swept(
+    glances: Callable[[np.ndarray, np.ndarray], Glance],
+    platform: tuple[np.ndarray, np.ndarray],
+    row: np.ndarray,
+    ends: tuple[np.ndarray, np.ndarray],
+    count: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whether cables cross, and whether one sweeps over the platform, within steps.
+
+    Args:
+        glances: of motions (k,) at instants (k,).
+        platform: sides (6, 2, 3) and normal (3,) of `interference.Contacts`.
+        row: (k,) whose step it is.
+        ends: (k,) instants before and after each.
+        count: n, of motions.
+
+    Returns:
+        (n,) each.
+    """
+    met, hit = (np.zeros(count, bool) for _ in range(2))
+    if not len(row):
+        return met, hit
+    seen = tuple(glances(row, tau) for tau in ends)
+    for level in range(HALVINGS + 1):
+        (gap, view), (next_gap, next_view) = seen
+        turns = _turns_much(gap, next_gap) | _turns_much(view, next_view)
+        closed = ~turns if level < HALVINGS else np.ones(len(row), bool)
+        met[row[closed & cables_cross(gap, next_gap).any(1)]] = True
+        hit[row[closed & platform_hit(*platform, view, next_view).any(1)]] = True
+        row, before, after = row[~closed], ends[0][~closed], ends[1][~closed]
+        if not len(row):
+            break
+        middle = 0.5 * (before + after)
+        between = glances(row, middle)
+        first, last = ((gap[~closed], view[~closed]) for gap, view in seen)
+        seen = _joined(first, between), _joined(between, last)
+        ends = np.concatenate([before, middle]), np.concatenate([middle, after])
+        row = np.concatenate([row, row])
+    return met, hit
+
+
+def _joined(first: Glance, second: Glance) -> Glance:
+    return np.concatenate([first[0], second[0]]), np.concatenate([first[1], second[1]])
+
+
+def _turns_much(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    inner = (before * after).sum(2)
+    sizes = (before * before).sum(2) * (after * after).sum(2)
+    return ((inner < 0.0) | (inner**2 < LEAST_COSINE**2 * sizes)).any(1)
