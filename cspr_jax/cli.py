@@ -189,10 +189,11 @@ def _warn(line: str) -> None:
 @contextlib.contextmanager
 def _executor(options: argparse.Namespace, sweep: Any, stop: Any) -> Iterator[Any]:
     from cspr_jax import xla
-    from cspr_jax.sweep import executors
 
     if options.scheduler is None:  # the workers of a scheduler have settings of their own
         xla.prepare(options.device)
+    # These import jax, which is too late for settings.
+    from cspr_jax.sweep import executors
     from cspr_jax.sweep.tile import TileMap
 
     xla.check_device(options.device)

@@ -71,6 +71,14 @@ def test_the_library_sets_nothing(tmp_path):
     assert told(tmp_path, code).strip() == "None" and not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("words", [["run", "sweeps/demo.toml", "-o", "{}"], ["table", "2.1"]])
+def test_commands_set_it_before_they_import_jax(tmp_path, words):
+    words = [word.format(tmp_path / "out") for word in words]
+    code = f"from cspr_jax import cli; assert cli.main({words}) == 0; import jax\n"
+    seen = told(tmp_path / "kept", code + "print(jax.config.jax_compilation_cache_dir)")
+    assert Path(seen.splitlines()[-1]).is_relative_to(tmp_path / "kept")
+
+
 def test_the_second_run_compiles_nothing(tmp_path):
     """A run hands its compiled code over when it ends; one that was killed leaves nothing that is read."""
     code = """

@@ -25,13 +25,13 @@ from cspr_jax.grids import in_batches
 from cspr_jax.trajectories.pose_segment import USUAL, Kind, PoseSegment, duration
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
-FEW, MANY = 256, 1024
+FEW, MANY = 256, 2048
 # Instants of one call of the first look, and how many more are looked at than checked at a time.
-CHUNK, FIRST = 8, 4
+CHUNK, FIRST = 8, 2
 # Where the determinant changes by more than this factor from sample to sample, so many pieces are narrowed down.
 STEEP, PIECES = 1.25, 4
 # So many arcs are held at a time: each is 64 samples of several criteria.
-ARCS = 16 * MANY
+ARCS = 8 * MANY
 TOLERANCE = 1e-7
 TOUCH = 1e-6  # of the platform's size
 BESIDE_KNOT = 1e-12
@@ -143,7 +143,7 @@ class PoseChecker:
             some = segments if len(alive) == len(lowest) else rows(segments, alive)
             self._count("first look", len(alive) * CHUNK)
             # Few are not padded to many; where values are compared, not only refuted, all have one shape.
-            size = FIRST * self.batch if whole or len(alive) > self.batch else self.batch // 2
+            size = FIRST * self.batch if whole or len(alive) > self.batch // 2 else self.batch // 4
             found = in_batches(kernel, some, size=size)
             lowest[alive] = np.minimum(lowest[alive], np.where(np.isnan(found), -np.inf, found))
         return lowest

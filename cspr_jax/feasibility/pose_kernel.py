@@ -131,7 +131,9 @@ def look_along(
         return (gaps, views), (values, hit, wide)
 
     shapes = jax.eval_shape(lambda: seen(within[0])[1:])
-    _, (values, hit, wide) = lax.scan(step, jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes), within)
+    start = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
+    # Two places a turn: what is carried on is copied half as often.
+    _, (values, hit, wide) = lax.scan(step, start, within, unroll=2)
     # There is no step before the first place.
     return Look(jnp.stack(values, axis=1), (hit & ~wide)[1:].any(0), wide[1:])
 

@@ -64,20 +64,23 @@ def in_parts(function: Callable[[slice], PoseAnswers], count: int, size: int) ->
     Args:
         function: gives those of a range of cases; it is called from several threads.
         count: of cases, at least one.
-        size: of a range.
+        size: of the largest range.
 
     Returns:
         the answers of all.
     """
     wide = jax.config.read("jax_enable_x64")
 
-    def part(start: int) -> PoseAnswers:
+    def part(start: int, stop: int) -> PoseAnswers:
         # The setting may be the caller's thread's own.
         with jax.enable_x64(wide):
-            return function(slice(start, start + size))
+            return function(slice(start, stop))
 
+    # Parts of one length, as many for each thread.
+    rounds = -(-count // (THREADS * size))
+    bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
     with ThreadPoolExecutor(THREADS) as pool:
-        parts = list(pool.map(part, range(0, count, size)))
+        parts = list(pool.map(part, bounds[:-1], bounds[1:]))
     return PoseAnswers(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 
