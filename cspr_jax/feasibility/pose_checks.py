@@ -28,7 +28,7 @@ from cspr_jax.trajectories.pose_segment import USUAL, Kind, PoseSegment, duratio
 FEW, MANY = 256, 2048
 # Instants of one call of the first look, and how many more are looked at than checked at a time.
 CHUNK, FIRST = 8, 2
-# Where the determinant changes by more than this factor from sample to sample, so many pieces are narrowed down.
+# Where the determinant changes by more than this factor from sample to sample, so many pieces have two samples more.
 STEEP, PIECES = 1.25, 4
 # So many arcs are held at a time: each is 64 samples of several criteria.
 ARCS = 8 * MANY
@@ -161,7 +161,7 @@ class PoseChecker:
         """
         found, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         self._count("motions", len(arcs))
-        size = ARCS // max(arcs, default=1)
+        size = max(ARCS // max(arcs, default=1), 1)
         for start in range(0, len(arcs), size):
             piece = np.arange(start, min(start + size, len(arcs)))
             found.put(piece, self._checked(motions.rows(piece), whole))
