@@ -30,6 +30,8 @@ class PlatformRobot:
         inertia: (3, 3) about the mass centre, platform axes, kg m^2.
         gravity: () along +z, m/s^2.
         name: for people.
+        joints: for each cable the first one that is attached at the same point; known when a function is compiled, so
+            that the point is computed once.
     """
 
     base_points: Array
@@ -38,10 +40,15 @@ class PlatformRobot:
     inertia: Array
     gravity: Array
     name: str = ""
+    joints: tuple[int, ...] = tuple(range(CABLES))
 
 
-_FIELDS = [field.name for field in dataclasses.fields(PlatformRobot)]
-jax.tree_util.register_dataclass(PlatformRobot, _FIELDS[:-1], [], drop_fields=["name"])
+jax.tree_util.register_dataclass(
+    PlatformRobot,
+    ["base_points", "platform_points", "mass", "inertia", "gravity"],
+    ["joints"],
+    drop_fields=["name"],
+)
 
 
 def platform_robot(
@@ -85,7 +92,8 @@ def platform_robot(
                 platform.tolist(),
                 f"no cables {first + 1} and {second + 1} between the same two points",
             )
-    return PlatformRobot(leaf(base), leaf(platform - centre), leaf(mass), leaf(tensor), leaf(gravity), name)
+    joints = tuple(int((platform == point).all(1).argmax()) for point in platform)
+    return PlatformRobot(leaf(base), leaf(platform - centre), leaf(mass), leaf(tensor), leaf(gravity), name, joints)
 
 
 def _points(key: str, given) -> np.ndarray:

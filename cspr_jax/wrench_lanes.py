@@ -34,11 +34,13 @@ class Balance(NamedTuple):
         numerators: six, of mu.
         denominator: their common one.
         signed: a number with the sign of det J.
+        volume: of the first, third and fifth ray, m^3.
     """
 
     numerators: Sequence[Array]
     denominator: Array
     signed: Array
+    volume: Array
 
 
 def cables(robot: PlatformRobot, position: Vector, turn: Matrix) -> Cables:
@@ -52,7 +54,8 @@ def cables(robot: PlatformRobot, position: Vector, turn: Matrix) -> Cables:
     Returns:
         the cables.
     """
-    arms = [turned(turn, [robot.platform_points[k, j] for j in range(3)]) for k in range(CABLES)]
+    each = {k: turned(turn, [robot.platform_points[k, j] for j in range(3)]) for k in set(robot.joints)}
+    arms = [each[k] for k in robot.joints]
     rays = [tuple(position[i] + arm[i] - robot.base_points[k, i] for i in range(3)) for k, arm in enumerate(arms)]
     return Cables(arms, rays)
 
@@ -114,7 +117,7 @@ def balance(wires: Cables, force: Vector, moment: Vector) -> Balance:
     even = [top[j] * determinant - sum(g[j][n] * odd[n] for n in range(3)) for j in range(3)]
     numerators = [x for pair in zip(even, [d * x for x in odd], strict=True) for x in pair]
     # Taking the cables in two groups is an odd permutation.
-    return Balance(numerators, d * determinant, -determinant)
+    return Balance(numerators, d * determinant, -determinant, d)
 
 
 def determinant(wires: Cables) -> Array:

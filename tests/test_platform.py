@@ -18,7 +18,7 @@ from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.endpoints import endpoint
-from cspr_jax.feasibility.pose_kernel import smallest_tensions
+from cspr_jax.feasibility.first_look import smallest_tensions
 from cspr_jax.platforms import pairs_apart, platform_robot
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.trajectories import pose_segment as segments
@@ -362,16 +362,11 @@ def test_the_fast_kernel(robot, name, kind):
             for i in range(24)
         ]
         batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
-        found = smallest_tensions(package, amplitude, float(p), tau, batch, kind=kind)
-        single = jax.tree.map(lambda x: np.asarray(x, np.float32), (package, amplitude, batch))
-        rough = smallest_tensions(
-            single[0],
-            single[1],
-            np.float32(p),
-            tau.astype(np.float32),
-            single[2],
-            kind=kind,
-        )
+        found, when = smallest_tensions(package, amplitude, float(p), tau, batch, kind=kind)
+        rough, _ = smallest_tensions(package, amplitude, float(p), tau, batch, kind=kind, rough=True)
+        assert rough.dtype == np.float32
+        alone, _ = smallest_tensions(package, amplitude, float(p), tau[np.unique(when)], batch, kind=kind)
+        assert (np.asarray(alone) == found).all()
         for i, segment in enumerate(some):
             at = states(package, segment, amplitude, float(p), tau, kind=kind)
             mu, det = (np.asarray(x) for x in readable(package, at))

@@ -14,10 +14,11 @@ from functools import partial
 import jax
 import numpy as np
 
+from cspr_jax.feasibility.first_look import FIRST, FirstLook
 from cspr_jax.feasibility.interference import contacts
-from cspr_jax.feasibility.pose_kernel import glances, look_along, moving_along, smallest_tensions
+from cspr_jax.feasibility.pose_kernel import glances, look_along, moving_along
 from cspr_jax.feasibility.pose_lanes import order
-from cspr_jax.feasibility.pose_samples import Motions, Narrowing, Places, Seen, along, low_points, rows
+from cspr_jax.feasibility.pose_samples import Motions, Narrowing, Places, Seen, along, low_points
 from cspr_jax.feasibility.pose_slacks import PoseShared, flags
 from cspr_jax.feasibility.pose_sweeps import swept
 from cspr_jax.feasibility.verdicts import Verdict
@@ -26,8 +27,6 @@ from cspr_jax.trajectories.pose_segment import USUAL, Kind, PoseSegment, duratio
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
 FEW, MANY = 256, 2048
-# Instants of one call of the first look, and how many more are looked at than checked at a time.
-CHUNK, FIRST = 8, 2
 # Where the determinant changes by more than this factor from sample to sample, so many pieces have two samples more.
 STEEP, PIECES = 1.25, 4
 # So many arcs are held at a time: each is 64 samples of several criteria.
@@ -99,6 +98,8 @@ class PoseChecker:
         self._flags = flags(shared.limits)
         self._size = float(np.linalg.norm(np.asarray(shared.robot.platform_points), axis=1).max())
         knots = np.asarray(shared.amplitude.knots)
+        count = partial(self._count, "first look")
+        self._first = FirstLook(shared.robot, shared.amplitude, kind, FIRST * batch, count)
         self._of_motion = Narrowing(shared, kind, None, batch)
         self._of_pose = self._of_motion._replace(pairs=self._pairs)
         self._knots = np.sort(np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT]))
@@ -119,34 +120,31 @@ class PoseChecker:
         """
         return in_batches(_durations, (segments, arcs.astype(float)), size=self.batch)
 
-    def first_look(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, whole: bool = False) -> np.ndarray:
-        """Smallest tension over some instants, by the fast kernel: what is negative here is infeasible.
+    def first_look(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Which motions some instants refute.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants, the most telling ones first.
+
+        Returns:
+            (n,) those that are infeasible for certain.
+        """
+        return self._first.refuted(segments, arcs, tau, -TOLERANCE)
+
+    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest tension over some instants.
 
         Args:
             segments: leaves (n, ...), all of this number of arcs.
             arcs: the number.
             tau: (m,) instants.
-            whole: whether to look at all of them; else a segment is done after the first few that refute it.
 
         Returns:
             (n,) over its value at rest in P0; -inf beyond a singularity or where not finite.
         """
-        lowest = np.full(len(segments.rate), np.inf)
-        # One shape for all: instants in chunks, the last of them repeated.
-        length = -(-len(tau) // CHUNK) * CHUNK
-        shared = self.shared
-        for chunk in np.pad(tau, (0, length - len(tau)), mode="edge").reshape(-1, CHUNK):
-            alive = np.flatnonzero((lowest > -TOLERANCE) | whole)
-            if not len(alive):
-                break
-            kernel = partial(smallest_tensions, shared.robot, shared.amplitude, float(arcs), chunk, kind=self.kind)
-            some = segments if len(alive) == len(lowest) else rows(segments, alive)
-            self._count("first look", len(alive) * CHUNK)
-            # Few are not padded to many; where values are compared, not only refuted, all have one shape.
-            size = FIRST * self.batch if whole or len(alive) > self.batch // 2 else self.batch // 4
-            found = in_batches(kernel, some, size=size)
-            lowest[alive] = np.minimum(lowest[alive], np.where(np.isnan(found), -np.inf, found))
-        return lowest
+        return self._first.lowest(segments, arcs, tau)
 
     def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True) -> PoseChecks:
         """Check motions in full.

@@ -7,12 +7,10 @@ import jax
 import jax.numpy as jnp
 from jax import Array, lax
 
-from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility import contact_lanes
-from cspr_jax.feasibility.pose_lanes import lowest_tension, moving_slacks, still_slacks
+from cspr_jax.feasibility.pose_lanes import moving_slacks, still_slacks
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.lanes import dot, smallest, stored
-from cspr_jax.platforms import PlatformRobot
 from cspr_jax.trajectories.pose_lanes import Instant, instant, instant_of_arc, state
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 from cspr_jax.wrench_lanes import cables
@@ -35,31 +33,6 @@ class Look(NamedTuple):
     values: Array
     hit: Array
     wide: Array
-
-
-@partial(jax.jit, static_argnames="kind")
-def smallest_tensions(
-    robot: PlatformRobot, amplitude: Amplitude, arcs: Array, tau: Array, segments: PoseSegment, *, kind: Kind
-) -> Array:
-    """Smallest normalised tension of many segments over some instants.
-
-    Args:
-        robot: in its reference axes.
-        amplitude: A.
-        arcs: () number of arcs, the same for all, a float.
-        tau: (m,) instants.
-        segments: leaves (n, ...), of the parity of `arcs`.
-        kind: of the motions.
-
-    Returns:
-        (n,) 1 at rest in P0; -inf where the determinant has not the sign of the reference pose.
-    """
-    table = jax.vmap(lambda t: instant(amplitude, segments.sense[0], arcs, t))(tau)
-
-    def step(lowest, now):
-        return jnp.minimum(lowest, lowest_tension(robot, segments, arcs, now, kind)), None
-
-    return lax.scan(step, jnp.full_like(segments.rate, jnp.inf), table)[0]
 
 
 @partial(jax.jit, static_argnames="kind")

@@ -5,7 +5,7 @@ from jax import Array
 
 from cspr_jax.feasibility.limits import Limits, given
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.lanes import cross, dot, smallest
+from cspr_jax.lanes import dot, smallest
 from cspr_jax.platforms import CABLES, PlatformRobot
 from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.trajectories.pose_lanes import Instant, State, squared_duration, state
@@ -28,17 +28,33 @@ def _balanced(robot: PlatformRobot, now: State, wires: Cables, squared: Array) -
     return balance(wires, force, slowed(moment))
 
 
-def _is_flat(wires: Cables) -> Array:
+def _is_flat(wires: Cables, found: Balance) -> Array:
     # Where three of the cables are nearly in one plane.
-    a, b, c = (wires.rays[k] for k in range(0, CABLES, 2))
-    volume = dot(a, cross(b, c))
-    return volume * volume < FLAT**2 * dot(a, a) * dot(b, b) * dot(c, c)
+    a, b, c = (dot(wires.rays[k], wires.rays[k]) for k in range(0, CABLES, 2))
+    return found.volume * found.volume < FLAT**2 * a * b * c
 
 
-def _smallest_tension(segment: PoseSegment, found: Balance) -> Array:
+def _smallest_tension(rate: Array, found: Balance) -> Array:
     # Over its value at rest in P0 if all were equal.
-    lowest = smallest([x * jnp.sign(found.denominator) for x in found.numerators])
-    return 6.0 / segment.rate * lowest / jnp.abs(found.denominator)
+    share = 6.0 / (rate * found.denominator)
+    return smallest([x * share for x in found.numerators])
+
+
+def certain_tension(rate: Array, regular: Array, wires: Cables, found: Balance) -> Array:
+    """The smallest tension, where the fast balance gives one.
+
+    Args:
+        rate: (n,) lambda of (3.50), 1/s^2.
+        regular: (n,) determinant at rest in P0, whose sign must not change.
+        wires: the cables.
+        found: the tensions.
+
+    Returns:
+        (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign, infinite
+        where the fast balance has no digits.
+    """
+    lowest = jnp.where(found.signed * regular > 0.0, _smallest_tension(rate, found), -jnp.inf)
+    return jnp.where(_is_flat(wires, found), jnp.inf, lowest)
 
 
 def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> Array:
@@ -52,14 +68,12 @@ def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now:
         kind: of the motions.
 
     Returns:
-        (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign, infinite
-        where the fast balance has no digits.
+        (n,) of `certain_tension`.
     """
     here = state(segment, arcs, now, kind)
     wires = cables(robot, here.position, here.turn)
     found = _balanced(robot, here, wires, squared_duration(segment, arcs))
-    lowest = jnp.where(found.signed * segment.regular > 0.0, _smallest_tension(segment, found), -jnp.inf)
-    return jnp.where(_is_flat(wires), jnp.inf, lowest)
+    return certain_tension(segment.rate, segment.regular, wires, found)
 
 
 def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> list[Array]:
@@ -79,8 +93,8 @@ def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: In
     here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
     wires = cables(robot, here.position, here.turn)
     found = _balanced(robot, here, wires, squared)
-    is_flat = _is_flat(wires)
-    values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment, found))]
+    is_flat = _is_flat(wires, found)
+    values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment.rate, found))]
     names = _given(limits, MOVING)
     if not names:
         return values

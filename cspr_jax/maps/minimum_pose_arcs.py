@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.feasibility.pose_checks import TOLERANCE, PoseChecker, PoseChecks
+from cspr_jax.feasibility.pose_checks import PoseChecker, PoseChecks
 from cspr_jax.feasibility.pose_samples import rows
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.grids import in_batches
@@ -136,7 +136,7 @@ def _sieved(checker: PoseChecker, segments: _Segments, arcs: int, alive: np.ndar
     # Those that some instants do not refute.
     if not len(alive):
         return alive
-    return alive[checker.first_look(segments(arcs, alive), arcs, tau) > -TOLERANCE]
+    return alive[~checker.first_look(segments(arcs, alive), arcs, tau)]
 
 
 def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:
@@ -157,7 +157,7 @@ def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: i
     segments = _Segments(checker.shared.robot, candidates)
     for arcs in range(1, max_arcs + 1):
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
-        lowest = checker.first_look(segments(arcs, every), arcs, tau, whole=True)
+        lowest = checker.lowest(segments(arcs, every), arcs, tau)
         best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)
     return best
 

@@ -1,0 +1,174 @@
+"""The first look at many motions of a platform: instants that refute most of them.
+
+In float32, where a sample costs half; each refutation is then looked at again in float64, at its own instant. So the
+first look refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full anyway.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.amplitudes import Amplitude
+from cspr_jax.feasibility.pose_lanes import certain_tension, lowest_tension
+from cspr_jax.feasibility.pose_samples import rows
+from cspr_jax.grids import in_batches
+from cspr_jax.lanes import cross, dot
+from cspr_jax.platforms import PlatformRobot
+from cspr_jax.trajectories.pose_lanes import instant
+from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
+from cspr_jax.trajectories.rest_lanes import rest_table, swing, swings
+from cspr_jax.wrench_lanes import balance, cables
+
+# Instants of one call, and how many more motions are looked at than checked at a time.
+CHUNK, FIRST = 8, 2
+
+
+@partial(jax.jit, static_argnames=("kind", "rough"))
+def smallest_tensions(
+    robot: PlatformRobot,
+    amplitude: Amplitude,
+    arcs: Array,
+    tau: Array,
+    segments: PoseSegment,
+    *,
+    kind: Kind,
+    rough: bool = False,
+) -> tuple[Array, Array]:
+    """Smallest normalised tension of many segments over some instants.
+
+    Args:
+        robot: in its reference axes.
+        amplitude: A.
+        arcs: () number of arcs, the same for all, a float.
+        tau: (m,) instants.
+        segments: leaves (n, ...), of the parity of `arcs`.
+        kind: of the motions.
+        rough: whether in float32.
+
+    Returns:
+        (n,) of `pose_lanes.certain_tension`; and which instant it belongs to, (n,) from 0 on.
+    """
+    kept = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if rough else x.dtype))
+    robot, segments, number = kept((robot, segments, jnp.asarray(arcs)))
+    if kind.from_rest:
+        at, table = _from_rest(robot, segments), kept(rest_table(amplitude, arcs, tau, kind))
+    else:
+        table = kept(jax.vmap(lambda t: instant(amplitude, segments.sense[0], arcs, t))(tau))
+
+        def at(now):
+            return lowest_tension(robot, segments, number, now, kind)
+
+    # One number a loop: XLA would compute the tension once for each of several.
+    values = lax.map(at, table)
+    lowest = values.min(0)
+    return lowest, jnp.where(values == lowest, jnp.arange(len(tau))[:, None], len(tau)).min(0)
+
+
+def _from_rest(robot: PlatformRobot, segments: PoseSegment):
+    which, inertia = swings(segments), robot.inertia / robot.mass
+    # I e has the same direction in platform axes as about the fixed ones before the turn, which leaves the axis alone.
+    own = tuple(dot([inertia[i, j] for j in range(3)], which.axis) for i in range(3))
+
+    def at(row):
+        here = swing(which, row)
+        wires = cables(robot, here.position, here.turn)
+        weight = tuple(dot(line, own) for line in here.turn)
+        whirl = cross(which.axis, weight)
+        moment = tuple(here.spin * a + here.squared_speed * b for a, b in zip(weight, whirl, strict=True))
+        force = (here.acceleration[0], here.acceleration[1], here.acceleration[2] - robot.gravity)
+        return certain_tension(which.rate, segments.regular, wires, balance(wires, force, moment))
+
+    return at
+
+
+@partial(jax.jit, static_argnames="kind")
+def _tensions_at(robot: PlatformRobot, amplitude: Amplitude, arcs: Array, items, *, kind: Kind) -> Array:
+    # Of segments, each at an instant of its own.
+    segments, tau = items
+    return lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau), kind)
+
+
+class FirstLook(NamedTuple):
+    """Looks at motions of one robot.
+
+    Fields:
+        robot: the robot.
+        amplitude: A.
+        kind: of the motions.
+        size: how many are looked at in one call.
+        count_instants: is told how many.
+    """
+
+    robot: PlatformRobot
+    amplitude: Amplitude
+    kind: Kind
+    size: int
+    count_instants: Callable[[int], None]
+
+    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest tension over some instants.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants.
+
+        Returns:
+            (n,) of `smallest_tensions`; -inf where not finite.
+        """
+        lowest = np.full(len(segments.rate), np.inf)
+        # Where values are compared, not only refuted, all calls have one shape.
+        for chunk in _chunks(tau):
+            lowest = np.minimum(lowest, self._seen(segments, arcs, chunk, self.size)[0])
+        return np.where(np.isnan(lowest), -np.inf, lowest)
+
+    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, least: float) -> np.ndarray:
+        """Which motions some instants refute.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants, the most telling ones first.
+            least: a tension no larger than that refutes.
+
+        Returns:
+            (n,) where a tension is, or is none, or the determinant has changed its sign.
+        """
+        found = np.zeros(len(segments.rate), bool)
+        for chunk in _chunks(tau):
+            alive = np.flatnonzero(~found)
+            if not len(alive):
+                break
+            some = segments if len(alive) == len(found) else rows(segments, alive)
+            # Few are not padded to many, and are not worth two looks.
+            is_many = len(alive) > self.size // (2 * FIRST)
+            if not is_many:
+                found[alive] = ~(self._seen(some, arcs, chunk, self.size // (4 * FIRST))[0] > least)
+                continue
+            lowest, when = self._seen(some, arcs, chunk, self.size, rough=True)
+            doubtful = np.flatnonzero(lowest < 0.0)
+            found[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk[when[doubtful]]) > least)
+        return found
+
+    def _seen(self, segments: PoseSegment, arcs: int, tau: np.ndarray, size: int, *, rough: bool = False):
+        self.count_instants(len(segments.rate) * len(tau))
+        kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind, rough=rough)
+        return in_batches(kernel, segments, size=size)
+
+    def _again(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        if not len(tau):
+            return np.zeros(0)
+        self.count_instants(len(tau))
+        kernel = partial(_tensions_at, self.robot, self.amplitude, float(arcs), kind=self.kind)
+        return in_batches(kernel, (segments, tau), size=self.size)
+
+
+def _chunks(tau: np.ndarray) -> np.ndarray:
+    # One shape for all: the last instant is repeated.
+    length = -(-len(tau) // CHUNK) * CHUNK
+    return np.pad(tau, (0, length - len(tau)), mode="edge").reshape(-1, CHUNK)
