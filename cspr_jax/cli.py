@@ -125,6 +125,9 @@ def _parser() -> argparse.ArgumentParser:
     table.add_argument("--fine", action="store_true", help="3.3, 3.4: step pi/64 instead of pi/32")
     bench = add("bench", _bench, "measure checks per second beside a NumPy version of the same check")
     bench.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    bench.add_argument(
+        "--kernels", type=Path, metavar="DIR", help="beside C++ kernels of this folder, such as benchmarks"
+    )
     for sub in (run, plan, table, bench):
         sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
     robots = add("robots", _robots, "list the catalogue of robots")
@@ -382,16 +385,11 @@ def _quantities(options: argparse.Namespace) -> int:
 
 def _bench(options: argparse.Namespace) -> int:
     _start_jax(options)
-    from cspr_jax.bench import bench
+    from cspr_jax.bench import bench, lines
 
-    found = bench()
+    found = bench(options.kernels)
     if options.json:
         _print_json(found)
-        return ExitCode.DONE
-    rates, ratios = found["three_cable"], found["ratio_to_numpy"]
-    heading = f"best of {found['repeats']}, {found['cores']} cores, {found['device']}"
-    sys.stdout.write(f"three-cable checks per second, {heading}\n")
-    for kind, rate in rates.items():
-        ratio = f"  {ratios[kind]:5.0f} x NumPy" if kind in ratios else ""
-        sys.stdout.write(f"  {kind:8s} {rate / 1e6:8.1f} M/s{ratio}\n")
+    else:
+        sys.stdout.write("\n".join(lines(found)) + "\n")
     return ExitCode.DONE

@@ -9,6 +9,9 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
+# How many times as large a batch is elsewhere than on a CPU, whose caches it has to fit.
+LARGER = {"gpu": 16, "tpu": 16}
+
 
 def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
     """Apply a compiled function to arrays of any length, in batches of one length.
@@ -16,12 +19,13 @@ def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
     Args:
         function: takes one pytree whose leaves have leading dimension `size`, returns a pytree likewise.
         arguments: pytree of NumPy arrays (n, ...), n >= 0.
-        size: length of a batch.
+        size: length of a batch on a CPU; see `LARGER`.
         axis: along which the results of a batch lie.
 
     Returns:
         pytree of NumPy arrays, n long along that axis; None if n is 0.
     """
+    size *= LARGER.get(jax.default_backend(), 1)
     leaves = jax.tree.leaves(arguments)
     count = len(leaves[0])
     if count == 0:

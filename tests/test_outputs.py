@@ -8,14 +8,11 @@ import jax
 import matplotlib.colors
 import numpy as np
 import pytest
-from oracles import point_mass
 
 import cspr_jax
-from cspr_jax import bench
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.feasibility.verdicts import SENTENCES
-from cspr_jax.maps import sieve
 from cspr_jax.plots.sections import NONE_COLOUR
 from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY, flag_attributes
 from cspr_jax.reports import plan_object
@@ -346,24 +343,3 @@ def test_robots_that_do_not_fit(tmp_path):
     (tmp_path / "up.toml").write_text(text)
     points = cspr_jax.load_robot(tmp_path / "up.toml").base_points
     np.testing.assert_allclose(np.asarray(points), [[0, 0, -1], [1, 0, -1], [0, -2, -1]])
-
-
-def test_bench(capsys, monkeypatch):
-    for name, small in (("BATCHES", 1), ("REPEATS", 1), ("NUMPY_SEGMENTS", 2)):
-        monkeypatch.setattr(bench, name, small)
-    found = strict_json(cspr(capsys, "bench", "--json"))
-    assert found["schema"] == 1 and found["cores"] >= 1 and jax.devices()[0].platform in found["device"]
-    assert found["checks_per_second"] == {"float32": None, "float64": None, "numpy": None}
-    assert set(found["three_cable"]) == {"float32", "float64", "numpy"}
-    assert all(rate > 0 for rate in found["three_cable"].values())
-    for name in ("float32", "float64"):
-        assert found["ratio_to_numpy"][name] == found["three_cable"][name] / found["three_cable"]["numpy"]
-
-
-def test_the_numpy_version_of_the_check_is_the_oracle_s(prototype):
-    base, ends = np.asarray(prototype.base_points), np.array([[-1.1, 0.2, 1.2]])
-    found, tau = bench._numpy_checks(base, ends), (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
-    for arcs in range(1, 31):
-        _, place, _, acceleration = point_mass.motion([0.7, 0.7, 3.0], ends[0], [0, 0, 1.7], 9.81, arcs, tau)
-        wanted = point_mass.pseudotensions(base, place, acceleration, 9.81).min()
-        assert found[0, arcs - 1] == pytest.approx(wanted, rel=1e-9), arcs

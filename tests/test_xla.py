@@ -2,24 +2,28 @@
 
 import json
 import os
+import platform
 import subprocess
 import sys
 import types
 from contextlib import nullcontext
 from pathlib import Path
 
+import jax
+import numpy as np
 import pytest
 
 from cspr_jax import compiled, xla
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError
+from cspr_jax.grids import in_batches
 
 ROOT = Path(__file__).parent.parent
 
 
 def told(folder, code, **settings):
     """What a fresh process prints, with its cache in a folder."""
-    names = ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS")
+    names = ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS", "MALLOC_ARENA_MAX")
     here = {name: value for name, value in os.environ.items() if name not in names}
     here |= {"CSPR_CACHE_DIR": str(folder)} | settings
     done = subprocess.run([sys.executable, "-c", code], env=here, cwd=ROOT, capture_output=True, text=True, timeout=300)
@@ -125,3 +129,43 @@ def test_workers_of_a_scheduler_choose_their_device(capsys):
     sweep = ROOT / "sweeps" / "demo.toml"
     assert main(["run", str(sweep), "--scheduler", "tcp://localhost:1", "--device", "cpu"]) == 2
     assert capsys.readouterr().err.startswith("cspr: --device: cpu: must be absent beside --scheduler")
+
+
+@pytest.mark.parametrize(("backend", "length"), [("cpu", 32), ("gpu", 512)])
+def test_batches_are_larger_on_a_gpu(monkeypatch, backend, length):
+    """The shapes of the calls, and that padding is trimmed; maps are then the same but for rounding."""
+    shapes = []
+    monkeypatch.setattr(jax, "default_backend", lambda: backend)
+
+    def doubled(x):
+        shapes.append(len(x))
+        return 2.0 * x
+
+    found = in_batches(doubled, np.arange(700.0), size=32)
+    np.testing.assert_array_equal(found, 2.0 * np.arange(700.0))
+    assert set(shapes) == {length} and len(shapes) == -(-700 // length)
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="arenas are glibc's")
+def test_one_arena_of_memory(tmp_path):
+    """For this process (glibc tells by its statistics) and for those started from it; a user's setting stays."""
+    code = """
+import ctypes, os, threading
+from cspr_jax import xla
+xla.prepare()
+hold = threading.Barrier(9)
+def work():
+    kept = [bytes(1000) for _ in range(1000)]
+    hold.wait()
+    hold.wait()
+threads = [threading.Thread(target=work) for _ in range(8)]
+[thread.start() for thread in threads]
+hold.wait()
+os.dup2(1, 2)
+ctypes.CDLL(None).malloc_stats()
+hold.wait()
+print(os.environ["MALLOC_ARENA_MAX"])
+"""
+    found, theirs = told(tmp_path, code), told(tmp_path, code, MALLOC_ARENA_MAX="7")
+    assert found.count("Arena ") == 1 and found.endswith("1\n")
+    assert theirs.count("Arena ") == 7 and theirs.endswith("7\n")

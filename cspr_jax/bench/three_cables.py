@@ -1,88 +1,103 @@
-"""Raw speed of the check, beside a NumPy version of the same check in the same run.
+"""Three-cable checks: the three pseudotensions at one tau of one trajectory.
 
-One three-cable check is the three pseudotensions at one tau of one trajectory. The NumPy version
-computes the printed formulas, (2.12) to (2.14) and (2.31) to (2.48), on whole arrays.
+The NumPy version computes the printed formulas, (2.12) to (2.14) and (2.31) to (2.48), on whole arrays.
 """
 
 import math
-import os
-import platform
-import time
-from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import NamedTuple
 
 import jax
 import numpy as np
 
 from cspr_jax import amplitudes
+from cspr_jax.bench.timing import best, in_threads
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.limits import Limits
 from cspr_jax.maps import sieve
 from cspr_jax.maps.minimum_arcs import segments_between
 from cspr_jax.robots import point_mass_robot
+from cspr_jax.trajectories.hypocycloid import Segment
 
-SCHEMA = 1
-REPEATS = 5
 MAX_ARCS = 30
 BATCHES = 8
 NUMPY_SEGMENTS = 128
 Z0 = 1.7
 RADIUS = 0.26
+START = (0.7, 0.7, 3.0)
 
 
-def bench() -> dict[str, Any]:
-    """Measure the rates.
+class Work(NamedTuple):
+    """What is measured.
+
+    Fields:
+        shared: robot and amplitude function.
+        ends: (n, 3) m.
+        segments: for even numbers of arcs and for odd ones, leaves (n, ...).
+    """
+
+    shared: Shared
+    ends: np.ndarray
+    segments: tuple[Segment, Segment]
+
+
+def work() -> Work:
+    """Segments from one point to random ones.
 
     Returns:
-        the object that `cspr bench --json` prints: checks per second, best of five.
+        the work.
     """
-    shared, ends = _work(BATCHES * sieve.BATCH)
-    starts = np.broadcast_to([0.7, 0.7, 3.0], ends.shape).copy()
-    parities, _ = segments_between(shared, starts, ends, np.full(len(ends), Z0))
-    rates: dict[str, float] = {}
-    for dtype in ("float32", "float64"):
-        pair = jax.tree.map(lambda x, d=dtype: np.asarray(x, d), (parities[0], parities[1]))
-        batches = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::BATCHES], pair)) for i in range(BATCHES)]
-        rates[dtype] = len(ends) * MAX_ARCS * sieve.SAMPLES / _best(partial(_all, shared, batches))
-    few = ends[:NUMPY_SEGMENTS]
-    rates["numpy"] = (
-        len(few) * MAX_ARCS * sieve.SAMPLES / _best(partial(_numpy_checks, np.asarray(shared.robot.base_points), few))
-    )
-    return {
-        "schema": SCHEMA,
-        "checks_per_second": {"float32": None, "float64": None, "numpy": None},
-        "three_cable": rates,
-        "ratio_to_numpy": {dtype: rates[dtype] / rates["numpy"] for dtype in ("float32", "float64")},
-        "cores": len(os.sched_getaffinity(0)),
-        "device": f"{jax.devices()[0].platform} {jax.devices()[0].device_kind}",
-        "machine": platform.machine(),
-        "jax": jax.__version__,
-        "repeats": REPEATS,
-    }
-
-
-def _work(count: int) -> tuple[Shared, np.ndarray]:
     half = math.sqrt(3.0) / 2.0
     base = RADIUS * np.array([[half, -0.5, 0.0], [-half, -0.5, 0.0], [0.0, 1.0, 0.0]])
-    robot = point_mass_robot(base, mass=0.198)
-    ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (count, 3))
-    return Shared(robot, Limits(), amplitudes.named("quintic")), ends
+    shared = Shared(point_mass_robot(base, mass=0.198), Limits(), amplitudes.named("quintic"))
+    ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * sieve.BATCH, 3))
+    starts = np.broadcast_to(START, ends.shape).copy()
+    found, _ = segments_between(shared, starts, ends, np.full(len(ends), Z0))
+    return Work(shared, ends, (found[0], found[1]))
 
 
-def _all(shared: Shared, batches: list) -> None:
-    found = [sieve.upper_bounds(shared.amplitude, *pair, max_arcs=MAX_ARCS) for pair in batches]
-    jax.block_until_ready(found)
+def rate(given: Work, dtype: str) -> float:
+    """Checks a second of the sieve.
+
+    Args:
+        given: the work.
+        dtype: "float32" or "float64".
+
+    Returns:
+        the rate.
+    """
+    pair = jax.tree.map(lambda x: np.asarray(x, dtype), given.segments)
+    batches = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::BATCHES], pair)) for i in range(BATCHES)]
+
+    def one(batch):
+        return sieve.upper_bounds(given.shared.amplitude, *batch, max_arcs=MAX_ARCS)
+
+    return checks(len(given.ends)) / best(partial(in_threads, one, batches))
 
 
-def _best(work: Callable[[], object]) -> float:
-    work()  # compiles
-    times = []
-    for _ in range(REPEATS):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
+def checks(count: int) -> int:
+    """How many checks segments are.
+
+    Args:
+        count: of segments.
+
+    Returns:
+        their number.
+    """
+    return count * MAX_ARCS * sieve.SAMPLES
+
+
+def numpy_rate(given: Work) -> float:
+    """Checks a second of the NumPy version.
+
+    Args:
+        given: the work; a part of it is done.
+
+    Returns:
+        the rate.
+    """
+    ends = given.ends[:NUMPY_SEGMENTS]
+    return checks(len(ends)) / best(partial(_numpy_checks, np.asarray(given.shared.robot.base_points), ends))
 
 
 def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -90,7 +105,7 @@ def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
     tau = (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
     amplitude = (10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4)
     bend = 60 * tau - 180 * tau**2 + 120 * tau**3
-    hub, start, g = np.array([0.0, 0.0, Z0]), np.array([0.7, 0.7, 3.0]), 9.81
+    hub, start, g = np.array([0.0, 0.0, Z0]), np.array(START), 9.81
     v1, v2 = start - hub, ends - hub
     r1, r2 = np.linalg.norm(v1), np.linalg.norm(v2, axis=1)[:, None]
     q1 = v1 / r1

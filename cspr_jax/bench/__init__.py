@@ -1,0 +1,86 @@
+"""Raw speed of the checks, beside NumPy versions of the same checks in the same run, and hand-written ones if asked."""
+
+import os
+import platform
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from cspr_jax.bench import hand_written, six_cables, three_cables, timing
+
+SCHEMA = 1
+
+
+def bench(kernels: Path | None = None) -> dict[str, Any]:
+    """Measure the rates.
+
+    Args:
+        kernels: folder of the hand-written kernels; None: without them.
+
+    Returns:
+        the object that `cspr bench --json` prints: checks per second, best of five.
+
+    Raises:
+        ConfigError: there is no compiler, or it refuses a kernel.
+    """
+    six, three = six_cables.work(six_cables.TRAJECTORIES), three_cables.work()
+    batches = six_cables.batches(six)
+    rough, exact = (six_cables.rate(six.robot, batches, rough=is_rough) for is_rough in (True, False))
+    rates = {
+        "six_cable": {"float32": rough[0], "float64": exact[0], "numpy": six_cables.numpy_rate(six)},
+        "three_cable": {dtype: three_cables.rate(three, dtype) for dtype in ("float32", "float64")}
+        | {"numpy": three_cables.numpy_rate(three)},
+    }
+    written = None if kernels is None else hand_written.rates(kernels, six, three)
+    return {
+        "schema": SCHEMA,
+        "checks_per_second": rates["six_cable"],
+        "three_cable": rates["three_cable"],
+        "taut_share": {"float32": rough[1], "float64": exact[1]},
+        "operations_per_check": six_cables.operations_a_check(six.robot, batches[0]),
+        "peak_per_second": timing.peak(),
+        "hand_written": written,
+        "ratio_to_numpy": _ratios(rates, {name: found["numpy"] for name, found in rates.items()}),
+        "ratio_to_hand_written": None if written is None else _ratios(rates, written),
+        "cores": timing.cores(),
+        "device": f"{jax.devices()[0].platform} {jax.devices()[0].device_kind}",
+        "machine": platform.machine(),
+        "flags": os.environ.get("XLA_FLAGS", ""),
+        "jax": jax.__version__,
+        "repeats": timing.REPEATS,
+    }
+
+
+def _ratios(rates: dict[str, dict[str, float]], to: dict[str, float]) -> dict[str, dict[str, float]]:
+    return {
+        name: {dtype: rates[name][dtype] / reference for dtype in ("float32", "float64")}
+        for name, reference in to.items()
+    }
+
+
+def lines(found: dict[str, Any]) -> list[str]:
+    """What `cspr bench` prints for people.
+
+    Args:
+        found: by `bench`.
+
+    Returns:
+        the lines.
+    """
+    text = [f"checks per second, best of {found['repeats']}, {found['cores']} cores, {found['device']}"]
+    for name, key in (("six_cable", "checks_per_second"), ("three_cable", "three_cable")):
+        text.append(name.replace("_", "-"))
+        for dtype, rate in found[key].items():
+            ratio = found["ratio_to_numpy"][name].get(dtype)
+            words = "" if ratio is None else f"  {ratio:6.0f} x NumPy"
+            if ratio is not None and found["hand_written"] is not None:
+                words += f"  {found['ratio_to_hand_written'][name][dtype]:5.2f} x hand-written C++ in float32"
+            text.append(f"  {dtype:8s} {rate / 1e6:8.2f} M/s{words}")
+    for dtype in ("float32", "float64"):
+        used = found["checks_per_second"][dtype] * found["operations_per_check"] / found["peak_per_second"][dtype]
+        peak = found["peak_per_second"][dtype] / 1e9
+        text.append(
+            f"six-cable {dtype}: {used:.0%} of what products of matrices reach, {peak:.0f} G operations a second"
+        )
+    return text

@@ -1,0 +1,138 @@
+"""Kernels written by hand in C++ for the same work: how near XLA comes to them."""
+
+import ctypes
+import os
+import shutil
+import subprocess
+import tempfile
+from functools import partial
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.bench import six_cables, three_cables
+from cspr_jax.bench.timing import best
+from cspr_jax.errors import ConfigError
+from cspr_jax.lanes import Vector
+from cspr_jax.maps import sieve
+from cspr_jax.trajectories.rest_lanes import rest_table, swings
+
+FLAGS = (
+    "-O3",
+    "-march=native",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-freciprocal-math",
+    "-ffp-contract=fast",
+    "-fopenmp",
+)
+ALIGNED = 64
+
+
+def rates(folder: Path, six: six_cables.Work, three: three_cables.Work) -> dict[str, float]:
+    """Checks a second of both kernels, on all cores; the first results are compared with the package's.
+
+    Args:
+        folder: where three_cables.cpp and six_cables.cpp are.
+        six: the work of one.
+        three: the work of the other.
+
+    Returns:
+        "six_cable" and "three_cable".
+
+    Raises:
+        ConfigError: there is no compiler, or it refuses a kernel.
+    """
+    return {
+        "six_cable": _six_cables(_compiled(folder / "six_cables.cpp").six_cables, six),
+        "three_cable": _three_cables(_compiled(folder / "three_cables.cpp").three_cables, three),
+    }
+
+
+def _compiled(source: Path) -> ctypes.CDLL:
+    compiler = os.environ.get("CXX") or shutil.which("c++") or "g++"
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder) / f"{source.stem}.so"
+        try:
+            command = [compiler, *FLAGS, "-shared", "-fPIC", str(source), "-o", str(library)]
+            done = subprocess.run(command, capture_output=True, text=True)
+        except OSError as error:
+            raise ConfigError("--kernels", f"{compiler}: must be a C++ compiler ({error.strerror})") from error
+        if done.returncode:
+            reason = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip())
+            raise ConfigError(source, f"{compiler} must accept it, but says: {reason}")
+        return ctypes.CDLL(str(library))
+
+
+def _lined(values) -> np.ndarray:
+    # Whole vectors of float32, at the start of a cache line.
+    array = np.ascontiguousarray(values, np.float32)
+    room = np.zeros(array.size + ALIGNED // 4, np.float32)
+    first = -room.ctypes.data % ALIGNED // 4
+    found = room[first : first + array.size].reshape(array.shape)
+    found[...] = array
+    return found
+
+
+def _pointers(*arrays: np.ndarray) -> list[ctypes.c_void_p]:
+    return [array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
+
+
+def _three_cables(kernel, work: three_cables.Work) -> float:
+    tau = (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
+    calls, kept = [], []
+    for first, segments in ((0, work.segments[1]), (1, work.segments[0])):
+        arcs = np.arange(1, three_cables.MAX_ARCS + 1)[first::2]
+        s = jax.tree.map(np.asarray, segments)
+        fields = [s.start_radius, s.end_radius - s.start_radius, s.precession, s.sense, *s.tilt.T]
+        fields += [*s.pull.reshape(-1, 6).T, *s.twist.T]
+        table = sieve.sample_table(work.shared.amplitude, arcs, tau, np.float32)
+        given = [_lined(x) for x in (np.stack(fields), table, arcs, tau)]
+        found = _lined(np.zeros((len(arcs), len(s.rate))))
+        sizes = ctypes.c_size_t(len(s.rate)), ctypes.c_int(len(arcs)), ctypes.c_int(len(tau))
+        calls.append(partial(kernel, *_pointers(*given), *sizes, *_pointers(found)))
+        kept.append((given, found))
+        few = jax.tree.map(lambda x: x[: sieve.BATCH], s)
+        _compare("three_cables.cpp", found, calls[-1], sieve.smallest_sampled(work.shared.amplitude, few, arcs, tau))
+    return three_cables.checks(len(work.ends)) / best(lambda: [call() for call in calls])
+
+
+def _six_cables(kernel, work: six_cables.Work) -> float:
+    robot, tau = work.robot, np.linspace(0.0, 1.0, six_cables.SAMPLES)
+    corners = sorted(set(robot.joints))
+    points = np.asarray(robot.platform_points)[corners]
+    joint = np.array([corners.index(k) for k in robot.joints], np.int32)
+    constants = [_lined(np.asarray(robot.base_points)), _lined(points)]
+    calls, kept, count = [], [], 0
+    for batch in six_cables.batches(work):
+        which = swings(batch.segments)
+        inertia = np.asarray(robot.inertia / robot.mass) @ _stacked(which.axis)
+        fields = [_stacked(which.reach), _stacked(which.axis), inertia, np.stack([which.angle, which.end_bend])]
+        table = rest_table(six_cables.QUINTIC, jnp.asarray(float(batch.arcs)), jnp.asarray(tau), six_cables.FROM_REST)
+        given = [_lined(np.concatenate(fields)), _lined(table)]
+        found = _lined(np.zeros(six_cables.LANES))
+        numbers = ctypes.c_float(six_cables.PLACE[2]), ctypes.c_float(float(robot.gravity))
+        sizes = ctypes.c_size_t(six_cables.LANES), ctypes.c_int(len(tau))
+        calls.append(partial(kernel, *_pointers(*given, *constants, joint), *numbers, *sizes, *_pointers(found)))
+        kept.append((given, found))
+        count += batch.real
+        if len(kept) == 1:
+            wanted = six_cables.tensions(robot, batch, rough=False) * float(batch.segments.rate[0]) / 6.0
+            _compare("six_cables.cpp", found, calls[0], wanted)
+    return count * six_cables.SAMPLES / best(lambda: [call() for call in calls])
+
+
+def _stacked(vector: Vector) -> np.ndarray:
+    return np.stack([np.asarray(x) for x in vector])
+
+
+def _compare(name: str, found: np.ndarray, call, wanted) -> None:
+    # A kernel that computes something else has no rate.
+    call()
+    wanted = np.asarray(wanted)
+    mine = found[..., : wanted.shape[-1]]
+    differs = (mine > 0.0) != (wanted > 0.0)
+    if differs.mean() > 1e-3:
+        raise ConfigError(name, f"must agree with the package, but differs in {differs.mean():.1%} of the cases")

@@ -1,0 +1,204 @@
+"""Six-cable checks: the six tensions and the sign of the determinant at one tau of one transition from rest.
+
+The MSSM goes to one place with random orientations, numbers of arcs and beta-hat. The NumPy version computes the
+printed formulas, (3.1) to (3.11), (3.44) and (3.80), on whole arrays, and solves with `np.linalg.solve`.
+"""
+
+import math
+from functools import partial
+from typing import NamedTuple, cast
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax import amplitudes
+from cspr_jax.api import load_robot
+from cspr_jax.bench.timing import best, in_threads, operations
+from cspr_jax.feasibility.first_look import smallest_tensions
+from cspr_jax.grids import padded
+from cspr_jax.platforms import PlatformRobot
+from cspr_jax.reference_pose import aligned
+from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, pose_segment
+
+TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
+NUMPY_TRAJECTORIES = 128
+FEWEST_ARCS, MOST_ARCS = 4, 15
+PLACE = (1.5 * 0.86, 0.0, 1.7)
+FROM_REST, QUINTIC = Kind(from_rest=True), amplitudes.named("quintic")
+
+
+class Work(NamedTuple):
+    """Transitions from rest, all to `PLACE`.
+
+    Fields:
+        robot: the MSSM.
+        axis: (n, 3) unit vectors of the rotation.
+        angle: (n,) rad.
+        arcs: (n,).
+        bend: (n,) beta-hat.
+    """
+
+    robot: PlatformRobot
+    axis: np.ndarray
+    angle: np.ndarray
+    arcs: np.ndarray
+    bend: np.ndarray
+
+
+def work(count: int) -> Work:
+    """Random transitions.
+
+    Args:
+        count: how many.
+
+    Returns:
+        the work.
+    """
+    rng = np.random.default_rng(0)
+    axis = rng.normal(size=(3, count))
+    axis /= np.linalg.norm(axis, axis=0)
+    angle, arcs = rng.uniform(0.0, 2.0, count), rng.integers(FEWEST_ARCS, MOST_ARCS + 1, count)
+    robot = cast(PlatformRobot, load_robot("laval-mssm"))
+    return Work(aligned(robot)[0], axis.T, angle, arcs, rng.uniform(-15.0, 0.0, count))
+
+
+class Batch(NamedTuple):
+    """Segments of one number of arcs, as many as lanes.
+
+    Fields:
+        arcs: how many.
+        real: how many segments are not padding.
+        segments: leaves (LANES, ...), on the device.
+    """
+
+    arcs: int
+    real: int
+    segments: PoseSegment
+
+
+def batches(given: Work) -> list[Batch]:
+    """The work by numbers of arcs.
+
+    Args:
+        given: the work.
+
+    Returns:
+        batches of one shape.
+    """
+    half = given.angle[:, None] / 2.0
+    quaternions = np.concatenate([np.cos(half), np.sin(half) * given.axis], axis=1)
+    found = []
+    for arcs in np.unique(given.arcs):
+        which = np.flatnonzero(given.arcs == arcs)
+        every = _segments(given.robot, quaternions[which], given.bend[which], np.asarray(arcs % 2 == 1))
+        every = jax.tree.map(np.asarray, every)
+        for start in range(0, len(which), LANES):
+            some = jax.tree.map(lambda x, s=start: x[s : s + LANES], every)
+            found.append(Batch(int(arcs), len(some.rate), jax.device_put(padded(some, LANES))))
+    return found
+
+
+@jax.jit
+def _segments(robot: PlatformRobot, quaternions, bends, odd) -> PoseSegment:
+    depth = jnp.asarray(PLACE[2])
+    rest = jnp.stack([0.0 * depth, 0.0 * depth, depth]), jnp.array([1.0, 0.0, 0.0, 0.0])
+
+    def one(quaternion, bend):
+        return pose_segment(robot, rest, (jnp.asarray(PLACE), quaternion), depth, (bend, bend), odd=odd)
+
+    return jax.vmap(one)(quaternions, bends)
+
+
+def rate(robot: PlatformRobot, some: list[Batch], *, rough: bool) -> tuple[float, float]:
+    """Checks a second.
+
+    Args:
+        robot: the robot.
+        some: batches.
+        rough: whether in float32.
+
+    Returns:
+        the rate, and the share of the trajectories whose tensions are positive at all samples.
+    """
+    call = partial(tensions, robot, rough=rough)
+    found = [np.asarray(call(batch)) for batch in some]
+    total = sum(batch.real for batch in some)
+    taut = sum(int((x[: batch.real] > 0.0).sum()) for x, batch in zip(found, some, strict=True))
+    return total * SAMPLES / best(partial(in_threads, call, some)), taut / total
+
+
+def tensions(robot: PlatformRobot, batch: Batch, *, rough: bool) -> Array:
+    """Smallest normalised tension of each trajectory.
+
+    Args:
+        robot: the robot.
+        batch: of segments.
+        rough: whether in float32.
+
+    Returns:
+        (LANES,) of `first_look.smallest_tensions`.
+    """
+    tau, arcs = np.linspace(0.0, 1.0, SAMPLES), float(batch.arcs)
+    return smallest_tensions(robot, QUINTIC, arcs, tau, batch.segments, kind=FROM_REST, rough=rough)[0]
+
+
+def operations_a_check(robot: PlatformRobot, batch: Batch) -> float:
+    """Arithmetic operations of one check.
+
+    Args:
+        robot: the robot.
+        batch: of segments.
+
+    Returns:
+        as XLA counts them.
+    """
+    lowered = smallest_tensions.lower(
+        robot, QUINTIC, float(batch.arcs), np.zeros(1), batch.segments, kind=FROM_REST, rough=True
+    )
+    return operations(lowered, LANES)
+
+
+def numpy_rate(given: Work) -> float:
+    """Checks a second of the NumPy version.
+
+    Args:
+        given: the work; a part of it is done.
+
+    Returns:
+        the rate.
+    """
+    some = Work(given.robot, *(x[:NUMPY_TRAJECTORIES] for x in given[1:]))
+    return len(some.arcs) * SAMPLES / best(partial(_numpy_checks, some))
+
+
+def _numpy_checks(given: Work) -> np.ndarray:
+    # Smallest tension per mass and length of each trajectory: (n,); -inf where the determinant changes its sign.
+    tau, theta = np.linspace(0.0, 1.0, SAMPLES), math.pi * given.arcs[:, None]
+    a, a1 = 10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4
+    a2, a3 = 60 * tau - 180 * tau**2 + 120 * tau**3, 60 - 360 * tau + 360 * tau**2
+    gravity, sign = float(given.robot.gravity), (-1.0) ** given.arcs[:, None]
+    squared = theta**2 * PLACE[2] / gravity
+    c, s, c3, s3 = np.cos(theta * tau), np.sin(theta * tau), np.cos(3 * theta * tau), np.sin(3 * theta * tau)
+    h = given.bend[:, None]
+    beat = ((9 + h) * c - (1 + h) * c3) / 8
+    beat1, beat2 = theta * (3 * (1 + h) * s3 - (9 + h) * s) / 8, theta**2 * (9 * (1 + h) * c3 - (9 + h) * c) / 8
+    turn = (sign * given.angle[:, None])[..., None]
+    angle = turn * (a * beat)[..., None]
+    speed, spin = turn * (a1 * beat + a * beat1)[..., None], turn * (a2 * beat + 2 * a1 * beat1 + a * beat2)[..., None]
+    reach = (sign * (a * c - a1 * s / theta))[..., None]
+    pull = (-sign * ((a * theta**2 + a2) * c + (a1 * theta + a3 / theta) * s) / squared)[..., None]
+    rest, far = np.array([0.0, 0.0, PLACE[2]]), np.array([*PLACE[:2], 0.0])
+    position, acceleration = rest + reach * far, pull * far - np.array([0.0, 0.0, gravity])
+    e = given.axis[:, None, :]
+    skew = np.cross(np.eye(3), given.axis[:, None, :])[:, None]
+    rotation = np.eye(3) + np.sin(angle)[..., None] * skew + (1 - np.cos(angle))[..., None] * skew @ skew
+    weight = np.einsum("ntij,jk,nlk->nti", rotation, np.asarray(given.robot.inertia / given.robot.mass), e)
+    moment = (spin * weight + speed**2 * np.cross(e, weight)) / squared[..., None]
+    arms = np.einsum("ntij,kj->ntki", rotation, np.asarray(given.robot.platform_points))
+    rays = position[:, :, None] + arms - np.asarray(given.robot.base_points)
+    matrix = -np.concatenate([rays, np.cross(arms, rays)], axis=3).swapaxes(2, 3)
+    tensions = np.linalg.solve(matrix, np.concatenate([acceleration, moment], axis=2)[..., None])[..., 0]
+    is_same = np.linalg.det(matrix) * np.linalg.det(matrix[:, :1]) > 0.0
+    return np.where(is_same, tensions.min(2), -np.inf).min(1)

@@ -1,0 +1,94 @@
+"""`cspr bench`: what it says, and that the versions which it times compute the same."""
+
+import shutil
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+from oracles import point_mass
+from test_outputs import cspr, strict_json
+
+from cspr_jax import load_robot
+from cspr_jax.bench import six_cables, three_cables, timing
+from cspr_jax.cli import main
+from cspr_jax.maps import sieve
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture
+def small_bench(monkeypatch):
+    monkeypatch.setattr(timing, "REPEATS", 1)
+    monkeypatch.setattr(timing, "SIDE", 8)
+    monkeypatch.setattr(timing, "COPIED", 4096)
+    monkeypatch.setattr(three_cables, "BATCHES", 1)
+    monkeypatch.setattr(three_cables, "NUMPY_SEGMENTS", 2)
+    monkeypatch.setattr(six_cables, "NUMPY_TRAJECTORIES", 2)
+    monkeypatch.setattr(six_cables, "TRAJECTORIES", 400)
+    monkeypatch.setattr(six_cables, "LANES", 64)
+
+
+@pytest.mark.parametrize("kernels", [None, ROOT / "benchmarks"])
+def test_bench(capsys, small_bench, kernels):
+    if kernels and not shutil.which("c++"):
+        pytest.skip("no C++ compiler")
+    options = ["--kernels", str(kernels)] if kernels else []
+    found = strict_json(cspr(capsys, "bench", "--json", *options))
+    assert found["schema"] == 1 and found["cores"] >= 1 and jax.devices()[0].platform in found["device"]
+    for name, key in (("six_cable", "checks_per_second"), ("three_cable", "three_cable")):
+        assert set(found[key]) == {"float32", "float64", "numpy"}
+        assert all(rate > 0 for rate in found[key].values())
+        for dtype in ("float32", "float64"):
+            assert found["ratio_to_numpy"][name][dtype] == found[key][dtype] / found[key]["numpy"]
+            if kernels:
+                assert found["ratio_to_hand_written"][name][dtype] == found[key][dtype] / found["hand_written"][name]
+    assert found["taut_share"]["float32"] == found["taut_share"]["float64"]
+    assert (found["hand_written"] is None) == (kernels is None)
+    assert 300 < found["operations_per_check"] < 900
+    assert "x NumPy" in cspr(capsys, "bench", *options)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"six_cables.cpp": None}, "six_cables.cpp"),
+        ({"six_cables.cpp": "int"}, "must accept it"),
+        ({"CXX": "no-such-compiler"}, "no-such-compiler: must be a C++ compiler"),
+        ({"six_cables.cpp": 'extern "C" void six_cables() {}'}, "must agree"),
+    ],
+)
+def test_kernels_that_are_wrong(capsys, small_bench, tmp_path, monkeypatch, change, words):
+    if not shutil.which("c++"):
+        pytest.skip("no C++ compiler")
+    for path in (ROOT / "benchmarks").glob("*.[ch]*"):
+        shutil.copy(path, tmp_path)
+    for name, text in change.items():
+        if name == "CXX":
+            monkeypatch.setenv(name, text)
+        elif text is None:
+            (tmp_path / name).unlink()
+        else:
+            (tmp_path / name).write_text(text)
+    assert main(["bench", "--json", "--kernels", str(tmp_path)]) == 2
+    out, err = capsys.readouterr()
+    assert not out and words in err and err.count("\n") == 1
+
+
+def test_the_numpy_version_of_the_six_cable_check(small_bench):
+    """Against the package, trajectory by trajectory."""
+    given = six_cables.work(60)
+    found = six_cables._numpy_checks(given)
+    for batch in six_cables.batches(given):
+        wanted = np.asarray(six_cables.tensions(given.robot, batch, rough=False))[: batch.real]
+        mine = found[given.arcs == batch.arcs] * 6.0 * six_cables.PLACE[2] / float(given.robot.gravity)
+        np.testing.assert_allclose(mine, wanted, rtol=1e-8, atol=1e-9)
+
+
+def test_the_numpy_version_of_the_three_cable_check():
+    base, ends = np.asarray(load_robot("prototype").base_points), np.array([[-1.1, 0.2, 1.2]])
+    found, tau = three_cables._numpy_checks(base, ends), (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
+    for arcs in range(1, 31):
+        _, place, _, acceleration = point_mass.motion([0.7, 0.7, 3.0], ends[0], [0, 0, 1.7], 9.81, arcs, tau)
+        wanted = point_mass.pseudotensions(base, place, acceleration, 9.81).min()
+        assert found[0, arcs - 1] == pytest.approx(wanted, rel=1e-9), arcs

@@ -1,0 +1,89 @@
+"""The first look at transitions of a platform: what it refutes and how many are left, beside checking everything."""
+
+from itertools import pairwise
+
+import jax
+import numpy as np
+import pytest
+from oracles import platform as oracle
+from test_platform import MSSM, Z0, general, ours
+
+from cspr_jax.amplitudes import named
+from cspr_jax.feasibility import first_look
+from cspr_jax.feasibility.limits import Limits
+from cspr_jax.feasibility.pose_checks import PoseChecker
+from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.maps.minimum_pose_arcs import Candidates, _Segments, smallest_arcs
+from cspr_jax.trajectories.pose_segment import Kind
+
+BENDS, ARCS = 5, 8
+
+
+def checker_of(robot, *, batch=512):
+    return PoseChecker(PoseShared(ours(robot), Limits(), named("quintic")), Kind(from_rest=True), batch=batch)
+
+
+def candidates(robot, rng, count):
+    """Random targets up to twice the footprint away, each with several values of beta-hat."""
+    radius, angle = 1.7 * np.sqrt(rng.uniform(0.0, 1.0, count)), rng.uniform(-np.pi, np.pi, count)
+    place = np.stack([radius * np.cos(angle), radius * np.sin(angle), rng.uniform(0.9, 2.0, count)], axis=1)
+    turns = rng.uniform([-np.pi, 0.0, -1.0], [np.pi, 1.0, 1.0], (count, 3))
+    end = place, np.stack([oracle.pose_quaternion(*pair) for pair in zip(place, turns, strict=True)])
+    rest = np.tile(oracle.rest_point(robot, Z0), (count, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+    motion = np.repeat(np.arange(count), BENDS)
+    bends = np.full(len(motion), -1.0), rng.uniform(-8.0, 1.0, len(motion))
+    return Candidates(rest, end, np.full(count, Z0), motion, bends)
+
+
+@pytest.mark.parametrize(("robot", "motions"), [(MSSM, 500), (general(2), 60)])
+def test_the_search_is_the_full_search(robot, motions):
+    """20,000 trajectories of one robot: smallest numbers of arcs, and what passes where each is checked in full."""
+    rng, checker, full = np.random.default_rng(3), checker_of(robot), checker_of(robot)
+    given = candidates(robot, rng, motions)
+    segments, every = _Segments(full.shared.robot, given), np.arange(motions * BENDS)
+    passes = np.zeros((ARCS + 1, len(every)), bool)
+    for arcs in range(1, ARCS + 1):
+        passes[arcs] = full.check(segments(arcs, every), np.full(len(every), arcs)).verdict == 0
+    of_motion = passes.reshape(ARCS + 1, motions, BENDS).any(2)
+    wanted = np.where(of_motion.any(0), of_motion.argmax(0), 0)
+    found = smallest_arcs(checker, given, max_arcs=ARCS)
+    arcs = np.zeros(motions, int)
+    some = np.flatnonzero(found.arcs)
+    arcs[given.motion[some]] = found.arcs[some]
+    np.testing.assert_array_equal(arcs, wanted)
+    assert passes[found.arcs[some], some].all()
+    assert 0 < (wanted > 0).sum() < motions
+    work, brute = (sum(c.done[name] for name in ("first look", "checks")) for c in (checker, full))
+    assert checker.done["motions"] < 0.2 * motions * BENDS * ARCS and work < 0.25 * brute
+
+
+@pytest.mark.parametrize("kind", [Kind(), Kind(from_rest=True)])
+def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
+    """Instants of every kind; with a float32 that is wrong on purpose, less is refuted but never more."""
+    checker, rng = checker_of(MSSM), np.random.default_rng(4)
+    checker = PoseChecker(checker.shared, kind, batch=64)
+    segments = _Segments(checker.shared.robot, candidates(MSSM, rng, 60))(6, np.arange(300))
+    tau = np.linspace(1.0, 0.0, 37)
+    lowest = checker.lowest(segments, 6, tau)
+    wanted = lowest <= -1e-7
+    assert 30 < wanted.sum() < 270
+    np.testing.assert_array_equal(checker.first_look(segments, 6, tau), wanted)
+    few = jax.tree.map(lambda x: x[:16], segments)
+    np.testing.assert_array_equal(checker.first_look(few, 6, tau), wanted[:16])
+    exact = first_look.smallest_tensions
+    for wrong in (lambda x: x - 0.3, lambda x: np.inf * x, lambda x: np.nan * x):
+
+        def spoiled(*given, rough, wrong=wrong, **options):
+            value, when = exact(*given, rough=rough, **options)
+            return (wrong(value), when) if rough else (value, when)
+
+        monkeypatch.setattr(first_look, "smallest_tensions", spoiled)
+        refuted = checker.first_look(segments, 6, tau)
+        assert not (refuted & ~wanted).any()
+
+
+def test_more_instants_refute_more():
+    checker, rng = checker_of(MSSM, batch=64), np.random.default_rng(5)
+    segments = _Segments(checker.shared.robot, candidates(MSSM, rng, 40))(5, np.arange(200))
+    found = [checker.first_look(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
+    assert all(not (a & ~b).any() for a, b in pairwise(found))
