@@ -58,13 +58,16 @@ def best(function) -> float:
 
 def six_cables(count: int) -> tuple[float, int]:
     """The bench's kernel over all trajectories, whatever their numbers."""
-    from functools import partial
+    import jax
 
     from cspr_jax.bench import six_cables as bench
-    from cspr_jax.bench.timing import in_threads
+    from cspr_jax.grids import in_threads
 
     given = bench.work(count)
-    look = partial(bench.tensions, given.robot, rough=True)
+
+    def look(batch):
+        return jax.block_until_ready(bench.tensions(given.robot, batch, rough=True))
+
     batches = bench.batches(given)
     return best(lambda: in_threads(look, batches)), count * bench.SAMPLES
 

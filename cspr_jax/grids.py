@@ -4,16 +4,39 @@ XLA compiles for one shape, and the bits of its results can depend on it. So eve
 same shape: the last batch is padded with its own last element, and trimmed.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import jax
 import numpy as np
 
 # How many times as large a batch is elsewhere than on a CPU, whose caches it has to fit.
 LARGER = {"gpu": 16, "tpu": 16}
+THREADS = 2
 
 
-def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
+def in_threads(function: Callable, items: Sequence) -> list:
+    """Results of a function, in order, by two threads: what XLA does on one core goes beside another's.
+
+    Args:
+        function: called from several threads.
+        items: its arguments, one each.
+
+    Returns:
+        one result an item.
+    """
+    wide = jax.config.read("jax_enable_x64")
+
+    def one(item):
+        # The setting may be the caller's thread's own.
+        with jax.enable_x64(wide):
+            return function(item)
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(one, items))
+
+
+def in_batches(function: Callable, arguments, *, size: int, axis: int = 0, threads: bool = False):
     """Apply a compiled function to arrays of any length, in batches of one length.
 
     Args:
@@ -21,6 +44,7 @@ def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
         arguments: pytree of NumPy arrays (n, ...), n >= 0.
         size: length of a batch on a CPU; see `LARGER`.
         axis: along which the results of a batch lie.
+        threads: whether two threads call the function.
 
     Returns:
         pytree of NumPy arrays, n long along that axis; None if n is 0.
@@ -30,10 +54,13 @@ def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
     count = len(leaves[0])
     if count == 0:
         return None
-    pending = [
-        function(padded(jax.tree.map(lambda a, s=start: a[s : s + size], arguments), size))
-        for start in range(0, count, size)
-    ]
+
+    def batch(start):
+        found = function(padded(jax.tree.map(lambda a: a[start : start + size], arguments), size))
+        return jax.tree.map(np.asarray, found) if threads else found
+
+    starts = range(0, count, size)
+    pending = in_threads(batch, starts) if threads else [batch(start) for start in starts]
     parts = [jax.tree.map(np.asarray, part) for part in pending]
 
     def whole(*pieces):

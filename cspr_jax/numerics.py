@@ -51,6 +51,19 @@ def sincospi(x: Array) -> tuple[Array, Array]:
     return sign * (math.pi * angle) * sine, sign * cosine
 
 
+def lesser(a: Array, b: Array) -> Array:
+    """The smaller of two numbers in one machine instruction; XLA's minimum takes four, for the sake of NaN.
+
+    Args:
+        a: (...).
+        b: (...).
+
+    Returns:
+        (...) where one is NaN, b.
+    """
+    return jnp.where(a < b, a, b)
+
+
 def length(vector: Array) -> Array:
     """Length of a vector, with a gradient of zero where it is zero.
 

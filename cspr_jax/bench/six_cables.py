@@ -15,9 +15,9 @@ from jax import Array
 
 from cspr_jax import amplitudes
 from cspr_jax.api import load_robot
-from cspr_jax.bench.timing import best, in_threads, operations
+from cspr_jax.bench.timing import best, operations
 from cspr_jax.feasibility.first_look import smallest_tensions
-from cspr_jax.grids import padded
+from cspr_jax.grids import in_threads, padded
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.reference_pose import aligned
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, pose_segment
@@ -122,7 +122,10 @@ def rate(robot: PlatformRobot, some: list[Batch], *, rough: bool) -> tuple[float
     Returns:
         the rate, and the share of the trajectories whose tensions are positive at all samples.
     """
-    call = partial(tensions, robot, rough=rough)
+
+    def call(batch):
+        return jax.block_until_ready(tensions(robot, batch, rough=rough))
+
     found = [np.asarray(call(batch)) for batch in some]
     total = sum(batch.real for batch in some)
     taut = sum(int((x[: batch.real] > 0.0).sum()) for x, batch in zip(found, some, strict=True))

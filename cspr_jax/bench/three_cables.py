@@ -11,16 +11,17 @@ import jax
 import numpy as np
 
 from cspr_jax import amplitudes
-from cspr_jax.bench.timing import best, in_threads
+from cspr_jax.bench.timing import best
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.limits import Limits
+from cspr_jax.grids import in_threads
 from cspr_jax.maps import sieve
 from cspr_jax.maps.minimum_arcs import segments_between
 from cspr_jax.robots import point_mass_robot
 from cspr_jax.trajectories.hypocycloid import Segment
 
 MAX_ARCS = 30
-BATCHES = 8
+BATCHES = 16
 NUMPY_SEGMENTS = 128
 Z0 = 1.7
 RADIUS = 0.26
@@ -70,7 +71,7 @@ def rate(given: Work, dtype: str) -> float:
     batches = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::BATCHES], pair)) for i in range(BATCHES)]
 
     def one(batch):
-        return sieve.upper_bounds(given.shared.amplitude, *batch, max_arcs=MAX_ARCS)
+        return jax.block_until_ready(sieve.upper_bounds(given.shared.amplitude, *batch, max_arcs=MAX_ARCS))
 
     return checks(len(given.ends)) / best(partial(in_threads, one, batches))
 

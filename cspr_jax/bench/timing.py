@@ -2,18 +2,15 @@
 
 import os
 import time
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 REPEATS = 5
 # Sides of the matrices that are multiplied, and bytes that are copied: far beyond every cache.
-SIDE, COPIED = 2048, 2**28
+SIDE, COPIED = 3072, 2**28
 
 
 def best(work: Callable[[], object]) -> float:
@@ -43,36 +40,19 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def in_threads(function: Callable, items: Iterable[Any]) -> list:
-    """Results of a compiled function, one thread a core: XLA runs a loop over many cases on one.
-
-    Args:
-        function: gives arrays.
-        items: its arguments.
-
-    Returns:
-        one result an item, in order.
-    """
-    with ThreadPoolExecutor(cores()) as pool:
-        return list(pool.map(lambda item: jax.block_until_ready(function(item)), items))
-
-
 def peak() -> dict[str, float]:
-    """What the machine does at most, by the same library: products of large matrices, and copies of large arrays.
+    """What the processor does at most: NumPy's products of large matrices, and copies of large arrays.
 
     Returns:
         "float32" and "float64" operations a second, "bytes" read and written a second.
     """
-    found, array = {}, jnp.ones(COPIED // 4, jnp.float32)
+    found = {}
     for dtype in ("float32", "float64"):
-        matrix = jnp.ones((SIDE, SIDE), dtype)
-        found[dtype] = 2.0 * SIDE**3 / best(partial(_done, jax.jit(jnp.matmul), matrix, matrix))
-    found["bytes"] = 2.0 * COPIED / best(partial(_done, jax.jit(jnp.add), array, jnp.float32(1.0)))
+        matrix, product = np.ones((SIDE, SIDE), dtype), np.empty((SIDE, SIDE), dtype)
+        found[dtype] = 2.0 * SIDE**3 / best(partial(np.matmul, matrix, matrix, out=product))
+    array, copy = np.ones(COPIED // 8), np.empty(COPIED // 8)
+    found["bytes"] = 2.0 * COPIED / best(partial(np.copyto, copy, array))
     return found
-
-
-def _done(function: Callable, *arguments: Any) -> None:
-    jax.block_until_ready(function(*arguments))
 
 
 def operations(lowered: Any, cases: int) -> float:

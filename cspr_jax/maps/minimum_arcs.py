@@ -111,6 +111,6 @@ def _sieved(shared: Shared, even: Segment, odd: Segment, max_arcs: int, dtype: s
     # Upper bounds (n, max_arcs): of the sieve, and of the two ends, where every slack is known.
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
     kernel = partial(sieve.upper_bounds, max_arcs=max_arcs)
-    upper = in_batches(lambda pair: kernel(shared.amplitude, *pair), cast, size=sieve.BATCH).astype(float)
+    upper = in_batches(lambda pair: kernel(shared.amplitude, *pair), cast, size=sieve.BATCH, threads=True).astype(float)
     at_ends = in_batches(partial(end_slacks, shared, 3.0), odd, size=sieve.BATCH)
     return np.where(np.isnan(upper), -np.inf, np.minimum(upper, at_ends[:, None] + SMALLEST_MARGIN))

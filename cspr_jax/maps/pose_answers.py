@@ -3,20 +3,19 @@
 import dataclasses
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
-import jax
 import numpy as np
 
 from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_samples import rows
 from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.grids import THREADS, in_threads
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
 
 NEVER = np.iinfo(int).max
-THREADS = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,18 +68,10 @@ def in_parts(function: Callable[[slice], PoseAnswers], count: int, size: int) ->
     Returns:
         the answers of all.
     """
-    wide = jax.config.read("jax_enable_x64")
-
-    def part(start: int, stop: int) -> PoseAnswers:
-        # The setting may be the caller's thread's own.
-        with jax.enable_x64(wide):
-            return function(slice(start, stop))
-
     # Parts of one length, as many for each thread.
     rounds = -(-count // (THREADS * size))
     bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
-    with ThreadPoolExecutor(THREADS) as pool:
-        parts = list(pool.map(part, bounds[:-1], bounds[1:]))
+    parts = in_threads(function, [slice(*pair) for pair in pairwise(bounds)])
     return PoseAnswers(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 

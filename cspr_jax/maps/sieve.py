@@ -19,13 +19,13 @@ from jax import Array, lax
 
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.feasibility.slacks import largest_term
-from cspr_jax.numerics import sincospi
+from cspr_jax.numerics import lesser, sincospi
 from cspr_jax.trajectories.hypocycloid import Segment, oscillation
 
 SAMPLES = 32
-BATCH = 4096
-# Samples in one pass over the batch, by precision; measured.
-UNROLL = {"float32": 8, "float64": 4}
+BATCH = 2048
+# Samples in one pass over the batch; measured.
+UNROLL = 4
 # Below this T^2 lambda a segment has no duration (p = 1, psi -> 0) and is no trajectory.
 SMALLEST_PERIOD = 1e-9
 # Units of rounding of the largest term by which a sampled value is raised to be an upper bound.
@@ -57,7 +57,7 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
         amplitude: A.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n_arcs,) all odd or all even.
-        tau: (n_samples,), a multiple of 8.
+        tau: (n_samples,), a multiple of 4.
 
     Returns:
         (n_arcs, n): an upper bound of the margin; -inf where there is no trajectory.
@@ -69,7 +69,6 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
     mirror = jnp.stack([jnp.ones_like(span), segments.sense], axis=-1)
     tilt = tuple((segments.tilt * mirror).T)
     rows = [(*(segments.pull[:, k] * mirror).T, segments.twist[:, k] * segments.sense) for k in range(3)]
-    unroll = UNROLL[str(dtype)]
 
     def one(candidate):
         p, table = candidate
@@ -88,15 +87,17 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
             eta = 1.0 + tilt[0] * c0 + tilt[1] * c1
             pulls = [row[0] * d0 + row[1] * d1 + row[2] * cross for row in rows]
             # kappa_k = eta + pull_k; eta itself is the depth ratio
-            lowest = jnp.minimum(jnp.minimum(pulls[0], pulls[1]), jnp.minimum(pulls[2], 0.0))
-            return jnp.minimum(smallest, eta + lowest)
+            lowest = lesser(lesser(pulls[0], pulls[1]), lesser(pulls[2], jnp.zeros_like(eta)))
+            return lesser(smallest, eta + lowest)
 
-        def several(j, smallest):
-            for i in range(unroll):
-                smallest = check(unroll * j + i, smallest)
+        def several(j):
+            smallest = check(UNROLL * j, jnp.full_like(span, jnp.inf))
+            for i in range(1, UNROLL):
+                smallest = check(UNROLL * j + i, smallest)
             return smallest
 
-        smallest = lax.fori_loop(0, len(tau) // unroll, several, jnp.full_like(span, jnp.inf))
+        # Not carried from one to the next: what a loop stacks XLA leaves on one core, as its caller's threads want it.
+        smallest = lax.map(several, jnp.arange(len(tau) // UNROLL)).min(0)
         return jnp.where(exists, smallest, -jnp.inf)
 
     return lax.map(one, (jnp.asarray(arcs, dtype), sample_table(amplitude, arcs, tau, dtype)))
