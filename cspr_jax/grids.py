@@ -36,7 +36,7 @@ def in_threads(function: Callable, items: Sequence) -> list:
         return list(pool.map(one, items))
 
 
-def in_batches(function: Callable, arguments, *, size: int, axis: int = 0, threads: bool = False):
+def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
     """Apply a compiled function to arrays of any length, in batches of one length.
 
     Args:
@@ -44,7 +44,6 @@ def in_batches(function: Callable, arguments, *, size: int, axis: int = 0, threa
         arguments: pytree of NumPy arrays (n, ...), n >= 0.
         size: length of a batch on a CPU; see `LARGER`.
         axis: along which the results of a batch lie.
-        threads: whether two threads call the function.
 
     Returns:
         pytree of NumPy arrays, n long along that axis; None if n is 0.
@@ -54,13 +53,10 @@ def in_batches(function: Callable, arguments, *, size: int, axis: int = 0, threa
     count = len(leaves[0])
     if count == 0:
         return None
-
-    def batch(start):
-        found = function(padded(jax.tree.map(lambda a: a[start : start + size], arguments), size))
-        return jax.tree.map(np.asarray, found) if threads else found
-
-    starts = range(0, count, size)
-    pending = in_threads(batch, starts) if threads else [batch(start) for start in starts]
+    pending = [
+        function(padded(jax.tree.map(lambda a, s=start: a[s : s + size], arguments), size))
+        for start in range(0, count, size)
+    ]
     parts = [jax.tree.map(np.asarray, part) for part in pending]
 
     def whole(*pieces):

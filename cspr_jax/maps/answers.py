@@ -7,7 +7,8 @@ candidate with the largest margin is reported.
 
 import dataclasses
 from collections.abc import Callable
-from typing import NamedTuple
+from itertools import pairwise
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -17,7 +18,7 @@ from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared, prove
 from cspr_jax.feasibility.margins import margins
 from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.grids import in_batches
+from cspr_jax.grids import THREADS, in_batches, in_threads
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -25,6 +26,7 @@ from cspr_jax.trajectories.hypocycloid import Segment
 BATCH = 4096
 # Candidates whose margins differ by less are equally good; the first of them is reported.
 TIE = 1e-9
+Said = TypeVar("Said", bound="Answers")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,6 +52,26 @@ class Answers:
     margin_bound: np.ndarray
     limit_margin: np.ndarray
     feasible_at_infinity: np.ndarray
+
+
+def in_parts(function: Callable[[slice], Said], count: int, size: int) -> Said:
+    """Answers of many cases, so many at a time.
+
+    Two threads work: what one does outside of XLA, and what XLA does on one core, goes beside the other's.
+
+    Args:
+        function: gives those of a range of cases; it is called from several threads.
+        count: of cases, at least one.
+        size: of the largest range.
+
+    Returns:
+        the answers of all.
+    """
+    # Parts of one length, as many for each thread.
+    rounds = -(-count // (THREADS * size))
+    bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
+    parts = in_threads(function, [slice(*pair) for pair in pairwise(bounds)])
+    return type(parts[0])(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 
 @jax.jit

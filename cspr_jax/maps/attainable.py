@@ -4,8 +4,9 @@ import numpy as np
 
 from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.pose_checks import PoseChecker
+from cspr_jax.maps.answers import in_parts
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
-from cspr_jax.maps.pose_answers import PoseAnswers, in_parts, reached
+from cspr_jax.maps.pose_answers import PoseAnswers, reached
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.rotations import from_tilt_torsion
 from cspr_jax.symmetries import NONE, Symmetries, alike

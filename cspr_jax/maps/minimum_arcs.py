@@ -14,10 +14,13 @@ from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
 from cspr_jax.grids import in_batches
 from cspr_jax.maps import sieve
-from cspr_jax.maps.answers import Answers, decided, end_slacks, only
+from cspr_jax.maps.answers import Answers, decided, end_slacks, in_parts, only
 from cspr_jax.robots import LARGEST_LENGTH
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
+
+# So many segments are held at a time by each thread.
+PART = 16 * sieve.BATCH
 
 
 @jax.jit
@@ -83,9 +86,14 @@ def minimum_arcs(
         raise InputError(
             "amplitude", shared.amplitude.name, "an amplitude function that meets (2.49): " + "; ".join(broken)
         )
-    parities, infinity = segments_between(shared, starts, ends, z0)
-    upper = _sieved(shared, parities[0], parities[1], max_arcs, dtype)
-    return decided(shared, parities, only(upper, arcs), infinity)
+
+    def part(which: slice) -> Answers:
+        parities, infinity = segments_between(shared, starts[which], ends[which], z0[which])
+        upper = _sieved(shared, parities[0], parities[1], max_arcs, dtype)
+        return decided(shared, parities, only(upper, None if arcs is None else np.asarray(arcs)[which]), infinity)
+
+    # Not two batches where one has room for all.
+    return in_parts(part, len(z0), PART) if len(z0) > sieve.BATCH else part(slice(None))
 
 
 def check_numbers(z0: np.ndarray, max_arcs: int) -> None:
@@ -111,6 +119,6 @@ def _sieved(shared: Shared, even: Segment, odd: Segment, max_arcs: int, dtype: s
     # Upper bounds (n, max_arcs): of the sieve, and of the two ends, where every slack is known.
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
     kernel = partial(sieve.upper_bounds, max_arcs=max_arcs)
-    upper = in_batches(lambda pair: kernel(shared.amplitude, *pair), cast, size=sieve.BATCH, threads=True).astype(float)
+    upper = in_batches(lambda pair: kernel(shared.amplitude, *pair), cast, size=sieve.BATCH).astype(float)
     at_ends = in_batches(partial(end_slacks, shared, 3.0), odd, size=sieve.BATCH)
     return np.where(np.isnan(upper), -np.inf, np.minimum(upper, at_ends[:, None] + SMALLEST_MARGIN))

@@ -2,8 +2,6 @@
 
 import dataclasses
 import math
-from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 
@@ -11,7 +9,6 @@ from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_samples import rows
 from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.grids import THREADS, in_threads
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
 
@@ -53,26 +50,6 @@ def contradictions(answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         "an infeasible cell whose verdict is 0": ~found & (answers["verdict"] == 0),
         "a feasible cell without a duration": found & ~(answers["duration"] > 0.0),
     }
-
-
-def in_parts(function: Callable[[slice], PoseAnswers], count: int, size: int) -> PoseAnswers:
-    """Answers of many cases, so many at a time.
-
-    Two threads work: what one does outside of XLA, and what XLA does on one core, goes beside the other's.
-
-    Args:
-        function: gives those of a range of cases; it is called from several threads.
-        count: of cases, at least one.
-        size: of the largest range.
-
-    Returns:
-        the answers of all.
-    """
-    # Parts of one length, as many for each thread.
-    rounds = -(-count // (THREADS * size))
-    bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
-    parts = in_threads(function, [slice(*pair) for pair in pairwise(bounds)])
-    return PoseAnswers(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 
 def settled(

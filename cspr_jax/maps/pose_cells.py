@@ -9,10 +9,11 @@ from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
+from cspr_jax.maps.answers import in_parts
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
-from cspr_jax.maps.pose_answers import PoseAnswers, contradictions, in_parts, reached
+from cspr_jax.maps.pose_answers import PoseAnswers, contradictions, reached
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.tiles import Grid
