@@ -6,7 +6,6 @@ import os
 import resource
 import subprocess
 import sys
-import time
 
 SIZES = {"six-cable look": (10**3, 10**4, 10**5, 10**6, 10**7), "three-cable map": (10**3, 10**4, 10**5, 10**6)}
 
@@ -46,21 +45,12 @@ def one(work: str, count: int, cores: int) -> None:
     print(json.dumps({"seconds": seconds, "rate": checks / seconds, "memory": memory}))
 
 
-def best(function) -> float:
-    # The first one compiles.
-    times = []
-    for _ in range(3):
-        start = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - start)
-    return min(times[1:])
-
-
 def six_cables(count: int) -> tuple[float, int]:
     """The bench's kernel over all trajectories, whatever their numbers."""
     import jax
 
     from cspr_jax.bench import six_cables as bench
+    from cspr_jax.bench.timing import best
     from cspr_jax.grids import in_threads
 
     given = bench.work(count)
@@ -69,7 +59,7 @@ def six_cables(count: int) -> tuple[float, int]:
         return jax.block_until_ready(bench.tensions(given.robot, batch, rough=True))
 
     batches = bench.batches(given)
-    return best(lambda: in_threads(look, batches)), count * bench.SAMPLES
+    return best(lambda: in_threads(look, batches), repeats=2), count * bench.SAMPLES
 
 
 def three_cables(count: int) -> tuple[float, int]:
@@ -77,13 +67,14 @@ def three_cables(count: int) -> tuple[float, int]:
     import numpy as np
 
     from cspr_jax.bench import three_cables as bench
+    from cspr_jax.bench.timing import best
     from cspr_jax.maps.minimum_arcs import minimum_arcs
 
     given = bench.work()
     ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (count, 3))
     starts = np.broadcast_to(bench.START, ends.shape).copy()
     z0 = np.full(count, bench.Z0)
-    return best(lambda: minimum_arcs(given.shared, starts, ends, z0)), bench.checks(count)
+    return best(lambda: minimum_arcs(given.shared, starts, ends, z0), repeats=2), bench.checks(count)
 
 
 if __name__ == "__main__":

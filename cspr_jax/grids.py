@@ -25,15 +25,27 @@ def in_threads(function: Callable, items: Sequence) -> list:
     Returns:
         one result an item.
     """
-    wide = jax.config.read("jax_enable_x64")
+    wide, device = jax.config.read("jax_enable_x64"), jax.config.jax_default_device
 
     def one(item):
-        # The setting may be the caller's thread's own.
-        with jax.enable_x64(wide):
+        # The settings may be the caller's thread's own.
+        with jax.enable_x64(wide), jax.default_device(device):
             return function(item)
 
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(one, items))
+
+
+def room(size: int) -> int:
+    """Length of a batch on the device in use.
+
+    Args:
+        size: its length on a CPU.
+
+    Returns:
+        the length.
+    """
+    return size * LARGER.get(jax.default_backend(), 1)
 
 
 def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
@@ -42,13 +54,13 @@ def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
     Args:
         function: takes one pytree whose leaves have leading dimension `size`, returns a pytree likewise.
         arguments: pytree of NumPy arrays (n, ...), n >= 0.
-        size: length of a batch on a CPU; see `LARGER`.
+        size: length of a batch on a CPU; see `room`.
         axis: along which the results of a batch lie.
 
     Returns:
         pytree of NumPy arrays, n long along that axis; None if n is 0.
     """
-    size *= LARGER.get(jax.default_backend(), 1)
+    size = room(size)
     leaves = jax.tree.leaves(arguments)
     count = len(leaves[0])
     if count == 0:

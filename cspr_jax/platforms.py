@@ -31,7 +31,7 @@ class PlatformRobot:
         gravity: () along +z, m/s^2.
         name: for people.
         joints: for each cable the first one that is attached at the same point; known when a function is compiled, so
-            that the point is computed once.
+            that the point is computed once. Who replaces points so that others coincide replaces it too.
     """
 
     base_points: Array

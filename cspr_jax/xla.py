@@ -1,7 +1,7 @@
 """What the command line sets before jax starts: vector width, where compiled code is kept, device, arenas of memory.
 
-All of it is in environment variables, which processes that are started from here inherit. What the user has set wins,
-and the library itself never comes here.
+It is in environment variables, which processes that are started from here inherit; arenas are set for this one too.
+What the user has set wins, and the library itself never comes here.
 """
 
 import contextlib
@@ -75,7 +75,8 @@ def check_device(device: str | None) -> None:
 
 def _one_arena() -> None:
     # The variable is read when a process starts: it is for those that are started from here.
-    if ARENAS in os.environ or platform.libc_ver()[0] != "glibc":
+    is_set = ARENAS in os.environ or "arena_max" in os.environ.get("GLIBC_TUNABLES", "")
+    if is_set or platform.libc_ver()[0] != "glibc":
         return
     os.environ[ARENAS] = "1"
     ctypes.CDLL(None).mallopt(_ARENA_MAX, 1)

@@ -55,7 +55,13 @@ def test_bench(capsys, small_bench, kernels):
         ({"six_cables.cpp": None}, "six_cables.cpp"),
         ({"six_cables.cpp": "int"}, "must accept it"),
         ({"CXX": "no-such-compiler"}, "no-such-compiler: must be a C++ compiler"),
+        ({"CXX": "c++ -D"}, "must accept it"),
         ({"six_cables.cpp": 'extern "C" void six_cables() {}'}, "must agree"),
+        ({"three_cables.cpp": "void three_cables() {}"}, "must define three_cables"),
+        (
+            {"three_cables.cpp": 'int far(); extern "C" int three_cables() { return far(); }'},
+            "must define three_cables",
+        ),
     ],
 )
 def test_kernels_that_are_wrong(capsys, small_bench, tmp_path, monkeypatch, change, words):

@@ -1,5 +1,6 @@
 """The first look at transitions of a platform: what it refutes and how many are left, beside checking everything."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import jax
@@ -87,3 +88,27 @@ def test_more_instants_refute_more():
     segments = _Segments(checker.shared.robot, candidates(MSSM, rng, 40))(5, np.arange(200))
     found = [checker.first_look(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
     assert all(not (a & ~b).any() for a, b in pairwise(found))
+
+
+@pytest.mark.parametrize("scale", [0.003, 300.0])
+def test_the_size_of_the_robot_changes_nothing(scale):
+    """In float32 too, whose range a determinant of such lengths leaves."""
+    sizes = []
+    for unit in (1.0, scale):
+        robot = replace(MSSM, base=MSSM.base * unit, platform=MSSM.platform * unit, inertia=MSSM.inertia * unit**2)
+        checker, given = checker_of(robot, batch=64), candidates(MSSM, np.random.default_rng(6), 60)
+        start, end = ((place * unit, turn) for place, turn in (given.start, given.end))
+        given = given._replace(start=start, end=end, z0=given.z0 * unit)
+        segments = _Segments(checker.shared.robot, given)(5, np.arange(300))
+        sizes.append(checker.first_look(segments, 5, np.linspace(1.0, 0.0, 33)))
+        rough, _ = first_look.smallest_tensions(
+            checker.shared.robot,
+            named("quintic"),
+            5.0,
+            np.linspace(0.1, 1.0, 8),
+            segments,
+            kind=Kind(from_rest=True),
+            rough=True,
+        )
+        assert not np.isnan(rough).any() and (np.asarray(rough) < 0.0).sum() > 20
+    np.testing.assert_array_equal(*sizes)

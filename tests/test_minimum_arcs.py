@@ -201,6 +201,21 @@ def test_single_precision_sieve_changes_nothing():
     assert (one.arcs == 0).any()
 
 
+def test_parts_are_put_together_in_order(monkeypatch):
+    """More than a batch, in several rounds of two threads, with numbers of arcs and depths of their own."""
+    starts, ends = random_points(34, 2500, far=1.2, deep=3.2)
+    rng = np.random.default_rng(35)
+    arcs, z0 = rng.integers(0, 9, len(starts)), rng.uniform(1.4, 1.8, len(starts))
+    pieces = [
+        answer(starts[k : k + 500], ends[k : k + 500], z0=z0[k : k + 500], arcs=arcs[k : k + 500])
+        for k in range(0, 2500, 500)
+    ]
+    monkeypatch.setattr("cspr_jax.maps.minimum_arcs.PART", 400)
+    whole = answer(starts, ends, z0=z0, arcs=arcs)
+    for name, values in vars(whole).items():
+        np.testing.assert_array_equal(values, np.concatenate([getattr(piece, name) for piece in pieces]), err_msg=name)
+
+
 def test_refusals():
     """Unusable settings are refused by name, before anything is computed."""
     points = TABLE[:1]

@@ -340,6 +340,12 @@ def readable(package, poses):
     return jax.vmap(one)(*poses)
 
 
+def test_joints():
+    """Points where cables meet are known as such."""
+    assert ours(MSSM).joints == (0, 1, 1, 3, 3, 0)
+    assert ours(general(2)).joints == tuple(range(6))
+
+
 @pytest.mark.parametrize("kind", [USUAL, Kind(variable=False), Kind(plain=True), Kind(from_rest=True)])
 @pytest.mark.parametrize("name", AMPLITUDES)
 @pytest.mark.parametrize("robot", [MSSM, general(2)])

@@ -133,7 +133,7 @@ def test_workers_of_a_scheduler_choose_their_device(capsys):
 
 @pytest.mark.parametrize(("backend", "length"), [("cpu", 32), ("gpu", 512)])
 def test_batches_are_larger_on_a_gpu(monkeypatch, backend, length):
-    """The shapes of the calls, and that padding is trimmed; maps are then the same but for rounding."""
+    """The shapes of the calls, and that padding is trimmed."""
     shapes = []
     monkeypatch.setattr(jax, "default_backend", lambda: backend)
 
@@ -164,8 +164,10 @@ hold.wait()
 os.dup2(1, 2)
 ctypes.CDLL(None).malloc_stats()
 hold.wait()
-print(os.environ["MALLOC_ARENA_MAX"])
+print(os.environ.get("MALLOC_ARENA_MAX"))
 """
     found, theirs = told(tmp_path, code), told(tmp_path, code, MALLOC_ARENA_MAX="7")
+    tuned = told(tmp_path, code, GLIBC_TUNABLES="glibc.malloc.arena_max=7")
+    assert tuned.count("Arena ") == 7
     assert found.count("Arena ") == 1 and found.endswith("1\n")
     assert theirs.count("Arena ") == 7 and theirs.endswith("7\n")

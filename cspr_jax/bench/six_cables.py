@@ -17,7 +17,7 @@ from cspr_jax import amplitudes
 from cspr_jax.api import load_robot
 from cspr_jax.bench.timing import best, operations
 from cspr_jax.feasibility.first_look import smallest_tensions
-from cspr_jax.grids import in_threads, padded
+from cspr_jax.grids import in_batches, in_threads, padded
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.reference_pose import aligned
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, pose_segment
@@ -92,8 +92,8 @@ def batches(given: Work) -> list[Batch]:
     found = []
     for arcs in np.unique(given.arcs):
         which = np.flatnonzero(given.arcs == arcs)
-        every = _segments(given.robot, quaternions[which], given.bend[which], np.asarray(arcs % 2 == 1))
-        every = jax.tree.map(np.asarray, every)
+        kernel = partial(_segments, given.robot, np.asarray(arcs % 2 == 1))
+        every = in_batches(kernel, (quaternions[which], given.bend[which]), size=LANES)
         for start in range(0, len(which), LANES):
             some = jax.tree.map(lambda x, s=start: x[s : s + LANES], every)
             found.append(Batch(int(arcs), len(some.rate), jax.device_put(padded(some, LANES))))
@@ -101,14 +101,14 @@ def batches(given: Work) -> list[Batch]:
 
 
 @jax.jit
-def _segments(robot: PlatformRobot, quaternions, bends, odd) -> PoseSegment:
+def _segments(robot: PlatformRobot, odd, items) -> PoseSegment:
     depth = jnp.asarray(PLACE[2])
     rest = jnp.stack([0.0 * depth, 0.0 * depth, depth]), jnp.array([1.0, 0.0, 0.0, 0.0])
 
     def one(quaternion, bend):
         return pose_segment(robot, rest, (jnp.asarray(PLACE), quaternion), depth, (bend, bend), odd=odd)
 
-    return jax.vmap(one)(quaternions, bends)
+    return jax.vmap(one)(*items)
 
 
 def rate(robot: PlatformRobot, some: list[Batch], *, rough: bool) -> tuple[float, float]:
@@ -147,7 +147,7 @@ def tensions(robot: PlatformRobot, batch: Batch, *, rough: bool) -> Array:
     return smallest_tensions(robot, QUINTIC, arcs, tau, batch.segments, kind=FROM_REST, rough=rough)[0]
 
 
-def operations_a_check(robot: PlatformRobot, batch: Batch) -> float:
+def operations_a_check(robot: PlatformRobot, batch: Batch) -> float | None:
     """Arithmetic operations of one check.
 
     Args:
@@ -155,7 +155,7 @@ def operations_a_check(robot: PlatformRobot, batch: Batch) -> float:
         batch: of segments.
 
     Returns:
-        as XLA counts them.
+        as XLA counts them; None where it does not.
     """
     lowered = smallest_tensions.lower(
         robot, QUINTIC, float(batch.arcs), np.zeros(1), batch.segments, kind=FROM_REST, rough=True

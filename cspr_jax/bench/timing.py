@@ -13,18 +13,19 @@ REPEATS = 5
 SIDE, COPIED = 3072, 2**28
 
 
-def best(work: Callable[[], object]) -> float:
+def best(work: Callable[[], object], repeats: int | None = None) -> float:
     """The shortest of several times, after one that compiles.
 
     Args:
         work: what is timed.
+        repeats: how often; None: `REPEATS`.
 
     Returns:
         s.
     """
     work()
     times = []
-    for _ in range(REPEATS):
+    for _ in range(repeats or REPEATS):
         start = time.perf_counter()
         work()
         times.append(time.perf_counter() - start)
@@ -55,7 +56,7 @@ def peak() -> dict[str, float]:
     return found
 
 
-def operations(lowered: Any, cases: int) -> float:
+def operations(lowered: Any, cases: int) -> float | None:
     """Arithmetic operations of a compiled function, as XLA counts them; a loop's are counted once.
 
     Args:
@@ -63,7 +64,7 @@ def operations(lowered: Any, cases: int) -> float:
         cases: how many it computes.
 
     Returns:
-        of each case.
+        of each case; None where XLA does not say.
     """
-    found = lowered.compile().cost_analysis()
-    return float(np.asarray((found[0] if isinstance(found, list) else found).get("flops", np.nan))) / cases
+    found = lowered.compile().cost_analysis() or {}
+    return found["flops"] / cases if "flops" in found else None

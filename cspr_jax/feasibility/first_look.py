@@ -4,6 +4,7 @@ In float32, where a sample costs half; each refutation is then looked at again i
 first look refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full anyway.
 """
 
+import dataclasses
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from jax import Array, lax
 from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility.pose_lanes import certain_tension, lowest_tension
 from cspr_jax.feasibility.pose_samples import rows
-from cspr_jax.grids import in_batches
+from cspr_jax.grids import in_batches, room
 from cspr_jax.lanes import cross, dot
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.trajectories.pose_lanes import instant
@@ -53,6 +54,8 @@ def smallest_tensions(
     Returns:
         (n,) of `pose_lanes.certain_tension`; and which instant it belongs to, (n,) from 0 on.
     """
+    if rough:
+        robot, segments = _of_one_size(robot, segments)
     kept = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if rough else x.dtype))
     robot, segments, number = kept((robot, segments, jnp.asarray(arcs)))
     if kind.from_rest:
@@ -67,6 +70,27 @@ def smallest_tensions(
     values = lax.map(at, table)
     lowest = values.min(0)
     return lowest, jnp.where(values == lowest, jnp.arange(len(tau))[:, None], len(tau)).min(0)
+
+
+def _of_one_size(robot: PlatformRobot, segments: PoseSegment) -> tuple[PlatformRobot, PoseSegment]:
+    # With the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
+    # eighteenth, which float32 has no room for. Tensions over their value at rest do not depend on the unit.
+    unit = jnp.sqrt(jnp.mean((robot.base_points - robot.base_points.mean(0)) ** 2))
+    smaller = dataclasses.replace(
+        robot,
+        base_points=robot.base_points / unit,
+        platform_points=robot.platform_points / unit,
+        inertia=robot.inertia / unit**2,
+        gravity=robot.gravity / unit,
+    )
+    radii = segments.start_radius / unit, segments.end_radius / unit
+    return smaller, dataclasses.replace(
+        segments,
+        hub=segments.hub / unit,
+        start_radius=radii[0],
+        end_radius=radii[1],
+        regular=jnp.sign(segments.regular),
+    )
 
 
 def _from_rest(robot: PlatformRobot, segments: PoseSegment):
@@ -145,10 +169,9 @@ class FirstLook(NamedTuple):
             if not len(alive):
                 break
             some = segments if len(alive) == len(found) else rows(segments, alive)
-            # Few are not padded to many, and are not worth two looks.
-            is_many = len(alive) > self.size // (2 * FIRST)
-            if not is_many:
-                found[alive] = ~(self._seen(some, arcs, chunk, self.size // (4 * FIRST))[0] > least)
+            size = self._size_for(len(alive))
+            if size < self.size:  # few are not worth two looks
+                found[alive] = ~(self._seen(some, arcs, chunk, size)[0] > least)
                 continue
             lowest, when = self._seen(some, arcs, chunk, self.size, rough=True)
             doubtful = np.flatnonzero(lowest < 0.0)
@@ -165,7 +188,12 @@ class FirstLook(NamedTuple):
             return np.zeros(0)
         self.count_instants(len(tau))
         kernel = partial(_tensions_at, self.robot, self.amplitude, float(arcs), kind=self.kind)
-        return in_batches(kernel, (segments, tau), size=self.size)
+        return in_batches(kernel, (segments, tau), size=self._size_for(len(tau)))
+
+    def _size_for(self, count: int) -> int:
+        # Few are not padded to many.
+        few = self.size // (4 * FIRST)
+        return self.size if count > room(few) else few
 
 
 def _chunks(tau: np.ndarray) -> np.ndarray:

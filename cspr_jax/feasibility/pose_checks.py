@@ -22,7 +22,7 @@ from cspr_jax.feasibility.pose_samples import Motions, Narrowing, Places, Seen, 
 from cspr_jax.feasibility.pose_slacks import PoseShared, flags
 from cspr_jax.feasibility.pose_sweeps import swept
 from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.grids import in_batches
+from cspr_jax.grids import in_batches, room
 from cspr_jax.trajectories.pose_segment import USUAL, Kind, PoseSegment, duration
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
@@ -159,7 +159,7 @@ class PoseChecker:
         """
         found, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         self._count("motions", len(arcs))
-        size = max(ARCS // max(arcs, default=1), 1)
+        size = max(room(ARCS) // max(arcs, default=1), 1)
         for start in range(0, len(arcs), size):
             piece = np.arange(start, min(start + size, len(arcs)))
             found.put(piece, self._checked(motions.rows(piece), whole))

@@ -87,6 +87,7 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
             eta = 1.0 + tilt[0] * c0 + tilt[1] * c1
             pulls = [row[0] * d0 + row[1] * d1 + row[2] * cross for row in rows]
             # kappa_k = eta + pull_k; eta itself is the depth ratio
+            # A NaN may be forgotten, which leaves an upper bound: what decides is the certificate.
             lowest = lesser(lesser(pulls[0], pulls[1]), lesser(pulls[2], jnp.zeros_like(eta)))
             return lesser(smallest, eta + lowest)
 
