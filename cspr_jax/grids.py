@@ -25,7 +25,7 @@ def in_threads(function: Callable, items: Sequence) -> list:
     Returns:
         one result an item.
     """
-    wide, device = jax.config.read("jax_enable_x64"), jax.config.jax_default_device
+    wide, device = jax.config.read("jax_enable_x64"), jax.config.jax_default_device  # type: ignore[attr-defined]
 
     def one(item):
         # The settings may be the caller's thread's own.

@@ -347,8 +347,7 @@ def test_joints():
 
 
 @pytest.mark.parametrize("kind", [USUAL, Kind(variable=False), Kind(plain=True), Kind(from_rest=True)])
-@pytest.mark.parametrize("name", AMPLITUDES)
-@pytest.mark.parametrize("robot", [MSSM, general(2)])
+@pytest.mark.parametrize(("robot", "name"), [(MSSM, "quintic"), (general(2), "effective-c3")])
 def test_the_fast_kernel(robot, name, kind):
     """The smallest tension of many segments as the readable functions give it; -inf past a singularity."""
     package, rng, amplitude = ours(robot), np.random.default_rng(9), AMPLITUDES[name][0]
@@ -371,7 +370,9 @@ def test_the_fast_kernel(robot, name, kind):
         found, when = smallest_tensions(package, amplitude, float(p), tau, batch, kind=kind)
         rough, _ = smallest_tensions(package, amplitude, float(p), tau, batch, kind=kind, rough=True)
         assert rough.dtype == np.float32
-        alone, _ = smallest_tensions(package, amplitude, float(p), tau[np.unique(when)], batch, kind=kind)
+        alone, _ = smallest_tensions(
+            package, amplitude, float(p), tau[np.resize(np.unique(when), len(tau))], batch, kind=kind
+        )
         assert (np.asarray(alone) == found).all()
         for i, segment in enumerate(some):
             at = states(package, segment, amplitude, float(p), tau, kind=kind)

@@ -17,6 +17,8 @@ from cspr_jax.wrench_lanes import cables
 
 # Steps between which a gap or a cable turns by more than this angle are to be halved.
 LEAST_COSINE = 0.8
+# Arcs of a call from which on a loop is unrolled.
+UNROLLED = 1024
 # The golden section, and how often: the bracket shrinks to a 500th.
 _GOLDEN, SECTIONS = 0.6180339887498949, 13
 
@@ -105,8 +107,9 @@ def look_along(
 
     shapes = jax.eval_shape(lambda: seen(within[0])[1:])
     start = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
-    # Two places a turn: what is carried on is copied half as often.
-    _, (values, hit, wide) = lax.scan(step, start, within, unroll=2)
+    # Two places a turn: what is carried on is copied half as often. Not where compiling takes longer than looking.
+    unroll = 2 if len(arc) >= UNROLLED else 1
+    _, (values, hit, wide) = lax.scan(step, start, within, unroll=unroll)
     # There is no step before the first place.
     return Look(jnp.stack(values, axis=1), (hit & ~wide)[1:].any(0), wide[1:])
 
