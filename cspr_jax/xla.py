@@ -21,9 +21,10 @@ from cspr_jax.errors import ConfigError
 # Twice as fast where the processor has it; XLA's own choice is half of it.
 WIDE, NEEDS = "--xla_cpu_prefer_vector_width=512", "avx512f"
 PROBE_SECONDS = 120
-# glibc gives each thread memory of its own, and XLA has many threads: what one frees, the others cannot use. With one
-# arena a sweep needs half the memory, in the same time. The number is M_ARENA_MAX of malloc.h.
-ARENAS, _ARENA_MAX = "MALLOC_ARENA_MAX", -8
+# glibc gives each thread memory of its own, and XLA has many threads: what one frees, the others cannot use. With four
+# arenas a long sweep needs half the memory; with one, threads that compile would wait for each other. The last number
+# is M_ARENA_MAX of malloc.h.
+ARENAS, _FEW, _ARENA_MAX = "MALLOC_ARENA_MAX", 4, -8
 _PROBE = "import jax; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
 _KEPT = {
     # Else the name of the folder is part of what entries are known by.
@@ -43,7 +44,7 @@ def prepare(device: str | None = None) -> None:
         return
     if device == "cpu":
         os.environ["JAX_PLATFORMS"] = "cpu"
-    _one_arena()
+    _few_arenas()
     folder = _folder()
     if folder is None:
         return
@@ -73,13 +74,13 @@ def check_device(device: str | None) -> None:
         raise ConfigError("--device", f"gpu: must be cpu here, since jax finds no GPU (it has {found})")
 
 
-def _one_arena() -> None:
+def _few_arenas() -> None:
     # The variable is read when a process starts: it is for those that are started from here.
     is_set = ARENAS in os.environ or "arena_max" in os.environ.get("GLIBC_TUNABLES", "")
     if is_set or platform.libc_ver()[0] != "glibc":
         return
-    os.environ[ARENAS] = "1"
-    ctypes.CDLL(None).mallopt(_ARENA_MAX, 1)
+    os.environ[ARENAS] = str(_FEW)
+    ctypes.CDLL(None).mallopt(_ARENA_MAX, _FEW)
 
 
 def _folder() -> Path | None:

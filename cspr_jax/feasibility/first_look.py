@@ -25,8 +25,8 @@ from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 from cspr_jax.trajectories.rest_lanes import rest_table, swing, swings
 from cspr_jax.wrench_lanes import balance, cables
 
-# Instants of one call, and how many more motions are looked at than checked at a time.
-CHUNK, FIRST = 8, 2
+# Instants of one call; how many more motions are looked at than checked at a time, and what part of them is few.
+CHUNK, FIRST, FEWER = 8, 2, 8
 
 
 @partial(jax.jit, static_argnames=("kind", "rough"))
@@ -146,9 +146,8 @@ class FirstLook(NamedTuple):
             (n,) of `smallest_tensions`; -inf where not finite.
         """
         lowest = np.full(len(segments.rate), np.inf)
-        # Where values are compared, not only refuted, all calls have one shape.
         for chunk in _chunks(tau):
-            lowest = np.minimum(lowest, self._seen(segments, arcs, chunk, self.size)[0])
+            lowest = np.minimum(lowest, self._seen(segments, arcs, chunk)[0])
         return np.where(np.isnan(lowest), -np.inf, lowest)
 
     def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, least: float) -> np.ndarray:
@@ -169,31 +168,26 @@ class FirstLook(NamedTuple):
             if not len(alive):
                 break
             some = segments if len(alive) == len(found) else rows(segments, alive)
-            size = self._size_for(len(alive))
-            if size < self.size:  # few are not worth two looks
-                found[alive] = ~(self._seen(some, arcs, chunk, size)[0] > least)
+            if len(alive) <= room(self.size // FEWER):  # not worth two looks
+                found[alive] = ~(self._seen(some, arcs, chunk)[0] > least)
                 continue
-            lowest, when = self._seen(some, arcs, chunk, self.size, rough=True)
+            lowest, when = self._seen(some, arcs, chunk, rough=True)
             doubtful = np.flatnonzero(lowest < 0.0)
             found[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk[when[doubtful]]) > least)
         return found
 
-    def _seen(self, segments: PoseSegment, arcs: int, tau: np.ndarray, size: int, *, rough: bool = False):
+    def _seen(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, rough: bool = False):
+        # Many in float32, few in float64: two compilations.
         self.count_instants(len(segments.rate) * len(tau))
         kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind, rough=rough)
-        return in_batches(kernel, segments, size=size)
+        return in_batches(kernel, segments, size=self.size if rough else self.size // FEWER)
 
     def _again(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         if not len(tau):
             return np.zeros(0)
         self.count_instants(len(tau))
         kernel = partial(_tensions_at, self.robot, self.amplitude, float(arcs), kind=self.kind)
-        return in_batches(kernel, (segments, tau), size=self._size_for(len(tau)))
-
-    def _size_for(self, count: int) -> int:
-        # Few are not padded to many.
-        few = self.size // (4 * FIRST)
-        return self.size if count > room(few) else few
+        return in_batches(kernel, (segments, tau), size=self.size // FEWER)
 
 
 def _chunks(tau: np.ndarray) -> np.ndarray:
