@@ -26,6 +26,8 @@ from cspr_jax.wrenches import conditioning
 
 # Relative determinant below which a pose counts as singular.
 SINGULAR = 1e-9
+# Up to so many segments compiling for large batches takes longer than it saves.
+SOME = 1000
 
 
 class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
@@ -82,7 +84,7 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         count, depths = len(self), z0.reshape(-1, len(self))[:, 0]
         points = points.reshape(len(depths), -1, 3)
         quaternions = self.quaternions(shared.robot, float(depths[0]))
-        checker = PoseChecker(shared, problem.motion_kind(self.keys), batch=FEW if len(depths) == 1 else MANY)
+        checker = PoseChecker(shared, problem.motion_kind(self.keys), batch=FEW if len(z0) <= SOME else MANY)
         bends = [self._bends(shared, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)]
         if len(depths) == 1:
             self._refuse_slack(bends[0])

@@ -70,7 +70,7 @@ def near_pose(rng):
 def test_verdicts_are_the_oracle_s(checker):
     """Of random motions, at 4001 samples; margins and distances too, where the motion is not singular."""
     rng, seen = np.random.default_rng(11), set()
-    for i in range(60):
+    for i in range(48):
         p = int(rng.integers(2, 10))
         start, end = random_pose(rng, rest=True) if i % 2 else near_pose(rng), near_pose(rng)
         bends = (-1.0 if i % 2 else rng.uniform(-6.0, 1.0), rng.uniform(-6.0, 1.0))
