@@ -7,7 +7,7 @@ import jax
 import numpy as np
 import pytest
 from oracles import platform as oracle
-from test_platform import MSSM, Z0, ours
+from test_platform import MSSM, Z0, made, ours
 
 from cspr_jax.amplitudes import named
 from cspr_jax.feasibility import first_look
@@ -81,6 +81,20 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
         monkeypatch.setattr(first_look, "smallest_tensions", spoiled)
         refuted = checker.first_look(segments, 6, tau)
         assert not (refuted & ~wanted).any()
+
+
+def test_segments_of_candidates():
+    """Those of their motions, with their own beta-hat at the start and at the end."""
+    robot, given = ours(MSSM), candidates(MSSM, np.random.default_rng(7), 4)
+    (places, turns), (ends, targets) = given.start, given.end
+    for arcs in (4, 5):
+        found = _Segments(robot, given)(arcs, np.arange(20))
+        for k in range(20):
+            i = given.motion[k]
+            pair = (places[i], turns[i]), (ends[i], targets[i])
+            one = made(robot, *pair, Z0, (given.bends[0][k], given.bends[1][k]), arcs)
+            for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(found), strict=True):
+                np.testing.assert_allclose(b[k], a, rtol=1e-12, atol=1e-12)
 
 
 def test_more_instants_refute_more():
