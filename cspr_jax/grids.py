@@ -25,6 +25,7 @@ def in_threads(function: Callable, items: Sequence) -> list:
     Returns:
         one result an item.
     """
+    # jax does not say the type of the second.
     wide, device = jax.config.read("jax_enable_x64"), jax.config.jax_default_device  # type: ignore[attr-defined]
 
     def one(item):

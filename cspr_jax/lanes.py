@@ -92,6 +92,27 @@ def rotation(quaternion: Sequence[Array]) -> Matrix:
     )
 
 
+def about_axis(axis: Vector, sine: Array, cosine: Array) -> Matrix:
+    """The matrix of a rotation about an axis, by Rodrigues' formula.
+
+    Args:
+        axis: unit vector; zero where nothing turns.
+        sine: (...) of the angle.
+        cosine: (...) of the angle.
+
+    Returns:
+        rows.
+    """
+    x, y, z = axis
+    sx, sy, sz = (sine * e for e in axis)
+    px, py, pz = ((1.0 - cosine) * e for e in axis)
+    return (
+        (cosine + px * x, px * y - sz, px * z + sy),
+        (px * y + sz, cosine + py * y, py * z - sx),
+        (px * z - sy, py * z + sx, cosine + pz * z),
+    )
+
+
 def smallest(values: Sequence[Array]) -> Array:
     """The smallest of several arrays, case by case; NaN stays NaN.
 

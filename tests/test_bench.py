@@ -15,6 +15,7 @@ from cspr_jax.cli import main
 from cspr_jax.maps import sieve
 
 ROOT = Path(__file__).parent.parent
+with_compiler = pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler")
 
 
 @pytest.fixture
@@ -29,10 +30,8 @@ def small_bench(monkeypatch):
     monkeypatch.setattr(six_cables, "LANES", 64)
 
 
-@pytest.mark.parametrize("kernels", [None, ROOT / "benchmarks"])
+@pytest.mark.parametrize("kernels", [None, pytest.param(ROOT / "benchmarks", marks=with_compiler)])
 def test_bench(capsys, small_bench, kernels):
-    if kernels and not shutil.which("c++"):
-        pytest.skip("no C++ compiler")
     options = ["--kernels", str(kernels)] if kernels else []
     found = strict_json(cspr(capsys, "bench", "--json", *options))
     assert found["schema"] == 1 and found["cores"] >= 1 and jax.devices()[0].platform in found["device"]
@@ -49,6 +48,7 @@ def test_bench(capsys, small_bench, kernels):
     assert "x NumPy" in cspr(capsys, "bench", *options)
 
 
+@with_compiler
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -65,8 +65,6 @@ def test_bench(capsys, small_bench, kernels):
     ],
 )
 def test_kernels_that_are_wrong(capsys, small_bench, tmp_path, monkeypatch, change, words):
-    if not shutil.which("c++"):
-        pytest.skip("no C++ compiler")
     for path in (ROOT / "benchmarks").glob("*.[ch]*"):
         shutil.copy(path, tmp_path)
     for name, text in change.items():

@@ -65,12 +65,12 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     checker = PoseChecker(checker.shared, kind, batch=64)
     segments = _Segments(checker.shared.robot, candidates(MSSM, rng, 60))(6, np.arange(300))
     tau = np.linspace(1.0, 0.0, 37)
-    lowest = checker.lowest(segments, 6, tau)
+    lowest = checker.look.lowest(segments, 6, tau)
     wanted = lowest <= -1e-7
     assert 30 < wanted.sum() < 270
-    np.testing.assert_array_equal(checker.first_look(segments, 6, tau), wanted)
+    np.testing.assert_array_equal(checker.look.refuted(segments, 6, tau), wanted)
     few = jax.tree.map(lambda x: x[:16], segments)
-    np.testing.assert_array_equal(checker.first_look(few, 6, tau), wanted[:16])
+    np.testing.assert_array_equal(checker.look.refuted(few, 6, tau), wanted[:16])
     exact = first_look.smallest_tensions
     for wrong in (lambda x: x - 0.3, lambda x: np.inf * x, lambda x: np.nan * x):
 
@@ -79,7 +79,7 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
             return (wrong(value), when) if rough else (value, when)
 
         monkeypatch.setattr(first_look, "smallest_tensions", spoiled)
-        refuted = checker.first_look(segments, 6, tau)
+        refuted = checker.look.refuted(segments, 6, tau)
         assert not (refuted & ~wanted).any()
 
 
@@ -100,7 +100,7 @@ def test_segments_of_candidates():
 def test_more_instants_refute_more():
     checker, rng = checker_of(MSSM, batch=64), np.random.default_rng(5)
     segments = _Segments(checker.shared.robot, candidates(MSSM, rng, 40))(5, np.arange(200))
-    found = [checker.first_look(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
+    found = [checker.look.refuted(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
     assert all(not (a & ~b).any() for a, b in pairwise(found))
 
 
@@ -114,7 +114,7 @@ def test_the_size_of_the_robot_changes_nothing(scale):
         start, end = ((place * unit, turn) for place, turn in (given.start, given.end))
         given = given._replace(start=start, end=end, z0=given.z0 * unit)
         segments = _Segments(checker.shared.robot, given)(5, np.arange(300))
-        sizes.append(checker.first_look(segments, 5, np.linspace(1.0, 0.0, 33)))
+        sizes.append(checker.look.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
         rough, _ = first_look.smallest_tensions(
             checker.shared.robot,
             named("quintic"),

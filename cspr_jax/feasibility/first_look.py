@@ -83,12 +83,11 @@ def _of_one_size(robot: PlatformRobot, segments: PoseSegment) -> tuple[PlatformR
         inertia=robot.inertia / unit**2,
         gravity=robot.gravity / unit,
     )
-    radii = segments.start_radius / unit, segments.end_radius / unit
     return smaller, dataclasses.replace(
         segments,
         hub=segments.hub / unit,
-        start_radius=radii[0],
-        end_radius=radii[1],
+        start_radius=segments.start_radius / unit,
+        end_radius=segments.end_radius / unit,
         regular=jnp.sign(segments.regular),
     )
 
@@ -124,6 +123,7 @@ class FirstLook(NamedTuple):
         robot: the robot.
         amplitude: A.
         kind: of the motions.
+        least: a tension no larger than that refutes.
         size: how many are looked at in one call.
         count_instants: is told how many.
     """
@@ -131,6 +131,7 @@ class FirstLook(NamedTuple):
     robot: PlatformRobot
     amplitude: Amplitude
     kind: Kind
+    least: float
     size: int
     count_instants: Callable[[int], None]
 
@@ -150,14 +151,13 @@ class FirstLook(NamedTuple):
             lowest = np.minimum(lowest, self._seen(segments, arcs, chunk)[0])
         return np.where(np.isnan(lowest), -np.inf, lowest)
 
-    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, least: float) -> np.ndarray:
+    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         """Which motions some instants refute.
 
         Args:
             segments: leaves (n, ...), all of this number of arcs.
             arcs: the number.
             tau: (m,) instants, the most telling ones first.
-            least: a tension no larger than that refutes.
 
         Returns:
             (n,) where a tension is, or is none, or the determinant has changed its sign.
@@ -169,11 +169,11 @@ class FirstLook(NamedTuple):
                 break
             some = segments if len(alive) == len(found) else rows(segments, alive)
             if len(alive) <= room(self.size // FEWER):  # not worth two looks
-                found[alive] = ~(self._seen(some, arcs, chunk)[0] > least)
+                found[alive] = ~(self._seen(some, arcs, chunk)[0] > self.least)
                 continue
             lowest, when = self._seen(some, arcs, chunk, rough=True)
             doubtful = np.flatnonzero(lowest < 0.0)
-            found[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk[when[doubtful]]) > least)
+            found[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk[when[doubtful]]) > self.least)
         return found
 
     def _seen(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, rough: bool = False):

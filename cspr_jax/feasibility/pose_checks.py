@@ -85,6 +85,7 @@ class PoseChecker:
         batch: how many are computed at a time.
 
     Fields:
+        look: the first look, which comes before checks.
         done: how many instants of motions were looked at so far, in the first look and in checks, and how many motions
             were checked.
     """
@@ -99,7 +100,7 @@ class PoseChecker:
         self._size = float(np.linalg.norm(np.asarray(shared.robot.platform_points), axis=1).max())
         knots = np.asarray(shared.amplitude.knots)
         count = partial(self._count, "first look")
-        self._first = FirstLook(shared.robot, shared.amplitude, kind, FIRST * batch, count)
+        self.look = FirstLook(shared.robot, shared.amplitude, kind, -TOLERANCE, FIRST * batch, count)
         self._of_motion = Narrowing(shared, kind, None, batch)
         self._of_pose = self._of_motion._replace(pairs=self._pairs)
         self._knots = np.sort(np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT]))
@@ -119,32 +120,6 @@ class PoseChecker:
             (n,) s.
         """
         return in_batches(_durations, (segments, arcs.astype(float)), size=self.batch)
-
-    def first_look(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        """Which motions some instants refute.
-
-        Args:
-            segments: leaves (n, ...), all of this number of arcs.
-            arcs: the number.
-            tau: (m,) instants, the most telling ones first.
-
-        Returns:
-            (n,) those that are infeasible for certain.
-        """
-        return self._first.refuted(segments, arcs, tau, -TOLERANCE)
-
-    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        """Smallest tension over some instants.
-
-        Args:
-            segments: leaves (n, ...), all of this number of arcs.
-            arcs: the number.
-            tau: (m,) instants.
-
-        Returns:
-            (n,) over its value at rest in P0; -inf beyond a singularity or where not finite.
-        """
-        return self._first.lowest(segments, arcs, tau)
 
     def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True) -> PoseChecks:
         """Check motions in full.

@@ -136,7 +136,7 @@ def _sieved(checker: PoseChecker, segments: _Segments, arcs: int, alive: np.ndar
     # Those that some instants do not refute.
     if not len(alive):
         return alive
-    return alive[~checker.first_look(segments(arcs, alive), arcs, tau)]
+    return alive[~checker.look.refuted(segments(arcs, alive), arcs, tau)]
 
 
 def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:
@@ -157,7 +157,7 @@ def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: i
     segments = _Segments(checker.shared.robot, candidates)
     for arcs in range(1, max_arcs + 1):
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
-        lowest = checker.lowest(segments(arcs, every), arcs, tau)
+        lowest = checker.look.lowest(segments(arcs, every), arcs, tau)
         best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)
     return best
 

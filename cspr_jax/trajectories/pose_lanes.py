@@ -12,7 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.amplitudes import Amplitude, derivatives
-from cspr_jax.lanes import Matrix, Vector, combined, cross, dot, rotation, stored
+from cspr_jax.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation, stored
 from cspr_jax.numerics import polynomial, sincospi
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 
@@ -202,15 +202,7 @@ def _about_one_axis(
     sine, cosine = stored(sincospi(whole * beta * now.a / math.pi), one)
     rate = whole * (beta1 * now.a + beta * now.a1)
     bend = whole * (beta2 * now.a + 2.0 * beta1 * now.a1 + beta * now.a2)
-    part = 1.0 - cosine
-    x, y, z = axis
-    sx, sy, sz = (sine * e for e in axis)
-    turn = (
-        (cosine + part * x * x, part * x * y - sz, part * x * z + sy),
-        (part * x * y + sz, cosine + part * y * y, part * y * z - sx),
-        (part * x * z - sy, part * y * z + sx, cosine + part * z * z),
-    )
-    return turn, tuple(rate * e for e in axis), tuple(bend * e for e in axis)
+    return about_axis(axis, sine, cosine), tuple(rate * e for e in axis), tuple(bend * e for e in axis)
 
 
 def _angle_ratio_coefficients() -> list[float]:

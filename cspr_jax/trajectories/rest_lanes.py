@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.amplitudes import Amplitude, derivatives
-from cspr_jax.lanes import Matrix, Vector
+from cspr_jax.lanes import Matrix, Vector, about_axis
 from cspr_jax.numerics import sincospi
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 
@@ -141,20 +141,11 @@ def swing(which: Swings, row: Array) -> Swing:
 
     speed, spin = which.angle * blended(5), which.angle * blended(8)
     sine, cosine = sincospi(which.angle * blended(2))
-    x, y, z = which.axis
-    part = 1.0 - cosine
-    sx, sy, sz = (sine * e for e in which.axis)
-    px, py, pz = (part * e for e in which.axis)
-    turn = (
-        (cosine + px * x, px * y - sz, px * z + sy),
-        (px * y + sz, cosine + py * y, py * z - sx),
-        (px * z - sy, py * z + sx, cosine + pz * z),
-    )
     pull = which.rate * row[1]
     return Swing(
         tuple(h + row[0] * r for h, r in zip(which.hub, which.reach, strict=True)),
         tuple(pull * r for r in which.reach),
-        turn,
+        about_axis(which.axis, sine, cosine),
         which.rate * speed * speed,
         which.rate * spin,
     )
