@@ -6,6 +6,8 @@ same shape: the last batch is padded with its own last element, and trimmed.
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import TypeVar
 
 import jax
 import numpy as np
@@ -13,6 +15,7 @@ import numpy as np
 # How many times as large a batch is elsewhere than on a CPU, whose caches it has to fit.
 LARGER = {"gpu": 16, "tpu": 16}
 THREADS = 2
+Found = TypeVar("Found")
 
 
 def in_threads(function: Callable, items: Sequence) -> list:
@@ -35,6 +38,25 @@ def in_threads(function: Callable, items: Sequence) -> list:
 
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(one, items))
+
+
+def in_parts(function: Callable[[slice], Found], count: int, size: int) -> list[Found]:
+    """What is found of many cases, so many at a time.
+
+    Two threads work: what one does outside of XLA, and what XLA does on one core, goes beside the other's.
+
+    Args:
+        function: gives that of a range of cases; it is called from several threads.
+        count: of cases, at least one.
+        size: of the largest range.
+
+    Returns:
+        one result a range, in order.
+    """
+    # Parts of one length, as many for each thread.
+    rounds = -(-count // (THREADS * size))
+    bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
+    return in_threads(function, [slice(*pair) for pair in pairwise(bounds)])
 
 
 def room(size: int) -> int:

@@ -13,8 +13,8 @@ from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.maps import attainable
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
-from cspr_jax.maps.attainable import attainable
 from cspr_jax.reference_pose import aligned
 from cspr_jax.symmetries import folded, symmetries
 from cspr_jax.trajectories.pose_segment import Kind
@@ -78,20 +78,23 @@ def checker_of(amplitude: str) -> PoseChecker:
     return PoseChecker(shared, Kind(from_rest=True), batch=MANY)
 
 
-def attained(checker: PoseChecker, place: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def attained(checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
     """Which orientations horizontal transitions attain; the centroid of the spools is the origin.
 
     Args:
         checker: of `checker_of`.
-        place: (3,) m.
-        angles: (n, 3) tilt and torsion in the cylindrical frame, rad.
+        sets: of each set its place (3,), m, and its orientations (n, 3): tilt and torsion in the cylindrical frame,
+            rad.
 
     Returns:
-        (n,).
+        (n,) of each.
     """
-    places, z0 = np.tile(place, (len(angles), 1)), np.full(len(angles), place[2])
+    sizes = [len(angles) for _, angles in sets]
+    places = np.repeat([place for place, _ in sets], sizes, axis=0)
     found = symmetries(checker.shared.robot)
-    return attainable(checker, places, angles, z0, max_arcs=MAX_ARCS, found=found).arcs > 0
+    every = np.concatenate([angles for _, angles in sets])
+    good = attainable.attained(checker, places, every, places[:, 2], max_arcs=MAX_ARCS, found=found)
+    return np.split(good, np.cumsum(sizes)[:-1])
 
 
 def table_3_3(choice: Choice) -> dict[Key, float | None]:
@@ -104,27 +107,32 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
         cells; proportions, volumes (accessible of SO(3), attainable of that) and errors in percent.
     """
     found: dict[Key, float | None] = {}
+    # The step of the table, and twice that for the errors.
+    steps = [DIVISIONS * choice.finer, DIVISIONS * choice.finer // 2]
     for amplitude in choice.amplitudes:
         checker = checker_of(amplitude)
         for definition in choice.definitions:
-            for row, (x, y) in PLACES.items():
-                place, name = np.array([x * RADIUS, y * RADIUS, DEPTH]), variant(definition, amplitude)
-                fine, coarse = (_cells(checker, place, definition, DIVISIONS * choice.finer // k) for k in (1, 2))
+            places = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in PLACES.values()]
+            cells = [_cells(checker, places, definition, divisions) for divisions in steps]
+            for row, fine, coarse in zip(PLACES, *cells, strict=True):
                 errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
-                found |= {(row, column, name): value for column, value in (fine | errors).items()}
+                found |= {(row, column, variant(definition, amplitude)): x for column, x in (fine | errors).items()}
     return found
 
 
-def _cells(checker: PoseChecker, place: np.ndarray, definition: str, divisions: int) -> dict[str, float]:
-    inside = accessible(checker.shared.robot, place, definition, divisions)
-    good, volume = attained(checker, place, inside.angles), inside.volume
-    return {
-        "accessible": float(len(good)),
-        "attainable": float(good.sum()),
-        "proportion": 100.0 * good.mean(),
-        "accessible volume": 100.0 * volume.sum(),
-        "attainable volume": 100.0 * volume[good].sum() / volume.sum(),
-    }
+def _cells(checker: PoseChecker, places: list[np.ndarray], definition: str, divisions: int) -> list[dict[str, float]]:
+    sets = [accessible(checker.shared.robot, place, definition, divisions) for place in places]
+    masks = attained(checker, [(place, inside.angles) for place, inside in zip(places, sets, strict=True)])
+    return [
+        {
+            "accessible": float(len(good)),
+            "attainable": float(good.sum()),
+            "proportion": 100.0 * good.mean(),
+            "accessible volume": 100.0 * inside.volume.sum(),
+            "attainable volume": 100.0 * inside.volume[good].sum() / inside.volume.sum(),
+        }
+        for good, inside in zip(masks, sets, strict=True)
+    ]
 
 
 def table_3_4(choice: Choice) -> dict[Key, float | None]:
@@ -141,16 +149,17 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
         checker = checker_of(amplitude)
         robot = checker.shared.robot
         azimuths = np.unique(np.round(folded(symmetries(robot), _AZIMUTHS), 9))
+        divisions = DIVISIONS * choice.finer
         for definition in choice.definitions:
             for depth in _DEPTHS:
-                shares = []
-                for radius in _RADII:
-                    for azimuth in azimuths:
-                        level = RADIUS * radius * np.array([math.cos(azimuth), math.sin(azimuth)])
-                        place = np.append(level, depth)
-                        inside = accessible(robot, place, definition, DIVISIONS * choice.finer)
-                        shares.append(float(attained(checker, place, inside.angles).mean()))
-                found[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * min(shares)
+                places = [
+                    np.array([RADIUS * radius * math.cos(azimuth), RADIUS * radius * math.sin(azimuth), depth])
+                    for radius in _RADII
+                    for azimuth in azimuths
+                ]
+                sets = [(place, accessible(robot, place, definition, divisions).angles) for place in places]
+                smallest = min(good.mean() for good in attained(checker, sets))
+                found[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * float(smallest)
     return found
 
 

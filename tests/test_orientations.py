@@ -19,7 +19,7 @@ from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.sights import Watch
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
-from cspr_jax.maps.attainable import attainable
+from cspr_jax.maps.attainable import attainable, attained
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.orientations import equal_volume_grid, tilt_torsion_grid
 from cspr_jax.rotations import from_tilt_torsion
@@ -208,6 +208,8 @@ def test_orientations_that_a_mirror_joins():
         attainable(checker, many, angles, z0, max_arcs=8, values=4, found=found) for found in (symmetries(robot), NONE)
     )
     assert (once.arcs == twice.arcs).all()
+    whether = attained(checker, many, angles, z0, max_arcs=8, values=4, found=symmetries(robot))
+    assert (whether == (once.arcs > 0)).all() and whether.any() and not whether.all()
     np.testing.assert_allclose(once.margin[once.arcs > 0], twice.margin[once.arcs > 0], atol=1e-6)
 
 

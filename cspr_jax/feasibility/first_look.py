@@ -110,10 +110,12 @@ def _from_rest(robot: PlatformRobot, segments: PoseSegment):
 
 
 @partial(jax.jit, static_argnames="kind")
-def _tensions_at(robot: PlatformRobot, amplitude: Amplitude, arcs: Array, items, *, kind: Kind) -> Array:
-    # Of segments, each at an instant of its own.
-    segments, tau = items
-    return lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau), kind)
+def _tensions_at(robot: PlatformRobot, amplitude: Amplitude, arcs: Array, tau: Array, items, *, kind: Kind) -> Array:
+    # Of segments, each at one of some instants.
+    segments, when = items
+    if kind.from_rest:
+        return _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
+    return lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau[when]), kind)
 
 
 class FirstLook(NamedTuple):
@@ -173,7 +175,7 @@ class FirstLook(NamedTuple):
                 continue
             lowest, when = self._seen(some, arcs, chunk, rough=True)
             doubtful = np.flatnonzero(lowest < 0.0)
-            found[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk[when[doubtful]]) > self.least)
+            found[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk, when[doubtful]) > self.least)
         return found
 
     def _seen(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, rough: bool = False):
@@ -182,12 +184,12 @@ class FirstLook(NamedTuple):
         kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind, rough=rough)
         return in_batches(kernel, segments, size=self.size if rough else self.size // FEWER)
 
-    def _again(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        if not len(tau):
+    def _again(self, segments: PoseSegment, arcs: int, tau: np.ndarray, when: np.ndarray) -> np.ndarray:
+        if not len(when):
             return np.zeros(0)
-        self.count_instants(len(tau))
-        kernel = partial(_tensions_at, self.robot, self.amplitude, float(arcs), kind=self.kind)
-        return in_batches(kernel, (segments, tau), size=self.size // FEWER)
+        self.count_instants(len(when))
+        kernel = partial(_tensions_at, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
+        return in_batches(kernel, (segments, when), size=self.size // FEWER)
 
 
 def _chunks(tau: np.ndarray) -> np.ndarray:

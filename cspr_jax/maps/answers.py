@@ -7,7 +7,6 @@ candidate with the largest margin is reported.
 
 import dataclasses
 from collections.abc import Callable
-from itertools import pairwise
 from typing import NamedTuple, TypeVar
 
 import jax
@@ -18,7 +17,7 @@ from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared, prove
 from cspr_jax.feasibility.margins import margins
 from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.grids import THREADS, in_batches, in_threads
+from cspr_jax.grids import in_batches
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -54,23 +53,15 @@ class Answers:
     feasible_at_infinity: np.ndarray
 
 
-def in_parts(function: Callable[[slice], Said], count: int, size: int) -> Said:
-    """Answers of many cases, so many at a time.
-
-    Two threads work: what one does outside of XLA, and what XLA does on one core, goes beside the other's.
+def joined(parts: list[Said]) -> Said:
+    """Answers side by side.
 
     Args:
-        function: gives those of a range of cases; it is called from several threads.
-        count: of cases, at least one.
-        size: of the largest range.
+        parts: at least one.
 
     Returns:
-        the answers of all.
+        one for all.
     """
-    # Parts of one length, as many for each thread.
-    rounds = -(-count // (THREADS * size))
-    bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
-    parts = in_threads(function, [slice(*pair) for pair in pairwise(bounds)])
     return type(parts[0])(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 

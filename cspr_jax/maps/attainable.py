@@ -4,15 +4,18 @@ import numpy as np
 
 from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.pose_checks import PoseChecker
-from cspr_jax.maps.answers import in_parts
-from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
-from cspr_jax.maps.pose_answers import PoseAnswers, reached
+from cspr_jax.grids import in_parts
+from cspr_jax.maps.answers import joined
+from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates, smallest_arcs
+from cspr_jax.maps.pose_answers import PoseAnswers, reached, trials
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.rotations import from_tilt_torsion
 from cspr_jax.symmetries import NONE, Symmetries, alike
 
 # Values of beta-hat tried at the target.
 VALUES = 20
+# Motions of a part of a search that only asks whether; large ones fill their batches.
+PART = CANDIDATES // 4
 
 
 def attainable(
@@ -39,31 +42,78 @@ def attainable(
     Returns:
         the answers.
     """
-    centre = np.asarray(checker.shared.robot.base_points).mean(0)
-    some, own = np.unique(alike(found, np.c_[places - centre, z0], angles), return_inverse=True)
+    some, own = _once(checker, places, angles, z0, found)
 
     def part(which):
         which = some[which]
-        return _part(checker, centre, places[which], angles[which], z0[which], max_arcs, values)
+        motions, bends = _motions(checker, places[which], angles[which], z0[which], values)
+        return reached(checker, motions, bends, max_arcs=max_arcs)
 
-    return in_parts(part, len(some), CANDIDATES // values).rows(own.ravel())
+    return joined(in_parts(part, len(some), CANDIDATES // values)).rows(own)
 
 
-def _part(
+def attained(
     checker: PoseChecker,
-    centre: np.ndarray,
     places: np.ndarray,
     angles: np.ndarray,
     z0: np.ndarray,
+    *,
     max_arcs: int,
-    values: int,
-) -> PoseAnswers:
+    values: int = VALUES,
+    found: Symmetries = NONE,
+) -> np.ndarray:
+    """Which orientations of places some number of arcs and some value of beta-hat attains.
+
+    What `attainable` says too, which tells how, and why not; with half of the work.
+
+    Args:
+        checker: of motions from rest.
+        places: (n, 3) m.
+        angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
+        z0: (n,) m.
+        max_arcs: largest number tried.
+        values: of beta-hat, the preferred one first.
+        found: symmetries of the robot; orientations that they join are computed once.
+
+    Returns:
+        (n,).
+    """
+    some, own = _once(checker, places, angles, z0, found)
+
+    def part(which):
+        which = some[which]
+        motions, bends = _motions(checker, places[which], angles[which], z0[which], values)
+        is_attained = np.zeros(len(which), bool)
+        # The preferred value with every number of arcs, then the others where it fails.
+        for options in (bends[:, :1], bends[:, 1:]):
+            left = np.flatnonzero(~is_attained)
+            size = max(CANDIDATES // max(options.shape[1], 1), 1)
+            for piece in (left[k : k + size] for k in range(0, len(left), size)):
+                cell, trial = trials(motions.motions(piece), options[piece])
+                arcs = smallest_arcs(checker, trial, max_arcs=max_arcs).arcs
+                is_attained[piece[cell[arcs > 0]]] = True
+        return is_attained
+
+    return np.concatenate(in_parts(part, len(some), PART))[own]
+
+
+def _once(checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, found: Symmetries):
+    # Orientations that stand for others too, and where each of all is among them.
+    centre = np.asarray(checker.shared.robot.base_points).mean(0)
+    some, own = np.unique(alike(found, np.c_[places - centre, z0], angles), return_inverse=True)
+    return some, own.ravel()
+
+
+def _motions(
+    checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
+) -> tuple[Candidates, np.ndarray]:
+    # Transitions from rest, and (n, values) of beta-hat at their ends.
     robot, count = checker.shared.robot, len(angles)
+    centre = np.asarray(robot.base_points).mean(0)
     towards = np.arctan2(*(places - centre).T[1::-1])  # (3.98)
     ends = (places, from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
     bends, can_end = end_options(robot, *ends, z0, values)
     hub = centre + z0[:, None] * np.array([0.0, 0.0, 1.0])
     start = (hub, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
     rest = np.full(count, AT_REST)
-    motions = Candidates(start, ends, z0, np.arange(count), (rest, rest))
-    return reached(checker, motions, np.where(can_end[:, None], bends, np.nan), max_arcs=max_arcs)
+    return Candidates(start, ends, z0, np.arange(count), (rest, rest)), np.where(can_end[:, None], bends, np.nan)

@@ -12,9 +12,9 @@ import numpy as np
 from cspr_jax.amplitudes import boundary_errors
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
-from cspr_jax.grids import in_batches, room
+from cspr_jax.grids import in_batches, in_parts, room
 from cspr_jax.maps import sieve
-from cspr_jax.maps.answers import Answers, decided, end_slacks, in_parts, only
+from cspr_jax.maps.answers import Answers, decided, end_slacks, joined, only
 from cspr_jax.robots import LARGEST_LENGTH
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
@@ -93,7 +93,7 @@ def minimum_arcs(
         return decided(shared, parities, only(upper, None if arcs is None else np.asarray(arcs)[which]), infinity)
 
     # Not two batches where one has room for all.
-    return in_parts(part, len(z0), room(PART)) if len(z0) > room(sieve.BATCH) else part(slice(None))
+    return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(sieve.BATCH) else part(slice(None))
 
 
 def check_numbers(z0: np.ndarray, max_arcs: int) -> None:

@@ -46,6 +46,11 @@ class Candidates(NamedTuple):
         """Some of them: indices, or (n,) a mask."""
         return self._replace(motion=self.motion[which], bends=(self.bends[0][which], self.bends[1][which]))
 
+    def motions(self, which: np.ndarray) -> "Candidates":
+        """Some of the motions of one candidate each: indices."""
+        start, end, bends = ((a[which], b[which]) for a, b in (self.start, self.end, self.bends))
+        return Candidates(start, end, self.z0[which], np.arange(len(which)), bends)
+
 
 class Found(NamedTuple):
     """Smallest numbers of arcs.

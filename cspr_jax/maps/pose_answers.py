@@ -97,6 +97,21 @@ def settled(
     )
 
 
+def trials(motions: Candidates, values: np.ndarray, *, same: bool = False) -> tuple[np.ndarray, Candidates]:
+    """Motions with each of several values of beta-hat at their ends.
+
+    Args:
+        motions: n of them, one candidate each, with the values at their starts.
+        values: (n, n_values) in the order in which they are tried; NaN for none.
+        same: whether the value at the end holds at the start too.
+
+    Returns:
+        which motion each candidate is of, (k,); the candidates.
+    """
+    cell, option = np.nonzero(~np.isnan(values))
+    return cell, _with_ends(motions.rows(cell), values[cell, option], same=same)
+
+
 def reached(
     checker: PoseChecker, motions: Candidates, values: np.ndarray, *, max_arcs: int, same: bool = False
 ) -> PoseAnswers:
@@ -112,8 +127,7 @@ def reached(
     Returns:
         the answers; where there is none, those of the first value, or of that at rest.
     """
-    cell, option = np.nonzero(~np.isnan(values))
-    trial = _with_ends(motions.rows(cell), values[cell, option], same=same)
+    cell, trial = trials(motions, values, same=same)
     found = smallest_arcs(checker, trial, max_arcs=max_arcs)
     arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
     bends = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])

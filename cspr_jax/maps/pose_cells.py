@@ -9,7 +9,8 @@ from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
-from cspr_jax.maps.answers import in_parts
+from cspr_jax.grids import in_parts
+from cspr_jax.maps.answers import joined
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
@@ -44,7 +45,7 @@ class PoseMap(PlatformMap):
         def part(which: slice) -> PoseAnswers:
             return self._answers({name: x[which] for name, x in cells.items()})
 
-        found = in_parts(part, len(cells["z0"]), at_a_time)
+        found = joined(in_parts(part, len(cells["z0"]), at_a_time))
         return vars(found) | {"beta_hat": found.beta_hat[:, 1]}
 
     def _answers(self, cells: dict[str, np.ndarray]) -> PoseAnswers:
