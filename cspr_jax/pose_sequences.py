@@ -3,8 +3,10 @@
 import itertools
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from cspr_jax import problem, rotations
 from cspr_jax.config.plan import PlanFile, Pose
@@ -130,8 +132,7 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
             if pose.beta_hat is not None or pose.rest:
                 found.append(np.array([AT_REST if pose.beta_hat is None else pose.beta_hat]))
                 continue
-            end = endpoint(shared.robot, jnp.asarray(position), jnp.asarray(quaternion), jnp.asarray(z0))
-            preferred, lowest, highest = (np.atleast_1d(x) for x in end[2:])
+            preferred, lowest, highest = (np.atleast_1d(x) for x in _end(shared.robot, position, quaternion, z0)[2:])
             values = options(preferred, lowest, highest)[0]
             found.append(values[~np.isnan(values)] if not np.isnan(values[0]) else values[:1])
         return found
@@ -173,21 +174,30 @@ def _orientation(i: int, pose: Pose, path: Path) -> np.ndarray:
     return problem.given_quaternion(pose.quaternion, f"pose[{i}].quaternion", path)
 
 
+# One function for XLA instead of some hundred small ones.
+_end = jax.jit(endpoint)
+
+
+@jax.jit
+def _standing(robot: PlatformRobot, position: Array, quaternion: Array, centre: Array, pairs: Array):
+    # Depth below the spool plane, determinant over that of the reference orientation in the middle at the same depth,
+    # distances between cables.
+    where = (position, rotations.matrix(quaternion))
+    depth = plane_normal(robot) @ (position - centre)
+    middle = (centre + depth * jnp.array([0.0, 0.0, 1.0]), jnp.eye(3))
+    apart = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)
+    return depth, conditioning(robot, *where) / conditioning(robot, *middle), apart
+
+
 def _check_pose(
     robot: PlatformRobot, i: int, position: np.ndarray, quaternion: np.ndarray, centre: np.ndarray, path: Path
 ) -> None:
-    where = (jnp.asarray(position), rotations.matrix(jnp.asarray(quaternion)))
-    depth = float(plane_normal(robot) @ (where[0] - centre))
+    depth, share, apart = map(np.asarray, _standing(robot, position, quaternion, centre, contacts(robot).pairs))
     if not depth > 0.0:
         raise ConfigError(path, f"pose[{i}].position: must be below the spool plane")
-    # Beside the reference orientation in the middle, at the same depth.
-    middle = (jnp.asarray(centre + np.array([0.0, 0.0, depth])), jnp.eye(3))
-    share = float(conditioning(robot, *where)) / float(conditioning(robot, *middle))
     if not abs(share) > SINGULAR:
         raise ConfigError(
             path, f"pose[{i}]: must be another orientation: singular there (relative determinant {share:.1g})"
         )
-    near = contacts(robot)
-    apart = float(np.linalg.norm(gaps(robot, jnp.asarray(near.pairs), *where), axis=1).min(initial=np.inf))
-    if apart < TOUCH * float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max()):
+    if apart.min(initial=np.inf) < TOUCH * float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max()):
         raise ConfigError(path, f"pose[{i}]: must be another orientation: two cables touch there")

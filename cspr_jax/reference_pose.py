@@ -14,6 +14,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from cspr_jax import wrenches
 from cspr_jax.errors import InputError
@@ -74,8 +75,7 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     hub = np.asarray(robot.base_points).mean(0) + np.array([0.0, 0.0, z0])
     turned, rotation = aligned(robot)
     with jax.enable_x64(True):
-        size = float(wrenches.conditioning(turned, jnp.asarray(hub), jnp.eye(3)))
-        still = np.asarray(wrenches.tensions(turned, wrenches.at_rest(jnp.asarray(hub), jnp.eye(3))))
+        size, still = (np.asarray(x) for x in _standing(turned, hub))
     if not abs(size) > SMALLEST_CONDITIONING:
         raise InputError(
             "platform_points", f"a singular reference pose (determinant {size:.2g})", "points apart from it"
@@ -88,7 +88,12 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
             f"a reference pose at rest with a slack cable {slack}",
             "a platform that hangs in equilibrium with every cable taut",
         )
-    return Reference(turned, rotation, size, share)
+    return Reference(turned, rotation, float(size), share)
+
+
+@jax.jit
+def _standing(robot: PlatformRobot, hub: Array) -> tuple[Array, Array]:
+    return wrenches.conditioning(robot, hub, jnp.eye(3)), wrenches.tensions(robot, wrenches.at_rest(hub, jnp.eye(3)))
 
 
 def _level_and_straight(robot: PlatformRobot) -> np.ndarray:

@@ -118,7 +118,8 @@ def test_motions_are_the_oracle_s(name, which):
         np.testing.assert_allclose(found.angular_velocity, wanted.omega, atol=1e-8)
         np.testing.assert_allclose(found.angular_acceleration, wanted.omega_dot, atol=1e-7)
         if which == "variable":  # the platform stands still at every cusp
-            cusps = states(robot, segment, amplitude[0], float(p), np.arange(p + 1) / p)
+            places = np.minimum(np.arange(13) / p, 1.0)  # one shape for all p
+            cusps = states(robot, segment, amplitude[0], float(p), places)
             np.testing.assert_allclose(cusps.velocity, 0.0, atol=1e-11)
 
 
