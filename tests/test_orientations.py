@@ -124,6 +124,18 @@ def test_symmetric_places_have_equal_sets(definition):
             assert other.volume.sum() == pytest.approx(plain.volume.sum(), rel=1e-9)
 
 
+def test_cables_that_lie_in_the_platform():
+    """Exactly so at some orientations of this grid: the set is its own mirror image all the same."""
+    robot, found = ours(MSSM), []
+    for azimuth in (math.pi / 2.0, math.pi / 2.0 + 2.0 * math.pi / 3.0):
+        angles = accessible(robot, place(3.0, azimuth), "grid", 16).angles
+        phi, theta, sigma = np.round(angles * 16 / math.pi).astype(int).T
+        found.append(set(zip(np.where(theta > 0, phi % 32, 0), theta, sigma % 32, strict=True)))
+    # phi becomes pi - phi in the cylindrical frame.
+    mirrored = {((16 - phi) % 32 if theta else 0, theta, -sigma % 32) for phi, theta, sigma in found[0]}
+    assert mirrored == found[0] == found[1]
+
+
 def test_definitions_agree():
     """On the volume, within what the step lets expect; the scan counts no orientation outside of the other two."""
     robot = ours(MSSM)

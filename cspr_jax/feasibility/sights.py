@@ -13,7 +13,7 @@ from cspr_jax.feasibility import contact_lanes
 from cspr_jax.feasibility.interference import Contacts, cables_cross, contacts, platform_hit
 from cspr_jax.grids import in_batches
 from cspr_jax.lanes import rotation, stored
-from cspr_jax.platforms import PlatformRobot
+from cspr_jax.platforms import CABLES, PlatformRobot
 from cspr_jax.robots import centroid, plane_normal
 from cspr_jax.wrench_lanes import cables
 from cspr_jax.wrenches import conditioning
@@ -22,7 +22,8 @@ BATCH = 4096
 # Determinants below this part of that of the reference orientation count as singular, of whichever sign rounding makes
 # them.
 SINGULAR = 1e-6
-# Gaps between cables below this part of the platform's size are none.
+# Gaps between cables below this part of the platform's size are none. A cable that makes a smaller angle with the
+# platform lies in it, and counts as being where it is in the reference orientation: it has not yet swept over.
 TOUCHING = 1e-9
 # Steps between neighbours that are held at a time.
 STEPS = 65536
@@ -86,6 +87,8 @@ class Watch:
         self._pairs = tuple((int(i), int(j)) for i, j in self._contacts.pairs)
         self._reference = reference_share(robot, self._place)
         self._size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
+        self._side = np.ones(CABLES)
+        self._side = np.sign(self.at(np.array([[1.0, 0.0, 0.0, 0.0]])).views[0] @ self._contacts.normal)
 
     def at(self, quaternions: np.ndarray) -> Sights:
         """What is seen of orientations.
@@ -103,7 +106,10 @@ class Watch:
         share, gaps, views = found
         # Cables that touch have a gap of rounding errors, whose direction means nothing.
         gaps[np.linalg.norm(gaps, axis=2) < TOUCHING * self._size] = 0.0
-        return Sights(share / self._reference, gaps, views)
+        # So has the height of cables that lie in the platform: they are put on one side of it.
+        height, least = views @ self._contacts.normal, TOUCHING * np.linalg.norm(views, axis=2)
+        height = np.where(np.abs(height) < least, 2.0 * least * self._side - height, 0.0)
+        return Sights(share / self._reference, gaps, views + height[..., None] * self._contacts.normal)
 
     def regular(self, sights: Sights) -> np.ndarray:
         """Orientations that are not beyond a singularity.
