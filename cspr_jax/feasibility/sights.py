@@ -87,7 +87,7 @@ class Watch:
         self._pairs = tuple((int(i), int(j)) for i, j in self._contacts.pairs)
         self._reference = reference_share(robot, self._place)
         self._size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
-        self._side = np.ones(CABLES)
+        self._side = np.zeros(CABLES)  # of each cable; not yet known, and nothing lies in the platform there
         self._side = np.sign(self.at(np.array([[1.0, 0.0, 0.0, 0.0]])).views[0] @ self._contacts.normal)
 
     def at(self, quaternions: np.ndarray) -> Sights:

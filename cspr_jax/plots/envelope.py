@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.verdicts import Verdict
@@ -51,6 +52,9 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> F
             ylabel="tilt · sin azimuth (°)",
             zlabel="torsion (°)",
         )
+        # Few ticks: an axis may be seen nearly from its end.
+        for axis in (panel.xaxis, panel.yaxis):
+            axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 3, 4.5, 9, 10], prune="both"))
     handles = [Line2D([], [], color=_ACCESSIBLE), Line2D([], [], color=_ATTAINED)]
     figure.legend(handles, ["accessible", "attained from rest"], loc="outside lower center", ncols=2, frameon=False)
     title = f"{result.attributes['robot']}: orientations of a place"
