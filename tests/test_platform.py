@@ -347,8 +347,19 @@ def test_joints():
     assert ours(general(2)).joints == tuple(range(6))
 
 
-@pytest.mark.parametrize("kind", [USUAL, Kind(variable=False), Kind(plain=True), Kind(from_rest=True)])
-@pytest.mark.parametrize(("robot", "name"), [(MSSM, "quintic"), (general(2), "effective-c3")])
+KINDS = [USUAL, Kind(variable=False), Kind(plain=True), Kind(from_rest=True)]
+
+
+@pytest.mark.parametrize(
+    ("robot", "name", "kind"),
+    [
+        *((MSSM, "quintic", kind) for kind in KINDS),
+        *(
+            pytest.param(general(2), "effective-c3", kind, marks=() if kind in KINDS[::3] else pytest.mark.soak)
+            for kind in KINDS
+        ),
+    ],
+)
 def test_the_fast_kernel(robot, name, kind):
     """The smallest tension of many segments as the readable functions give it; -inf past a singularity."""
     package, rng, amplitude = ours(robot), np.random.default_rng(9), AMPLITUDES[name][0]

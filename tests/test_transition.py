@@ -165,7 +165,9 @@ def test_far_targets_need_oscillations_in_proportion(name):
     assert n == pytest.approx(3000.0 * float(amplitude.largest[1]) / math.pi, rel=1e-5)
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.soak if name in ("A2", "A3") else ()) for name in FUNCTIONS]
+)
 def test_the_best_inclination(name):
     """No inclination of a fine scan needs less; it is against the largest weight, and zero where two are largest."""
     amplitude = FUNCTIONS[name]

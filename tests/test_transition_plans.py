@@ -74,8 +74,17 @@ def balance(base, p, acceleration):
     return np.linalg.solve(units.transpose(0, 2, 1), pulled[..., None])[..., 0]
 
 
-@pytest.mark.parametrize("name", POLYNOMIALS)
-@pytest.mark.parametrize("robot", TARGETS)
+SOME = {("transition-prototype", "A1"), ("transition-planar", "A2")}
+
+
+@pytest.mark.parametrize(
+    ("robot", "name"),
+    [
+        pytest.param(robot, name, marks=() if (robot, name) in SOME else pytest.mark.soak)
+        for robot in TARGETS
+        for name in POLYNOMIALS
+    ],
+)
 def test_there_swings_and_back(tmp_path, robot, name):
     """Every row of the motion is the printed motion; acceleration and tensions go on without a jump."""
     code, _, err = cspr(tmp_path, text(robot, f'"{name}"'), "-o", tmp_path / "motion.h5")
@@ -137,6 +146,12 @@ def test_inclinations(tmp_path):
     ]
     assert best["segments"][0]["least_oscillations"] <= min(others)
     assert best["segments"][0]["inclination"] > 0.1  # under spool 3, whose weight is negative
+
+
+@pytest.mark.soak
+def test_the_best_inclination_with_the_best_epsilon(tmp_path):
+    target = [0.0, 1.0, 2.0]
+    best = planned(tmp_path, text(depth='inclination = "best"', target=target))
     effective = text(depth='inclination = "best"', amplitude='{ name = "effective", epsilon = "best" }', target=target)
     found = planned(tmp_path, effective)
     assert found["amplitude"] != best["amplitude"] and found["total_duration"] <= best["total_duration"]

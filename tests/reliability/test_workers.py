@@ -116,6 +116,7 @@ def test_a_dask_scheduler(job, tmp_path):
         check_same(tmp_path / "run", reference)
 
 
+@pytest.mark.soak
 def test_ctrl_c_while_no_worker_is_there(job, tmp_path):
     """Before the first worker comes, and after the last one has gone."""
     command = [sys.executable, "-m", "cspr_jax", "run", str(job[0]), "-o", str(tmp_path / "run"), "--scheduler"]
@@ -188,7 +189,7 @@ def real_kills(job, tmp_path, count, longest):
 
 
 def test_kills_of_the_real_command(job, tmp_path):
-    real_kills(job, tmp_path, 2, 7.0)
+    real_kills(job, tmp_path, 1, 7.0)
 
 
 @pytest.mark.soak
