@@ -189,6 +189,7 @@ def mirrored(pose):
     return pose[0] * [-1.0, 1.0, 1.0], pose[1] * [1.0, 1.0, -1.0, -1.0]
 
 
+@pytest.mark.soak
 def test_symmetries_of_the_mssm():
     """A third of a turn, the mirror x -> -x, and time reversed change no verdict and no margin."""
     checker, rng = checker_with(named("quintic")), np.random.default_rng(13)

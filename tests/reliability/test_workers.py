@@ -85,6 +85,7 @@ def test_worker_processes(job, tmp_path):
     check_same(tmp_path / "run", reference)
 
 
+@pytest.mark.soak
 def test_a_worker_dies_while_another_cannot_end(job, tmp_path):
     """As one does that waits for a lock the dead one held; here it is stopped."""
     path, reference = job
