@@ -1,8 +1,10 @@
-"""The package from Python: load a robot, plan a sequence, map an array of targets, open a result."""
+"""The package from Python: load a robot, plan a sequence, map an array of targets, open a result.
+
+Everything here is in the axes of the robot file, and computed in float64 whatever jax is set to.
+"""
 
 from pathlib import Path
 
-import jax
 import numpy as np
 
 from cspr_jax import planning, problem
@@ -11,29 +13,29 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.limits import Limits
+from cspr_jax.limits import Limits
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_arcs import minimum_arcs as _minimum_arcs
+from cspr_jax.numerics import double_precision
 from cspr_jax.planning import Plan
 from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import PointMassRobot, centroid, is_planar
+from cspr_jax.robots import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point
 
 
 def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
-    """A robot of the catalogue, or of a file. Its axes become z down.
+    """A robot of the catalogue, or of a file, with its axes and its limits.
 
     Args:
         reference: a catalogue name, or the path of a robot file.
 
     Returns:
-        the robot, without the limits that its file may hold; with six cables, a platform.
+        the robot; with six cables, a platform.
 
     Raises:
         ConfigError: no such robot, or a mistake in its file.
     """
     spec = resolve_robot(str(reference), reference, Path.cwd())
-    build = problem.build_platform if spec.is_platform else problem.build_robot
-    return build(spec, TrajectoryKeys(), reference)
+    return problem.build_robot(spec, TrajectoryKeys(), reference)
 
 
 def plan(path: str | Path) -> Plan:
@@ -48,7 +50,7 @@ def plan(path: str | Path) -> Plan:
     Raises:
         ConfigError: a mistake in the file.
     """
-    with jax.enable_x64(True):
+    with double_precision():
         return planning.plan(Path(path))
 
 
@@ -66,11 +68,12 @@ def minimum_arcs(
 
     Args:
         robot: a point mass on three cables.
-        targets: (n, 3) m, z down.
-        start: (3,) or (n, 3) m; None: at rest in P0.
+        targets: (n, 3) in the robot's axes, m.
+        start: (3,) or (n, 3) in the robot's axes, m; None: at rest in P0. A start within 1e-9 of the robot's size
+            (the largest distance of a spool from the centroid of all) of P0 is at rest there too.
         z0: () or (n,) depth of P0 below the centroid of the spools, m.
         amplitude: None: the quintic (2.50).
-        limits: None: cables taut and the effector below the spools, nothing else.
+        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
         max_arcs: largest number of arcs tried.
 
     Returns:
@@ -78,24 +81,30 @@ def minimum_arcs(
 
     Raises:
         InputError: another kind of robot, shapes that do not fit, values that are not finite, z0 not positive,
-            max_arcs below 1, or an amplitude function that breaks (2.49).
+            max_arcs below 1, limits that contradict each other, or an amplitude function that breaks (2.49).
     """
     if not isinstance(robot, PointMassRobot) or is_planar(robot):
-        raise InputError("robot", robot.name, "a point mass on three cables")
-    ends = np.asarray(targets, float)
-    if ends.ndim != 2 or ends.shape[1] != 3 or not len(ends) or not np.isfinite(ends).all():
-        raise InputError("targets", f"shape {ends.shape}", "finite numbers of shape (n, 3), n >= 1")
+        raise InputError("robot", getattr(robot, "name", robot), "a point mass on three cables")
+    ends = _points("targets", targets)
     if np.shape(z0) not in ((), (len(ends),)):
         raise InputError("z0", f"shape {np.shape(z0)}", f"a number > 0, or ({len(ends)},) of them")
-    depth = np.broadcast_to(np.asarray(z0, float), (len(ends),))
-    if start is None:
-        starts = np.asarray(centroid(robot), float) + np.stack(
-            [np.zeros(len(ends)), np.zeros(len(ends)), depth], axis=1
-        )
-    else:
-        starts = np.asarray(start, float)
-        if starts.shape not in ((3,), ends.shape) or not np.isfinite(starts).all():
-            raise InputError("start", f"shape {starts.shape}", f"finite numbers of shape (3,) or {ends.shape}")
-    shared = Shared(robot, limits or Limits(), amplitude or named("quintic"))
-    with jax.enable_x64(True):
-        return _minimum_arcs(shared, np.broadcast_to(starts, ends.shape).copy(), ends, depth.copy(), max_arcs=max_arcs)
+    depth = np.broadcast_to(np.asarray(z0, float), (len(ends),)).copy()
+    given = None if start is None else np.asarray(start, float)
+    if given is not None and given.shape not in ((3,), ends.shape):
+        raise InputError("start", f"shape {given.shape}", f"finite numbers of shape (3,) or {ends.shape}")
+    with double_precision():
+        centred, frame = problem.centred(robot)
+        starts = rest_point(depth) if given is None else frame.inward(_points("start", np.atleast_2d(given)))
+        shared = Shared(centred, problem.limits_over(robot, limits), amplitude or named("quintic"))
+        starts = np.broadcast_to(starts, ends.shape).copy()
+        return _minimum_arcs(shared, starts, frame.inward(ends), depth, max_arcs=max_arcs)
+
+
+def _points(key: str, given) -> np.ndarray:
+    points = np.asarray(given, float)
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points):
+        raise InputError(key, f"shape {points.shape}", "finite numbers of shape (n, 3), n >= 1")
+    fits = (np.abs(points) <= LARGEST_LENGTH).all(1)
+    if not fits.all():
+        raise InputError(key, points[~fits][0].tolist(), "finite numbers, at most 1e6 m")
+    return points

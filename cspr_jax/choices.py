@@ -11,12 +11,12 @@ from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.oscillations import best_inclination
-from cspr_jax.robots import HasSpools, centroid
+from cspr_jax.robots import AT_P0, HasSpools, rest_point, spool_radius
 from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories import depths
 from cspr_jax.trajectories.transition import depth_for, transition, weights
 
-REST_TOLERANCE = 1e-9  # m
+SAME_DEPTH = 1e-9  # m
 # A conservative z0 must lie above its bound: by this part of it.
 ABOVE_BOUND = 1e-6
 EPSILONS = np.linspace(0.02, 0.5, 49)
@@ -73,10 +73,12 @@ def _check_depth_keys(sequence: Sequence) -> None:
 
 
 def _check_rest(robot: HasSpools, sequence: Sequence, z0: float) -> None:
-    hub = (np.asarray(centroid(robot)) + np.array([0.0, 0.0, z0])) * problem.axis_signs(sequence.spec)
+    at_rest, near = rest_point(np.asarray(z0)), AT_P0 * float(spool_radius(robot))
     for i, pose in enumerate(sequence.keys.pose):
-        if pose.rest and pose.position is not None and np.abs(np.asarray(pose.position) - hub).max() > REST_TOLERANCE:
-            place = [float(f"{value:.9g}") for value in hub]
+        if not pose.rest or pose.position is None:
+            continue
+        if np.linalg.norm(sequence.frame.inward(pose.position) - at_rest) > near:
+            place = [float(f"{value:.12g}") for value in sequence.frame.outward(at_rest)]
             raise ConfigError(
                 sequence.path, f"pose[{i}].position = {shown(pose.position)}: must be P0 = {place} at rest, or absent"
             )
@@ -93,7 +95,7 @@ def _depth_of_inclination(shared: Shared, sequence: Sequence) -> float:
     else:
         v = float(inclination or 0.0)
     found = [float(depth_for(shared.robot, jnp.asarray(target), jnp.asarray(v))) for target in targets]
-    if max(found) - min(found) > REST_TOLERANCE:
+    if max(found) - min(found) > SAME_DEPTH:
         raise ConfigError(
             path, f"inclination = {v:g}: must be replaced by z0, since the targets lie at different depths"
         )
@@ -108,7 +110,7 @@ def _fastest_depth(shared: Shared, sequence: Sequence) -> float:
     safe = depths.conservative_depth(shared.robot, sequence.targets)
     trial = np.linspace(0.5 * least, max(1.5 * least, safe if np.isfinite(safe) else 0.0), DEPTHS)
     for _ in range(2):
-        points = np.stack([sequence.points(shared.robot, z0) for z0 in trial])
+        points = np.stack([sequence.points(z0) for z0 in trial])
         answers = sequence.answers(shared, points, np.repeat(trial, len(sequence)))
         cost = np.where(answers.arcs > 0, answers.duration, np.inf).reshape(DEPTHS, -1).sum(1)
         best = int(np.argmin(cost))
@@ -136,7 +138,7 @@ def best_amplitude(shared: Any, sequence: Sequence, z0: float) -> tuple[Amplitud
         amplitude = problem.build_amplitude(sequence.keys, sequence.path, epsilon=float(epsilon))
         trial = shared._replace(amplitude=amplitude)
         depth = chosen_depth(trial, sequence) if sequence.keys.inclination == "best" else z0
-        points = sequence.points(shared.robot, depth)
+        points = sequence.points(depth)
         answers = sequence.answers(trial, points, np.full(len(sequence), depth))
         cost = np.where(answers.arcs > 0, answers.duration, np.inf).sum()
         ranked.append((round(float(cost), 9), -float(answers.margin.min()), len(ranked), amplitude, depth))

@@ -12,6 +12,8 @@ from typing import TypeVar
 import jax
 import numpy as np
 
+from cspr_jax.numerics import double_precision
+
 # How many times as large a batch is elsewhere than on a CPU, whose caches it has to fit.
 LARGER = {"gpu": 16, "tpu": 16}
 THREADS = 2
@@ -28,12 +30,12 @@ def in_threads(function: Callable, items: Sequence) -> list:
     Returns:
         one result an item.
     """
-    # jax does not say the type of the second.
-    wide, device = jax.config.read("jax_enable_x64"), jax.config.jax_default_device  # type: ignore[attr-defined]
+    # jax does not say its type.
+    device = jax.config.jax_default_device  # type: ignore[attr-defined]
 
     def one(item):
         # The settings may be the caller's thread's own.
-        with jax.enable_x64(wide), jax.default_device(device):
+        with double_precision(), jax.default_device(device):
             return function(item)
 
     with ThreadPoolExecutor(THREADS) as pool:

@@ -13,7 +13,7 @@ from cspr_jax import tensions, wrenches
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.planning import Plan
-from cspr_jax.problem import axis_signs, motion_kind
+from cspr_jax.problem import motion_kind
 from cspr_jax.quantities import TRAJECTORY
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import new_hdf5, set_attributes
@@ -86,12 +86,12 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         parts.append({"t": starts[i] + tau * length, **part})
     names = [name for name in TRAJECTORY if name in parts[0]]
     found = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    signs = axis_signs(plan.spec)
     for name in names:
         if name in _VECTORS:
-            found[name] = found[name] * signs
+            change = plan.frame.outward if name == "position" else plan.frame.turned
+            found[name] = change(found[name])
     if "quaternion" in found:
-        found["quaternion"] = found["quaternion"] * np.concatenate([[1.0], signs])
+        found["quaternion"] = plan.frame.turned_quaternions(found["quaternion"])
     return found
 
 

@@ -1,6 +1,8 @@
 """Elementary functions that XLA compiles well, for one number or an array of any shape."""
 
+import contextlib
 import math
+from collections.abc import Iterator
 from typing import cast
 
 import jax
@@ -76,6 +78,25 @@ def length(vector: Array) -> Array:
     square = jnp.sum(vector * vector)
     # NaN stays NaN.
     return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), square)
+
+
+@contextlib.contextmanager
+def double_precision() -> Iterator[None]:
+    """Settings of jax under which this package computes, whatever the caller's are; these come back afterwards.
+
+    64 bits above all: verdicts are float64's. NaN is an answer in places, so that it is no error.
+    """
+    with contextlib.ExitStack() as stack:
+        for setting in (
+            jax.enable_x64(True),
+            jax.numpy_dtype_promotion("standard"),
+            jax.numpy_rank_promotion("allow"),
+            jax.default_matmul_precision("highest"),
+            jax.debug_nans(False),
+            jax.debug_infs(False),
+        ):
+            stack.enter_context(setting)
+        yield
 
 
 def leaf(value) -> Array:

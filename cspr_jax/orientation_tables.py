@@ -73,7 +73,7 @@ def checker_of(amplitude: str) -> PoseChecker:
         the checker, of motions of the MSSM from rest.
     """
     here = Path(__file__)
-    robot = problem.build_platform(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
+    robot = problem.platform_of(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
     shared = PoseShared(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
     return PoseChecker(shared, Kind(from_rest=True), batch=MANY)
 

@@ -18,10 +18,11 @@ from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.extremes import Extremes, extremes
 from cspr_jax.feasibility.pose_extremes import pose_extremes
 from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.frames import Frame
 from cspr_jax.maps.answers import Answers
 from cspr_jax.pose_sequences import Poses
 from cspr_jax.reference_pose import aligned, reference_pose
-from cspr_jax.sequences import sequence_of
+from cspr_jax.sequences import Sequence, sequence_of
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.pose_segment import PoseSegment
 
@@ -41,10 +42,11 @@ class Plan:
         keys: the plan file.
         shared: robot, limits, amplitude function; of a platform its reference too.
         z0: m.
-        points: (n + 1, 3) in the kernels' axes, m.
+        frame: of the robot file.
+        points: (n + 1, 3) in the axes of the robot file, m.
         answers: of the n segments.
-        extremes: of the n segments.
-        segments: of the n segments, each of the parity of its number of arcs.
+        extremes: of the n segments; `lowest` is z in the axes of the robot file.
+        segments: of the n segments, each of the parity of its number of arcs; in the kernels' coordinates.
         backwards: (n,) whether a segment runs against its normalised time, from its target back to rest.
         warnings: what its user should know, one line each.
     """
@@ -53,6 +55,7 @@ class Plan:
     keys: PlanFile
     shared: Shared | PoseShared
     z0: float
+    frame: Frame
     points: np.ndarray
     answers: Answers
     extremes: Extremes
@@ -93,7 +96,7 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     if spec.is_platform:
         return _plan_of_poses(spec, keys, path)
     sequence = sequence_of(spec, keys, path)
-    robot = problem.build_robot(spec, keys, path)
+    robot = problem.point_mass_of(spec, keys, path)
     limits = problem.build_limits(spec, keys, keys.floor, path)
     amplitude = problem.build_amplitude(keys, path, epsilon=FIRST_EPSILON)
     shared = Shared(robot, limits, amplitude)
@@ -101,12 +104,20 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
         amplitude, z0 = best_amplitude(shared, sequence, z0)
         shared = shared._replace(amplitude=amplitude)
-    points = sequence.points(robot, z0)
+    points = sequence.points(z0)
     depth = np.full(len(sequence), z0)
     answers = sequence.answers(shared, points, depth)
     segments = sequence.segments(shared, points, depth, answers)
     asked = extremes(shared, segments, answers.tried_arcs, keys.samples)
-    return Plan(spec, keys, shared, z0, points, answers, asked, segments, sequence.backwards)
+    return _plan(sequence, shared, z0, points, (answers, asked, segments))
+
+
+def _plan(sequence: Sequence, shared, z0: float, points: np.ndarray, found: tuple, warnings: tuple = ()) -> Plan:
+    # What leaves the kernels is in the axes of the robot file.
+    frame, (answers, asked, segments) = sequence.frame, found
+    asked = dataclasses.replace(asked, lowest=frame.height(asked.lowest))
+    places, backwards = frame.outward(points), sequence.backwards
+    return Plan(sequence.spec, sequence.keys, shared, z0, frame, places, answers, asked, segments, backwards, warnings)
 
 
 def _jumps(amplitude: Amplitude) -> bool:
@@ -118,7 +129,7 @@ def _jumps(amplitude: Amplitude) -> bool:
 def _plan_of_poses(spec: RobotFile, keys: PlanFile, path: Path) -> Plan:
     # Of a rigid platform, thesis chapter 3.
     sequence = Poses(spec, keys, path)
-    robot = problem.build_platform(spec, keys, path)
+    robot = problem.platform_of(spec, keys, path)
     limits = problem.build_limits(spec, keys, keys.floor, path)
     amplitude = problem.build_amplitude(keys, path, epsilon=FIRST_EPSILON)
     shared = PoseShared(aligned(robot)[0], limits, amplitude)
@@ -131,10 +142,10 @@ def _plan_of_poses(spec: RobotFile, keys: PlanFile, path: Path) -> Plan:
     if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
         amplitude, z0 = best_amplitude(shared, sequence, z0)
         shared = shared._replace(amplitude=amplitude)
-    points, depth = sequence.points(robot, z0), np.full(len(sequence), z0)
+    points, depth = sequence.points(z0), np.full(len(sequence), z0)
     answers = sequence.answers(shared, points, depth)
     segments = sequence.segments(shared, points, depth, answers)
     kind = problem.motion_kind(keys)
     asked = pose_extremes(shared, segments, answers.tried_arcs, keys.samples, kind=kind)
     warnings = (_JUMPS.format(amplitude.name),) if kind.variable and _jumps(amplitude) else ()
-    return Plan(spec, keys, shared, z0, points, answers, asked, segments, sequence.backwards, warnings)
+    return _plan(sequence, shared, z0, points, (answers, asked, segments), warnings)

@@ -1,4 +1,4 @@
-"""The six-cable robot as the kernels see it: geometry, mass and inertia in the product's axes (z down)."""
+"""The six-cable robot: geometry, mass, inertia, limits; its axes are as of `robots`."""
 
 import dataclasses
 import itertools
@@ -8,8 +8,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
+from cspr_jax.limits import NO_LIMITS, Limits
 from cspr_jax.numerics import leaf
-from cspr_jax.robots import LARGEST_LENGTH, SMALLEST_AREA_RATIO, STANDARD_GRAVITY, check_numbers
+from cspr_jax.robots import LARGEST_LENGTH, SMALLEST_AREA_RATIO, STANDARD_GRAVITY, Axis, check_axis, check_numbers
 
 CABLES = 6
 # Points nearer to each other than this part of the largest distance are one point.
@@ -23,13 +24,15 @@ class PlatformRobot:
     """A rigid platform on six cables.
 
     Fields:
-        base_points: (6, 3) where the cables leave their spools, in cable order; z down, m.
+        base_points: (6, 3) where the cables leave their spools, in cable order; m.
         platform_points: (6, 3) where they are attached, from the mass centre, in platform axes, which are
             parallel to the fixed ones in the reference orientation; m.
         mass: () kg.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2.
-        gravity: () along +z, m/s^2.
+        gravity: () downwards, m/s^2.
+        limits: limits beyond taut cables.
         name: for people.
+        z_axis: where z points, "down" or "up"; known when a function is compiled.
         joints: for each cable the first one that is attached at the same point; known when a function is compiled, so
             that the point is computed once. Who replaces points so that others coincide replaces it too.
     """
@@ -39,14 +42,16 @@ class PlatformRobot:
     mass: Array
     inertia: Array
     gravity: Array
+    limits: Limits = NO_LIMITS
     name: str = ""
+    z_axis: Axis = "down"
     joints: tuple[int, ...] = tuple(range(CABLES))
 
 
 jax.tree_util.register_dataclass(
     PlatformRobot,
-    ["base_points", "platform_points", "mass", "inertia", "gravity"],
-    ["joints"],
+    ["base_points", "platform_points", "mass", "inertia", "gravity", "limits"],
+    ["joints", "z_axis"],
     drop_fields=["name"],
 )
 
@@ -60,30 +65,35 @@ def platform_robot(
     centre_of_mass=(0.0, 0.0, 0.0),
     gravity: float = STANDARD_GRAVITY,
     name: str = "robot",
+    z_axis: Axis = "down",
+    limits: Limits | None = None,
 ) -> PlatformRobot:
     """A six-cable robot, its geometry and inertia checked.
 
     Args:
-        base_points: (6, 3) spool points, z down, m.
+        base_points: (6, 3) spool points, m.
         platform_points: (6, 3) attachment points in platform axes, m.
         mass: kg, positive.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2; symmetric, positive definite, of a real body.
         centre_of_mass: (3,) in platform axes, m.
         gravity: m/s^2, positive.
         name: for people.
+        z_axis: where z points, "down" or "up".
+        limits: limits beyond taut cables; None: none.
 
     Returns:
         the robot, float64 NumPy leaves.
 
     Raises:
         InputError: wrong shape, not finite, points on a line, two cables between the same two points, an inertia
-            tensor that no body has, mass or gravity not positive.
+            tensor that no body has, mass or gravity not positive, another z_axis.
     """
     base, platform = _points("base_points", base_points), _points("platform_points", platform_points)
     centre = np.asarray(centre_of_mass, float)
     if centre.shape != (3,) or not (np.abs(centre) <= LARGEST_LENGTH).all():
         raise InputError("centre_of_mass", centre_of_mass, "three coordinates, at most 1e6 m")
     check_numbers(mass, gravity)
+    check_axis(z_axis)
     tensor = _inertia(inertia)
     for first, second in itertools.combinations(range(CABLES), 2):
         if _is_same(base, first, second) and _is_same(platform, first, second):
@@ -93,7 +103,8 @@ def platform_robot(
                 f"no cables {first + 1} and {second + 1} between the same two points",
             )
     joints = tuple(int((platform == point).all(1).argmax()) for point in platform)
-    return PlatformRobot(leaf(base), leaf(platform - centre), leaf(mass), leaf(tensor), leaf(gravity), name, joints)
+    numbers = (leaf(base), leaf(platform - centre), leaf(mass), leaf(tensor), leaf(gravity))
+    return PlatformRobot(*numbers, limits or NO_LIMITS, name, z_axis, joints)
 
 
 def _points(key: str, given) -> np.ndarray:

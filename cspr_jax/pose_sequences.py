@@ -21,7 +21,7 @@ from cspr_jax.maps.bends import BEYOND, cheapest_path, options
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, segments_with, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, settled
 from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import centroid, plane_normal
+from cspr_jax.robots import plane_normal, rest_point
 from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories.pose_segment import PoseSegment
 from cspr_jax.wrenches import conditioning
@@ -50,21 +50,20 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         super().__init__(spec, keys, path)
         self._given = np.array([_orientation(i, pose, path) for i, pose in enumerate(keys.pose)])
 
-    def quaternions(self, robot, z0: float) -> np.ndarray:
+    def quaternions(self, z0: float) -> np.ndarray:
         """Orientations in the kernels' axes.
 
         Args:
-            robot: gives the centroid.
             z0: m.
 
         Returns:
             (n_poses, 4).
         """
-        points, centre = self.points(robot, z0), np.asarray(centroid(robot))
+        points = self.points(z0)
         angles = np.array([[0.0] * 3 if p.rest else p.tilt_torsion or [0.0] * 3 for p in self.keys.pose])
-        turned = problem.orientations(self.spec, centre, points, angles)
+        turned = problem.orientations(self.frame, points, angles)
         is_given = np.array([pose.rest or pose.tilt_torsion is None for pose in self.keys.pose])
-        return np.where(is_given[:, None], self._given * np.append(1.0, problem.axis_signs(self.spec)), turned)
+        return np.where(is_given[:, None], self.frame.turned_quaternions(self._given), turned)
 
     def check_poses(self, shared: PoseShared) -> None:
         """Refuse poses at which no motion can begin or end.
@@ -75,17 +74,16 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         Raises:
             ConfigError: which pose, and why.
         """
-        robot, centre = shared.robot, np.asarray(centroid(shared.robot))
-        poses = zip(self.points(robot, 1.0), self.quaternions(robot, 1.0), strict=True)
+        poses = zip(self.points(1.0), self.quaternions(1.0), strict=True)
         for i, (position, quaternion) in enumerate(poses):
             if not self.keys.pose[i].rest:
-                _check_pose(robot, i, position, quaternion, centre, self.path)
+                _check_pose(shared.robot, i, position, quaternion, self.path)
 
     def answers(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray) -> PoseAnswers:
         """Smallest numbers of arcs, with the values of beta-hat that give the fewest in sum; see `Sequence.answers`."""
         count, depths = len(self), z0.reshape(-1, len(self))[:, 0]
         points = points.reshape(len(depths), -1, 3)
-        quaternions = self.quaternions(shared.robot, float(depths[0]))
+        quaternions = self.quaternions(float(depths[0]))
         checker = PoseChecker(shared, problem.motion_kind(self.keys), batch=FEW if len(z0) <= SOME else MANY)
         bends = [self._bends(shared, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)]
         if len(depths) == 1:
@@ -118,7 +116,7 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
 
     def segments(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray, answers: PoseAnswers) -> PoseSegment:
         """The segments; see `Sequence.segments`."""
-        quaternions = self.quaternions(shared.robot, float(z0[0]))
+        quaternions = self.quaternions(float(z0[0]))
         found = self._candidates(points[None], quaternions, z0, np.arange(len(self)), tuple(answers.beta_hat.T))
         return segments_with(shared.robot, found, answers.tried_arcs)
 
@@ -179,20 +177,18 @@ _end = jax.jit(endpoint)
 
 
 @jax.jit
-def _standing(robot: PlatformRobot, position: Array, quaternion: Array, centre: Array, pairs: Array):
+def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: Array):
     # Depth below the spool plane, determinant over that of the reference orientation in the middle at the same depth,
     # distances between cables.
     where = (position, rotations.matrix(quaternion))
-    depth = plane_normal(robot) @ (position - centre)
-    middle = (centre + depth * jnp.array([0.0, 0.0, 1.0]), jnp.eye(3))
+    depth = plane_normal(robot) @ position
+    middle = (rest_point(depth), jnp.eye(3))
     apart = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)
     return depth, conditioning(robot, *where) / conditioning(robot, *middle), apart
 
 
-def _check_pose(
-    robot: PlatformRobot, i: int, position: np.ndarray, quaternion: np.ndarray, centre: np.ndarray, path: Path
-) -> None:
-    depth, share, apart = map(np.asarray, _standing(robot, position, quaternion, centre, contacts(robot).pairs))
+def _check_pose(robot: PlatformRobot, i: int, position: np.ndarray, quaternion: np.ndarray, path: Path) -> None:
+    depth, share, apart = map(np.asarray, _standing(robot, position, quaternion, contacts(robot).pairs))
     if not depth > 0.0:
         raise ConfigError(path, f"pose[{i}].position: must be below the spool plane")
     if not abs(share) > SINGULAR:

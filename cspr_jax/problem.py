@@ -1,5 +1,8 @@
 """From checked files to what the kernels take: robot, limits, amplitude function, axes."""
 
+import dataclasses
+from typing import Any, TypeVar
+
 import numpy as np
 
 from cspr_jax import amplitudes, robots
@@ -7,7 +10,8 @@ from cspr_jax.amplitudes import Amplitude, boundary_errors
 from cspr_jax.config.robot import LimitKeys, RobotFile
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.feasibility.limits import Limits
+from cspr_jax.frames import Frame, frame_of
+from cspr_jax.limits import NO_LIMITS, Limits
 from cspr_jax.numerics import leaf
 from cspr_jax.platforms import PlatformRobot, platform_robot
 from cspr_jax.reference_pose import reference_pose
@@ -15,20 +19,24 @@ from cspr_jax.robots import STANDARD_GRAVITY, PointMassRobot
 from cspr_jax.rotations import UNIT_TOLERANCE, from_tilt_torsion
 from cspr_jax.trajectories.pose_segment import Kind
 
-# A z-up file is turned by half a turn about x: a rotation, so that nothing is mirrored.
-_TURN = {"down": np.array([1.0, 1.0, 1.0]), "up": np.array([1.0, -1.0, -1.0])}
+RobotKind = TypeVar("RobotKind", PointMassRobot, PlatformRobot)
 
 
-def axis_signs(spec: RobotFile) -> np.ndarray:
-    """Factors between a file's axes and the kernels' (z down); the same both ways.
+def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
+    """A robot as the kernels take it: from the centroid of its spools, z down, without limits.
 
     Args:
-        spec: the robot, whose z_axis holds for the whole file.
+        robot: in its own axes.
 
     Returns:
-        (3,) of +1 and -1.
+        the robot, and the frame that takes points to it and back.
     """
-    return _TURN[spec.z_axis]
+    frame = frame_of(robot.base_points, robot.z_axis)
+    changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
+    if isinstance(robot, PlatformRobot):
+        changes["platform_points"] = leaf(frame.turned(robot.platform_points))
+        changes["inertia"] = leaf(np.asarray(robot.inertia) * np.outer(frame.signs, frame.signs))
+    return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
 
 
 def gravity_of(spec: RobotFile, keys: TrajectoryKeys) -> float:
@@ -44,8 +52,8 @@ def gravity_of(spec: RobotFile, keys: TrajectoryKeys) -> float:
     return keys.gravity or spec.gravity or STANDARD_GRAVITY
 
 
-def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot:
-    """A point-mass robot, in the kernels' axes.
+def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot | PlatformRobot:
+    """The robot of a file, in its own axes and with its own limits.
 
     Args:
         spec: the robot file's content.
@@ -54,22 +62,44 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
 
     Returns:
         the robot.
+
+    Raises:
+        ConfigError: its geometry, inertia or limits cannot be used.
+    """
+    given: dict[str, Any] = {"mass": spec.mass, "gravity": gravity_of(spec, keys), "name": spec.name}
+    given |= {"z_axis": spec.z_axis, "limits": build_limits(spec, LimitKeys(), None, file)}
+    try:
+        if not spec.is_platform:
+            make = robots.planar_robot if spec.planar else robots.point_mass_robot
+            return make(spec.base_points, **given)
+        given |= {"inertia": spec.inertia, "centre_of_mass": spec.centre_of_mass or [0.0, 0.0, 0.0]}
+        return platform_robot(spec.base_points, spec.platform_points, **given)
+    except InputError as error:
+        raise ConfigError(file, f"robot.{error}") from error
+
+
+def point_mass_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot:
+    """The point mass of a file, as the kernels take it.
+
+    Args:
+        spec: the robot file's content.
+        keys: of the plan or sweep.
+        file: named in errors.
+
+    Returns:
+        the robot, centred.
 
     Raises:
         ConfigError: its geometry cannot be used, or it is a rigid platform.
     """
-    if spec.is_platform:
+    robot = build_robot(spec, keys, file)
+    if isinstance(robot, PlatformRobot):
         raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass here')
-    try:
-        points = np.asarray(spec.base_points) * axis_signs(spec)
-        make = robots.planar_robot if spec.planar else robots.point_mass_robot
-        return make(points, mass=spec.mass, gravity=gravity_of(spec, keys), name=spec.name)
-    except InputError as error:
-        raise ConfigError(file, f"robot.{error}") from error
+    return centred(robot)[0]
 
 
-def build_platform(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PlatformRobot:
-    """A six-cable robot, in the kernels' axes; its platform axes are still those of the file.
+def platform_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PlatformRobot:
+    """The six-cable robot of a file, as the kernels take it; its platform axes are still those of the file.
 
     Args:
         spec: the robot file's content.
@@ -77,24 +107,15 @@ def build_platform(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Platf
         file: named in errors.
 
     Returns:
-        the robot.
+        the robot, centred.
 
     Raises:
-        ConfigError: its geometry or inertia cannot be used.
+        ConfigError: its geometry or inertia cannot be used, or it is a point mass.
     """
-    signs = axis_signs(spec)
-    try:
-        return platform_robot(
-            np.asarray(spec.base_points) * signs,
-            np.asarray(spec.platform_points) * signs,
-            mass=spec.mass,
-            inertia=np.asarray(spec.inertia) * np.outer(signs, signs),
-            centre_of_mass=np.asarray(spec.centre_of_mass or [0.0, 0.0, 0.0]) * signs,
-            gravity=gravity_of(spec, keys),
-            name=spec.name,
-        )
-    except InputError as error:
-        raise ConfigError(file, f"robot.{error}") from error
+    robot = build_robot(spec, keys, file)
+    if not isinstance(robot, PlatformRobot):
+        raise ConfigError(file, f'robot "{spec.name}" is a point mass: must be a platform on six cables here')
+    return centred(robot)[0]
 
 
 def fault_at_rest(spec: RobotFile) -> str | None:
@@ -108,9 +129,8 @@ def fault_at_rest(spec: RobotFile) -> str | None:
     """
     try:
         if spec.is_platform:
-            robot = build_platform(spec, TrajectoryKeys(), spec.name)
-            base = np.asarray(robot.base_points)
-            reference_pose(robot, float(np.linalg.norm(base - base.mean(0), axis=1).mean()))
+            robot = platform_of(spec, TrajectoryKeys(), spec.name)
+            reference_pose(robot, float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean()))
         else:
             build_robot(spec, TrajectoryKeys(), spec.name)
     except (ConfigError, InputError) as error:
@@ -180,7 +200,44 @@ def build_limits(spec: RobotFile, keys: LimitKeys, floor: float | None, file: ob
     low, high = found["tension_min"], found["tension_max"]
     if low is not None and high is not None and not (np.asarray(low) < np.asarray(high)).all():
         raise ConfigError(file, f"tension_min = {np.asarray(low).tolist()}: must be below tension_max for every cable")
-    depth = None if floor is None else leaf(floor * axis_signs(spec)[2])
+    depth = None if floor is None else leaf(frame_of(spec.base_points, spec.z_axis).depth(floor))
+    return Limits(floor=depth, **found)
+
+
+def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None) -> Limits:
+    """Limits that are given over those of a robot, as the kernels take them.
+
+    Args:
+        robot: in its own axes.
+        limits: one number or one a cable each, in the robot's axes; None: those of the robot.
+
+    Returns:
+        the limits.
+
+    Raises:
+        InputError: numbers of another count, or no limits at all: not finite, a length or speed that is not positive,
+            a smallest tension that is not below the largest.
+    """
+    n_cables, found = len(robot.base_points), dict[str, Any]()
+    for name in LimitKeys.model_fields:
+        value = getattr(limits or NO_LIMITS, name)
+        value = getattr(robot.limits, name) if value is None else value
+        if value is None:
+            found[name] = None
+            continue
+        numbers = np.asarray(value, float)
+        low = 0.0 if name == "tension_min" else np.nextafter(0.0, 1.0)
+        if numbers.shape not in ((), (n_cables,)) or not ((numbers >= low) & np.isfinite(numbers)).all():
+            sign = ">= 0" if name == "tension_min" else "> 0"
+            raise InputError(f"limits.{name}", value, f"a finite number {sign}, or {n_cables} of them: one a cable")
+        found[name] = leaf(np.broadcast_to(numbers, n_cables))
+    low, high = found["tension_min"], found["tension_max"]
+    if low is not None and high is not None and not (low < high).all():
+        raise InputError("limits.tension_min", low.tolist(), "below tension_max for every cable")
+    floor = None if limits is None else limits.floor
+    if floor is not None and not (np.ndim(floor) == 0 and np.isfinite(floor)):
+        raise InputError("limits.floor", floor, "a finite number: z of the floor")
+    depth = None if floor is None else leaf(frame_of(robot.base_points, robot.z_axis).depth(floor))
     return Limits(floor=depth, **found)
 
 
@@ -197,22 +254,20 @@ def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> Kind:
     return Kind(keys.family == "hypocycloid", keys.beat == "beta_1", from_rest)
 
 
-def orientations(spec: RobotFile, centre: np.ndarray, points: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def orientations(frame: Frame, points: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes.
 
     Args:
-        spec: gives the file's axes, which the angles are of.
-        centre: (3,) centroid of the spools, kernels' axes, m.
-        points: (n, 3) kernels' axes, m.
+        frame: of the file, whose axes the angles are of.
+        points: (n, 3) from the centroid of the spools, z down, m.
         angles: (n, 3) phi, theta, sigma, rad.
 
     Returns:
         (n, 4) unit quaternions.
     """
-    signs = axis_signs(spec)
-    own = (points - centre) * signs
+    own = frame.turned(points)
     towards = np.arctan2(own[:, 1], own[:, 0])
-    return from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])) * np.append(1.0, signs)
+    return frame.turned_quaternions(from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
 
 
 def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> np.ndarray:

@@ -18,8 +18,9 @@ from jax import Array
 
 from cspr_jax import wrenches
 from cspr_jax.errors import InputError
-from cspr_jax.numerics import leaf
+from cspr_jax.numerics import double_precision, leaf
 from cspr_jax.platforms import PlatformRobot
+from cspr_jax.robots import rest_point
 
 # Axes that differ less from the reference ones are taken to be these.
 ALIGNED = 1e-6
@@ -47,7 +48,7 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
     """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
 
     Args:
-        robot: in any platform axes.
+        robot: centred, in any platform axes.
 
     Returns:
         the robot, and the rotation (3, 3) from its former axes to these.
@@ -63,7 +64,7 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     """The reference orientation of a robot, checked.
 
     Args:
-        robot: in any platform axes.
+        robot: centred, in any platform axes.
         z0: depth of P0 below the centroid of the spools, m.
 
     Returns:
@@ -72,10 +73,9 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     Raises:
         InputError: singular there, or not in equilibrium with every cable taut.
     """
-    hub = np.asarray(robot.base_points).mean(0) + np.array([0.0, 0.0, z0])
     turned, rotation = aligned(robot)
-    with jax.enable_x64(True):
-        size, still = (np.asarray(x) for x in _standing(turned, hub))
+    with double_precision():
+        size, still = (np.asarray(x) for x in _standing(turned, rest_point(np.asarray(z0, float))))
     if not abs(size) > SMALLEST_CONDITIONING:
         raise InputError(
             "platform_points", f"a singular reference pose (determinant {size:.2g})", "points apart from it"
@@ -99,7 +99,6 @@ def _standing(robot: PlatformRobot, hub: Array) -> tuple[Array, Array]:
 def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
     # Of both sides of the platform, the one whose points come nearer to below their spools.
     points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points)
-    base = base - base.mean(0)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]
     found = [_straightest(points @ side.T, base) for side in sides]

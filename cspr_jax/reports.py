@@ -7,7 +7,6 @@ from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.maps.minimum_oscillations import OscillationAnswers
 from cspr_jax.maps.pose_answers import PoseAnswers
 from cspr_jax.planning import Plan
-from cspr_jax.problem import axis_signs
 
 SCHEMA = 1
 
@@ -93,7 +92,7 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
         "beta_hat": [float(value) for value in poses.beta_hat[i]] if poses else None,
         "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
-        "z_lowest": float(asked.lowest[i] * axis_signs(plan.spec)[2]),
+        "z_lowest": float(asked.lowest[i]),
         "cable_length_max": float(asked.length_max[i]),
         "cable_speed_max": float(asked.speed_max[i]),
         "cable_acceleration_max": float(asked.acceleration_max[i]),
@@ -128,9 +127,8 @@ def plan_table(plan: Plan):
     heads = ("to", "position (m)", *count, "T (s)", "margin", "tension (N)", last, "verdict")
     for head in heads:
         table.add_column(head, justify="left" if head in ("position (m)", "verdict") else "right")
-    signs = axis_signs(plan.spec)
     for i, segment in enumerate(plan_object(plan)["segments"]):
-        position = ", ".join(f"{round(value, 9) + 0.0:.4g}" for value in plan.points[i + 1] * signs)
+        position = ", ".join(f"{round(value, 9) + 0.0:.4g}" for value in plan.points[i + 1])
         bends = " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
         found = segment["oscillations" if swings else "arcs"]
         tried = segment["tried_arcs"] // (2 if swings else 1)

@@ -7,15 +7,15 @@ from typing import Generic, TypeVar
 import jax
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.frames import frame_of
 from cspr_jax.maps.answers import Answers, pick
 from cspr_jax.maps.minimum_arcs import minimum_arcs, segments_between
 from cspr_jax.maps.minimum_oscillations import minimum_oscillations, transitions_to
-from cspr_jax.robots import HasSpools, centroid
+from cspr_jax.robots import rest_point
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.transition import steady
 
@@ -39,6 +39,7 @@ class Sequence(abc.ABC, Generic[SharedKind, AnswersKind, SegmentKind]):
     def __init__(self, spec: RobotFile, keys: PlanFile, path: Path) -> None:
         """Refuse poses that are no points."""
         self.spec, self.keys, self.path = spec, keys, path
+        self.frame = frame_of(spec.base_points, spec.z_axis)
         for i, pose in enumerate(keys.pose):
             if pose.position is None and not pose.rest:
                 raise ConfigError(path, f"pose[{i}].position is missing: [x, y, z] in m, or rest = true")
@@ -51,28 +52,26 @@ class Sequence(abc.ABC, Generic[SharedKind, AnswersKind, SegmentKind]):
 
     @property
     def targets(self) -> np.ndarray:
-        """Poses that are not at rest, (n, 3) in the kernels' axes, m."""
+        """Poses that are not at rest, (n, 3) from the centroid of the spools, z down, m."""
         moving = [pose.position for pose in self.keys.pose if not pose.rest]
-        return np.asarray(moving, float).reshape(-1, 3) * problem.axis_signs(self.spec)
+        return self.frame.inward(np.asarray(moving, float).reshape(-1, 3))
 
     @property
     def backwards(self) -> np.ndarray:
         """(n_segments,) whether a segment runs against its normalised time."""
         return np.zeros(len(self), bool)
 
-    def points(self, robot: HasSpools, z0: float) -> np.ndarray:
-        """Poses as points in the kernels' axes; those at rest are P0.
+    def points(self, z0: float) -> np.ndarray:
+        """Poses as points of the kernels; those at rest are P0.
 
         Args:
-            robot: gives the centroid.
             z0: m.
 
         Returns:
-            (n_poses, 3) m.
+            (n_poses, 3) from the centroid of the spools, z down, m.
         """
-        hub = np.asarray(centroid(robot)) + np.array([0.0, 0.0, z0])
-        signs = problem.axis_signs(self.spec)
-        return np.array([hub if pose.rest else np.asarray(pose.position) * signs for pose in self.keys.pose])
+        at_rest = rest_point(np.asarray(z0))
+        return np.array([at_rest if pose.rest else self.frame.inward(pose.position) for pose in self.keys.pose])
 
     @abc.abstractmethod
     def answers(self, shared: SharedKind, points: np.ndarray, z0: np.ndarray) -> AnswersKind:

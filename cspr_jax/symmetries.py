@@ -33,14 +33,14 @@ def symmetries(robot: PlatformRobot) -> Symmetries:
     """The symmetries of a robot.
 
     Args:
-        robot: in its reference axes.
+        robot: centred, in its reference axes.
 
     Returns:
         those found.
     """
     fold = next(k for k in range(LARGEST_FOLD, 0, -1) if _maps(robot, _turn(2.0 * math.pi / k)))
     # A mirror plane goes through a spool or halves the angle between two.
-    base = np.asarray(robot.base_points)[:, :2] - np.asarray(robot.base_points)[:, :2].mean(0)
+    base = np.asarray(robot.base_points)[:, :2]
     azimuth = np.arctan2(base[:, 1], base[:, 0])
     halves = np.unique(np.round((0.5 * (azimuth[:, None] + azimuth[None, :])) % math.pi, 12))
     every = sorted({float(x) for h in halves for x in (h, (h + 0.5 * math.pi) % math.pi)})
@@ -103,8 +103,8 @@ def _mirror(azimuth: float) -> np.ndarray:
 def _maps(robot: PlatformRobot, change: np.ndarray) -> bool:
     # Whether the changed robot has the same cables and the same inertia.
     base, points = np.asarray(robot.base_points), np.asarray(robot.platform_points)
-    own = np.concatenate([base - base.mean(0), points], axis=1)
-    other = np.concatenate([(base - base.mean(0)) @ change.T, points @ change.T], axis=1)
+    own = np.concatenate([base, points], axis=1)
+    other = np.concatenate([base @ change.T, points @ change.T], axis=1)
     size = np.abs(own).max()
     apart = np.linalg.norm(own[:, None] - other[None, :], axis=2)
     inertia = np.asarray(robot.inertia)

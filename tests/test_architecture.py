@@ -14,7 +14,7 @@ PACKAGE = ROOT / "cspr_jax"
 
 # From the bottom up, as docs/architecture.md draws them; a package stands for its modules, a longer name goes first.
 LAYERS = (
-    ("errors", "numerics", "bounds", "grids", "lanes"),
+    ("errors", "frames", "limits", "numerics", "bounds", "grids", "lanes"),
     ("amplitudes", "robots", "platforms", "rotations", "orientations", "symmetries"),
     ("tensions", "wrenches", "wrench_lanes", "reference_pose"),
     ("trajectories",),
@@ -59,6 +59,7 @@ WITHOUT_JAX = (
     "config.sweep",
     "config.trajectory",
     "feasibility.verdicts",
+    "frames",
     "identity",
     "quantities",
     "tiles",

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from conftest import equilateral
+from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax import robots
@@ -22,7 +22,7 @@ from cspr_jax.trajectories import hypocycloid
 COUNT, SOAK_COUNT = 2_000, 20_000
 SAMPLES = 20_001
 Z0 = 1.7
-BASES = {"prototype": equilateral(0.26), "tilted": np.array([[1.3, 0.2, -0.1], [-0.4, 1.1, 0.25], [-0.9, -0.8, 0.05]])}
+BASES = {"prototype": equilateral(0.26), "tilted": TILTED}
 MASS = {"prototype": 0.198, "tilted": 1.7}
 ROBOTS = {name: robots.point_mass_robot(base, mass=MASS[name]) for name, base in BASES.items()}
 QUINTIC, EFFECTIVE, SMOOTH = named("quintic"), named("effective", 0.2), named("effective-c3", 0.2)

@@ -22,7 +22,6 @@ from cspr_jax.feasibility.margins import margins
 from cspr_jax.feasibility.transition_margins import transition_margins
 from cspr_jax.maps.minimum_oscillations import transitions_to
 from cspr_jax.results import open_result
-from cspr_jax.robots import centroid
 
 CURVES = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}
 SWEEP = """schema = 1
@@ -201,7 +200,7 @@ def test_margins_of_transitions_from_two_functions(name, tilted):
     """The same as from the slack of each cable and the depth, where feasible and where not."""
     shared = Shared(tilted, Limits(), named(name, 0.1 if name == "effective" else None))
     rng = np.random.default_rng(7)
-    targets = np.asarray(centroid(tilted)) + rng.uniform([-4.0, -4.0, 0.2], [4.0, 4.0, 3.4], (300, 3))
+    targets = rng.uniform([-4.0, -4.0, 0.2], [4.0, 4.0, 3.4], (300, 3))
     segments, arcs = transitions_to(shared, targets, np.full(300, 1.6)), 2 * rng.integers(1, 9, 300)
     found, wanted = transition_margins(shared, segments, arcs), margins(shared, segments, arcs)
     assert 50 < (wanted.min(1) > 0.0).sum() < 250

@@ -5,7 +5,7 @@ from functools import partial
 import jax
 import numpy as np
 import pytest
-from conftest import equilateral
+from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax import robots
@@ -18,7 +18,6 @@ TAU = np.sort(np.r_[0.0, 1.0, np.random.default_rng(0).uniform(0.0, 1.0, 39)])
 QUINTIC, EFFECTIVE = named("quintic"), named("effective", 0.2)
 AMPLITUDES = [(QUINTIC, oracle.quintic), (EFFECTIVE, partial(oracle.effective, epsilon=0.2))]
 DOWN, OFFSET = np.array([0.0, 0.0, 1.0]), np.array([0.5, -0.7, 0.4])
-TILTED = np.array([[1.3, 0.2, -0.1], [-0.4, 1.1, 0.25], [-0.9, -0.8, 0.05]])
 
 
 def one_swing(segment, amplitude, arcs, tau):
@@ -66,12 +65,12 @@ class Batch:
 
 @pytest.fixture(scope="module")
 def general():
-    """Tilted triangles of either labelling, anywhere in space, and points all around p0."""
+    """Tilted triangles of either labelling, and points all around p0."""
     rng = np.random.default_rng(1)
     angles = np.array([0.0, 2.1, 4.2]) + rng.uniform(-0.6, 0.6, (N, 3))
     bases = np.stack([np.cos(angles), np.sin(angles), rng.uniform(-0.4, 0.4, (N, 3))], 2)
     bases[::2] = bases[::2, ::-1]
-    bases = rng.uniform(0.3, 2.0, (N, 1, 1)) * bases + rng.normal(size=(N, 1, 3))
+    bases = rng.uniform(0.3, 2.0, (N, 1, 1)) * (bases - bases.mean(1, keepdims=True))
     z0 = rng.uniform(0.8, 4.0, N)
     hub = bases.mean(1) + z0[:, None] * DOWN
     starts, ends = hub + rng.normal(size=(N, 3)), hub + rng.normal(size=(N, 3))

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from conftest import equilateral
+from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax import robots
@@ -20,7 +20,7 @@ from cspr_jax.numerics import vertex
 from cspr_jax.trajectories import hypocycloid
 
 N, Z0 = 40, 1.7
-BASES = {"prototype": equilateral(0.26), "tilted": np.array([[1.3, 0.2, -0.1], [-0.4, 1.1, 0.25], [-0.9, -0.8, 0.05]])}
+BASES = {"prototype": equilateral(0.26), "tilted": TILTED}
 ROBOTS = {name: robots.point_mass_robot(base, mass=0.8) for name, base in BASES.items()}
 QUINTIC, EFFECTIVE = named("quintic"), named("effective", 0.2)
 PRINTED = {"quintic": (QUINTIC, oracle.quintic), "effective": (EFFECTIVE, partial(oracle.effective, epsilon=0.2))}

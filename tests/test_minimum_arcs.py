@@ -5,7 +5,7 @@ import itertools
 import jax
 import numpy as np
 import pytest
-from conftest import equilateral
+from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax import robots
@@ -18,7 +18,6 @@ from cspr_jax.maps.minimum_arcs import minimum_arcs
 
 Z0 = 1.7
 BASE = equilateral(0.26)
-TILTED = np.array([[1.3, 0.2, -0.1], [-0.4, 1.1, 0.25], [-0.9, -0.8, 0.05]])
 QUINTIC = named("quintic")
 TABLE = [(0.7, 0.7, 3), (-1.1, -1.1, 0.5), (-1.1, -0.9, 1.5), (0.8, 0.5, 1.5), (-0.6, 0.1, 1.9), (0.1, -0.6, 1.8)]
 TABLE = np.array([*TABLE, (0.0, -1.1, 1.7)])

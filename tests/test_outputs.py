@@ -341,5 +341,5 @@ def test_robots_that_do_not_fit(tmp_path):
         cspr_jax.load_robot("prototyp")
     text = 'name = "up"\nmass = 1\nz_axis = "up"\nbase_points = [[0, 0, 1], [1, 0, 1], [0, 2, 1]]\n'
     (tmp_path / "up.toml").write_text(text)
-    points = cspr_jax.load_robot(tmp_path / "up.toml").base_points
-    np.testing.assert_allclose(np.asarray(points), [[0, 0, -1], [1, 0, -1], [0, -2, -1]])
+    robot = cspr_jax.load_robot(tmp_path / "up.toml")
+    assert (robot.base_points.tolist(), robot.z_axis) == ([[0, 0, 1], [1, 0, 1], [0, 2, 1]], "up")

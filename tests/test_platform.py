@@ -267,8 +267,8 @@ def test_the_catalogue_hangs_still(name):
     """Every six-cable robot of the catalogue is in equilibrium in its reference orientation, with equal tensions."""
     path = CATALOGUE / f"{name}.toml"
     spec = read_robot(path)
-    robot = problem.build_platform(spec, TrajectoryKeys(), path)
-    span = np.linalg.norm(robot.base_points - robot.base_points.mean(0), axis=1).max()
+    robot = problem.platform_of(spec, TrajectoryKeys(), path)
+    span = np.linalg.norm(robot.base_points, axis=1).max()
     for depth in (1.0, 3.0):
         found = reference_pose(robot, depth * span)
         np.testing.assert_allclose(found.tensions, 1.0, atol=2e-3)

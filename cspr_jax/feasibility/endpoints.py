@@ -43,7 +43,7 @@ def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array
 
     Args:
         robot: the robot.
-        position: (3,) m.
+        position: (3,) from the centroid of the spools, z down, m.
         quaternion: (4,) unit.
         z0: () depth of p0 below the centroid of the spools, m.
 
@@ -53,15 +53,14 @@ def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array
     rotation = rotations.matrix(quaternion)
     matrix = -jacobian(robot, position, rotation).T
     eta = robot.gravity / z0  # (3.78)
-    from_centroid = position - jnp.mean(robot.base_points, axis=0)
     spin = eta * rotation @ robot.inertia @ _angle_vector(quaternion) / robot.mass  # (3.80)
     still = jnp.zeros(3)
-    right = jnp.stack([jnp.concatenate([-eta * from_centroid, still]), jnp.concatenate([still, spin])], axis=1)
+    right = jnp.stack([jnp.concatenate([-eta * position, still]), jnp.concatenate([still, spin])], axis=1)
     offset, slope = solved(matrix, right)[0].T  # (3.79)
     # Of (3.13): the combined tension that the translation asks for; eta where both centroids are at the origin.
     cables, _ = rays(robot, position, rotation)
     pull = jnp.mean(cables, axis=0)
-    even = eta * jnp.dot(from_centroid, pull) / jnp.dot(pull, pull) / 6.0
+    even = eta * jnp.dot(position, pull) / jnp.dot(pull, pull) / 6.0
     size = jnp.dot(slope, slope)
     is_flat = size <= (FLAT * even) ** 2
     preferred = -jnp.dot(offset - even, slope) / jnp.where(is_flat, 1.0, size)  # (3.91)

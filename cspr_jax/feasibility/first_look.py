@@ -75,7 +75,7 @@ def smallest_tensions(
 def _of_one_size(robot: PlatformRobot, segments: PoseSegment) -> tuple[PlatformRobot, PoseSegment]:
     # With the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
     # eighteenth, which float32 has no room for. Tensions over their value at rest do not depend on the unit.
-    unit = jnp.sqrt(jnp.mean((robot.base_points - robot.base_points.mean(0)) ** 2))
+    unit = jnp.sqrt(jnp.mean(robot.base_points**2))
     smaller = dataclasses.replace(
         robot,
         base_points=robot.base_points / unit,

@@ -12,42 +12,18 @@ the weight, and rates with respect to tau; w_k = (p - a_k) . p'. F of cable k is
 Each is dimensionless and free of a division that could blow up.
 """
 
-import dataclasses
 import math
 
-import jax
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.bounds import Bounds
 from cspr_jax.feasibility.slacks import Instant, Stretch, row_bounds
 from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.limits import Limits
 from cspr_jax.numerics import sincospi
 from cspr_jax.robots import PointMassRobot, plane_normal
 from cspr_jax.trajectories.hypocycloid import Segment, duration, oscillation
-
-
-@jax.tree_util.register_dataclass
-@dataclasses.dataclass(frozen=True)
-class Limits:
-    """Limits beyond taut cables; None where there is none.
-
-    Fields:
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N.
-        floor: () z of the floor, z down, m.
-        cable_length_max: (n_cables,) m.
-        cable_speed_max: (n_cables,) m/s, of paying out and of winding in.
-        cable_acceleration_max: (n_cables,) m/s^2, of either sign.
-    """
-
-    tension_min: Array | None = None
-    tension_max: Array | None = None
-    floor: Array | None = None
-    cable_length_max: Array | None = None
-    cable_speed_max: Array | None = None
-    cable_acceleration_max: Array | None = None
-
 
 FLAGS = {
     "tension_min": Verdict.SLACK_CABLE,
@@ -107,7 +83,7 @@ def limit_slacks(
     length = jnp.linalg.norm(rays, axis=1)
     rate = rays @ slope
     rate_slope = jnp.dot(slope, slope) + rays @ curvature
-    z0, time, weight = segment.hub[2] - _centre_depth(robot), duration(segment, arcs), robot.mass * robot.gravity
+    z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
     lift = jnp.stack(now.kappa) * length / (len(now.kappa) * z0)
     found = []
     for name in given(limits):
@@ -127,10 +103,6 @@ def limit_slacks(
             slack = jnp.concatenate([length**3 - bend, length**3 + bend]) / z0**3
         found.append([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])])
     return tuple(found)
-
-
-def _centre_depth(robot: PointMassRobot) -> Array:
-    return jnp.mean(robot.base_points[:, 2])
 
 
 def _path(segment: Segment, arcs: Array, tau: Array, now: Instant) -> tuple[Array, Array, Array]:
@@ -164,7 +136,7 @@ def limit_curvatures(
     """
     if not given(limits):
         return ()
-    z0, time, weight = segment.hub[2] - _centre_depth(robot), duration(segment, arcs), robot.mass * robot.gravity
+    z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
     pace, pull = _pace(segment, arcs, over)
     eta = row_bounds(segment, arcs, over, segment.tilt)
     length = _length(robot, segment, over, pace, eta)
@@ -210,7 +182,7 @@ def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds
     # the distance from the spool plane.
     at_middle = jnp.linalg.norm(segment.hub + segment.plane @ over.place - robot.base_points, axis=1)
     change = over.radius * pace.slope
-    depth = (1.0 + segment.tilt @ over.place - over.radius * eta.slope) * (segment.hub[2] - _centre_depth(robot))
+    depth = (1.0 + segment.tilt @ over.place - over.radius * eta.slope) * segment.hub[2]
     nearest = jnp.maximum(jnp.maximum(at_middle - change, depth / jnp.linalg.norm(plane_normal(robot))), 0.0)
     slope = jnp.broadcast_to(pace.slope, nearest.shape)
     return Bounds(at_middle + change, slope, slope**2 / nearest + pace.curvature)

@@ -14,7 +14,7 @@ from cspr_jax.feasibility.narrowing import narrowed
 from cspr_jax.feasibility.pose_samples import SAMPLES
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.grids import in_batches
-from cspr_jax.robots import centroid, plane_normal
+from cspr_jax.robots import plane_normal
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, motion
 
 BATCH = 512
@@ -27,7 +27,7 @@ def _demands(shared: PoseShared, arguments, *, kind: Kind) -> Array:
         per_length = wrenches.tensions_per_length(robot, pose)
         lengths, rates, bends = wrenches.cable_motion(robot, pose)
         force = robot.mass * per_length * lengths
-        depth = plane_normal(robot) @ (pose.position - centroid(robot)) * segment.rate / robot.gravity
+        depth = plane_normal(robot) @ pose.position * segment.rate / robot.gravity
         return jnp.stack(
             [
                 jnp.min(force),

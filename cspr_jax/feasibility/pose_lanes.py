@@ -7,7 +7,7 @@ from cspr_jax.feasibility.limits import Limits, given
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.lanes import dot, smallest
 from cspr_jax.platforms import CABLES, PlatformRobot
-from cspr_jax.robots import centroid, plane_normal
+from cspr_jax.robots import plane_normal
 from cspr_jax.trajectories.pose_lanes import Instant, State, squared_duration, state
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 from cspr_jax.wrench_lanes import Balance, Cables, balance, cable_rates, cables, conditioning, inertial_wrench
@@ -126,8 +126,8 @@ def still_slacks(shared: PoseShared, segment: PoseSegment, here: State, wires: C
         (n,) each, in the order of `STILL`.
     """
     robot, limits, z0 = shared.robot, shared.limits, shared.robot.gravity / segment.rate
-    normal, centre = plane_normal(robot), centroid(robot)
-    below = dot([normal[i] for i in range(3)], [here.position[i] - centre[i] for i in range(3)]) / z0
+    normal = plane_normal(robot)
+    below = dot([normal[i] for i in range(3)], here.position) / z0
     values = [conditioning(robot, wires) / segment.regular, below]
     if limits.floor is not None:
         values.append((limits.floor - here.position[2]) / z0)

@@ -20,7 +20,7 @@ from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility.limits import FLAGS, Limits, given
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import centroid, plane_normal
+from cspr_jax.robots import plane_normal
 from cspr_jax.wrenches import Pose
 
 
@@ -67,7 +67,7 @@ def pose_slacks(shared: PoseShared, pose: Pose, z0: Array, regular: Array) -> Ar
     found = [
         6.0 * z0 / robot.gravity * jnp.min(per_length),
         wrenches.conditioning(robot, pose.position, pose.rotation) / regular,
-        plane_normal(robot) @ (pose.position - centroid(robot)) / z0,
+        plane_normal(robot) @ pose.position / z0,
     ]
     names = given(limits)
     if not names:

@@ -14,7 +14,7 @@ from cspr_jax.feasibility.interference import Contacts, cables_cross, contacts, 
 from cspr_jax.grids import in_batches
 from cspr_jax.lanes import rotation, stored
 from cspr_jax.platforms import CABLES, PlatformRobot
-from cspr_jax.robots import centroid, plane_normal
+from cspr_jax.robots import plane_normal, rest_point
 from cspr_jax.wrench_lanes import cables
 from cspr_jax.wrenches import conditioning
 
@@ -65,10 +65,9 @@ def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
     Returns:
         of `wrenches.conditioning`; NaN if it has not, or the place is not below the spools.
     """
-    centre, upright = centroid(robot), jnp.eye(3)
-    depth = plane_normal(robot) @ (jnp.asarray(place) - centre)
+    upright, depth = jnp.eye(3), plane_normal(robot) @ jnp.asarray(place)
     here = float(conditioning(robot, jnp.asarray(place), upright))
-    middle = float(conditioning(robot, centre.at[2].add(depth), upright))
+    middle = float(conditioning(robot, rest_point(depth), upright))
     return here if float(depth) > 0.0 and here / middle > SINGULAR else np.nan
 
 

@@ -46,8 +46,8 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
     """The accessible orientations of a place.
 
     Args:
-        robot: in its reference axes.
-        place: (3,) m.
+        robot: centred, in its reference axes.
+        place: (3,) from the centroid of the spools, z down, m.
         definition: one of `DEFINITIONS`.
         divisions: of pi; the step is pi over it.
 
@@ -55,8 +55,7 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
         the orientations; none where the reference orientation itself is singular, or the place above the spools.
     """
     watch = Watch(robot, place)
-    offset = np.asarray(place) - np.asarray(robot.base_points).mean(0)
-    towards = np.array([math.atan2(offset[1], offset[0]), 0.0, 0.0])  # (3.98)
+    towards = np.array([math.atan2(place[1], place[0]), 0.0, 0.0])  # (3.98)
     if definition == "scan":
         parts = list(_scan(watch, towards, divisions))
         angles, volume = (np.concatenate(x) for x in zip(*parts, strict=True))

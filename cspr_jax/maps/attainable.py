@@ -9,6 +9,7 @@ from cspr_jax.maps.answers import joined
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, reached, trials
 from cspr_jax.maps.pose_ends import end_options
+from cspr_jax.robots import rest_point
 from cspr_jax.rotations import from_tilt_torsion
 from cspr_jax.symmetries import NONE, Symmetries, alike
 
@@ -32,7 +33,7 @@ def attainable(
 
     Args:
         checker: of motions from rest.
-        places: (n, 3) m.
+        places: (n, 3) from the centroid of the spools, z down, m.
         angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
         z0: (n,) m.
         max_arcs: largest number tried.
@@ -68,7 +69,7 @@ def attained(
 
     Args:
         checker: of motions from rest.
-        places: (n, 3) m.
+        places: (n, 3) from the centroid of the spools, z down, m.
         angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
         z0: (n,) m.
         max_arcs: largest number tried.
@@ -99,8 +100,7 @@ def attained(
 
 def _once(checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, found: Symmetries):
     # Orientations that stand for others too, and where each of all is among them.
-    centre = np.asarray(checker.shared.robot.base_points).mean(0)
-    some, own = np.unique(alike(found, np.c_[places - centre, z0], angles), return_inverse=True)
+    some, own = np.unique(alike(found, np.c_[places, z0], angles), return_inverse=True)
     return some, own.ravel()
 
 
@@ -109,11 +109,9 @@ def _motions(
 ) -> tuple[Candidates, np.ndarray]:
     # Transitions from rest, and (n, values) of beta-hat at their ends.
     robot, count = checker.shared.robot, len(angles)
-    centre = np.asarray(robot.base_points).mean(0)
-    towards = np.arctan2(*(places - centre).T[1::-1])  # (3.98)
+    towards = np.arctan2(*places.T[1::-1])  # (3.98)
     ends = (places, from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
     bends, can_end = end_options(robot, *ends, z0, values)
-    hub = centre + z0[:, None] * np.array([0.0, 0.0, 1.0])
-    start = (hub, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
+    start = (rest_point(z0), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
     rest = np.full(count, AT_REST)
     return Candidates(start, ends, z0, np.arange(count), (rest, rest)), np.where(can_end[:, None], bends, np.nan)

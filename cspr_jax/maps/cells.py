@@ -7,6 +7,7 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import OF_TARGETS, PointMassMap
 from cspr_jax.maps.minimum_arcs import minimum_arcs
+from cspr_jax.robots import rest_point
 from cspr_jax.tiles import Grid
 
 _OF_STARTS = ("from_x", "from_y", "from_z", "z0")
@@ -30,15 +31,13 @@ class CellMap(PointMassMap):
         return vars(answers)
 
     def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # In the kernels' axes.
+        # In the kernels' coordinates.
         start, count = self._keys.trajectory.start, len(cells["z0"])
         if start is not None and start.rest:
-            starts = np.tile(self._centre, (count, 1))
-            starts[:, 2] += cells["z0"]
-            return starts
+            return rest_point(np.asarray(cells["z0"]))
         fixed = start.position if start is not None and start.position is not None else [0.0, 0.0, 0.0]
         columns = [cells.get(f"from_{name}", np.full(count, fixed[i])) for i, name in enumerate("xyz")]
-        return np.stack(columns, axis=1) * self._signs
+        return self._frame.inward(np.stack(columns, axis=1))
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""
@@ -51,7 +50,7 @@ class CellMap(PointMassMap):
         longest = self._shared.limits.cable_length_max
         if longest is None or "radius" in grid.axes:
             return
-        base = np.asarray(self._shared.robot.base_points) * self._signs
+        base = self._frame.outward(self._shared.robot.base_points)
         for cable in range(len(base)):
             gaps = [np.abs(grid.axes[name] - base[cable, i]).min() for i, name in enumerate("xyz")]
             if np.linalg.norm(gaps) > np.asarray(longest)[cable]:

@@ -14,8 +14,9 @@ from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.frames import frame_of
 from cspr_jax.reference_pose import aligned
-from cspr_jax.robots import centroid, plane_normal
+from cspr_jax.robots import plane_normal
 from cspr_jax.tiles import Grid
 
 # How far a refined margin may lie below the bound proved for it.
@@ -39,11 +40,11 @@ class GridMap(abc.ABC, Generic[SharedKind]):
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Build what all tiles share."""
-        self._keys, self._file, self._signs = keys, file, problem.axis_signs(spec)
+        self._keys, self._file = keys, file
+        self._frame = frame_of(spec.base_points, spec.z_axis)
         amplitude = problem.build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=for_bounds)
         limits = problem.build_limits(spec, keys.limits, keys.limits.floor, file)
         self._shared: SharedKind = self._built(spec, limits, amplitude)
-        self._centre = np.asarray(centroid(self._shared.robot))
 
     @abc.abstractmethod
     def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> SharedKind:
@@ -93,17 +94,17 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         """
 
     def _targets(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # In the kernels' axes. Radius and azimuth are about the vertical through the centroid of the spools.
+        # In the kernels' coordinates. Radius and azimuth are about the vertical through the centroid of the spools.
         if "radius" not in cells:
-            return np.stack([cells["x"], cells["y"], cells["z"]], axis=1) * self._signs
-        middle, radius, azimuth = self._centre * self._signs, cells["radius"], cells["azimuth"]
-        level: list[np.ndarray] = [middle[0] + radius * np.cos(azimuth), middle[1] + radius * np.sin(azimuth)]
-        return np.stack([*level, cells["z"]], axis=1) * self._signs
+            return self._frame.inward(np.stack([cells["x"], cells["y"], cells["z"]], axis=1))
+        radius, azimuth, signs = cells["radius"], cells["azimuth"], self._frame.signs
+        level: list[np.ndarray] = [signs[0] * radius * np.cos(azimuth), signs[1] * radius * np.sin(azimuth)]
+        return np.stack([*level, self._frame.depth(cells["z"])], axis=1)
 
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         # Cells among which depths and heights have their extremes. Of azimuths the one down the slope of the spool
         # plane stands for all: no other target is deeper below it.
-        slope = np.asarray(plane_normal(self._shared.robot)) * self._signs
+        slope = self._frame.turned(plane_normal(self._shared.robot))
         axes = {
             name: np.array([points.min(), points.max()]) if name != "azimuth" else np.arctan2(slope[1:2], slope[:1])
             for name, points in grid.axes.items()
@@ -113,7 +114,7 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         return Grid(axes, shape).cells(tuple(slice(0, n) for n in shape))
 
     def _refuse_out_of_reach(self, points: np.ndarray, key: str) -> None:
-        depth = (points - self._centre) @ np.asarray(plane_normal(self._shared.robot))
+        depth = points @ np.asarray(plane_normal(self._shared.robot))
         floor = self._shared.limits.floor
         if not (depth > 0.0).any():
             raise ConfigError(self._file, f"{key}: every point is above the spool plane: must be some below it")
@@ -133,7 +134,7 @@ class PlatformMap(GridMap[PoseShared]):
         super().__init__(spec, keys, file)
 
     def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> PoseShared:
-        robot = problem.build_platform(spec, self._keys.trajectory, self._file)
+        robot = problem.platform_of(spec, self._keys.trajectory, self._file)
         return PoseShared(aligned(robot)[0], limits, amplitude)
 
 
@@ -141,4 +142,4 @@ class PointMassMap(GridMap[Shared]):
     """The map of a sweep of a point mass; see `GridMap`."""
 
     def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Shared:
-        return Shared(problem.build_robot(spec, self._keys.trajectory, self._file), limits, amplitude)
+        return Shared(problem.point_mass_of(spec, self._keys.trajectory, self._file), limits, amplitude)

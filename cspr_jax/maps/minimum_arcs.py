@@ -15,7 +15,7 @@ from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
 from cspr_jax.grids import in_batches, in_parts, room
 from cspr_jax.maps import sieve
 from cspr_jax.maps.answers import Answers, decided, end_slacks, joined, only
-from cspr_jax.robots import LARGEST_LENGTH
+from cspr_jax.robots import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -39,8 +39,8 @@ def segments_between(
 
     Args:
         shared: gives the robot and the amplitude function.
-        starts: (n, 3) m, z down.
-        ends: (n, 3) m.
+        starts: (n, 3) from the centroid of the spools, z down, m.
+        ends: (n, 3) likewise.
         z0: (n,) m.
 
     Returns:
@@ -67,8 +67,8 @@ def minimum_arcs(
 
     Args:
         shared: robot, limits and amplitude.
-        starts: (n, 3) m, z down.
-        ends: (n, 3) m.
+        starts: (n, 3) from the centroid of the spools, z down, m.
+        ends: (n, 3) likewise.
         z0: (n,) depth of p0 below the centroid of the spools, m; positive.
         max_arcs: largest number of arcs tried.
         arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
@@ -80,7 +80,7 @@ def minimum_arcs(
     Raises:
         InputError: an amplitude function that breaks (2.49); max_arcs below 1; z0 not positive; jax without 64 bits.
     """
-    check_numbers(z0, max_arcs)
+    check_numbers(shared.robot, z0, max_arcs)
     broken = boundary_errors(shared.amplitude)
     if broken:
         raise InputError(
@@ -96,20 +96,25 @@ def minimum_arcs(
     return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(sieve.BATCH) else part(slice(None))
 
 
-def check_numbers(z0: np.ndarray, max_arcs: int) -> None:
+def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
     """Refuse what no search can use.
 
     Args:
+        robot: that is to be centred.
         z0: (n,) m.
         max_arcs: largest number of arcs tried.
 
     Raises:
-        InputError: max_arcs below 1; z0 not positive; jax without 64 bits.
+        InputError: max_arcs below 1; z0 not positive; jax without 64 bits; a robot that is not centred.
     """
     if not jax.config.read("jax_enable_x64"):
         raise InputError("jax_enable_x64", False, "true: verdicts need float64")
     if max_arcs < 1:
         raise InputError("max_arcs", max_arcs, "an integer >= 1")
+    if np.abs(np.asarray(robot.base_points).mean(0)).max() > AT_P0 * float(spool_radius(robot)):
+        raise InputError(
+            "base_points", np.asarray(robot.base_points).tolist(), "from their centroid; see `problem.centred`"
+        )
     fits = (np.asarray(z0) > 0.0) & (np.asarray(z0) <= LARGEST_LENGTH)
     if not fits.all():
         raise InputError("z0", float(np.asarray(z0)[~fits][0]), "a number > 0, at most 1e6 m")

@@ -63,7 +63,7 @@ def transitions_to(shared: Shared, targets: np.ndarray, z0: np.ndarray) -> Segme
 
     Args:
         shared: gives the robot and the amplitude function.
-        targets: (n, 3) m, z down.
+        targets: (n, 3) from the centroid of the spools, z down, m.
         z0: (n,) m.
 
     Returns:
@@ -82,7 +82,7 @@ def best_inclinations(shared: Shared, targets: np.ndarray) -> np.ndarray:
 
     Args:
         shared: gives the robot and the amplitude function.
-        targets: (n, 3) m, z down.
+        targets: (n, 3) from the centroid of the spools, z down, m.
 
     Returns:
         (n,) v.
@@ -171,7 +171,7 @@ def minimum_oscillations(
     Raises:
         InputError: max_arcs below 1; z0 not positive; jax without 64 bits.
     """
-    check_numbers(z0, max_arcs)
+    check_numbers(shared.robot, z0, max_arcs)
     largest = max(max_arcs // 2, 1)
     v, weights = np.asarray(transition.inclination(segments)), np.asarray(transition.weights(segments))
     envelopes = _level if (v == 0.0).all() else _envelopes

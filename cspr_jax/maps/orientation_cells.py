@@ -33,18 +33,16 @@ class AccessibleMap(PlatformMap):
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`. Places that symmetries join are computed once."""
         places, depths = self._targets(cells), self._depths(cells)
-        offset = places - self._centre
-        radius, azimuth = np.hypot(offset[:, 0], offset[:, 1]), np.arctan2(offset[:, 1], offset[:, 0])
+        radius, azimuth = np.hypot(places[:, 0], places[:, 1]), np.arctan2(places[:, 1], places[:, 0])
         azimuth = folded(self._alike, azimuth)
-        level = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth)], axis=1)
-        places = np.concatenate([self._centre[:2] + level, places[:, 2:]], axis=1)
+        places = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), places[:, 2]], axis=1)
         every, own = np.unique(np.round(np.c_[places, depths], DIGITS), axis=0, return_inverse=True)
         found = self._places(every[:, :3], every[:, 3])
         return {name: values[own.ravel()] for name, values in found.items()}
 
     def _depths(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # z0 of horizontal transitions, where none is given; not needed for what is accessible.
-        depth = self._targets(cells)[:, 2] - self._centre[2]
+        depth = self._targets(cells)[:, 2]
         return np.asarray(cells.get("z0", depth), float)
 
     def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:

@@ -17,6 +17,7 @@ from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
 from cspr_jax.maps.pose_answers import PoseAnswers, contradictions, reached
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import reference_pose
+from cspr_jax.robots import rest_point
 from cspr_jax.tiles import Grid
 
 # Time functions of the rotation with a beta-hat of its own at each end.
@@ -29,7 +30,6 @@ class PoseMap(PlatformMap):
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a start that is no pose."""
-        self._spec = spec
         super().__init__(spec, keys, file)
         start = keys.trajectory.start
         self._quaternion = problem.given_quaternion(
@@ -51,7 +51,7 @@ class PoseMap(PlatformMap):
     def _answers(self, cells: dict[str, np.ndarray]) -> PoseAnswers:
         z0, targets = np.asarray(cells["z0"], float), self._targets(cells)
         angles = np.stack([cells.get(name, np.zeros(len(z0))) for name in TILT_TORSION], axis=1)
-        poses = (targets, problem.orientations(self._spec, self._centre, targets, angles))
+        poses = (targets, problem.orientations(self._frame, targets, angles))
         given, beat = self._keys.trajectory.beta_hat, self._keys.trajectory.beat
         values, can_end = end_options(self._shared.robot, *poses, z0, 1 if given == "preferred" else OPTIONS)
         if beat in WITHOUT_BETA_HAT:
@@ -66,15 +66,14 @@ class PoseMap(PlatformMap):
         # One of each cell.
         count, start = len(z0), self._keys.trajectory.start
         if start is None or start.position is None:
-            hub = self._centre + z0[:, None] * np.array([0.0, 0.0, 1.0])
-            first, bend = (hub, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))), np.full(count, AT_REST)
+            first, bend = (rest_point(z0), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))), np.full(count, AT_REST)
         else:
             depths, own = np.unique(z0, return_inverse=True)
-            place = np.tile(np.asarray(start.position) * self._signs, (len(depths), 1))
-            turned = np.tile(self._quaternion * np.append(1.0, self._signs), (len(depths), 1))
+            place = np.tile(self._frame.inward(start.position), (len(depths), 1))
+            turned = np.tile(self._frame.turned_quaternions(self._quaternion), (len(depths), 1))
             if start.tilt_torsion is not None:
                 angles = np.tile(start.tilt_torsion, (len(depths), 1))
-                turned = problem.orientations(self._spec, self._centre, place, angles)
+                turned = problem.orientations(self._frame, place, angles)
             values = end_options(self._shared.robot, place, turned, depths, 1)[0][:, 0]
             chosen = np.where(np.isnan(values), AT_REST, values)
             bend = chosen[own] if start.beta_hat is None else np.full(count, start.beta_hat)

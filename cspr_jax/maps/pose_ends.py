@@ -11,7 +11,7 @@ from cspr_jax.feasibility.endpoints import endpoint
 from cspr_jax.grids import in_batches
 from cspr_jax.maps.bends import options
 from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import plane_normal
+from cspr_jax.robots import plane_normal, rest_point
 from cspr_jax.wrenches import conditioning
 
 BATCH = 1024
@@ -21,10 +21,9 @@ BATCH = 1024
 def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
     # Of each pose (3.91), the interval (3.92), the determinant over that at the same depth in the middle, the depth.
     def one(position, quaternion, z0):
-        found, centre = endpoint(robot, position, quaternion, z0), jnp.mean(robot.base_points, axis=0)
-        depth = plane_normal(robot) @ (position - centre)
+        found, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
         here = conditioning(robot, position, rotations.matrix(quaternion))
-        share = here / conditioning(robot, centre.at[2].add(depth), jnp.eye(3))
+        share = here / conditioning(robot, rest_point(depth), jnp.eye(3))
         return found.preferred, found.lowest, found.highest, share, depth
 
     return jax.vmap(one)(*poses)

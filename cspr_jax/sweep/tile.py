@@ -18,6 +18,7 @@ from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.maps.orientation_cells import AccessibleMap, AttainableMap
 from cspr_jax.maps.oscillation_cells import OscillationMap
 from cspr_jax.maps.pose_cells import PoseMap
+from cspr_jax.numerics import double_precision
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
@@ -49,7 +50,7 @@ class TileMap:
     def __init__(self, sweep: Sweep) -> None:
         """Refuse what cannot be computed."""
         self._sweep = sweep
-        with jax.enable_x64(True):
+        with double_precision():
             self._cells = MAPS[sweep.keys.map](sweep.robot, sweep.keys, sweep.file)
             self._cells.refuse_hopeless(sweep.grid)
 
@@ -68,7 +69,7 @@ class TileMap:
         """
         tiling = self._sweep.grid.tiling
         try:
-            with jax.enable_x64(True):
+            with double_precision():
                 answers = self._cells(self._sweep.grid.cells(tiling.place(index)))
         except (MemoryError, jax.errors.JaxRuntimeError) as error:
             if isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error):

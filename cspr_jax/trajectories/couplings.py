@@ -14,7 +14,7 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
     at rest in p0: cable k has the normalised pseudotension 1 + tilt . c + pull_k . d + twist_k (c x d).
 
     Args:
-        robot: a point mass on three cables, any triangle; or on two, then the motion is a line in their plane.
+        robot: centred; a point mass on three cables, any triangle; or on two, then the motion is a line in their plane.
         hub: (3,) p0 from the centroid of the spools, m.
         axes: (3, n) the directions of the motion, as columns; n is 1 or 2.
 
@@ -22,10 +22,10 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
         tilt (n,), 1/m; pull (n_cables, n), 1/m, one row a cable; twist (n_cables,), 1/m^2, zero for a line.
     """
     if robots.is_planar(robot):
-        half = robot.base_points[:, 0] - robots.centroid(robot)[0]
+        half = robot.base_points[:, 0]
         tilt = axes[2] / hub[2]
         return tilt, axes[0] / half[:, None] - tilt, jnp.zeros_like(half)  # (1.15), (1.16)
-    a = robot.base_points - robots.centroid(robot)
+    a = robot.base_points
     area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
     scale = 3.0 / (area[2] * hub[2])
     opposite = jnp.roll(a, -1, axis=0) - jnp.roll(a, -2, axis=0)  # a2 - a3, a3 - a1, a1 - a2

@@ -2,21 +2,20 @@
 
 import numpy as np
 
-from cspr_jax.robots import HasSpools, centroid, plane_normal
+from cspr_jax.robots import HasSpools, plane_normal
 
 
 def _depths(robot: HasSpools, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    below = np.asarray(targets) - np.asarray(centroid(robot))
     normal = np.asarray(plane_normal(robot))
-    return below, below @ normal, normal
+    return targets, targets @ normal, normal
 
 
 def mean_depth(robot: HasSpools, targets: np.ndarray) -> float:
     """Mean height of the targets, as chosen in thesis section 2.9.
 
     Args:
-        robot: gives the centroid.
-        targets: (n, 3) m, z down.
+        robot: centred.
+        targets: (n, 3) from the centroid of the spools, z down, m.
 
     Returns:
         z0, m.
@@ -29,7 +28,7 @@ def least_depth(robot: HasSpools, targets: np.ndarray) -> float:
 
     Args:
         robot: any robot; the depth is measured below their plane, along the vertical.
-        targets: (n, 3) m, z down.
+        targets: (n, 3) from the centroid of the spools, z down, m.
 
     Returns:
         z0, m.
@@ -46,7 +45,7 @@ def conservative_depth(robot: HasSpools, targets: np.ndarray) -> float:
 
     Args:
         robot: any robot.
-        targets: (n, 3) m, z down, below the spools.
+        targets: (n, 3) from the centroid of the spools, z down, m; below the spools.
 
     Returns:
         z0, m; NaN if there is none.

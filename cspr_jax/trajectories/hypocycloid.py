@@ -70,8 +70,8 @@ def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: 
     """The segment from one point to another.
 
     Args:
-        robot: a point mass on three cables.
-        start: (3,) p1, m.
+        robot: a point mass on three cables, centred.
+        start: (3,) p1, from the centroid of the spools, z down, m.
         end: (3,) p2, m.
         z0: () depth of p0 below the centroid of the spools, m.
         odd: () whether the number of arcs is odd.
@@ -79,10 +79,9 @@ def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: 
     Returns:
         the segment for arcs of that parity.
     """
-    centre = robots.centroid(robot)
-    hub = centre + jnp.stack([jnp.zeros_like(z0), jnp.zeros_like(z0), z0])
-    plane, r1, r2, precession = swing_plane(start - hub, end - hub, z0, robots.plane_normal(robot), odd)
-    tilt, pull, twist = couplings(robot, hub - centre, plane)
+    hub, size = robots.rest_point(z0), robots.spool_radius(robot)
+    plane, r1, r2, precession = swing_plane(start - hub, end - hub, size, robots.plane_normal(robot), odd)
+    tilt, pull, twist = couplings(robot, hub, plane)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
     return Segment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, jnp.zeros_like(r1), tilt, pull, twist)
 

@@ -22,6 +22,7 @@ from cspr_jax import rotations
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.numerics import sincospi
 from cspr_jax.platforms import PlatformRobot
+from cspr_jax.robots import rest_point, spool_radius
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn
 from cspr_jax.trajectories.swing_plane import swing_plane
 from cspr_jax.wrenches import Pose, conditioning
@@ -84,7 +85,7 @@ def pose_segment(
     """The segment from one pose to another.
 
     Args:
-        robot: the robot.
+        robot: the robot, centred.
         start: position (3,) m and orientation (4,) of the first pose.
         end: of the last.
         z0: () depth of p0 below the centroid of the spools, m.
@@ -94,9 +95,9 @@ def pose_segment(
     Returns:
         the segment for arcs of that parity.
     """
-    hub = jnp.mean(robot.base_points, axis=0) + jnp.stack([jnp.zeros_like(z0), jnp.zeros_like(z0), z0])
+    hub = rest_point(z0)
     upright = jnp.zeros_like(hub).at[2].set(1.0)
-    plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, z0, upright, odd)
+    plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, spool_radius(robot), upright, odd)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
     how = turn(start[1], end[1], *bends, odd=odd)
     regular = conditioning(robot, hub, jnp.eye(3, dtype=hub.dtype))

@@ -6,12 +6,13 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics import length
+from cspr_jax.robots import AT_P0
 
-# Relative to z0 or to a radius: below this a point is at p0, or on the line through p0.
-COINCIDENT = 1e-12
+# Sine of an angle below which a plane counts as upright.
+UPRIGHT = 1e-12
 
 
-def swing_plane(v1: Array, v2: Array, z0: Array, normal: Array, odd: Array) -> tuple[Array, Array, Array, Array]:
+def swing_plane(v1: Array, v2: Array, size: Array, normal: Array, odd: Array) -> tuple[Array, Array, Array, Array]:
     """Plane, radii and precession of a swing from one point to another.
 
     A rest end makes it a straight line. Where start and end lie on one line through p0 and the arcs still need a
@@ -20,7 +21,7 @@ def swing_plane(v1: Array, v2: Array, z0: Array, normal: Array, odd: Array) -> t
     Args:
         v1: (3,) from p0 to the start, m.
         v2: (3,) from p0 to the end, m.
-        z0: () the scale below which a point is p0, m.
+        size: () of the robot, m: points nearer to p0 than `AT_P0` of it are p0, and nearer to a line through p0 on it.
         normal: (3,) of the spool plane.
         odd: () whether the number of arcs is odd.
 
@@ -28,7 +29,7 @@ def swing_plane(v1: Array, v2: Array, z0: Array, normal: Array, odd: Array) -> t
         plane (3, 2): q_h1 and q_h2 of (2.30) as columns; r1 and r2 of (2.39), m; precession, in half turns.
     """
     r1, r2 = length(v1), length(v2)  # (2.39)
-    from_rest, to_rest = r1 < COINCIDENT * z0, r2 < COINCIDENT * z0
+    from_rest, to_rest = r1 < AT_P0 * size, r2 < AT_P0 * size
     toward_end = v2 / jnp.where(to_rest, 1.0, r2)
     x_axis = jnp.zeros_like(v1).at[0].set(1.0)
     q1 = jnp.where(from_rest, jnp.where(odd, -1.0, 1.0) * toward_end, v1 / jnp.where(from_rest, 1.0, r1))
@@ -36,7 +37,7 @@ def swing_plane(v1: Array, v2: Array, z0: Array, normal: Array, odd: Array) -> t
     along = jnp.dot(q1, v2)
     across = v2 - q1 * along  # (2.30)
     distance = length(across)
-    in_line = from_rest | to_rest | (distance < COINCIDENT * r2)
+    in_line = from_rest | to_rest | (distance < AT_P0 * size)
     q2 = jnp.where(in_line, _least_inclined(normal, q1, x_axis), across / jnp.where(in_line, 1.0, distance))
     # delta, not psi: its arctangent keeps its digits where psi is close to pi.
     forward = jnp.where(from_rest | to_rest, 1.0, jnp.where(odd, -along, along))
@@ -47,6 +48,6 @@ def swing_plane(v1: Array, v2: Array, z0: Array, normal: Array, odd: Array) -> t
 def _least_inclined(normal: Array, q1: Array, x_axis: Array) -> Array:
     level = jnp.cross(normal, q1)
     size = length(level)
-    upright = size < COINCIDENT
+    upright = size < UPRIGHT
     fallback = x_axis - q1 * jnp.dot(q1, x_axis)
     return jnp.where(upright, fallback / jnp.linalg.norm(fallback), level / jnp.where(upright, 1.0, size))

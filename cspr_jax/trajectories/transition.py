@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.amplitudes import Amplitude, derivatives
-from cspr_jax.robots import PointMassRobot, centroid, plane_normal
+from cspr_jax.robots import PointMassRobot, plane_normal, rest_point
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -26,14 +26,13 @@ def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: A
     Args:
         robot: a point mass on three cables, any triangle; or on two in a plane.
         amplitude: A, which meets (1.27) and (1.28).
-        target: (3,) z down, m.
+        target: (3,) from the centroid of the spools, z down, m.
         z0: () depth of p0 below the centroid of the spools, m.
 
     Returns:
         the segment, for even numbers of arcs.
     """
-    hub = centroid(robot) + jnp.stack([jnp.zeros_like(z0), jnp.zeros_like(z0), z0])
-    segment = hypocycloid.segment(robot, hub, target, z0, odd=jnp.asarray(False))
+    segment = hypocycloid.segment(robot, rest_point(z0), target, z0, odd=jnp.asarray(False))
     bend = derivatives(amplitude, jnp.ones_like(z0), order=2)[2]
     return dataclasses.replace(segment, end_bend=bend)
 
@@ -83,11 +82,11 @@ def depth_for(robot: PointMassRobot, target: Array, inclination: Array) -> Array
     """The depth z0 of p0 that gives a target an inclination, from (1.31).
 
     Args:
-        robot: a point mass on three cables, any triangle; or on two in a plane.
-        target: (3,) z down, m.
+        robot: a point mass on three cables, any triangle; or on two in a plane; centred.
+        target: (3,) from the centroid of the spools, z down, m.
         inclination: () v, above -1.
 
     Returns:
         () z0, m; positive where the target is below the spools.
     """
-    return plane_normal(robot) @ (target - centroid(robot)) / (1.0 + inclination)
+    return plane_normal(robot) @ target / (1.0 + inclination)

@@ -8,11 +8,9 @@ from conftest import equilateral
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import cspr_jax
 from cspr_jax import robots
 from cspr_jax.amplitudes import named
-from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.limits import Limits
-from cspr_jax.maps.minimum_arcs import minimum_arcs
 
 N, EXAMPLES = 300, 10
 QUINTIC = named("quintic")
@@ -39,9 +37,7 @@ class Problem:
             own if v is None else v for v, own in ((base, self.base), (starts, self.starts), (ends, self.ends))
         )
         robot = robots.point_mass_robot(base, **{"mass": self.mass, "gravity": self.gravity} | other)
-        return minimum_arcs(
-            Shared(robot, Limits(), QUINTIC), starts, ends, np.full(N, self.z0 if z0 is None else z0), max_arcs=8
-        )
+        return cspr_jax.minimum_arcs(robot, ends, start=starts, z0=self.z0 if z0 is None else z0, max_arcs=8)
 
     def of(self, change):
         """The answer after a change of space that takes robot and points along."""

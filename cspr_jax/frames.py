@@ -1,0 +1,110 @@
+"""Axes of a robot file beside those of the kernels: z down, origin in the centroid of the spools.
+
+Coordinates cross here, once, in the float64 numbers of the file: the centroid is subtracted before anything is
+computed, so that no digit is lost on a robot whose spools lie far from the origin of its axes.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+
+# A z-up file is turned by half a turn about x: a rotation, so that nothing is mirrored.
+_TURN = {"down": (1.0, 1.0, 1.0), "up": (1.0, -1.0, -1.0)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Frame:
+    """Axes and origin of a robot file, as the kernels' see them.
+
+    Fields:
+        signs: (3,) of +1 and -1 between the axes of the file and the kernels'; the same both ways.
+        origin: (3,) centroid of the spools in the file's axes, to the nearest float64, m.
+        rest: (3,) of the centroid, what its rounding leaves, m.
+    """
+
+    signs: np.ndarray
+    origin: np.ndarray
+    rest: np.ndarray
+
+    def inward(self, points) -> np.ndarray:
+        """Points of the file in the kernels' coordinates.
+
+        Args:
+            points: (..., 3) m.
+
+        Returns:
+            (..., 3) from the centroid of the spools, z down, m.
+        """
+        return ((np.asarray(points, float) - self.origin) - self.rest) * self.signs
+
+    def outward(self, points) -> np.ndarray:
+        """Points of the kernels in the file's coordinates.
+
+        Args:
+            points: (..., 3) from the centroid of the spools, z down, m.
+
+        Returns:
+            (..., 3) m.
+        """
+        return self.origin + (np.asarray(points, float) * self.signs + self.rest)
+
+    def depth(self, height) -> np.ndarray:
+        """Depth below the centroid of the spools of a z of the file.
+
+        Args:
+            height: (...) z in the file's axes, m.
+
+        Returns:
+            (...) z in the kernels' coordinates, m.
+        """
+        return ((np.asarray(height, float) - self.origin[2]) - self.rest[2]) * self.signs[2]
+
+    def height(self, depth) -> np.ndarray:
+        """A depth below the centroid of the spools as z of the file.
+
+        Args:
+            depth: (...) m.
+
+        Returns:
+            (...) z in the file's axes, m.
+        """
+        return self.origin[2] + (np.asarray(depth, float) * self.signs[2] + self.rest[2])
+
+    def turned(self, vectors) -> np.ndarray:
+        """Vectors in the other axes, either way.
+
+        Args:
+            vectors: (..., 3).
+
+        Returns:
+            (..., 3).
+        """
+        return np.asarray(vectors, float) * self.signs
+
+    def turned_quaternions(self, quaternions) -> np.ndarray:
+        """Orientations in the other axes, either way.
+
+        Args:
+            quaternions: (..., 4), scalar first.
+
+        Returns:
+            (..., 4).
+        """
+        return np.asarray(quaternions, float) * np.append(1.0, self.signs)
+
+
+def frame_of(base_points, z_axis: str) -> Frame:
+    """The frame of a robot.
+
+    Args:
+        base_points: (n_cables, 3) in the file's axes, m.
+        z_axis: "down" or "up".
+
+    Returns:
+        the frame.
+    """
+    points = np.asarray(base_points, float)
+    origin = np.array([math.fsum(column) / len(points) for column in points.T])
+    rest = np.array([math.fsum(column) / len(points) for column in (points - origin).T])
+    return Frame(np.array(_TURN[z_axis]), origin, rest)
