@@ -133,7 +133,7 @@ QUANTITIES = {
             "least_oscillations",
             "1",
             "number of oscillations n, a real number",
-            "What the envelopes ask for, (1.48) and (1.94); NaN where no number will do (|v| >= 1).",
+            "What the envelopes ask for, (1.48) and (1.94); NaN where no number will do (|v A| reaches 1).",
         ),
         Quantity(
             "inclination_gain",

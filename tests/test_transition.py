@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cspr_jax import tensions
-from cspr_jax.amplitudes import derivatives, named
+from cspr_jax.amplitudes import derivatives, from_polynomial, named
 from cspr_jax.cli import main
 from cspr_jax.feasibility import oscillations as counts
 from cspr_jax.feasibility import zero_tension
@@ -179,6 +179,71 @@ def test_the_best_inclination(name):
         assert n <= float(scan.min()) + 1e-9
         assert np.sign(v) == -np.sign(weights[int(np.argmax(np.abs(weights)))])
     assert float(counts.best_inclination(amplitude, jnp.array([2.0, -2.0, 0.0]))[0]) == pytest.approx(0.0, abs=1e-6)
+
+
+def overshooting(rng):
+    """A user's own function that overshoots, as a list of ten coefficients: one shape for all."""
+    bump = np.polynomial.Polynomial([0, 0, 0, 1, -2, 1]) * np.polynomial.Polynomial(rng.normal(size=3) * 20.0)
+    curve = np.polynomial.Polynomial([0, 0, 0, 4, -3]) + bump
+    return np.pad(curve.coef, (0, 10 - len(curve.coef))).tolist()
+
+
+def densest(coefficients, weights, v, samples=400_001):
+    """The largest root of (1.44) over samples, the printed formula in NumPy; infinite where |v A| reaches 1."""
+    curve, tau = np.polynomial.Polynomial(coefficients), np.linspace(0.0, 1.0, samples)
+    size, slope, bend, end = curve(tau), curve.deriv()(tau), curve.deriv(2)(tau), curve.deriv(2)(1.0)
+    c, d = bend - size * end, (1.0 - v * size) * (1.0 + v * size)
+    if (d <= 0.0).any():
+        return np.inf
+    found = 0.0
+    for load in v + np.asarray(weights):
+        half, rest = v * size * load * c - 2.0 * (load * slope) ** 2, load**2 * (c**2 + 4.0 * end * slope**2)
+        inside = half**2 + d * rest
+        omega = np.where(inside < 0.0, 0.0, np.maximum((-half + np.sqrt(np.maximum(inside, 0.0))) / d, 0.0))
+        found = max(found, float((omega + end).max()) / (4.0 * math.pi**2))
+    return math.sqrt(found)
+
+
+LEAST, BEST = jax.jit(counts.least_oscillations), jax.jit(counts.best_inclination)
+
+
+def test_functions_that_overshoot():
+    """Their peaks are sharp where |v A| comes near to 1, and beyond that no number of oscillations will do."""
+    rng, beyond = np.random.default_rng(4), 0
+    for i in range(40):
+        coefficients = overshooting(rng)
+        amplitude = from_polynomial(coefficients)
+        most = max(abs(float(amplitude.lowest)), float(amplitude.highest))
+        v = float(rng.choice([-1, 1]) * (1.0 - 10 ** rng.uniform(-6, -1)) / (most if i % 4 else 1.0))
+        weights = rng.normal(size=3) * 3.0
+        weights -= weights.mean() + v  # the loads v + w_k have no sum: that of the depth is their mean
+        found, wanted = float(LEAST(amplitude, weights, v)), densest(coefficients, weights, v)
+        beyond += np.isinf(wanted)
+        assert found == pytest.approx(wanted, rel=1e-5)
+        best, n = (float(x) for x in BEST(amplitude, weights))
+        assert abs(best) * most < 1.0
+        assert n == pytest.approx(densest(coefficients, weights, best), rel=1e-5)
+    assert 3 < beyond < 20
+
+
+def test_beyond_its_reach_no_number_of_oscillations_will_do():
+    """Where |v A| >= 1 the lower envelope of some cable is below zero for every n: infinite is right."""
+    rng, tau = np.random.default_rng(6), np.linspace(0.0, 1.0, 2001)
+    for _ in range(10):
+        coefficients = overshooting(rng)
+        curve, v = (
+            np.polynomial.Polynomial(coefficients),
+            1.02 / np.abs(np.polynomial.Polynomial(coefficients)(tau)).max(),
+        )
+        loads = rng.normal(size=3)
+        loads -= loads.mean()
+        size, slope, bend, end = curve(tau), curve.deriv()(tau), curve.deriv(2)(tau), curve.deriv(2)(1.0)
+        for n in (*range(3, 200), 1e3, 1e4, 1e6):
+            omega = (2.0 * math.pi * n) ** 2 - end
+            if omega > 0.0:
+                c = loads[:, None] * (bend - size * end) / omega - v * size
+                s = 4.0 * math.pi * n * loads[:, None] * slope / omega
+                assert (c**2 + s**2).max() > 1.0
 
 
 def test_the_best_epsilon():

@@ -24,9 +24,9 @@ from cspr_jax.numerics import vertex
 # Samples of each piece of the amplitude function; between them the maximum is refined.
 SAMPLES = 64
 UNROLL = 4
-# Golden section narrows the bracket to a twentieth, parabolas then find the place to rounding.
-GOLDEN, STEPS = (math.sqrt(5.0) - 1.0) / 2.0, 6
-PARABOLAS = 3
+# Golden section narrows the bracket to a three-hundredth, parabolas then find the place to rounding.
+GOLDEN, STEPS = (math.sqrt(5.0) - 1.0) / 2.0, 12
+PARABOLAS, SMALLEST_SHARE, TINY = 2, 1e-3, 1e-100
 # Of a best inclination: the bracket ends at 4e-9 of where it began.
 INCLINATION_STEPS = 40
 EPSILONS = 50
@@ -43,22 +43,32 @@ def squared_oscillations_at(amplitude: Amplitude, weight: Array, inclination: Ar
         tau: ().
 
     Returns:
-        () N; that of Omega = 0 where every Omega will do.
+        () N; that of Omega = 0 where every Omega will do; infinite where none will, |v A| >= 1.
     """
     end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
-    return _root(inclination + weight, inclination, end, derivatives(amplitude, tau, order=2))
+    return _squared(_root(inclination + weight, inclination, end, derivatives(amplitude, tau, order=2)), end)
+
+
+def _squared(omega: Array, end: Array) -> Array:
+    # N of Omega.
+    return (omega + end) / (4.0 * math.pi**2)
 
 
 def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]) -> Array:
-    # The largest root N of the envelope, for A, A', A'' at an instant.
+    # The largest root Omega of the envelope, for A, A', A'' at an instant.
     size, slope, bend = values
-    c, d = bend - size * end, 1.0 - (inclination * size) ** 2
-    half = inclination * size * load * c - 2.0 * (load * slope) ** 2
+    c, swung = bend - size * end, inclination * size
+    d = (1.0 - swung) * (1.0 + swung)
+    half = swung * load * c - 2.0 * (load * slope) ** 2
     rest = load**2 * (c**2 + 4.0 * end * slope**2)
     squared = half**2 + d * rest
-    # Without a real root the envelope is positive for every Omega.
-    omega = jnp.where(squared < 0.0, 0.0, jnp.maximum((-half + jnp.sqrt(jnp.maximum(squared, 0.0))) / d, 0.0))
-    return (omega + end) / (4.0 * math.pi**2)
+    root = jnp.sqrt(jnp.maximum(squared, 0.0))
+    # The second form of the root where the first would cancel. Without a real root every Omega keeps the envelope up.
+    is_second = half > 0.0
+    largest = jnp.where(is_second, rest, root - half) / jnp.where(is_second, root + half, jnp.where(d > 0.0, d, 1.0))
+    omega = jnp.where(squared < 0.0, 0.0, jnp.maximum(largest, 0.0))
+    # Where |v A| >= 1 some phase takes the effector to the spool plane, and one cable slack before that.
+    return jnp.where(d > 0.0, omega, jnp.inf)
 
 
 def _samples(amplitude: Amplitude) -> Array:
@@ -94,12 +104,15 @@ def _least(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array)
     values = derivatives(amplitude, tau, order=2)
 
     def one(weight):
-        def at(t):
-            return squared_oscillations_at(amplitude, weight, inclination, t)
+        def needed(now):
+            return _root(inclination + weight, inclination, end, now)
 
-        places, highest = _peaks(lambda now: _root(inclination + weight, inclination, end, now), values)
+        def at(t):
+            return needed(derivatives(amplitude, t, order=2))
+
+        places, highest = _peaks(needed, values)
         low, high = tau[jnp.maximum(places - 1, 0)], tau[jnp.minimum(places + 1, len(tau) - 1)]
-        return jnp.maximum(highest, jnp.max(jax.vmap(partial(_peak, at))(low, high)))
+        return _squared(jnp.maximum(highest, jnp.max(jax.vmap(partial(_peak, at))(low, high))), end)
 
     return jnp.max(jax.vmap(one)(weights))
 
@@ -130,14 +143,16 @@ def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, 
 
 
 def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    # The largest value near the only peak between two places.
+    # The largest value, not negative, near the only peak between two places. Where |v A| comes near to 1 it is sharp,
+    # but its reciprocal is smooth: parabolas are laid through that, where it is not too large.
     middle, width = _golden(lambda t: -function(t), low, high, STEPS), 0.5 * (high - low) * GOLDEN**STEPS
 
     def narrow(_, state):
         found, at, width = state
         points = jnp.clip(at + width * jnp.array([-1.0, 0.0, 1.0]), low, high)
         values = jax.vmap(function)(points)
-        move = jnp.clip(vertex(-values[0], -values[1], -values[2])[0], -1.0, 1.0)
+        shares = 1.0 / jnp.maximum(values, jnp.maximum(SMALLEST_SHARE * jnp.max(values), TINY))
+        move = vertex(shares[0], shares[1], shares[2])[0]
         return jnp.maximum(found, jnp.max(values)), jnp.clip(points[1] + width * move, low, high), width / 16.0
 
     return lax.fori_loop(0, PARABOLAS, narrow, (jnp.full_like(middle, -jnp.inf), middle, width))[0]
@@ -152,7 +167,7 @@ def least_oscillations(amplitude: Amplitude, weights: Array, inclination: Array)
         inclination: () v, |v| < 1.
 
     Returns:
-        () n.
+        () n; infinite where |v A| reaches 1: no n will do.
     """
     return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), _extreme(weights), inclination), 0.0))
 
@@ -184,14 +199,14 @@ def best_inclination(amplitude: Amplitude, weights: Array) -> tuple[Array, Array
         weights: (n_cables,) w_k.
 
     Returns:
-        v and n, () each.
+        v and n, () each; |v| stays below 1 over the largest |A|, beyond which no n will do.
     """
     return _best(amplitude, _samples(amplitude), _extreme(weights))
 
 
 @jax.jit
 def _best(amplitude: Amplitude, samples: Array, weights: Array) -> tuple[Array, Array]:
-    high = jnp.full_like(weights[0], LARGEST_INCLINATION)
+    high = LARGEST_INCLINATION / jnp.maximum(amplitude.largest[0], 1.0).astype(weights.dtype)
     v = _golden(lambda v: _least(amplitude, samples, weights, v), -high, high, INCLINATION_STEPS)
     return v, jnp.sqrt(jnp.maximum(_least(amplitude, samples, weights, v), 0.0))
 

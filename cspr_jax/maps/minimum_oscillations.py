@@ -38,7 +38,7 @@ class OscillationAnswers(Answers):
         oscillations: (n,) smallest number of oscillations proved feasible; 0: none.
         tried_oscillations: (n,) the number that duration and margins belong to.
         envelope_oscillations: (n,) smallest integer that keeps the envelopes positive; 0: none up to the largest tried.
-        least_oscillations: (n,) the real number that they ask for; NaN where |v| >= 1.
+        least_oscillations: (n,) the real number that they ask for; NaN where |v A| reaches 1, so that none will do.
         inclination_gain: (n,) oscillations, a real number, that the inclination saves over a horizontal transition.
         used_inclination: (n,) v.
         used_z0: (n,) depth of p0 below the centroid of the spools, m.
@@ -99,8 +99,8 @@ def _envelopes(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
     def one(weights, v):
         inside = jnp.abs(v) < 1.0
         here = counts.least_oscillations(amplitude, weights, jnp.where(inside, v, 0.0))
-        level = counts.horizontal_oscillations(amplitude, weights)
-        return jnp.where(inside, here, jnp.nan), level - here
+        here = jnp.where(inside & jnp.isfinite(here), here, jnp.nan)
+        return here, counts.horizontal_oscillations(amplitude, weights) - here
 
     return jax.vmap(one)(*arguments)
 
