@@ -43,22 +43,24 @@ class Extremes:
     samples: np.ndarray
 
 
+# Largest values are smallest ones of the negative.
+SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
+
+
 def _demands(robot, limits, amplitude, segment, arcs, tau):
+    # Smooth functions of one instant, in the order of `Extremes`.
     del limits
     position, velocity, acceleration = hypocycloid.motion(segment, amplitude, arcs, tau)
     force = tensions.tensions(robot, position, acceleration)
     length, rate, rate_slope = tensions.cable_motion(robot, position, velocity, acceleration)
     depth = 1.0 + segment.tilt @ (segment.plane.T @ (position - segment.hub))
-    return (
-        jnp.min(force),
-        -jnp.max(force),
-        jnp.min(force / length) / robot.mass,
-        depth,
-        -position[2],
-        -jnp.max(length),
-        -jnp.max(jnp.abs(rate)),
-        -jnp.max(jnp.abs(rate_slope)),
-    )
+    heights = jnp.stack([depth, -position[2]])
+    every = (force, -force, force / length / robot.mass, heights, -length, rate, -rate, rate_slope, -rate_slope)
+    return tuple(jnp.concatenate(every))
+
+
+def _groups(n_cables: int) -> tuple[int, ...]:
+    return (n_cables, n_cables, n_cables, 1, 1, n_cables, 2 * n_cables, 2 * n_cables)
 
 
 def extremes(shared: Shared, segments: Segment, arcs: np.ndarray, least_samples: int) -> Extremes:
@@ -74,8 +76,8 @@ def extremes(shared: Shared, segments: Segment, arcs: np.ndarray, least_samples:
         the extremes.
     """
     table = blocks(shared.amplitude, int(arcs.max()), density=4, least=-(-least_samples // INTERVALS))
-    found = smallest_values(Functions(_demands, 8, 8), shared, segments, arcs, table, batch=BATCH)
-    signs = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
-    columns = (found * signs + 0.0).T  # no -0
+    functions = Functions(_demands, _groups(len(shared.robot.base_points)))
+    found = smallest_values(functions, shared, segments, arcs, table, batch=BATCH)
+    columns = (found * SIGNS + 0.0).T  # no -0
     names = [field.name for field in dataclasses.fields(Extremes)][:-1]
     return Extremes(**dict(zip(names, columns, strict=True)), samples=table[1][arcs] * INTERVALS + 1)

@@ -1,7 +1,7 @@
 """The smallest value along a segment of functions of one instant, refined between the samples.
 
 Every block is sampled; where its smallest sample lies, a parabola estimates the minimum. The best
-three estimates of a function over all blocks are then refined by two parabolas, each narrower.
+three estimates of a group of functions over all blocks are then refined by parabolas, each narrower.
 """
 
 from collections.abc import Callable
@@ -21,27 +21,30 @@ from cspr_jax.numerics import vertex
 from cspr_jax.trajectories.hypocycloid import Segment
 
 CANDIDATES = 3
-# Distance of the points of the first refining parabola, in steps between samples, and of the next ones.
-FIRST_WIDTH, NARROWER = 1.0 / 4.0, 1.0 / 16.0
+# Distance of the points of the first refining parabola, in steps between samples; how much narrower each next one is.
+FIRST_WIDTH, NARROWER, ROUNDS = 1.0 / 4.0, 1.0 / 6.0, 7
 
 
 def _block_estimates(function, shared: Shared, segment: Segment, arcs: Array, start: Array, stop: Array):
     # For each function: an estimate of its minimum in the block, and where.
     weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
     tau = start * (1.0 - weight) + stop * weight
-    estimates, places = [], []
-    for values in jax.vmap(partial(function, *shared, segment, arcs))(tau):
-        i = jnp.argmin(values)
-        inner = jnp.clip(i, 1, INTERVALS - 1)
-        move, estimate = vertex(values[inner - 1], values[inner], values[inner + 1])
-        better = estimate < values[i]
-        estimates.append(jnp.where(better, estimate, values[i]))
-        places.append(jnp.where(better, tau[inner] + move * (tau[1] - tau[0]), tau[i]))
-    return jnp.stack(estimates), jnp.stack(places)
+    values = jnp.stack(jax.vmap(partial(function, *shared, segment, arcs))(tau))
+    # A parabola through every three neighbours: the lowest sample may be of the valley of another block.
+    moves, vertices = vertex(values[:, :-2], values[:, 1:-1], values[:, 2:])
+    return _lowest(vertices, tau[1:-1] + moves * (tau[1] - tau[0]))
+
+
+def _lowest(estimates: Array, places: Array) -> tuple[Array, Array]:
+    # The smallest of the last axis and its place, without an argmin, which XLA computes one number at a time.
+    smallest = jnp.min(estimates, axis=-1)
+    return smallest, jnp.max(jnp.where(estimates == smallest[..., None], places, -jnp.inf), axis=-1)
 
 
 def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[Array, Array]:
-    # Keep the candidates in order, the new one in its place; leaves (CANDIDATES, n_values, n).
+    # Keep the candidates in order, the new one in its place; leaves (CANDIDATES, n_values, n). A segment with fewer
+    # blocks than others sees its last block again: what is known is not new.
+    estimate = jnp.where((best[1] == place).any(0), jnp.inf, estimate)
     estimates, places = [], []
     for old_estimate, old_place in zip(*best, strict=True):
         first = estimate < old_estimate
@@ -52,7 +55,10 @@ def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[A
 
 
 def refined_minimum(function, tau: Array, step: Array) -> Array:
-    """Smallest value of a smooth function near an estimated minimum, by two parabolas.
+    """Smallest value of a continuous function near an estimated minimum, by ever narrower parabolas.
+
+    A parabola is believed only where its middle is the lowest of its three points; else they move to the lowest. So a
+    minimum that is steep on one side, or a kink beside it, is found too.
 
     Args:
         function: () -> ().
@@ -65,53 +71,75 @@ def refined_minimum(function, tau: Array, step: Array) -> Array:
 
     def narrow(i, state):
         smallest, at, width = state
-        points = jnp.clip(at + width * jnp.array([-1.0, 0.0, 1.0]), 0.0, 1.0)
-        values = jax.vmap(function)(points)
-        at = jnp.clip(points[1] + width * vertex(*values)[0], 0.0, 1.0)
-        return jnp.minimum(smallest, jnp.min(values)), at, width * NARROWER
+        middle_point = jnp.clip(at, width, 1.0 - width)  # equidistant points, the ends of the motion among them
+        points = jnp.stack([middle_point - width, middle_point, middle_point + width])
+        left, middle, right = jax.vmap(function)(points)
+        bracketed = (middle <= left) & (middle <= right)
+        lower = jnp.where(left < right, points[0], points[2])
+        at = jnp.where(bracketed, middle_point + width * vertex(left, middle, right)[0], lower)
+        is_narrower = bracketed | (lower <= 0.0) | (lower >= 1.0)
+        width = jnp.where(is_narrower, width * NARROWER, width)
+        return jnp.minimum(smallest, jnp.minimum(middle, jnp.minimum(left, right))), at, width
 
     first = (jnp.full_like(tau, jnp.inf), tau, step * FIRST_WIDTH)
-    # The third round evaluates where the second ended.
-    return lax.fori_loop(0, 3, narrow, first)[0]
+    # The last round evaluates where the one before ended.
+    return lax.fori_loop(0, ROUNDS, narrow, first)[0]
 
 
 class Functions(NamedTuple):
-    """Functions of one instant, whose smallest values are wanted.
+    """Smooth functions of one instant in groups, whose smallest values are wanted.
 
     Fields:
-        evaluate: (robot, limits, amplitude, segment, arcs, tau) -> `number` numbers (); hashable.
-        number: how many.
-        refined: of how many, from the first, the minimum is refined to a value that is attained; the
-            others stay the estimates of parabolas through the samples.
+        evaluate: (robot, limits, amplitude, segment, arcs, tau) -> numbers (), group by group; hashable.
+        groups: how many functions each group has.
     """
 
     evaluate: Callable
-    number: int
-    refined: int
+    groups: tuple[int, ...]
+
+
+def _best_of_groups(groups: tuple[int, ...], estimates: Array, places: Array) -> tuple[Array, Array]:
+    # Of each group its best candidates, whatever function they are of: which function, and where;
+    # (n_groups, CANDIDATES, n) each, from (CANDIDATES, n_functions, n).
+    functions, taus, first = [], [], 0
+    for size in groups:
+        mine = slice(first, first + size)
+        values, where = (x[:, mine].reshape(CANDIDATES * size, -1) for x in (estimates, places))
+        number = jnp.broadcast_to(jnp.arange(CANDIDATES * size)[:, None], values.shape)
+        for _ in range(CANDIDATES):
+            chosen = jnp.min(jnp.where(values == jnp.min(values, axis=0), number, CANDIDATES * size), axis=0)
+            is_chosen = number == chosen
+            functions.append(first + chosen % size)
+            taus.append(jnp.sum(jnp.where(is_chosen, where, 0.0), axis=0))
+            values = jnp.where(is_chosen, jnp.inf, values)
+        first += size
+    shape = (len(groups), CANDIDATES, -1)
+    return jnp.stack(functions).reshape(shape), jnp.stack(taus).reshape(shape)
 
 
 @partial(jax.jit, static_argnums=0)
 def _minima(functions: Functions, shared: Shared, edges: Array, counts: Array, arguments) -> Array:
     segments, arcs = arguments
-    evaluate, _, n_refined = functions
+    evaluate, groups = functions
 
     def step(state, start, stop):
         found = jax.vmap(partial(_block_estimates, evaluate, shared), out_axes=1)(segments, arcs, start, stop)
         return _insert(state, *found)
 
-    nothing = jnp.full((CANDIDATES, functions.number, *arcs.shape), jnp.inf, arcs.dtype)
-    estimates, places = over_blocks(edges, counts, arcs, (nothing, jnp.zeros_like(nothing)), step)
+    nothing = jnp.full((CANDIDATES, sum(groups), *arcs.shape), jnp.inf, arcs.dtype)
+    nowhere = jnp.full_like(nothing, -1.0)
+    estimates, places = over_blocks(edges, counts, arcs, (nothing, nowhere), step)
+    which, where = _best_of_groups(groups, estimates, places)
     steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)])
 
-    def refine(segment, p, place, width):
-        # place: (CANDIDATES, n_refined). One copy of the function serves all of its values: it compiles much faster.
+    def refine(segment, p, which, where, width):
+        # which, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.
         def one(which, tau):
-            return refined_minimum(lambda t: jnp.stack(evaluate(*shared, segment, p, t)[:n_refined])[which], tau, width)
+            return refined_minimum(lambda t: jnp.stack(evaluate(*shared, segment, p, t))[which], tau, width)
 
-        return jnp.min(jax.vmap(jax.vmap(one), in_axes=(None, 0))(jnp.arange(n_refined), place), axis=0)
+        return jnp.min(jax.vmap(jax.vmap(one))(which, where), axis=1)
 
-    refined = jax.vmap(refine, in_axes=(0, 0, 2, 0))(segments, arcs, places[:, :n_refined], steps)
-    return jnp.concatenate([refined, estimates[0, n_refined:].T], axis=1)
+    return jax.vmap(refine, in_axes=(0, 0, 2, 2, 0))(segments, arcs, which, where, steps)
 
 
 def smallest_values(
@@ -120,7 +148,7 @@ def smallest_values(
     """Smallest values along each segment of functions of one instant.
 
     Args:
-        functions: of one instant.
+        functions: of one instant, in groups.
         shared: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, 1 or more.
@@ -128,7 +156,7 @@ def smallest_values(
         batch: segments computed at a time.
 
     Returns:
-        (n, functions.number).
+        (n, n_groups).
     """
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
@@ -151,11 +179,8 @@ def margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> np.ndarray:
         (n, n_criteria) in the order of `criteria.flags`; NaN where the motion is not finite.
     """
     table = blocks(shared.amplitude, int(np.max(arcs)))
-    groups = counts(shared.robot, shared.limits)
-    # The smallest over the cables has kinks, each cable's own slack has none: they are refined apart.
-    # Limits are many: their slacks stay estimates.
-    functions = Functions(smooth_slacks, sum(groups), sum(groups[:2]))
-    every = smallest_values(functions, shared, segments, arcs, table)
-    smallest = np.minimum.reduceat(every, np.cumsum([0, *groups[:-1]]), axis=1)
+    # The smallest over the cables has kinks, each cable's own slack has none.
+    functions = Functions(smooth_slacks, counts(shared.robot, shared.limits))
+    smallest = smallest_values(functions, shared, segments, arcs, table)
     # A compiled minimum may pass over NaN; what has no finite minimum has none.
     return np.where(np.isfinite(smallest), smallest, np.nan)

@@ -9,7 +9,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax import wrenches
-from cspr_jax.feasibility.extremes import Extremes
+from cspr_jax.feasibility.extremes import SIGNS, Extremes
 from cspr_jax.feasibility.narrowing import narrowed
 from cspr_jax.feasibility.pose_samples import SAMPLES
 from cspr_jax.feasibility.pose_slacks import PoseShared
@@ -59,7 +59,6 @@ def pose_extremes(
     Returns:
         the extremes.
     """
-    signs = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
     found, samples = [], []
     for i, p in enumerate(arcs):
         segment = jax.tree.map(lambda x, i=i: x[i], segments)
@@ -70,7 +69,7 @@ def pose_extremes(
             return in_batches(partial(_demands, shared, kind=kind), (*items, points), size=BATCH)
 
         smallest = narrowed(at, tau, at(tau))
-        found.append(smallest * signs + 0.0)  # no -0
+        found.append(smallest * SIGNS + 0.0)  # no -0
         samples.append(len(tau))
     names = [field.name for field in dataclasses.fields(Extremes)][:-1]
     return Extremes(**dict(zip(names, np.array(found).T, strict=True)), samples=np.array(samples))

@@ -48,7 +48,7 @@ def transition_margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> n
     if given(shared.limits):
         return margins(shared, segments, arcs)
     table = blocks(shared.amplitude, int(np.max(arcs)))
-    smallest = smallest_values(Functions(_extreme_pseudotensions, 2, 2), shared, segments, arcs, table).min(1)
+    smallest = smallest_values(Functions(_extreme_pseudotensions, (1, 1)), shared, segments, arcs, table).min(1)
     found = np.stack([smallest, smallest], axis=1)
     unclear = np.flatnonzero(~(np.isfinite(smallest) & (smallest > 0.0)))
     if len(unclear):
