@@ -45,7 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return int(options.command(options))
     except CsprError as error:
-        sys.stderr.write("".join(f"cspr: {line}\n" for line in str(error).splitlines()))
+        every = error.lines if isinstance(error, ConfigError) and getattr(options, "all_errors", False) else None
+        sys.stderr.write("".join(f"cspr: {line}\n" for line in every or str(error).splitlines()))
         return int(error.exit_code)
     except KeyboardInterrupt:
         sys.stderr.write("cspr: interrupted; nothing half-written was left\n")
@@ -128,6 +129,8 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument(
         "--kernels", type=Path, metavar="DIR", help="beside C++ kernels of this folder, such as benchmarks"
     )
+    for sub in (run, plan):
+        sub.add_argument("--all-errors", action="store_true", help="print every mistake of a file, one a line")
     for sub in (run, plan, table, bench):
         sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
     robots = add("robots", _robots, "list the catalogue of robots")
@@ -159,6 +162,7 @@ def _print(renderable: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from cspr_jax.config.hints import robot_hints
     from cspr_jax.sweep import engine
     from cspr_jax.sweep.definition import read_sweep, run_directory
     from cspr_jax.sweep.signals import stop_signals
@@ -170,6 +174,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.scheduler is not None and options.device is not None:
         raise ConfigError("--device", f"{options.device}: must be absent beside --scheduler, whose workers choose")
     sweep = read_sweep(options.sweep)
+    _hint(robot_hints(sweep.robot))
     directory = options.output or run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
     with stop_signals() as stop, progress() as on_tile:
@@ -187,6 +192,11 @@ def _run(options: argparse.Namespace) -> int:
 
 def _warn(line: str) -> None:
     sys.stderr.write(f"cspr: {line}\n")
+
+
+def _hint(lines: list[str]) -> None:
+    for line in lines:
+        _warn(f"hint: {line}")
 
 
 @contextlib.contextmanager
@@ -255,11 +265,13 @@ def _plan(options: argparse.Namespace) -> int:
         raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
     _start_jax(options)
     from cspr_jax import motions, planning, reports
+    from cspr_jax.config.hints import plan_hints, robot_hints
 
     plan = planning.plan(options.plan)
     feasible = reports.is_feasible(plan)
     for line in plan.warnings:
         _warn(line)
+    _hint(robot_hints(plan.spec) + ([] if feasible else plan_hints(plan.keys, plan.spec)))
     if options.json:
         _print_json(reports.plan_object(plan))
     else:

@@ -9,6 +9,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax import problem, rotations
+from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
@@ -77,9 +78,10 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         """
         robot, centre = shared.robot, np.asarray(centroid(shared.robot))
         poses = zip(self.points(robot, 1.0), self.quaternions(robot, 1.0), strict=True)
+        hint = "".join(f" ({line})" for line in plan_hints(self.keys, self.spec))
         for i, (position, quaternion) in enumerate(poses):
             if not self.keys.pose[i].rest:
-                _check_pose(robot, i, position, quaternion, centre, self.path)
+                _check_pose(robot, i, position, quaternion, centre, self.path, hint)
 
     def answers(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray) -> PoseAnswers:
         """Smallest numbers of arcs, with the values of beta-hat that give the fewest in sum; see `Sequence.answers`."""
@@ -190,11 +192,17 @@ def _standing(robot: PlatformRobot, position: Array, quaternion: Array, centre: 
 
 
 def _check_pose(
-    robot: PlatformRobot, i: int, position: np.ndarray, quaternion: np.ndarray, centre: np.ndarray, path: Path
+    robot: PlatformRobot,
+    i: int,
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    centre: np.ndarray,
+    path: Path,
+    hint: str,
 ) -> None:
     depth, share, apart = map(np.asarray, _standing(robot, position, quaternion, centre, contacts(robot).pairs))
     if not depth > 0.0:
-        raise ConfigError(path, f"pose[{i}].position: must be below the spool plane")
+        raise ConfigError(path, f"pose[{i}].position: must be below the spool plane{hint}")
     if not abs(share) > SINGULAR:
         raise ConfigError(
             path, f"pose[{i}]: must be another orientation: singular there (relative determinant {share:.1g})"

@@ -65,7 +65,7 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
         make = robots.planar_robot if spec.planar else robots.point_mass_robot
         return make(points, mass=spec.mass, gravity=gravity_of(spec, keys), name=spec.name)
     except InputError as error:
-        raise ConfigError(file, f"robot.{error}") from error
+        raise ConfigError(file, spec.typed(error)) from error
 
 
 def build_platform(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PlatformRobot:
@@ -94,7 +94,7 @@ def build_platform(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Platf
             name=spec.name,
         )
     except InputError as error:
-        raise ConfigError(file, f"robot.{error}") from error
+        raise ConfigError(file, spec.typed(error)) from error
 
 
 def fault_at_rest(spec: RobotFile) -> str | None:
