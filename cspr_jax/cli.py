@@ -313,35 +313,13 @@ def _table(options: argparse.Namespace) -> int:
         return ExitCode.DONE
     if options.name not in tables.TABLES:
         raise ConfigError("table", f"{shown(options.name)}: must be one of {', '.join(tables.TABLES)}")
-    cells = tables.table_cells(options.name, _choice(options))
+    given = {"--definition": options.definition, "--amplitude": options.amplitude, "--fine": options.fine or None}
+    cells = tables.table_cells(options.name, tables.chosen(options.name, given))
     if options.json:
         _print_json(tables.table_object(options.name, cells))
     else:
         _print(tables.table_for_people(options.name, cells))
     return ExitCode.DONE
-
-
-def _choice(options: argparse.Namespace) -> Any:
-    from cspr_jax import orientation_tables, tables
-
-    given = {"--definition": options.definition, "--amplitude": options.amplitude, "--fine": options.fine or None}
-    if not tables.TABLES[options.name].with_choice:
-        for name, value in given.items():
-            if value is not None:
-                raise ConfigError(name, f"must be absent with table {options.name}")
-        return None
-    usual = orientation_tables.Choice()
-    every = {"--definition": orientation_tables.DEFINITIONS, "--amplitude": tuple(orientation_tables.AMPLITUDES)}
-
-    def chosen(name: str, otherwise: tuple[str, ...]) -> tuple[str, ...]:
-        value = given[name]
-        return otherwise if value is None else every[name] if value == "all" else (value,)
-
-    return orientation_tables.Choice(
-        chosen("--definition", usual.definitions),
-        chosen("--amplitude", usual.amplitudes),
-        2 if options.fine else 1,
-    )
 
 
 def _robots(options: argparse.Namespace) -> int:

@@ -40,6 +40,7 @@ LAYERS = (
         "pose_tables",
         "orientation_tables",
         "tables",
+        "table_layout",
         "reports",
         "motions",
         "plots",
