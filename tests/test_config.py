@@ -37,6 +37,7 @@ z0 = [1.7]
 from = { rest = true }
 """
 ROBOT, Z0, POSE, FROM, AXES = 'robot = "prototype"', "z0 = 1.7", "position = [0.7, 0.7, 3.0]", "from =", "[axes]"
+UP_IN_LINE, UP = "[[0, 1, 3], [1, 2, 3], [2, 3, 3]]", "[[0, 1, 3], [2, 1, 3], [1, 4, 3]]"
 ON_A_LINE, UPRIGHT = "[[0, 0, 0], [1, 0, 0], [2, 0, 0]]", "[[0, 0, 0], [1, 0, 0], [0, 0, 1]]"
 
 
@@ -74,6 +75,13 @@ PLANS = {
     "one pose": (f"[[pose]]\n{POSE}\n", "", "pose", "at least 2"),
     "mass = 0": (ROBOT, inline(mass="mass = 0"), "robot.mass = 0", "greater than 0"),
     "spools in line": (ROBOT, inline(ON_A_LINE), "robot.base_points", "not on one line"),
+    "numbers as typed": (ROBOT, inline(UP_IN_LINE, more=', z_axis = "up"'), "= [[0.0, 1.0, 3.0], [1.0, 2.0, 3.0], [2"),
+    "P0 as typed": (
+        f"{ROBOT}\n{Z0}\n[[pose]]",
+        inline(UP, more=', z_axis = "up"') + f"\n{Z0}\n[[pose]]\nposition = [0, 0, 1]",
+        "pose[0].position = [0.0, 0.0, 1.0]",
+        "P0 = [1.0, 2.0, 1.3]",
+    ),
     "spools far away": (ROBOT, inline("[[0, 1e300, 0], [1, 0, 0], [0, 0, 1]]"), "robot.base_points"),
     "vertical spools": (ROBOT, inline(UPRIGHT), "robot.base_points", "plane is not vertical"),
     "tensions crossed": (Z0, f"{Z0}\ntension_min = 2.0\ntension_max = 2.0", "tension_min", "below tension_max"),
@@ -114,7 +122,13 @@ SWEEPS = {
     "no start": ("from = { rest = true }", "", "trajectory.from is missing", "rest = true", "from_x"),
     "two starts": ("rest = true", "rest = true, position = [0, 0, 1]", "trajectory.from", "one of them"),
     "rest elsewhere": ("z0 = [1.7]", "z0 = [1.7]\nfrom_x = [1.0]", "axes.from_x", "must be absent"),
-    "all above": ("start = 1.0, stop = 2.0", "start = -2.0, stop = 0.0", "axes", "above the spool plane"),
+    "all above": (
+        "start = 1.0, stop = 2.0",
+        "start = -2.0, stop = 0.0",
+        "axes",
+        "above the spool plane",
+        "z points down",
+    ),
     "starts above": ("rest = true", "position = [0, 0, -1]", "trajectory.from", "above the spool plane"),
     "all below": (AXES, "[limits]\nfloor = 0.9\n[axes]", "axes", "below the floor"),
     "starts below": (AXES, "[limits]\nfloor = 1.6\n[axes]", "trajectory.from", "below the floor"),
