@@ -113,9 +113,7 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
     plot.add_argument("--quantity", help="quantity of a map (default arcs or oscillations); see `cspr quantities`")
     plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
-    plot.add_argument(
-        "--envelope", action="store_true", help='outlines of all orientations of a place, of map = "orientations"'
-    )
+    plot.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
     plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")

@@ -123,6 +123,7 @@ def test_numbers_are_shown_as_typed():
         ("fromx", ["from_x", "from_y", "x"], "from_x"),
         ("quux", ["position", "rest"], None),
         ("", ["position"], None),
+        ("position" * 10_000, ["position"], None),
         ("\u2028", ["position"], None),
     ],
 )
@@ -235,6 +236,11 @@ def test_all_errors(tmp_path):
     assert keys == ["unknown key quux", "max_arcs", "z0"]
     copy = pickle.loads(pickle.dumps(error))
     assert (str(copy), copy.lines) == (str(error), error.lines)
+
+
+def test_a_very_long_key():
+    line = line_of(PlanFile, {"k" * 10_000: 1})
+    assert line.startswith("unknown key kkk") and "...: allowed" in line.replace(" = 1", "") and len(line) < 500
 
 
 def test_a_file_with_very_many_faults():

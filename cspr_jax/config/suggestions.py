@@ -32,6 +32,7 @@ _HEIGHT = frozenset({"z0", "z"})
 ALIKE = 0.8  # of letters, for two words to be one that is misspelt
 ENOUGH = 0.5  # of all words of both keys
 LETTERS = 0.6
+LONGEST = 100  # letters of what somebody may have meant to be a key
 
 
 def nearest(given: str, allowed: Iterable[str]) -> str | None:
@@ -45,6 +46,8 @@ def nearest(given: str, allowed: Iterable[str]) -> str | None:
         one of them; None if none is near.
     """
     names = list(allowed)
+    if len(given) > LONGEST:
+        return None
     words = _words(given)
     if "height" in words and _HEIGHT.isdisjoint(names):
         words = [word.replace("height", "floor") for word in words]
@@ -74,7 +77,7 @@ def did_you_mean(given: str, allowed: Iterable[str]) -> str:
 
 def _words(name: str) -> list[str]:
     # max_tension, max-tension, max.tension and maxTension are the same words.
-    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+|\d+", name[:100])
+    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+|\d+", name)
     return [_SYNONYMS.get(part.lower(), part.lower()) for part in parts]
 
 

@@ -13,6 +13,7 @@ from cspr_jax.errors import shown
 # Names of the variants of a union; they are part of pydantic's location of an error, not of the user's key.
 VARIANT = "~"
 FAULT = "fault"
+LONGEST_NAME = 200
 _KINDS = {
     "model_type": "a table",
     "model_attributes_type": "a table",
@@ -165,7 +166,7 @@ def _key(at: str, parts: list[Any]) -> str:
     text = at
     for part in parts:
         text += f"[{part}]" if isinstance(part, int) else f"{'.' if text else ''}{part}"
-    return text or "the file"
+    return (text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}...") or "the file"
 
 
 def _suggestion(model: type[BaseModel], parts: list[Any]) -> str:
