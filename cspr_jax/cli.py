@@ -172,7 +172,6 @@ def _run(options: argparse.Namespace) -> int:
     if options.scheduler is not None and options.device is not None:
         raise ConfigError("--device", f"{options.device}: must be absent beside --scheduler, whose workers choose")
     sweep = read_sweep(options.sweep)
-    _hint(robot_hints(sweep.robot))
     directory = options.output or run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
     with stop_signals() as stop, progress() as on_tile:
@@ -180,7 +179,8 @@ def _run(options: argparse.Namespace) -> int:
         work = engine.Run(sweep, directory, choices, hooks)
         path = work.finished()
         if path is None:
-            with _executor(options, sweep, stop) as executor:
+            with _executor(options, sweep, stop) as executor:  # refuses in one line, so hints come after it
+                _hint(robot_hints(sweep.robot))
                 path = work.go(executor).result
         else:
             sys.stdout.write("already finished; nothing was computed\n")
