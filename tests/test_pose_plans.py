@@ -420,9 +420,9 @@ ROBOT = 'base_points = {base}\nplatform_points = {platform}\ninertia = {inertia}
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (("inertia = ", "# "), "both platform_points and inertia"),
-        (("name", "planar = true\nname"), "not both"),
-        (("name", "centre_of_mass = [0.6, 0.0, 0.0]\nname"), "slack cable"),
+        (("inertia = ", "# "), "inertia is missing: a rigid platform has it beside platform_points"),
+        (("name", "planar = true\nname"), "planar = true: must be false, or absent, for a rigid platform"),
+        (("name", "centre_of_mass = [0.6, 0.0, 0.0]\nname"), "is slack: it would need "),
         (("[[0.003", "[[-0.003"), "positive definite"),
     ],
 )
