@@ -7,6 +7,7 @@ import numpy as np
 
 from cspr_jax import problem
 from cspr_jax.amplitudes import Amplitude
+from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.certificate import Shared
@@ -16,7 +17,6 @@ from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories import depths
 from cspr_jax.trajectories.transition import depth_for, transition, weights
 
-SAME_DEPTH = 1e-9  # m
 # A conservative z0 must lie above its bound: by this part of it.
 ABOVE_BOUND = 1e-6
 EPSILONS = np.linspace(0.02, 0.5, 49)
@@ -55,8 +55,9 @@ def chosen_depth(shared: Any, sequence: Sequence) -> float:
     else:
         z0 = _fastest_depth(shared, sequence)
     if not z0 > 0.0:
+        hint = "".join(f" ({line})" for line in plan_hints(keys, sequence.spec))
         raise ConfigError(
-            path, f'z0.choose = "{keys.z0.choose}": must be a number here, since no z0 > 0 follows from the poses'
+            path, f'z0.choose = "{keys.z0.choose}": must be a number here, since no z0 > 0 follows from the poses{hint}'
         )
     return z0
 
@@ -95,12 +96,14 @@ def _depth_of_inclination(shared: Shared, sequence: Sequence) -> float:
     else:
         v = float(inclination or 0.0)
     found = [float(depth_for(shared.robot, jnp.asarray(target), jnp.asarray(v))) for target in targets]
-    if max(found) - min(found) > SAME_DEPTH:
+    if max(found) - min(found) > AT_P0 * float(spool_radius(shared.robot)):
         raise ConfigError(
             path, f"inclination = {v:g}: must be replaced by z0, since the targets lie at different depths"
         )
     if not found[0] > 0.0:
-        raise ConfigError(path, "inclination: must be replaced by z0, since the targets are not below the spool plane")
+        hint = "".join(f" ({line})" for line in plan_hints(sequence.keys, sequence.spec))
+        why = f"since the targets are not below the spool plane{hint}"
+        raise ConfigError(path, f"inclination: must be replaced by z0, {why}")
     return found[0]
 
 

@@ -45,7 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return int(options.command(options))
     except CsprError as error:
-        sys.stderr.write("".join(f"cspr: {line}\n" for line in str(error).splitlines()))
+        every = error.lines if isinstance(error, ConfigError) and getattr(options, "all_errors", False) else None
+        sys.stderr.write("".join(f"cspr: {line}\n" for line in every or str(error).splitlines()))
         return int(error.exit_code)
     except KeyboardInterrupt:
         sys.stderr.write("cspr: interrupted; nothing half-written was left\n")
@@ -112,9 +113,7 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
     plot.add_argument("--quantity", help="quantity of a map (default arcs or oscillations); see `cspr quantities`")
     plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
-    plot.add_argument(
-        "--envelope", action="store_true", help='outlines of all orientations of a place, of map = "orientations"'
-    )
+    plot.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
     plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
@@ -128,6 +127,8 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument(
         "--kernels", type=Path, metavar="DIR", help="beside C++ kernels of this folder, such as benchmarks"
     )
+    for sub in (run, plan):
+        sub.add_argument("--all-errors", action="store_true", help="print every mistake of a file, one a line")
     for sub in (run, plan, table, bench):
         sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
     robots = add("robots", _robots, "list the catalogue of robots")
@@ -159,6 +160,7 @@ def _print(renderable: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from cspr_jax.config.hints import robot_hints
     from cspr_jax.sweep import engine
     from cspr_jax.sweep.definition import read_sweep, run_directory
     from cspr_jax.sweep.signals import stop_signals
@@ -177,7 +179,8 @@ def _run(options: argparse.Namespace) -> int:
         work = engine.Run(sweep, directory, choices, hooks)
         path = work.finished()
         if path is None:
-            with _executor(options, sweep, stop) as executor:
+            with _executor(options, sweep, stop) as executor:  # refuses in one line, so hints come after it
+                _hint(robot_hints(sweep.robot))
                 path = work.go(executor).result
         else:
             sys.stdout.write("already finished; nothing was computed\n")
@@ -187,6 +190,11 @@ def _run(options: argparse.Namespace) -> int:
 
 def _warn(line: str) -> None:
     sys.stderr.write(f"cspr: {line}\n")
+
+
+def _hint(lines: list[str]) -> None:
+    for line in lines:
+        _warn(f"hint: {line}")
 
 
 @contextlib.contextmanager
@@ -255,11 +263,13 @@ def _plan(options: argparse.Namespace) -> int:
         raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
     _start_jax(options)
     from cspr_jax import motions, planning, reports
+    from cspr_jax.config.hints import plan_hints, robot_hints
 
     plan = planning.plan(options.plan)
     feasible = reports.is_feasible(plan)
     for line in plan.warnings:
         _warn(line)
+    _hint(robot_hints(plan.spec) + ([] if feasible else plan_hints(plan.keys, plan.spec)))
     if options.json:
         _print_json(reports.plan_object(plan))
     else:
@@ -301,35 +311,13 @@ def _table(options: argparse.Namespace) -> int:
         return ExitCode.DONE
     if options.name not in tables.TABLES:
         raise ConfigError("table", f"{shown(options.name)}: must be one of {', '.join(tables.TABLES)}")
-    cells = tables.table_cells(options.name, _choice(options))
+    given = {"--definition": options.definition, "--amplitude": options.amplitude, "--fine": options.fine or None}
+    cells = tables.table_cells(options.name, tables.chosen(options.name, given))
     if options.json:
         _print_json(tables.table_object(options.name, cells))
     else:
         _print(tables.table_for_people(options.name, cells))
     return ExitCode.DONE
-
-
-def _choice(options: argparse.Namespace) -> Any:
-    from cspr_jax import orientation_tables, tables
-
-    given = {"--definition": options.definition, "--amplitude": options.amplitude, "--fine": options.fine or None}
-    if not tables.TABLES[options.name].with_choice:
-        for name, value in given.items():
-            if value is not None:
-                raise ConfigError(name, f"must be absent with table {options.name}")
-        return None
-    usual = orientation_tables.Choice()
-    every = {"--definition": orientation_tables.DEFINITIONS, "--amplitude": tuple(orientation_tables.AMPLITUDES)}
-
-    def chosen(name: str, otherwise: tuple[str, ...]) -> tuple[str, ...]:
-        value = given[name]
-        return otherwise if value is None else every[name] if value == "all" else (value,)
-
-    return orientation_tables.Choice(
-        chosen("--definition", usual.definitions),
-        chosen("--amplitude", usual.amplitudes),
-        2 if options.fine else 1,
-    )
 
 
 def _robots(options: argparse.Namespace) -> int:

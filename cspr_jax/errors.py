@@ -2,7 +2,8 @@
 
 import datetime
 import enum
-import reprlib
+import itertools
+from collections.abc import Sequence
 
 
 class ExitCode(enum.IntEnum):
@@ -42,14 +43,15 @@ class InputError(CsprError, ValueError):
         key: the key or argument, dotted.
         value: what was given.
         allowed: what would be right.
+        fault: what is wrong, in words, where the value does not show it.
     """
 
     exit_code = ExitCode.BAD_INPUT
 
-    def __init__(self, key: str, value: object, allowed: str) -> None:
+    def __init__(self, key: str, value: object, allowed: str, *, fault: str = "") -> None:
         """Keep the parts, so that a reader of files can add its name."""
-        super().__init__(f"{key} = {shown(value)}: must be {allowed}")
-        self.key, self.value, self.allowed = key, value, allowed
+        super().__init__(f"{key}: {fault}: {allowed}" if fault else f"{key} = {shown(value)}: must be {allowed}")
+        self.key, self.value, self.allowed, self.fault = key, value, allowed, fault
 
 
 class ConfigError(CsprError):
@@ -58,13 +60,23 @@ class ConfigError(CsprError):
     Args:
         file: the file's name.
         message: the rest of the line.
+        others: further faults of the file, each the rest of a line of its own; the error's text only counts them.
+        count: how many others there are, where not all are given.
+
+    Fields:
+        lines: one for each fault.
     """
 
     exit_code = ExitCode.BAD_INPUT
 
-    def __init__(self, file: object, message: str) -> None:
+    def __init__(self, file: object, message: str, *, others: Sequence[str] = (), count: int = 0) -> None:
         """Join the file's name and the message."""
-        super().__init__(one_line(f"{file}: {message}"))
+        count = max(count, len(others))
+        more = f" (and {count} more: --all-errors shows them)" if count else ""
+        super().__init__(one_line(f"{file}: {message}{more}"))
+        self.lines = [one_line(f"{file}: {text}") for text in (message, *others)]
+        if count > len(others):
+            self.lines.append(one_line(f"{file}: and {count - len(others)} more"))
 
 
 class RefusedError(CsprError):
@@ -106,8 +118,7 @@ class StoppedError(CsprError):
 
 
 # Containers are cut before they are written out: a user's may be nested thousands deep.
-_SHORT = reprlib.Repr()
-_SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxdict, _SHORT.maxother = 3, 12, 12, 60
+DEEPEST, LONGEST = 3, 12
 
 
 def one_line(text: str) -> str:
@@ -131,14 +142,28 @@ def shown(value: object) -> str:
     Returns:
         the text.
     """
-    if value is None:
-        return "(missing)"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, datetime.date | datetime.time):
-        return str(value)
+    text = _toml(value, DEEPEST)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _toml(value: object, depth: int) -> str:
+    if value is None or isinstance(value, bool):
+        return "(missing)" if value is None else str(value).lower()
+    if isinstance(value, dict | list | tuple):
+        return _container(value, depth - 1) if depth else "..."
     try:
-        text = f'"{value}"' if isinstance(value, str) else _SHORT.repr(value)
+        return f'"{value}"' if isinstance(value, str) else _plain(value)
     except ValueError:  # Python writes out no integer of more than some thousand digits
         return "a very large integer"
-    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _plain(value: object) -> str:
+    return str(value) if isinstance(value, datetime.date | datetime.time) else repr(value)
+
+
+def _container(value: dict | list | tuple, depth: int) -> str:
+    rest = ["..."] * (len(value) > LONGEST)
+    if isinstance(value, dict):
+        pairs = [f"{key} = {_toml(inner, depth)}" for key, inner in itertools.islice(value.items(), LONGEST)]
+        return f"{{ {', '.join(pairs + rest)} }}" if pairs else "{}"
+    return f"[{', '.join([_toml(inner, depth) for inner in value[:LONGEST]] + rest)}]"

@@ -9,8 +9,7 @@ import numpy as np
 from cspr_jax import problem
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.choices import best_amplitude, chosen_depth
-from cspr_jax.config.plan import PlanFile
-from cspr_jax.config.reading import checked, read_toml
+from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError, InputError
@@ -76,7 +75,7 @@ def plan(path: Path) -> Plan:
     Raises:
         ConfigError: a mistake in the file.
     """
-    return plan_of(checked(PlanFile, read_toml(path), path), path)
+    return plan_of(read_plan(path), path)
 
 
 def plan_of(keys: PlanFile, path: Path) -> Plan:
@@ -138,7 +137,7 @@ def _plan_of_poses(spec: RobotFile, keys: PlanFile, path: Path) -> Plan:
     try:
         reference_pose(robot, z0)
     except InputError as error:
-        raise ConfigError(path, f"robot.{error}") from error
+        raise ConfigError(path, spec.typed(error)) from error
     if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
         amplitude, z0 = best_amplitude(shared, sequence, z0)
         shared = shared._replace(amplitude=amplitude)

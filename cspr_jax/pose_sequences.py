@@ -9,6 +9,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax import problem, rotations
+from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
@@ -75,9 +76,10 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
             ConfigError: which pose, and why.
         """
         poses = zip(self.points(1.0), self.quaternions(1.0), strict=True)
+        hint = "".join(f" ({line})" for line in plan_hints(self.keys, self.spec))
         for i, (position, quaternion) in enumerate(poses):
             if not self.keys.pose[i].rest:
-                _check_pose(shared.robot, i, position, quaternion, self.path)
+                _check_pose(shared.robot, i, position, quaternion, self.path, hint)
 
     def answers(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray) -> PoseAnswers:
         """Smallest numbers of arcs, with the values of beta-hat that give the fewest in sum; see `Sequence.answers`."""
@@ -187,10 +189,12 @@ def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: A
     return depth, conditioning(robot, *where) / conditioning(robot, *middle), apart
 
 
-def _check_pose(robot: PlatformRobot, i: int, position: np.ndarray, quaternion: np.ndarray, path: Path) -> None:
+def _check_pose(
+    robot: PlatformRobot, i: int, position: np.ndarray, quaternion: np.ndarray, path: Path, hint: str
+) -> None:
     depth, share, apart = map(np.asarray, _standing(robot, position, quaternion, contacts(robot).pairs))
     if not depth > 0.0:
-        raise ConfigError(path, f"pose[{i}].position: must be below the spool plane")
+        raise ConfigError(path, f"pose[{i}].position: must be below the spool plane{hint}")
     if not abs(share) > SINGULAR:
         raise ConfigError(
             path, f"pose[{i}]: must be another orientation: singular there (relative determinant {share:.1g})"

@@ -46,8 +46,16 @@ def table_3_2() -> dict[Key, float | None]:
     return found
 
 
-_PRINTED = {"0": (8, 9.4944), "1": (9, 10.6739), "2": (9, 10.6740), "6": (4, 4.7472)}
-PUBLISHED: dict[Key, float] = {
+_PRINTED = {
+    "0": ("8", "9.4944"),
+    "1": ("9", "10.6739"),
+    "2": ("9", "10.6740"),
+    "3": ("12", "14.2291"),
+    "4": ("9", "10.6732"),
+    "5": ("13", "15.4236"),
+    "6": ("4", "4.7472"),
+}
+PUBLISHED: dict[Key, str] = {
     (row, column, _variant(amplitude, torsion)): value
     for amplitude in _AMPLITUDES
     for torsion in _TORSIONS

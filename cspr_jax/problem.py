@@ -75,7 +75,7 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
         given |= {"inertia": spec.inertia, "centre_of_mass": spec.centre_of_mass or [0.0, 0.0, 0.0]}
         return platform_robot(spec.base_points, spec.platform_points, **given)
     except InputError as error:
-        raise ConfigError(file, f"robot.{error}") from error
+        raise ConfigError(file, spec.typed(error)) from error
 
 
 def point_mass_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot:

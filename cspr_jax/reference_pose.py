@@ -27,6 +27,15 @@ ALIGNED = 1e-6
 # Smallest conditioning, and smallest tension over the mean one, that count.
 SMALLEST_CONDITIONING, SMALLEST_TENSION = 1e-6, 1e-6
 
+_CHANGE_LINES = (
+    "must be held in all directions: cable i runs from base_points[i] to platform_points[i]; let two neighbouring "
+    "spools share a platform point, or two platform points a spool, so that the cables make triangles"
+)
+_CHANGE_LOAD = (
+    "must hang with every cable taut: move centre_of_mass nearer to the middle of platform_points, check the order of "
+    "the cables in base_points and platform_points, or make z0 larger"
+)
+
 
 class Reference(NamedTuple):
     """A robot at rest.
@@ -74,21 +83,35 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
         InputError: singular there, or not in equilibrium with every cable taut.
     """
     turned, rotation = aligned(robot)
+    hub = rest_point(np.asarray(z0, float))
     with double_precision():
-        size, still = (np.asarray(x) for x in _standing(turned, rest_point(np.asarray(z0, float))))
+        size, still = (np.asarray(x) for x in _standing(turned, hub))
+    place = f"the reference pose (platform level and at rest, z0 = {z0:g} m)"
     if not abs(size) > SMALLEST_CONDITIONING:
-        raise InputError(
-            "platform_points", f"a singular reference pose (determinant {size:.2g})", "points apart from it"
-        )
+        fault = f"{place} is singular (determinant {size:.1g}, at least {SMALLEST_CONDITIONING:g} counts): "
+        raise InputError("platform_points", None, _CHANGE_LINES, fault=fault + _free(turned, hub))
     share = still / np.abs(still).mean()
     if not (np.isfinite(share) & (share > SMALLEST_TENSION)).all():
-        slack = int(np.argmin(np.where(np.isfinite(share), share, -np.inf))) + 1
-        raise InputError(
-            "platform_points",
-            f"a reference pose at rest with a slack cable {slack}",
-            "a platform that hangs in equilibrium with every cable taut",
-        )
+        slack = int(np.argmin(np.where(np.isfinite(share), share, -np.inf)))
+        fault = f"in {place} cable {slack + 1} is slack: it would need {share[slack]:.3g} of the mean tension"
+        raise InputError("platform_points", None, _CHANGE_LOAD, fault=fault)
     return Reference(turned, rotation, float(size), share)
+
+
+def _free(robot: PlatformRobot, hub: np.ndarray) -> str:
+    # The small motion that lengthens no cable: a turn and a shift, lengths over the platform's size.
+    points = np.asarray(robot.platform_points)
+    cables = np.asarray(robot.base_points) - hub - points
+    along = cables / np.linalg.norm(cables, axis=1, keepdims=True)
+    size = np.linalg.norm(points, axis=1).max()
+    still = np.linalg.svd(np.hstack([along, np.cross(points, along) / size]))[2][5]
+    parts = {
+        "be pushed sideways": np.linalg.norm(still[:2]),
+        "be lifted": abs(still[2]),
+        "turn about a level axis": np.linalg.norm(still[3:5]),
+        "turn about the vertical": abs(still[5]),
+    }
+    return f"the platform can {max(parts, key=lambda name: parts[name])} while no cable changes its length"
 
 
 @jax.jit

@@ -1,35 +1,18 @@
 """Published tables beside the same cells computed. The published numbers are compared with, never computed with."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 from cspr_jax import orientation_tables, pose_tables, transition_tables
+from cspr_jax.errors import ConfigError
 from cspr_jax.orientation_tables import Choice
 from cspr_jax.planning import plan
+from cspr_jax.table_layout import Cell, grid
 from cspr_jax.transition_tables import Key
 
 SCHEMA = 1
-
-
-@dataclasses.dataclass(frozen=True)
-class Cell:
-    """One cell of a table.
-
-    Fields:
-        row: as printed.
-        column: as printed, or its name.
-        computed: by this program; None where nothing was found.
-        published: in the source; None where the project does not know it.
-        variant: the reading of the source, where there are several.
-    """
-
-    row: str
-    column: str
-    computed: float | None
-    published: float | None
-    variant: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -38,15 +21,17 @@ class Source:
 
     Fields:
         title: of the table, with its source.
-        published: known cells, by row, column and variant.
+        published: known cells as printed, by row, column and variant.
         compute: () -> computed cells, by row, column and variant; of a `Choice`, where there is one.
         with_choice: whether there is one, of definitions, amplitude functions and step.
+        transposed: whether the source prints these rows as columns.
     """
 
     title: str
-    published: dict[Key, float]
+    published: dict[Key, str]
     compute: Callable[..., dict[Key, float | None]]
     with_choice: bool = False
+    transposed: bool = False
 
 
 def _table_2_1() -> dict[Key, float | None]:
@@ -60,9 +45,12 @@ def _table_2_1() -> dict[Key, float | None]:
 
 
 _PUBLISHED_2_1 = {
-    "1": {"feasible_at_infinity": -0.1557, "p": 5, "T": 6.54},
-    "2": {"feasible_at_infinity": -0.1416, "p": 2, "T": 2.61},
-    "3": {"feasible_at_infinity": 0.2057, "p": 5, "T": 6.54},
+    "1": ("-0.1557", "5", "6.54"),
+    "2": ("-0.1416", "2", "2.61"),
+    "3": ("0.2057", "5", "6.54"),
+    "4": ("0.8208", "5", "6.53"),
+    "5": ("0.8494", "5", "6.52"),
+    "6": ("0.5425", "6", "7.85"),
 }
 
 TABLES = {
@@ -83,7 +71,11 @@ TABLES = {
     ),
     "2.1": Source(
         "Dion-Gauvin thesis, Table 2.1: feasibility at infinity, smallest number of arcs, duration (s)",
-        {(row, column, ""): value for row, cells in _PUBLISHED_2_1.items() for column, value in cells.items()},
+        {
+            (row, column, ""): value
+            for row, cells in _PUBLISHED_2_1.items()
+            for column, value in zip(("feasible_at_infinity", "p", "T"), cells, strict=True)
+        },
         _table_2_1,
     ),
     "3.2": Source(
@@ -96,6 +88,7 @@ TABLES = {
         orientation_tables.PUBLISHED["3.3"],
         orientation_tables.table_3_3,
         with_choice=True,
+        transposed=True,
     ),
     "3.4": Source(
         "Dion-Gauvin thesis, Table 3.4: smallest proportion (%) of attainable orientations from 1.5b to 3b, z0 = z",
@@ -119,7 +112,7 @@ def table_cells(name: str, choice: Choice | None = None) -> list[Cell]:
     source = TABLES[name]
     computed = source.compute(choice or Choice()) if source.with_choice else source.compute()
     return [
-        Cell(row, column, value, source.published.get((row, column, variant)), variant)
+        Cell(row, column, value, source.published.get((row, column, variant), ""), variant)
         for (row, column, variant), value in computed.items()
     ]
 
@@ -138,9 +131,8 @@ def table_object(name: str, cells: list[Cell]) -> dict[str, Any]:
 
 
 def _plain(cell: Cell) -> dict[str, Any]:
-    found = dataclasses.asdict(cell)
-    variant = found.pop("variant")
-    return found | ({"variant": _variant(variant)} if variant else {})
+    found = {"row": cell.row, "column": cell.column, "computed": cell.computed, "published": cell.published}
+    return found | ({"variant": _variant(cell.variant)} if cell.variant else {})
 
 
 def _variant(text: str) -> dict[str, str]:
@@ -150,32 +142,45 @@ def _variant(text: str) -> dict[str, str]:
     return dict(part.split(" = ", 1) for part in text.split("; "))
 
 
-def table_for_people(name: str, cells: list[Cell]):
-    """The table for a terminal: published, computed, difference.
+def table_for_people(name: str, cells: list[Cell]) -> Any:
+    """The table for a terminal, as printed: published and computed in each cell.
 
     Args:
         name: of the table.
         cells: its cells.
 
     Returns:
-        a rich table.
+        a rich renderable.
     """
-    from rich.table import Table  # only a terminal needs it
-
-    note = "- : the project does not know the published value"
-    table = Table(title=TABLES[name].title, title_justify="left", caption=note, caption_justify="left")
-    several = any(cell.variant for cell in cells)
-    for head in ("row", "column", *(["reading"] if several else []), "published", "computed", "difference"):
-        table.add_column(head, justify="left" if head in ("column", "reading") else "right")
-    for cell in cells:
-        known = cell.published is not None and cell.computed is not None
-        difference = f"{(cell.computed or 0.0) - (cell.published or 0.0):+.4f}" if known else "-"
-        numbers = _number(cell.published), _number(cell.computed), difference
-        table.add_row(cell.row, cell.column, *([cell.variant] if several else []), *numbers)
-    return table
+    return grid(TABLES[name].title, cells, transposed=TABLES[name].transposed)
 
 
-def _number(value: float | None) -> str:
-    if value is None:
-        return "-"
-    return str(int(value)) if float(value).is_integer() else f"{value:.4f}"
+def chosen(name: str, given: dict[str, Any]) -> Choice | None:
+    """What a table is computed with, from the options of the command line.
+
+    Args:
+        name: of the table.
+        given: values of --definition, --amplitude and --fine, None where absent.
+
+    Returns:
+        the choice; None for a table that has none.
+
+    Raises:
+        ConfigError: an option given with such a table.
+    """
+    if not TABLES[name].with_choice:
+        for option, value in given.items():
+            if value is not None:
+                raise ConfigError(option, f"must be absent with table {name}")
+        return None
+    usual = Choice()
+
+    def every(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
+        value = given[option]
+        return otherwise if value is None else tuple(names) if value == "all" else (value,)
+
+    return Choice(
+        every("--definition", orientation_tables.DEFINITIONS, usual.definitions),
+        every("--amplitude", orientation_tables.AMPLITUDES, usual.amplitudes),
+        2 if given["--fine"] else 1,
+    )

@@ -100,13 +100,15 @@ def table_1_3() -> dict[Key, float | None]:
     return found
 
 
-PUBLISHED: dict[str, dict[Key, float]] = {
-    "1.1": {("n", "Planar", ""): 2.15, ("n", "H_0", ""): 3.86, ("n", "H_1", ""): 4.47},
+# As printed, digit by digit.
+PUBLISHED: dict[str, dict[Key, str]] = {
+    "1.1": {("n", "Planar", ""): "2.15", ("n", "H_0", ""): "3.86", ("n", "H_1", ""): "4.47"},
     "1.2": {
         (row, column, ""): value
         for row, values in {
-            "A1": (0.5681, 1.21, 0.85, 0.69, 0.76, 2.82),
-            "A2": (0.48798, 1.54, 1.1, 0.93, 1.29, 8.25),
+            "A1": ("0.5681", "1.21", "0.85", "0.69", "0.76", "2.82"),
+            "A2": ("0.48798", "1.54", "1.1", "0.93", "1.29", "8.25"),
+            "A3": ("0.71002", "1.41", "0.90", "0.61", "0.73", "1.62"),
         }.items()
         for column, value in zip(("optimal inclination", "-v_opt", "0", "v_opt", "0.8", "0.999"), values, strict=True)
     },
@@ -114,10 +116,12 @@ PUBLISHED: dict[str, dict[Key, float]] = {
         (row, column, reading): value
         for reading in _READINGS
         for row, column, value in (
-            ("n", "A_idl", 2.76),
-            ("n", "A1", 4.85),
-            ("n", "A_eff", 2.94),
-            ("epsilon", "A_eff", 0.0399),
+            ("n", "A_idl", "2.76"),
+            ("n", "A1", "4.85"),
+            ("n", "A2", "5.17"),
+            ("n", "A3", "4.72"),
+            ("n", "A_eff", "2.94"),
+            ("epsilon", "A_eff", "0.0399"),
         )
     },
 }

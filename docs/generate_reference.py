@@ -5,8 +5,8 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from cspr_jax.config.plan import Choice, PlanFile, Pose
-from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepLimits, SweepTrajectory
+from cspr_jax.config.robot import LimitTable, RobotFile
+from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepTrajectory
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.errors import ExitCode
 from cspr_jax.feasibility.verdicts import SENTENCES
@@ -31,10 +31,10 @@ FILES = {
         ("[trajectory]", SweepTrajectory),
         ("trajectory.from", From),
         ("[orientations]", Orientations),
-        ("[limits]", SweepLimits),
+        ("[limits]", LimitTable),
         ("[run]", Run),
     ],
-    "Plan files": [("", PlanFile), ("[[pose]]", Pose), ("z0, chosen", Choice)],
+    "Plan files": [("", PlanFile), ("[[pose]]", Pose), ("z0, chosen", Choice), ("[limits]", LimitTable)],
     "Amplitude functions": [
         ("amplitude, with a parameter", NamedAmplitude),
         ("amplitude, your own", PolynomialAmplitude),

@@ -37,6 +37,7 @@ z0 = [1.7]
 from = { rest = true }
 """
 ROBOT, Z0, POSE, FROM, AXES = 'robot = "prototype"', "z0 = 1.7", "position = [0.7, 0.7, 3.0]", "from =", "[axes]"
+UP_IN_LINE, UP = "[[0, 1, 3], [1, 2, 3], [2, 3, 3]]", "[[0, 1, 3], [2, 1, 3], [1, 4, 3]]"
 ON_A_LINE, UPRIGHT = "[[0, 0, 0], [1, 0, 0], [2, 0, 0]]", "[[0, 0, 0], [1, 0, 0], [0, 0, 1]]"
 
 
@@ -57,7 +58,7 @@ PLANS = {
     "no z0": (f"{Z0}\n", "", "z0 is missing", "depth of P0"),
     "schema 2": ("schema = 1", "schema = 2", "schema = 2", "must be 1"),
     "text for a number": (Z0, 'z0 = "1.7"', 'z0 = "1.7"', "number"),
-    "number for true": ("rest = true", "rest = 1", "pose[0].rest = 1", "boolean"),
+    "number for true": ("rest = true", "rest = 1", "pose[0].rest = 1", "must be true or false, not a number"),
     "fraction for a count": (Z0, f"{Z0}\nmax_arcs = 2.5", "max_arcs = 2.5", "integer"),
     "date": (Z0, "z0 = 2020-01-01", "z0 = ", "number"),
     "nan": (Z0, "z0 = nan", "z0 = nan", "finite"),
@@ -66,14 +67,21 @@ PLANS = {
     "z0 < 0": (Z0, "z0 = -1.5", "z0 = -1.5", "greater than 0"),
     "z0 chosen how": (Z0, 'z0 = { choose = "fast" }', 'z0.choose = "fast"', "mean", "conservative", "fastest"),
     "family": (Z0, f'{Z0}\nfamily = "bezier"', 'family = "bezier"', "hypocycloid-standard"),
-    "max_arcs = 0": (Z0, f"{Z0}\nmax_arcs = 0", "max_arcs = 0", "greater than or equal to 1"),
-    "arcs = 0": (POSE, f"{POSE}\narcs = 0", "pose[1].arcs = 0", "greater than or equal to 1"),
+    "max_arcs = 0": (Z0, f"{Z0}\nmax_arcs = 0", "max_arcs = 0", "must be at least 1"),
+    "arcs = 0": (POSE, f"{POSE}\narcs = 0", "pose[1].arcs = 0", "must be at least 1"),
     "two coordinates": (POSE, "position = [0.7, 0.7]", "pose[1].position", "3 values"),
     "no position": (POSE, "arcs = 3", "pose[1].position is missing", "rest = true"),
     "rest off P0": ("rest = true", "rest = true\nposition = [0, 0, 1.8]", "pose[0].position", "P0 = [0.0, 0.0, 1.7]"),
     "one pose": (f"[[pose]]\n{POSE}\n", "", "pose", "at least 2"),
     "mass = 0": (ROBOT, inline(mass="mass = 0"), "robot.mass = 0", "greater than 0"),
     "spools in line": (ROBOT, inline(ON_A_LINE), "robot.base_points", "not on one line"),
+    "numbers as typed": (ROBOT, inline(UP_IN_LINE, more=', z_axis = "up"'), "= [[0.0, 1.0, 3.0], [1.0, 2.0, 3.0], [2"),
+    "P0 as typed": (
+        f"{ROBOT}\n{Z0}\n[[pose]]",
+        inline(UP, more=', z_axis = "up"') + f"\n{Z0}\n[[pose]]\nposition = [0, 0, 1]",
+        "pose[0].position = [0.0, 0.0, 1.0]",
+        "P0 = [1.0, 2.0, 1.3]",
+    ),
     "spools far away": (ROBOT, inline("[[0, 1e300, 0], [1, 0, 0], [0, 0, 1]]"), "robot.base_points"),
     "vertical spools": (ROBOT, inline(UPRIGHT), "robot.base_points", "plane is not vertical"),
     "tensions crossed": (Z0, f"{Z0}\ntension_min = 2.0\ntension_max = 2.0", "tension_min", "below tension_max"),
@@ -89,7 +97,7 @@ PLANS = {
 }
 for value in ("0.0", "0.6", "-inf", '"better"'):
     named = f'{Z0}\namplitude = {{ name = "effective", epsilon = {value} }}'
-    PLANS[f"epsilon {value}"] = (Z0, named, f"amplitude.epsilon = {value}: must be ")
+    PLANS[f"epsilon {value}"] = (Z0, named, f"amplitude.epsilon = {value}: ", "must be ")
 for choice in ("mean", "conservative"):
     named = f'z0 = {{ choose = "{choice}" }}'
     PLANS[f"rest, z0 {choice}"] = (Z0, f"{named}\n[[pose]]\nrest = true\nposition = [0, 0, 1]", "pose[0]", "absent")
@@ -98,23 +106,29 @@ SWEEPS = {
     "near": (AXES, "[run]\ndtyp = 1\n[axes]", "unknown key run.dtyp = 1", "did you mean dtype?"),
     "near axis": ("z0 = [1.7]", "z0 = [1.7]\nfromx = [1.0]", "axes.fromx", "did you mean from_x?"),
     "python's name of a key": (FROM, "start =", "trajectory.start", "from"),
-    "map": ("minimum-arcs", "minimum-arc", 'map = "minimum-arc"', "'minimum-arcs'"),
+    "map": ("minimum-arcs", "minimum-arc", 'map = "minimum-arc"', 'did you mean "minimum-arcs"?'),
     "no axis": ("z0 = [1.7]\n", "", "axes.z0 is missing", "depth of P0"),
-    "count = 0": ("count = 2", "count = 0", "axes.z.count = 0", "greater than or equal to 1"),
+    "count = 0": ("count = 2", "count = 0", "axes.z.count = 0", "must be at least 1"),
     "nan": ("[0.2]", "[nan]", "axes.y[0] = nan", "finite"),
     "infinite range": ("start = 1.0, stop = 2.0", "start = -1e308, stop = 1e308", "axes.z", "1000000"),
     "z0 = 0": ("[1.7]", "[1.7, 0]", "axes.z0 = 0.0", "> 0"),
     "z0 < 0": ("[1.7]", "{ start = -1, stop = 1.7, count = 2 }", "axes.z0 = -1.0", "> 0"),
     "short tile": (AXES, "[run]\ntile = [1, 2]\n[axes]", "run.tile = [1, 2]", "4 integers"),
     "large tile": (AXES, "[run]\ntile = [300, 300, 1, 1]\n[axes]", "run.tile", "65536"),
-    "quantity": (AXES, '[run]\nstore = ["arc"]\n[axes]', 'run.store[0] = "arc"', "'arcs'"),
+    "quantity": (AXES, '[run]\nstore = ["arc"]\n[axes]', 'run.store[0] = "arc"', 'did you mean "arcs"?'),
     "quantity twice": (AXES, '[run]\nstore = ["arcs", "arcs"]\n[axes]', "run.store"),
     "epsilon best": (FROM, 'amplitude = { name = "effective", epsilon = "best" }\nfrom =', "epsilon", "a number in"),
     "A1": (FROM, 'amplitude = "A1"\nfrom =', 'trajectory.amplitude = "A1"', "(2.49)", "A''(1) = -12, must be 0"),
     "no start": ("from = { rest = true }", "", "trajectory.from is missing", "rest = true", "from_x"),
     "two starts": ("rest = true", "rest = true, position = [0, 0, 1]", "trajectory.from", "one of them"),
     "rest elsewhere": ("z0 = [1.7]", "z0 = [1.7]\nfrom_x = [1.0]", "axes.from_x", "must be absent"),
-    "all above": ("start = 1.0, stop = 2.0", "start = -2.0, stop = 0.0", "axes", "above the spool plane"),
+    "all above": (
+        "start = 1.0, stop = 2.0",
+        "start = -2.0, stop = 0.0",
+        "axes",
+        "above the spool plane",
+        "z points down",
+    ),
     "starts above": ("rest = true", "position = [0, 0, -1]", "trajectory.from", "above the spool plane"),
     "all below": (AXES, "[limits]\nfloor = 0.9\n[axes]", "axes", "below the floor"),
     "starts below": (AXES, "[limits]\nfloor = 1.6\n[axes]", "trajectory.from", "below the floor"),
@@ -159,7 +173,7 @@ def test_a_mistake_is_one_line(capsys, tmp_path, monkeypatch, command, good, row
     for part in wanted:
         assert part in line
     assert any(line.startswith(f"cspr: {name}") for name in ("in.toml: ", "no/such.toml: ", "a"))
-    for inner in ("Error", "constrained", "Input should", "pydantic", "datetime"):
+    for inner in ("Error", "constrained", "Input should", "valid", "instance", "pydantic", "datetime", "None"):
         assert inner not in line
 
 

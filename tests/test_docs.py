@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 from cspr_jax import cli, tables
-from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import checked, read_toml
+from cspr_jax.config.robot import read_robot
+from cspr_jax.errors import ConfigError
 from cspr_jax.quantities import QUANTITIES
 from cspr_jax.sweep.definition import read_sweep
 
@@ -34,7 +36,7 @@ def commands(page: Path) -> list[list[str]]:
 @pytest.fixture
 def checkout(tmp_path, monkeypatch):
     """A working directory with the files that documents name, free to be written to."""
-    for name in ("sweeps", "results/reference"):
+    for name in ("sweeps", "results/reference", "docs/examples"):
         shutil.copytree(ROOT / name, tmp_path / name)
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -73,6 +75,35 @@ def test_sweeps_of_the_documents_are_read(page, checkout):
         path.write_text(text, "utf-8")
         if "map" in read_toml(path):
             assert read_sweep(path).grid.size > 0
+
+
+def test_the_first_robot_and_plan(checkout, capsys):
+    """They are shown as they are, and what the page shows of them is what the program prints."""
+    page = ROOT / "docs" / "first_robot.md"
+    files = [checkout / "docs" / "examples" / name for name in ("hall.toml", "hall_plan.toml")]
+    assert blocks(page, "toml") == [path.read_text("utf-8") for path in files]
+    assert read_robot(files[0]).z_axis == "up"
+    assert cli.main(["plan", str(files[1])]) == 0
+    printed = capsys.readouterr()
+    shown, line = blocks(page, "text")
+    assert [text.rstrip() for text in printed.out.splitlines()] == shown.splitlines() and printed.err == ""
+    namespace: dict[str, object] = {"__name__": "first_robot"}
+    for text in blocks(page, "python"):
+        exec(compile(text, page.name, "exec"), namespace)
+    assert capsys.readouterr().out.startswith("[3 1 3] [1.12")
+    files[1].write_text(files[1].read_text("utf-8").replace("tension_min = 1.0", "max_tension = 40.0"), "utf-8")
+    with pytest.raises(ConfigError) as caught:
+        read_plan(files[1])
+    assert line == f"cspr: {str(caught.value).replace(str(files[1]), 'hall_plan.toml')}\n"
+
+
+def test_sources_are_named_as_what_they_are():
+    texts = [
+        path for folder in ("cspr_jax", "docs", "sweeps", "tests", "benchmarks") for path in (ROOT / folder).rglob("*")
+    ]
+    texts = [path for path in [*texts, *PAGES] if path.suffix in (".md", ".py", ".toml")]
+    word = re.compile("the " + "seeds")
+    assert [str(path) for path in texts if word.search(path.read_text("utf-8").lower())] == []
 
 
 def test_files_in_sweeps_are_read():

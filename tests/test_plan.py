@@ -284,3 +284,31 @@ def test_the_table_for_people(tmp_path):
     for row, place, arcs in zip(rows, ("(0.1, -0.6, 1.8)", "(0, -1.1, 1.7)"), "56", strict=True):
         assert place in row and arcs in row.split("│")[3]
     assert "total 14.36 s" in out and "z down" in out
+
+
+def test_limits_in_a_table_of_their_own(tmp_path, printed):
+    text = SEQUENCE.replace("floor = 3.5\n", "").replace("[[pose]]", "[limits]\nfloor = 3.5\n[[pose]]", 1)
+    assert planned(tmp_path, text) == printed
+
+
+def test_hints_go_to_stderr_and_change_nothing_else(tmp_path):
+    """Spools in millimetres, and below everything, as z was meant to point up: both are computed, and asked about."""
+    points = (1000.0 * BASE + [0.0, 0.0, 10.0]).tolist()
+    robot = f'{{ name = "mm", mass = 0.198, base_points = {points} }}'
+    code, out, err = cspr(tmp_path, SEQUENCE.replace('"prototype"', robot), "--json")
+    assert (code, strict_json(out)["feasible"]) == (1, False)
+    units, axis = err.splitlines()
+    assert units.startswith(
+        "cspr: hint: robot.base_points: spools 450.333 m apart, for a mass of 0.198 kg: are these mill"
+    )
+    assert axis.startswith("cspr: hint: pose: every target is above every spool: ") and 'z_axis = "up"?' in axis
+
+
+def test_all_errors(tmp_path):
+    text = ONE.replace("max_arcs = 30", "max_arcs = 0\nmax_tension = 3.0")
+    line = "unknown key max_tension = 3.0: did you mean tension_max? allowed: amplitude,"
+    for arguments, count in (((), 1), (("--all-errors",), 2)):
+        code, out, err = cspr(tmp_path, text, *arguments)
+        assert (code, out, len(err.splitlines())) == (2, "", count) and line in err
+        assert ("(and 1 more: --all-errors shows them)" in err) == (count == 1)
+    assert err.endswith("plan.toml: max_arcs = 0: must be at least 1\n")

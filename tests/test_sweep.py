@@ -297,3 +297,21 @@ def test_the_reference_data_set_is_what_the_program_computes():
     for name, stored in result.data.items():
         rtol = 1e-6 if name in FLOATS else 0.0
         np.testing.assert_allclose(stored[index], answers[name], rtol=rtol, atol=rtol, err_msg=name)
+
+
+def test_hints_come_with_what_is_computed_and_with_nothing_refused(tmp_path):
+    robot = '{ name = "mm", mass = 1.0, base_points = [[0, 0, 0], [1000, 0, 0], [0, 1000, 0]] }'
+    code, out, err = cspr("run", sweep_file(tmp_path, robot=robot), "-o", tmp_path / "run")
+    assert (code, out.splitlines()[-1]) == (0, str(tmp_path / "run" / "tiny.h5"))
+    assert err.startswith("cspr: hint: robot.base_points: spools 1414.21 m apart") and len(err.splitlines()) == 1
+    above = AXES.replace("start = 0.5, stop = 2.5", "start = -2.5, stop = -0.5")
+    code, out, err = cspr("run", sweep_file(tmp_path, axes=above, robot=robot))
+    assert (code, out, len(err.splitlines())) == (2, "", 1) and 'does it lack z_axis = "up"?' in err
+
+
+def test_all_errors_of_a_sweep(tmp_path):
+    path = sweep_file(tmp_path, axes=AXES.replace("count = 5", "count = 0"), start=f"{FROM}\nmax_arc = 3")
+    for arguments, count in (((), 1), (("--all-errors",), 2)):
+        code, out, err = cspr("run", path, *arguments)
+        assert (code, out, len(err.splitlines())) == (2, "", count)
+    assert "unknown key trajectory.max_arc = 3: did you mean max_arcs?" in err and "axes.x.count = 0: must be" in err

@@ -1,12 +1,16 @@
 """Plan files: a sequence of poses to be reached."""
 
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from cspr_jax.config.reading import Table
-from cspr_jax.config.robot import Coordinate, LimitKeys, Point, Positive
+from cspr_jax.config.kinds import refuse_other_kinds
+from cspr_jax.config.reading import Table, checked, read_toml
+from cspr_jax.config.robot import Coordinate, LimitKeys, LimitTable, Point, Positive
 from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
+from cspr_jax.config.wording import fault
+from cspr_jax.errors import shown
 
 
 class Choice(Table):
@@ -56,6 +60,37 @@ class PlanFile(TrajectoryKeys, LimitKeys):
     )
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
     floor: Coordinate | None = Field(None, description="z of the floor, m")
+    limits: LimitTable | None = Field(
+        None, description="[limits], as in a sweep: the same keys as here, each in one of both places"
+    )
     pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
         description="the poses in their order, at least two [[pose]] tables"
     )
+
+    @model_validator(mode="after")
+    def _one_place(self) -> "PlanFile":
+        if self.limits is None:
+            return self
+        given = {name: getattr(self.limits, name) for name in sorted(self.limits.model_fields_set)}
+        for name, value in given.items():
+            if getattr(self, name) is not None:
+                raise fault(f"limits.{name}", value, f"absent beside {name} = {shown(getattr(self, name))}")
+        # The rest of the program finds limits in one place.
+        return self.model_copy(update={"limits": None, **given})
+
+
+def read_plan(path: Path) -> PlanFile:
+    """A plan file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        its content, limits of [limits] beside the other keys.
+
+    Raises:
+        ConfigError: a mistake in it.
+    """
+    data = read_toml(path)
+    refuse_other_kinds(data, "plan", path)
+    return checked(PlanFile, data, path)

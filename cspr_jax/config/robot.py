@@ -1,13 +1,15 @@
 """Robot files and the catalogue."""
 
-import difflib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
+from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import Table, checked, read_toml
-from cspr_jax.errors import ConfigError, shown
+from cspr_jax.config.suggestions import did_you_mean
+from cspr_jax.config.wording import fault
+from cspr_jax.errors import ConfigError, InputError, shown
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
@@ -42,11 +44,24 @@ class LimitKeys(Table):
     )
 
 
+class LimitTable(LimitKeys):
+    """Limits of all motions of the file."""
+
+    floor: Coordinate | None = Field(None, description="z of the floor, m")
+
+
+# What is supported, by the number of spools.
+NUMBERS = {2: "2 (planar = true)", 3: "3 (a point mass)", 6: "6 (a rigid platform, with platform_points and inertia)"}
+SUPPORTED = "supported are " + ", ".join(NUMBERS.values())
+# Two spools count as level if their heights differ by less than this part of their distance; as in `robots`.
+LEVEL = 1e-9
+
+
 class RobotFile(LimitKeys):
     """A point mass on three cables, or on two in the plane y = 0; or a rigid platform on six."""
 
     name: str = Field(description="name of the robot", min_length=1)
-    base_points: Annotated[list[Point], Field(min_length=2, max_length=6)] = Field(
+    base_points: list[Point] = Field(
         description="where the cables leave their spools: three points [x, y, z] in cable order, m; two if planar, "
         "six with a rigid platform"
     )
@@ -70,19 +85,50 @@ class RobotFile(LimitKeys):
         """Whether it is a rigid platform on six cables."""
         return self.platform_points is not None
 
+    @field_validator("base_points")
+    @classmethod
+    def _number(cls, points: list[Point]) -> list[Point]:
+        if len(points) not in NUMBERS:
+            raise fault("", f"{len(points)} points", f"a supported number of cables: {SUPPORTED}")
+        return points
+
     @model_validator(mode="after")
     def _kind(self) -> "RobotFile":
         if (self.platform_points is None) != (self.inertia is None):
-            raise ValueError("with both platform_points and inertia (a rigid platform), or neither (a point mass)")
+            missing, other = ("inertia", "platform_points") if self.inertia is None else ("platform_points", "inertia")
+            raise fault(missing, None, f"a rigid platform has it beside {other}, a point mass has neither")
         if self.centre_of_mass is not None and not self.is_platform:
-            raise ValueError("without centre_of_mass, unless it has platform_points and inertia")
+            raise fault("centre_of_mass", self.centre_of_mass, "absent without platform_points and inertia")
         if self.is_platform and self.planar:
-            raise ValueError("planar, or a rigid platform, not both")
+            raise fault("planar", True, "false, or absent, for a rigid platform (platform_points, inertia)")
         wanted = 6 if self.is_platform else 2 if self.planar else 3
         if len(self.base_points) != wanted:
-            kind = "rigid platform" if self.is_platform else "planar robot" if self.planar else "point mass"
-            raise ValueError(f"a robot with {wanted} base_points: a {kind}")
+            allowed = f"{NUMBERS[wanted]}, as the other keys say; {SUPPORTED}"
+            raise fault("base_points", f"{len(self.base_points)} points", allowed)
+        if self.planar:
+            _check_level(self.base_points)
         return self
+
+    def typed(self, error: InputError) -> str:
+        """The line of an error about this robot, with the numbers of the file instead of those of the kernels' axes.
+
+        Args:
+            error: whose key is one of the file's.
+
+        Returns:
+            the line, without the file's name.
+        """
+        value = getattr(self, error.key, None)
+        if error.fault or value is None:
+            return f"robot.{error}"
+        return f"robot.{error.key} = {shown(value)}: must be {error.allowed}"
+
+
+def _check_level(points: list[Point]) -> None:
+    (x1, _, z1), (x2, _, z2) = points
+    if abs(z2 - z1) > LEVEL * abs(x2 - x1):
+        heights = f"spools at heights z = {z1:g} and {z2:g}"
+        raise fault("base_points", heights, "level in a planar robot: give both spools the same z")
 
 
 def catalogue_names() -> list[str]:
@@ -119,8 +165,7 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
         return read_robot(path)
     if reference in catalogue_names():
         return read_robot(CATALOGUE / f"{reference}.toml")
-    near = difflib.get_close_matches(reference, catalogue_names(), n=1)
-    hint = f"did you mean {near[0]}? " if near else ""
+    hint = did_you_mean(reference, catalogue_names())
     names = ", ".join(catalogue_names())
     raise ConfigError(file, f"robot = {shown(reference)}: {hint}must be one of {names}, or a path to a .toml file")
 
@@ -137,4 +182,6 @@ def read_robot(path: Path) -> RobotFile:
     Raises:
         ConfigError: a mistake in it.
     """
-    return checked(RobotFile, read_toml(path), path)
+    data = read_toml(path)
+    refuse_other_kinds(data, "robot", path)
+    return checked(RobotFile, data, path)

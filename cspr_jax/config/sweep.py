@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from cspr_jax.config.reading import Table
-from cspr_jax.config.robot import Coordinate, LimitKeys, Point
+from cspr_jax.config.robot import Coordinate, LimitTable, Point
 from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.quantities import STORABLE
 from cspr_jax.tiles import LARGEST_TILE
@@ -120,12 +120,6 @@ class Orientations(Table):
     )
 
 
-class SweepLimits(LimitKeys):
-    """Limits of every cell."""
-
-    floor: Coordinate | None = Field(None, description="z of the floor, m")
-
-
 class Run(Table):
     """How to compute and what to keep."""
 
@@ -175,5 +169,5 @@ class SweepFile(Table):
         description="[orientations] of orientations, orientation-workspace and attainability: definition, divisions, "
         "values",
     )
-    limits: SweepLimits = Field(default_factory=SweepLimits, description="[limits]")
+    limits: LimitTable = Field(default_factory=LimitTable, description="[limits]")
     run: Run = Field(default_factory=Run, description="[run] dtype, tile, store")

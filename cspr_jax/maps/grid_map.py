@@ -7,6 +7,7 @@ import numpy as np
 
 from cspr_jax import problem
 from cspr_jax.amplitudes import Amplitude
+from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
@@ -117,7 +118,10 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         depth = points @ np.asarray(plane_normal(self._shared.robot))
         floor = self._shared.limits.floor
         if not (depth > 0.0).any():
-            raise ConfigError(self._file, f"{key}: every point is above the spool plane: must be some below it")
+            question = axis_question("down" if self._frame.signs[2] > 0.0 else "up")
+            raise ConfigError(
+                self._file, f"{key}: every point is above the spool plane: must be some below ({question})"
+            )
         if floor is not None and not (points[:, 2] <= np.asarray(floor)).any():
             raise ConfigError(self._file, f"{key}: every point is below the floor: must be some above it")
 

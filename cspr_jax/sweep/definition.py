@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax import __version__
+from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import checked, parse_toml, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile
@@ -84,6 +85,7 @@ def read_sweep(path: Path) -> Sweep:
         raise ConfigError(path, f"a name of {len(os.fsencode(path.stem))} bytes: must be at most {LONGEST_NAME}")
     text = read_text(path)
     data = parse_toml(text, path)
+    refuse_other_kinds(data, "sweep", path)
     keys = checked(SweepFile, data, path)
     robot = resolve_robot(keys.robot, path, path.parent)
     check_map(keys, path)
@@ -96,7 +98,7 @@ def read_sweep(path: Path) -> Sweep:
         if name not in OF_MAP[keys.map]:
             raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(OF_MAP[keys.map])} in this map")
     tile = _tile(keys, tuple(counts.values()), path)
-    _check_size(counts, tile, store, keys.run.dtype, path)
+    _check_size(counts, tile, keys, store, path)
     axes = {name: _points(getattr(keys.axes, name)) for name in data["axes"]}
     check_points(axes, path)
     axes |= own
@@ -130,7 +132,7 @@ def _orientation_axes(keys: SweepFile) -> dict[str, np.ndarray]:
 def _tile(keys: SweepFile, shape: tuple[int, ...], path: Path) -> tuple[int, ...]:
     tile = keys.run.tile
     if tile is None:
-        return tile_shape(shape, LONG_CELLS.get(keys.map, LARGEST_TILE))
+        return _usual_tile(keys, shape)
     if len(tile) != len(shape) or float(np.prod(tile, dtype=float)) > LARGEST_TILE:
         raise ConfigError(
             path, f"run.tile = {shown(tile)}: must be {len(shape)} integers whose product is at most {LARGEST_TILE}"
@@ -138,14 +140,27 @@ def _tile(keys: SweepFile, shape: tuple[int, ...], path: Path) -> tuple[int, ...
     return tuple(min(t, n) for t, n in zip(tile, shape, strict=True))
 
 
-def _check_size(counts: dict[str, int], tile: tuple[int, ...], store: list[str], dtype: str, path: Path) -> None:
+def _usual_tile(keys: SweepFile, shape: tuple[int, ...]) -> tuple[int, ...]:
+    return tile_shape(shape, LONG_CELLS.get(keys.map, LARGEST_TILE))
+
+
+def _check_size(counts: dict[str, int], tile: tuple[int, ...], keys: SweepFile, store: list[str], path: Path) -> None:
     # Before any memory is taken; `check_room` looks at what is free when the run starts.
-    needed = bytes_needed(tuple(counts.values()), store, dtype)
+    shape, place = tuple(counts.values()), f"axes: {_cells_of(counts)}"
+    needed = bytes_needed(shape, store, keys.run.dtype)
     if needed > LARGEST_RESULT:
-        raise ConfigError(path, _too_large(counts, needed, LARGEST_RESULT))
-    tiles = len(Tiling(tuple(counts.values()), tile))
-    if tiles > LARGEST_TILES:
-        raise ConfigError(path, f"run.tile = {shown(list(tile))}: {tiles} tiles: must be at most {LARGEST_TILES}")
+        raise ConfigError(path, f"{place} needs {needed / 1e9:.3g} GB: must be at most {LARGEST_RESULT / 1e9:.3g} GB")
+    tiles, usual = len(Tiling(shape, tile)), _usual_tile(keys, shape)
+    if tiles <= LARGEST_TILES:
+        return
+    if len(Tiling(shape, usual)) <= LARGEST_TILES:
+        raise ConfigError(
+            path,
+            f"run.tile = {shown(list(tile))}: {tiles} tiles: must be so large that there are at most {LARGEST_TILES}, "
+            f"or absent: then it is {list(usual)}",
+        )
+    most = LARGEST_TILES * math.prod(usual)
+    raise ConfigError(path, f"{place} is too large: must be at most {most} cells; fewer points, or several sweeps")
 
 
 def check_room(sweep: Sweep, directory: Path, done: float) -> None:
@@ -164,12 +179,17 @@ def check_room(sweep: Sweep, directory: Path, done: float) -> None:
     free = shutil.disk_usage(folder).free
     if needed > free:
         counts = {name: len(points) for name, points in sweep.grid.axes.items()}
-        raise ConfigError(sweep.file, _too_large(counts, needed, free))
+        raise ConfigError(
+            sweep.file,
+            f"axes: {_cells_of(counts)} needs {needed / 1e9:.3g} GB: must fit on the disk ({free / 1e9:.3g} GB free)",
+        )
 
 
-def _too_large(counts: dict[str, int], needed: float, free: float) -> str:
-    cells = " x ".join(str(n) for n in counts.values())
-    return f"axes: a grid of {cells} needs {needed / 1e9:.3g} GB: must fit on the disk ({free / 1e9:.3g} GB free)"
+def _cells_of(counts: dict[str, int]) -> str:
+    # Which axis has how many points, and which has most.
+    largest = max(counts, key=lambda name: counts[name])
+    cells = f"{' x '.join(str(n) for n in counts.values())} ({', '.join(counts)})"
+    return f"a grid of {cells}, most along {largest},"
 
 
 def run_directory(sweep: Sweep) -> Path:

@@ -1,0 +1,88 @@
+"""What a file may have got wrong although it can be computed: hints, which change neither results nor exit codes."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import RobotFile
+
+# Cameras over stadiums hang from spools up to 250 m apart; what is larger, such as the cabin of a radio telescope,
+# weighs tonnes.
+LARGEST_SPAN, LARGEST_MASS = 300.0, 1000.0  # m, kg
+# A body's radius of gyration is near its size. Grams for kilograms or millimetres for metres miss by 1e3 at least.
+INERTIA_RATIOS = (1e-5, 1e3)
+
+
+def robot_hints(spec: RobotFile) -> list[str]:
+    """What may be wrong with the units of a robot.
+
+    Args:
+        spec: the robot.
+
+    Returns:
+        one line each.
+    """
+    found, spools = [], np.asarray(spec.base_points)
+    span = float(np.linalg.norm(spools[:, None] - spools, axis=2).max())
+    if span > LARGEST_SPAN and spec.mass < LARGEST_MASS:
+        found.append(
+            f"robot.base_points: spools {span:g} m apart, for a mass of {spec.mass:g} kg: are these millimetres? "
+            "Lengths are in m"
+        )
+    if spec.platform_points is not None and spec.inertia is not None:
+        arms = np.asarray(spec.platform_points) - np.asarray(spec.centre_of_mass or [0.0, 0.0, 0.0])
+        size, largest = float(np.linalg.norm(arms, axis=1).max()), float(np.abs(spec.inertia).max())
+        ratio = largest / (spec.mass * size**2) if size > 0.0 else 1.0
+        if not INERTIA_RATIOS[0] < ratio < INERTIA_RATIOS[1]:
+            found.append(
+                f"robot.inertia: {largest:g} kg m^2 for a mass of {spec.mass:g} kg and platform_points {size:g} m "
+                "from it: do the units fit? Inertia is in kg m^2, lengths are in m"
+            )
+    return found
+
+
+def plan_hints(keys: PlanFile, spec: RobotFile) -> list[str]:
+    """What may be wrong with a plan that is not feasible.
+
+    Args:
+        keys: the plan.
+        spec: its robot.
+
+    Returns:
+        one line each.
+    """
+    targets = [pose.position for pose in keys.pose if pose.position is not None and not pose.rest]
+    text = forgotten_axis(spec, targets)
+    return [f"pose: {text}"] if text else []
+
+
+def forgotten_axis(spec: RobotFile, targets: Iterable[Sequence[float]]) -> str:
+    """Whether the z axis seems to point the other way.
+
+    Args:
+        spec: the robot.
+        targets: [x, y, z] in the file's axes, m.
+
+    Returns:
+        what to look at, if every target is above every spool; else nothing.
+    """
+    heights = [target[2] for target in targets]
+    spools = [point[2] for point in spec.base_points]
+    is_above = max(heights) <= min(spools) if spec.z_axis == "down" and heights else False
+    if spec.z_axis == "up" and heights:
+        is_above = min(heights) >= max(spools)
+    return f"every target is above every spool: {axis_question(spec.z_axis)}" if is_above else ""
+
+
+def axis_question(z_axis: str) -> str:
+    """What to ask where everything is above the spools.
+
+    Args:
+        z_axis: "down" or "up", as the robot file has it.
+
+    Returns:
+        the question.
+    """
+    other = "up" if z_axis == "down" else "down"
+    return f'z points {z_axis} in this robot; does it lack z_axis = "{other}"?'

@@ -1,0 +1,42 @@
+"""Robot, plan or sweep: which kind of file it is, so that one given in place of another is told apart."""
+
+from typing import Any
+
+from cspr_jax.errors import ConfigError
+
+# Keys that only one kind has, and where it belongs.
+_MARKS = {
+    "sweep": ("map", "axes", "trajectory", "run", "orientations"),
+    "plan": ("pose",),
+    "robot": ("base_points", "platform_points", "mass", "inertia"),
+}
+_WANTED = {
+    "sweep": "a sweep file, with map, [axes] and [trajectory]",
+    "plan": "a plan file, with [[pose]] tables",
+    "robot": "a robot file, with base_points and mass",
+}
+_PLACES = {
+    "sweep": "a sweep is computed by `cspr run`",
+    "plan": "a plan is computed by `cspr plan`",
+    "robot": 'a robot file is named in a plan or sweep, robot = "FILE.toml"',
+}
+
+
+def refuse_other_kinds(data: dict[str, Any], wanted: str, file: object) -> None:
+    """Refuse a file of another kind, rather than every key of it.
+
+    Args:
+        data: the file's tables.
+        wanted: "sweep", "plan" or "robot".
+        file: named in errors.
+
+    Raises:
+        ConfigError: it has keys of another kind and none of its own.
+    """
+    if any(key in data for key in _MARKS[wanted]):
+        return
+    for kind, marks in _MARKS.items():
+        found = [key for key in marks if key in data]
+        if found:
+            keys = ", ".join(found)
+            raise ConfigError(file, f"is a {kind} file (it has {keys}): must be {_WANTED[wanted]}; {_PLACES[kind]}")

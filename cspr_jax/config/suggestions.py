@@ -1,0 +1,96 @@
+"""What a user probably meant by a key that does not exist: by its words first, then by its letters."""
+
+import difflib
+import re
+from collections.abc import Iterable
+
+# Words that users write for those of the keys.
+_SYNONYMS = {
+    "maximum": "max",
+    "largest": "max",
+    "upper": "max",
+    "minimum": "min",
+    "smallest": "min",
+    "lower": "min",
+    "begin": "from",
+    "start": "from",
+    "initial": "from",
+    "velocity": "speed",
+    "force": "tension",
+    "wire": "cable",
+    "rope": "cable",
+    "target": "position",
+    "ground": "floor",
+    "center": "centre",
+    "weight": "mass",
+    "anchors": "base",
+    "spools": "base",
+    "oscillations": "arcs",
+}
+# A height names the floor only where it cannot be a depth of P0 or a coordinate of targets.
+_HEIGHT = frozenset({"z0", "z"})
+ALIKE = 0.8  # of letters, for two words to be one that is misspelt
+ENOUGH = 0.5  # of all words of both keys
+LETTERS = 0.6
+LONGEST = 100  # letters of what somebody may have meant to be a key
+
+
+def nearest(given: str, allowed: Iterable[str]) -> str | None:
+    """The allowed name that a user probably meant.
+
+    Args:
+        given: what was written.
+        allowed: names.
+
+    Returns:
+        one of them; None if none is near.
+    """
+    names = list(allowed)
+    if len(given) > LONGEST:
+        return None
+    words = _words(given)
+    if "height" in words and _HEIGHT.isdisjoint(names):
+        words = [word.replace("height", "floor") for word in words]
+    if words:
+        # Among equals the one with the same letters.
+        ranked = [(_shared(words, _words(name)), _letters(given, name), name) for name in names]
+        best = max(ranked, default=(0.0, 0.0, ""))
+        if best[0] > ENOUGH:
+            return best[2]
+    near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=LETTERS)
+    return near[0] if near else None
+
+
+def did_you_mean(given: str, allowed: Iterable[str]) -> str:
+    """The question for an error's line.
+
+    Args:
+        given: what was written.
+        allowed: names.
+
+    Returns:
+        "did you mean NAME? ", or nothing.
+    """
+    near = nearest(given, allowed)
+    return f"did you mean {near}? " if near else ""
+
+
+def _words(name: str) -> list[str]:
+    # max_tension, max-tension, max.tension and maxTension are the same words.
+    parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+|\d+", name)
+    return [_SYNONYMS.get(part.lower(), part.lower()) for part in parts]
+
+
+def _letters(first: str, second: str) -> float:
+    return difflib.SequenceMatcher(None, first, second).ratio()
+
+
+def _shared(first: list[str], second: list[str]) -> float:
+    # Words that both have, over all words of both.
+    left, count = list(second), 0
+    for word in first:
+        near = difflib.get_close_matches(word, left, n=1, cutoff=ALIKE)
+        if near:
+            left.remove(near[0])
+            count += 1
+    return count / max(len(first) + len(left), 1)

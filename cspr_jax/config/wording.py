@@ -1,0 +1,208 @@
+"""What is wrong with a file, as one line in the words of TOML: no word of the library that checks it."""
+
+import datetime
+import math
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from cspr_jax.config.suggestions import nearest
+from cspr_jax.errors import shown
+
+# Names of the variants of a union; they are part of pydantic's location of an error, not of the user's key.
+VARIANT = "~"
+FAULT = "fault"
+LONGEST_NAME = 200
+_KINDS = {
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "dict_type": "a table",
+    "list_type": "a list",
+    "float_type": "a number",
+    "int_type": "an integer",
+    "bool_type": "true or false",
+    "string_type": "a string",
+    "finite_number": "a finite number",
+    "string_too_short": "a string that is not empty",
+}
+_BOUNDS = {
+    "greater_than": ("gt", "greater than"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "less than"),
+    "less_than_equal": ("le", "at most"),
+    "multiple_of": ("multiple_of", "a multiple of"),
+}
+
+
+def fault(key: str, value: object, allowed: str) -> PydanticCustomError:
+    """What a validator of a table raises about one of its keys, or about several together.
+
+    Args:
+        key: of the table; "" for the table itself.
+        value: text that is shown as it is, or any other value.
+        allowed: what would be right.
+
+    Returns:
+        the error.
+    """
+    given = value if isinstance(value, str) else shown(value)
+    return PydanticCustomError(FAULT, "{allowed}", {"key": key, "given": given, "allowed": allowed})
+
+
+def rank(error: ErrorDetails) -> int:
+    """Place of an error among those of a file: what explains others goes first.
+
+    Args:
+        error: pydantic's.
+
+    Returns:
+        the smaller, the earlier: another version of the format, then a misspelt key, which explains a missing one.
+    """
+    if error["loc"] == ("schema",) and error["type"] != "missing":
+        return 0
+    return 1 if error["type"] == "extra_forbidden" else 2
+
+
+def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
+    """One error as a line.
+
+    Args:
+        model: what the file must be.
+        error: pydantic's.
+        at: key under which the data stands.
+
+    Returns:
+        key, value and what is allowed.
+    """
+    # The last part of an unknown or missing key is the user's own, whatever it looks like.
+    own = error["loc"][-1:] if error["type"] in ("extra_forbidden", "missing") else ()
+    parts = [part for part in error["loc"][: len(error["loc"]) - len(own)] if not str(part).startswith(VARIANT)]
+    parts += own
+    if error["type"] == FAULT:
+        context = error.get("ctx", {})
+        parts += [context["key"]] if context["key"] else []
+        if context["given"] == shown(None):
+            return f"{_key(at, parts)} is missing: {context['allowed']}"
+        return f"{_key(at, parts)} = {context['given']}: must be {context['allowed']}"
+    if error["type"] == "extra_forbidden":
+        return f"unknown key {_key(at, parts)} = {shown(error['input'])}: {_suggestion(model, parts)}"
+    if error["type"] == "missing":
+        return f"{_key(at, parts)} is missing: {_description(model, parts)}"
+    question = _question(model, error, parts)
+    return f"{_key(at, parts)} = {shown(error['input'])}: {question}must be {_allowed(model, error, parts)}"
+
+
+def _question(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> str:
+    # What a string, or a number in place of a list, probably stands for.
+    value, key = error["input"], str(parts[-1]) if parts else ""
+    if not isinstance(value, str):
+        is_single = error["loc"][-1] == "~values" and isinstance(value, int | float) and not isinstance(value, bool)
+        return f"did you mean [{shown(value)}]? " if is_single else ""
+    if error["type"] == "literal_error":
+        near = nearest(value, error.get("ctx", {})["expected"].split("'")[1::2])
+        return f'did you mean "{near}"? ' if near else ""
+    field = _table_at(model, parts[:-1]).get(key)
+    tables = _tables_in(field.annotation) if field else []
+    if any(
+        value == name and inner.annotation is bool for table in tables for name, inner in table.model_fields.items()
+    ):
+        return f"did you mean {key} = {{ {value} = true }}? "
+    is_plain = (error["type"] in ("float_type", "int_type") and _is_number(value)) or (
+        error["type"] == "bool_type" and value in ("true", "false")
+    )
+    return f"did you mean {value}, without quotes? " if is_plain else ""
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text[:40]))
+    except ValueError:
+        return False
+
+
+def _allowed(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> str:
+    kind, value, context = error["type"], error["input"], error.get("ctx", {})
+    explained = _explained(model, error, parts)
+    if parts == ["schema"]:
+        allowed = "1, the version of the format that this program reads"
+    elif kind == "float_type" and isinstance(value, int) and not isinstance(value, bool):
+        allowed = "a number that is not as large"
+    elif kind in _KINDS:
+        is_kind = kind in ("string_too_short", "finite_number")
+        allowed = _KINDS[kind] + ("" if is_kind else f", not {_kind_of(value)}") + explained
+    elif kind in _BOUNDS:
+        bound, words = _BOUNDS[kind]
+        allowed = f"{words} {context[bound]:.15g}"
+    elif kind in ("too_short", "too_long"):
+        words = "at least" if kind == "too_short" else "at most"
+        number = context.get("min_length", context.get("max_length"))
+        allowed = f"a list of {words} {number} values, not {context['actual_length']}{explained}"
+    elif kind == "literal_error":
+        allowed = context["expected"].replace("'", '"') + explained
+    else:
+        allowed = str(context.get("error", error["msg"])).removeprefix("Input should be ")
+    return allowed
+
+
+def _kind_of(value: object) -> str:
+    names = ((bool, "true or false"), (int, "a number"), (float, "a number"), (str, "a string"), (list, "a list"))
+    dates = ((datetime.date, "a date"), (datetime.time, "a time"), (dict, "a table"))
+    return next((name for kind, name in names + dates if isinstance(value, kind)), "nothing")
+
+
+def _explained(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> str:
+    # A spelling for a table, or what the key is about, where the error is about the whole key.
+    if not parts or isinstance(parts[-1], int):
+        return ""
+    field = _table_at(model, parts[:-1]).get(str(parts[-1]))
+    if field is None:
+        return ""
+    is_whole = error["type"] != "literal_error" or str(error["loc"][-1]).startswith(VARIANT)
+    return f": {field.description.rstrip('.')}" if field.description and is_whole else ""
+
+
+def _key(at: str, parts: list[Any]) -> str:
+    text = at
+    for part in parts:
+        text += f"[{part}]" if isinstance(part, int) else f"{'.' if text else ''}{part}"
+    return (text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}...") or "the file"
+
+
+def _suggestion(model: type[BaseModel], parts: list[Any]) -> str:
+    table = _table_at(model, parts[:-1])
+    near = nearest(str(parts[-1]), table) or _elsewhere(model, parts)
+    return f"did you mean {near}? " * bool(near) + f"allowed: {', '.join(sorted(table))}"
+
+
+def _elsewhere(model: type[BaseModel], parts: list[Any]) -> str:
+    # The same key in another table of the file, where it is only misplaced.
+    top, name = _table_at(model, []), str(parts[-1])
+    if len(parts) > 1 and name in top:
+        return f"{name} above the first [table]"
+    for key, field in top.items():
+        for inner in _tables_in(field.annotation):
+            if name in {f.alias or n for n, f in inner.model_fields.items()} and str(parts[0]) != key:
+                return f"{key}.{name}"
+    return ""
+
+
+def _description(model: type[BaseModel], parts: list[Any]) -> str:
+    field = _table_at(model, parts[:-1]).get(str(parts[-1]))
+    return (field.description if field and field.description else "it is required").rstrip(".")
+
+
+def _table_at(model: type[BaseModel], parts: list[Any]) -> dict[str, Any]:
+    # Fields, by the key a user writes, of the table in which an error lies.
+    for part in parts:
+        field = {f.alias or n: f for n, f in model.model_fields.items()}.get(str(part))
+        inner = _tables_in(field.annotation) if field else [model]
+        if inner:
+            model = inner[0]
+    return {f.alias or n: f for n, f in model.model_fields.items()}
+
+
+def _tables_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [table for inner in getattr(annotation, "__args__", ()) for table in _tables_in(inner)]

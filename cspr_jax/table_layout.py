@@ -1,0 +1,104 @@
+"""A published table as printed: its rows and columns, published and computed numbers in one cell."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+MISMATCH, UNKNOWN, NOTHING = "!=", "?", "none"
+LEGEND = (
+    f"Each cell: published / computed, with as many digits as printed. {MISMATCH}: they differ by more than the "
+    f"rounding of these digits. {UNKNOWN}: not printed, or not known. {NOTHING}: no feasible number was found."
+)
+# Names of JSON cells, as people read them.
+_HEADS = {"feasible_at_infinity": "p to infinity", "T": "T (s)", "proportion": "proportion (%)"}
+ROUNDING = 1e-9  # of a number and of half a unit of its last digit
+
+
+@dataclasses.dataclass(frozen=True)
+class Cell:
+    """One cell of a table.
+
+    Fields:
+        row: as printed.
+        column: as printed, or its name.
+        computed: by this program; None where nothing was found.
+        printed: in the source, digit by digit; "" where it is not printed, or not known.
+        variant: the reading of the source, where there are several.
+    """
+
+    row: str
+    column: str
+    computed: float | None
+    printed: str
+    variant: str = ""
+
+    @property
+    def published(self) -> float | None:
+        """The printed number; whole where it has no decimals."""
+        if not self.printed:
+            return None
+        return float(self.printed) if "." in self.printed else int(self.printed)
+
+    @property
+    def differs(self) -> bool:
+        """Whether the computed number is not the printed one, by more than the rounding of the printed digits."""
+        if self.published is None:
+            return False
+        half = 0.5 * 10.0 ** -_decimals(self.printed)
+        return self.computed is None or abs(self.computed - self.published) > half * (1.0 + ROUNDING) + ROUNDING
+
+
+def grid(title: str, cells: Sequence[Cell], *, transposed: bool = False) -> Any:
+    """A table for a terminal, one block for each reading of the source.
+
+    Args:
+        title: of the table, with its source.
+        cells: its cells.
+        transposed: whether rows are printed as columns.
+
+    Returns:
+        a rich renderable.
+    """
+    from rich.console import Group  # only a terminal needs them
+    from rich.text import Text
+
+    variants = dict.fromkeys(cell.variant for cell in cells)
+    blocks: list[Any] = []
+    for name in variants:
+        blocks += [Text(name, style="bold")] if name else []
+        blocks.append(_block([cell for cell in cells if cell.variant == name], transposed))
+    return Group(Text(title, style="italic"), *blocks, Text(LEGEND, style="dim"))
+
+
+def _block(cells: list[Cell], transposed: bool) -> Any:
+    from rich.table import Table
+
+    table = Table()
+    by = {(cell.column, cell.row) if transposed else (cell.row, cell.column): cell for cell in cells}
+    rows, columns = (list(dict.fromkeys(key[i] for key in by)) for i in (0, 1))
+    table.add_column("")
+    for name in columns:
+        table.add_column(_HEADS.get(name, name), justify="right", no_wrap=True)
+    for row in rows:
+        texts = [_text(by[row, column], cells) if (row, column) in by else "" for column in columns]
+        table.add_row(_HEADS.get(row, row), *texts)
+    return table
+
+
+def _text(cell: Cell, cells: list[Cell]) -> str:
+    text = f"{cell.printed or UNKNOWN} / {_computed(cell, cells)}"
+    return f"[bold red]{text} {MISMATCH}[/]" if cell.differs else text
+
+
+def _computed(cell: Cell, cells: list[Cell]) -> str:
+    if cell.computed is None:
+        return NOTHING
+    printed = [other.printed for other in cells if other.column == cell.column and other.printed]
+    if cell.printed or printed:
+        places = _decimals(cell.printed) if cell.printed else min(map(_decimals, printed))
+        return f"{round(cell.computed, places) + 0.0:.{places}f}"  # no -0
+    return f"{cell.computed:.0f}" if abs(cell.computed) >= 1000.0 else f"{cell.computed:.4g}"
+
+
+def _decimals(printed: str) -> int:
+    return len(printed.partition(".")[2])

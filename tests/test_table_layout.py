@@ -1,0 +1,69 @@
+"""Published tables as printed: digits, signs, blocks. Nothing here computes a table."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from cspr_jax.table_layout import LEGEND, Cell, grid
+
+
+def lines_of(cells, **options) -> list[list[str]]:
+    """What stands in the boxes, line by line; a line without boxes is one text."""
+    console = Console(file=io.StringIO(), width=140, highlight=False, force_terminal=False)
+    console.print(grid("Table 9.9", cells, **options))
+    lines = console.file.getvalue().splitlines()
+    texts = [[part.strip() for part in line.replace("┃", "│").strip("│").split("│")] for line in lines]
+    return [parts for parts in texts if not set(parts[0]) & set("┏┡└━─")]
+
+
+@pytest.mark.parametrize(
+    ("printed", "computed", "published", "differs"),
+    [
+        ("6.54", 6.5381, 6.54, False),
+        ("6.54", 6.5449, 6.54, False),
+        ("6.54", 6.5451, 6.54, True),
+        ("10.6740", 10.67396, 10.674, False),
+        ("5", 5.0, 5, False),
+        ("5", 6.0, 5, True),
+        ("5", None, 5, True),
+        ("-0.1557", -0.15568, -0.1557, False),
+        ("", 3.0, None, False),
+        ("", None, None, False),
+    ],
+)
+def test_what_differs(printed, computed, published, differs):
+    cell = Cell("r", "c", computed, printed)
+    assert (cell.published, type(cell.published)) == (published, type(published)) and cell.differs is differs
+
+
+def test_rows_and_columns():
+    cells = [
+        Cell("1", "p", 5.0, "5"),
+        Cell("1", "T", 6.5381, "6.54"),
+        Cell("2", "p", None, "13"),
+        Cell("2", "T", None, ""),
+        Cell("3", "p", 34134.0, ""),
+        Cell("3", "T", 7.0, "6.5400"),
+        Cell("3", "epsilon", 0.059912, ""),
+    ]
+    assert lines_of(cells)[:5] == [
+        ["Table 9.9"],
+        ["", "p", "T (s)", "epsilon"],
+        ["1", "5 / 5", "6.54 / 6.54", ""],
+        ["2", "13 / none !=", "? / none", ""],
+        ["3", "? / 34134", "6.5400 / 7.0000 !=", "? / 0.05991"],
+    ]
+
+
+def test_a_transposed_table_and_its_readings():
+    cells = [
+        Cell(place, column, computed, printed, reading)
+        for reading in ("first", "second")
+        for place, values in {"x": ((27610.0, "27610"), (-0.0, "0.0")), "y": ((34134.0, "27610"), (1.04, ""))}.items()
+        for column, (computed, printed) in zip(("accessible", "error"), values, strict=True)
+    ]
+    block = [["", "x", "y"], ["accessible", "27610 / 27610", "27610 / 34134 !="], ["error", "0.0 / 0.0", "? / 1.0"]]
+    found = lines_of(cells, transposed=True)
+    assert found[:9] == [["Table 9.9"], ["first"], *block, ["second"], *block]
+    assert " ".join(parts[0] for parts in found[9:]) == LEGEND
