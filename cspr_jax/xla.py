@@ -11,6 +11,7 @@ import importlib.metadata
 import json
 import os
 import platform
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -123,9 +124,15 @@ def _is_known(folder: Path, flag: str) -> bool:
     if isinstance(known, dict) and isinstance(known.get(flag), bool):
         return known[flag]
     settings = os.environ | {"XLA_FLAGS": flag, "JAX_PLATFORMS": "cpu"}
+    # -P: nothing that lies in the working folder is executed. A session of its own: Ctrl-C is for us, not an answer.
+    words, silent = [sys.executable, "-P", "-c", _PROBE], subprocess.DEVNULL
     try:
-        done = subprocess.run([sys.executable, "-c", _PROBE], env=settings, capture_output=True, timeout=PROBE_SECONDS)
+        done = subprocess.run(
+            words, env=settings, stdout=silent, stderr=silent, timeout=PROBE_SECONDS, start_new_session=True
+        )
     except (OSError, subprocess.TimeoutExpired):
+        return False
+    if done.returncode in (-signal.SIGINT, -signal.SIGTERM, -signal.SIGKILL):  # somebody ended it: it has not answered
         return False
     partial = record.with_suffix(f".{os.getpid()}")
     try:
