@@ -13,6 +13,7 @@ from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.oscillations import best_inclination
 from cspr_jax.robots import HasSpools, centroid
 from cspr_jax.sequences import Sequence
+from cspr_jax.stages import within
 from cspr_jax.trajectories import depths
 from cspr_jax.trajectories.transition import depth_for, transition, weights
 
@@ -53,7 +54,8 @@ def chosen_depth(shared: Any, sequence: Sequence) -> float:
     elif keys.z0.choose == "conservative":
         z0 = depths.conservative_depth(shared.robot, targets) * (1.0 + ABOVE_BOUND)
     else:
-        z0 = _fastest_depth(shared, sequence)
+        with within("fastest z0"):
+            z0 = _fastest_depth(shared, sequence)
     if not z0 > 0.0:
         raise ConfigError(
             path, f'z0.choose = "{keys.z0.choose}": must be a number here, since no z0 > 0 follows from the poses'
@@ -137,7 +139,8 @@ def best_amplitude(shared: Any, sequence: Sequence, z0: float) -> tuple[Amplitud
         trial = shared._replace(amplitude=amplitude)
         depth = chosen_depth(trial, sequence) if sequence.keys.inclination == "best" else z0
         points = sequence.points(shared.robot, depth)
-        answers = sequence.answers(trial, points, np.full(len(sequence), depth))
+        with within(f"epsilon {epsilon:.2f} of {EPSILONS[-1]:.2f}"):
+            answers = sequence.answers(trial, points, np.full(len(sequence), depth))
         cost = np.where(answers.arcs > 0, answers.duration, np.inf).sum()
         ranked.append((round(float(cost), 9), -float(answers.margin.min()), len(ranked), amplitude, depth))
     return min(ranked)[-2:]

@@ -14,7 +14,8 @@ from typing import Any, NoReturn
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
-from cspr_jax.progress import progress
+from cspr_jax.progress import progress, waiting
+from cspr_jax.sweep.signals import Prompt, prompt_end, stop_signals
 
 EPILOGUE = (
     "exit codes: 0 done; 1 answered, not all feasible; 2 bad input; 3 refused; 4 I/O error or damaged file; "
@@ -41,14 +42,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         the exit code.
     """
     _mend_streams()
+    if sys.platform == "win32":
+        sys.stderr.write("cspr: Linux and macOS are supported, Windows is not; its subsystem for Linux will do\n")
+        return int(ExitCode.BAD_INPUT)
     options = _parser().parse_args(arguments)
+    with prompt_end(own_process=arguments is None) as prompt:
+        return _exit_code(options, prompt)
+
+
+def _exit_code(options: argparse.Namespace, prompt: Prompt) -> int:
     try:
         return int(options.command(options))
     except CsprError as error:
         sys.stderr.write("".join(f"cspr: {line}\n" for line in str(error).splitlines()))
         return int(error.exit_code)
     except KeyboardInterrupt:
-        sys.stderr.write("cspr: interrupted; nothing half-written was left\n")
+        prompt.tell()
         return int(ExitCode.INTERRUPTED)
     except BrokenPipeError:
         # The reader of our output has gone; there is nobody left to tell.
@@ -145,6 +154,7 @@ def _start_jax(options: argparse.Namespace) -> None:
 
     jax.config.update("jax_enable_x64", True)
     xla.check_device(options.device)
+    xla.tell_compiling()
 
 
 def _print_json(value: Any) -> None:
@@ -161,7 +171,6 @@ def _print(renderable: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from cspr_jax.sweep import engine
     from cspr_jax.sweep.definition import read_sweep, run_directory
-    from cspr_jax.sweep.signals import stop_signals
 
     if options.workers < 1 or options.workers > LARGEST_WORKERS:
         raise ConfigError("--workers", f"{options.workers}: must be an integer from 1 to {LARGEST_WORKERS}")
@@ -172,7 +181,7 @@ def _run(options: argparse.Namespace) -> int:
     sweep = read_sweep(options.sweep)
     directory = options.output or run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
-    with stop_signals() as stop, progress() as on_tile:
+    with stop_signals(_warn) as stop, progress() as on_tile:
         hooks = engine.Hooks(stop, on_tile, warn=_warn)
         work = engine.Run(sweep, directory, choices, hooks)
         path = work.finished()
@@ -200,6 +209,7 @@ def _executor(options: argparse.Namespace, sweep: Any, stop: Any) -> Iterator[An
     from cspr_jax.sweep.tile import TileMap
 
     xla.check_device(options.device)
+    xla.tell_compiling()
     tile_map = TileMap(sweep)  # refuses a hopeless sweep before anything is made
     if options.scheduler is not None:
         from cspr_jax.sweep.distributed import Scheduler
@@ -253,10 +263,11 @@ def _plan(options: argparse.Namespace) -> int:
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
     if options.rate is not None and not 0.0 < options.rate < float("inf"):
         raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
-    _start_jax(options)
-    from cspr_jax import motions, planning, reports
+    with waiting():
+        _start_jax(options)
+        from cspr_jax import motions, planning, reports
 
-    plan = planning.plan(options.plan)
+        plan = planning.plan(options.plan)
     feasible = reports.is_feasible(plan)
     for line in plan.warnings:
         _warn(line)
@@ -265,7 +276,8 @@ def _plan(options: argparse.Namespace) -> int:
     else:
         _print(reports.plan_table(plan))
     if options.output is not None and feasible:
-        motions.write_rows(plan, options.output, rate=options.rate)
+        with waiting():
+            motions.write_rows(plan, options.output, rate=options.rate)
     elif options.output is not None:
         sys.stderr.write(f"cspr: {options.output}: not written, since a segment is not proved feasible\n")
     return ExitCode.DONE if feasible else ExitCode.NOT_FEASIBLE
@@ -287,21 +299,25 @@ def _plot(options: argparse.Namespace) -> int:
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
     chosen = {"quantity": options.quantity, "at": at, "lines": options.lines, "envelope": options.envelope}
-    plot(options.result, output, **chosen)
+    with waiting():
+        plot(options.result, output, **chosen)
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE
 
 
 def _table(options: argparse.Namespace) -> int:
-    _start_jax(options)
-    from cspr_jax import tables
+    with waiting():
+        _start_jax(options)
+        from cspr_jax import tables
 
     if options.list:
         sys.stdout.write("".join(f"{name}  {source.title}\n" for name, source in tables.TABLES.items()))
         return ExitCode.DONE
     if options.name not in tables.TABLES:
         raise ConfigError("table", f"{shown(options.name)}: must be one of {', '.join(tables.TABLES)}")
-    cells = tables.table_cells(options.name, _choice(options))
+    choice = _choice(options)
+    with waiting():
+        cells = tables.table_cells(options.name, choice)
     if options.json:
         _print_json(tables.table_object(options.name, cells))
     else:
@@ -333,53 +349,24 @@ def _choice(options: argparse.Namespace) -> Any:
 
 
 def _robots(options: argparse.Namespace) -> int:
-    from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
-    from cspr_jax.problem import fault_at_rest
+    from cspr_jax import listings
 
-    specs = [read_robot(CATALOGUE / f"{name}.toml") for name in catalogue_names()]
-    found = [spec.model_dump(exclude_none=True) | {"fault": fault_at_rest(spec)} for spec in specs]
+    found = listings.robots()
     if options.json:
         _print_json(found)
-        return ExitCode.DONE
-    from rich.table import Table
-
-    table = Table()
-    for head in ("name", "cables", "mass (kg)", "z axis", "limits", "source", "at rest"):
-        table.add_column(head)
-    for robot in found:
-        limits = ", ".join(key for key in robot if key.startswith(("tension", "cable")))
-        row = (
-            robot["name"],
-            str(len(robot["base_points"])),
-            f"{robot['mass']:g}",
-            robot["z_axis"],
-            limits,
-            robot["source"],
-            robot["fault"] or "taut",
-        )
-        table.add_row(*row)
-    _print(table)
+    else:
+        _print(listings.robots_table(found))
     return ExitCode.DONE
 
 
 def _quantities(options: argparse.Namespace) -> int:
-    import dataclasses
+    from cspr_jax import listings
 
-    from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY
-
-    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY}
-    found = [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
+    found = listings.quantities()
     if options.json:
         _print_json(found)
-        return ExitCode.DONE
-    from rich.table import Table
-
-    table = Table()
-    for head in ("group", "name", "units", "description"):
-        table.add_column(head)
-    for row in found:
-        table.add_row(row["group"], row["name"], row["units"], row["description"])
-    _print(table)
+    else:
+        _print(listings.quantities_table(found))
     return ExitCode.DONE
 
 

@@ -11,12 +11,14 @@ import importlib.metadata
 import json
 import os
 import platform
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
-from cspr_jax import compiled
+from cspr_jax import compiled, stages
 from cspr_jax.errors import ConfigError
 
 # Twice as fast where the processor has it; XLA's own choice is half of it.
@@ -27,6 +29,10 @@ PROBE_SECONDS = 120
 # is M_ARENA_MAX of malloc.h.
 ARENAS, _FEW, _ARENA_MAX = "MALLOC_ARENA_MAX", 4, -8
 _PROBE = "import jax; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
+# jax tells when it has lowered a function, which it then compiles, and when that is done.
+_LOWERED = "/jax/core/compile/jaxpr_to_mlir_module_duration"
+_COMPILED = "/jax/core/compile/backend_compile_duration"
+_told: list[Any] = []
 _KEPT = {
     # Else the name of the folder is part of what entries are known by.
     "JAX_PERSISTENT_CACHE_ENABLE_XLA_CACHES": "none",
@@ -73,6 +79,27 @@ def check_device(device: str | None) -> None:
     found = jax.devices()[0].platform
     if found != "gpu":
         raise ConfigError("--device", f"gpu: must be cpu here, since jax finds no GPU (it has {found})")
+
+
+def tell_compiling() -> None:
+    """Let those who wait know which function is compiled; imports jax."""
+    import jax
+
+    def told(event: str, duration_secs: float, **keywords: str | int) -> None:
+        del duration_secs
+        if event == _LOWERED:
+            stages.compiling(_readable(str(keywords.get("fun_name", ""))))
+        elif event == _COMPILED:
+            stages.compiling(None)
+
+    if not _told:
+        _told.append(told)
+        jax.monitoring.register_event_duration_secs_listener(told)
+
+
+def _readable(name: str) -> str:
+    # Of jit(_first_look), or jit__first_look.
+    return re.sub(r"^jit[(_]|\)$", "", name).replace("_", " ").strip()
 
 
 def _few_arenas() -> None:

@@ -14,7 +14,7 @@ PACKAGE = ROOT / "cspr_jax"
 
 # From the bottom up, as docs/architecture.md draws them; a package stands for its modules, a longer name goes first.
 LAYERS = (
-    ("errors", "numerics", "bounds", "grids", "lanes"),
+    ("errors", "numerics", "bounds", "grids", "lanes", "stages"),
     ("amplitudes", "robots", "platforms", "rotations", "orientations", "symmetries"),
     ("tensions", "wrenches", "wrench_lanes", "reference_pose"),
     ("trajectories",),
@@ -44,6 +44,7 @@ LAYERS = (
         "motions",
         "plots",
         "progress",
+        "listings",
         "xla",
     ),
     ("cli", "__main__"),
@@ -52,6 +53,7 @@ KERNELS = tuple(name for layer in LAYERS[:6] for name in layer)
 WITHOUT_JAX = (
     "cli",
     "progress",
+    "stages",
     "errors",
     "config.plan",
     "config.reading",
