@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from cspr_jax import __version__
+from cspr_jax import __version__, compiled
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
 from cspr_jax.progress import progress, waiting
 from cspr_jax.sweep.signals import Prompt, prompt_end, stop_signals
@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write("cspr: Linux and macOS are supported, Windows is not; its subsystem for Linux will do\n")
         return int(ExitCode.BAD_INPUT)
     options = _parser().parse_args(arguments)
-    with prompt_end(own_process=arguments is None) as prompt:
+    with prompt_end(compiled.hand_over if arguments is None else None) as prompt:
         return _exit_code(options, prompt)
 
 
@@ -149,7 +149,7 @@ def _parser() -> argparse.ArgumentParser:
 def _start_jax(options: argparse.Namespace) -> None:
     from cspr_jax import xla
 
-    xla.prepare(options.device)
+    xla.prepare(options.device, _warn)
     import jax
 
     jax.config.update("jax_enable_x64", True)
@@ -203,7 +203,7 @@ def _executor(options: argparse.Namespace, sweep: Any, stop: Any) -> Iterator[An
     from cspr_jax import xla
 
     if options.scheduler is None:  # the workers of a scheduler have settings of their own
-        xla.prepare(options.device)
+        xla.prepare(options.device, _warn)
     # These import jax, which is too late for settings.
     from cspr_jax.sweep import executors
     from cspr_jax.sweep.tile import TileMap

@@ -122,13 +122,13 @@ class Prompt:
 
 
 @contextlib.contextmanager
-def prompt_end(*, own_process: bool) -> Iterator[Prompt]:
+def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
     """Say at once that Ctrl-C was noticed, and end the process where KeyboardInterrupt does not do so soon.
 
     Files get their names only when they are whole, so nothing half-written is left.
 
     Args:
-        own_process: whether the process ends with the block; else only the block is watched.
+        last: called before the process ends with the block, where Ctrl-C was pressed; None: the process goes on.
 
     Yields:
         whether it was pressed.
@@ -154,12 +154,13 @@ def prompt_end(*, own_process: bool) -> Iterator[Prompt]:
         with _watched((signal.SIGINT,), asked):
             yield prompt
     finally:
-        over.set()
-        if own_process and pressed.is_set():
+        if last is not None and pressed.is_set():
             # Other threads may be compiling still: the usual end would wait for them, or take from them what they use.
             with contextlib.suppress(OSError, ValueError):
                 sys.stdout.flush()
+            last()
             _end(ExitCode.INTERRUPTED)
+        over.set()
 
 
 @contextlib.contextmanager
