@@ -139,11 +139,20 @@ def _parser() -> argparse.ArgumentParser:
     )
     for sub in (run, plan, table, bench):
         sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
+    _add_listings(add)
+    return parser
+
+
+def _add_listings(add: Callable[..., argparse.ArgumentParser]) -> None:
     robots = add("robots", _robots, "list the catalogue of robots")
     robots.add_argument("--json", action="store_true", help="print one JSON array and nothing else")
     quantities = add("quantities", _quantities, "list the quantities that a result can hold")
     quantities.add_argument("--json", action="store_true", help="print one JSON array and nothing else")
-    return parser
+    examples = add("examples", _examples, "list sweep and plan files to start from, or copy them")
+    examples.add_argument("name", nargs="*", help="those to copy (default: list them)")
+    examples.add_argument("--all", action="store_true", help="copy all of them")
+    examples.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="to this folder (default .)")
+    examples.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 
 def _start_jax(options: argparse.Namespace) -> None:
@@ -351,22 +360,28 @@ def _choice(options: argparse.Namespace) -> Any:
 def _robots(options: argparse.Namespace) -> int:
     from cspr_jax import listings
 
-    found = listings.robots()
-    if options.json:
-        _print_json(found)
-    else:
-        _print(listings.robots_table(found))
-    return ExitCode.DONE
+    return _listed(options, listings.robots(), listings.robots_table)
 
 
 def _quantities(options: argparse.Namespace) -> int:
     from cspr_jax import listings
 
-    found = listings.quantities()
-    if options.json:
-        _print_json(found)
-    else:
-        _print(listings.quantities_table(found))
+    return _listed(options, listings.quantities(), listings.quantities_table)
+
+
+def _listed(options: argparse.Namespace, found: Any, table: Callable[[Any], Any]) -> int:
+    _print_json(found) if options.json else _print(table(found))
+    return ExitCode.DONE
+
+
+def _examples(options: argparse.Namespace) -> int:
+    from cspr_jax import example_files
+
+    known = example_files.examples()
+    names = list(known) if options.all else options.name
+    found = [str(path) for path in example_files.copy(names, options.output)] if names else known
+    lines = found if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
+    _print_json(found) if options.json else sys.stdout.write("".join(f"{line}\n" for line in lines))
     return ExitCode.DONE
 
 

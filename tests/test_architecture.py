@@ -45,6 +45,7 @@ LAYERS = (
         "plots",
         "progress",
         "listings",
+        "example_files",
         "xla",
     ),
     ("cli", "__main__"),
