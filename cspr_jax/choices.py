@@ -11,7 +11,7 @@ from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.oscillations import best_inclination
-from cspr_jax.robots import HasSpools, centroid
+from cspr_jax.robots import LARGEST_LENGTH, HasSpools, centroid
 from cspr_jax.sequences import Sequence
 from cspr_jax.stages import within
 from cspr_jax.trajectories import depths
@@ -40,6 +40,8 @@ def chosen_depth(shared: Any, sequence: Sequence) -> float:
     keys, path, targets = sequence.keys, sequence.path, sequence.targets
     _check_depth_keys(sequence)
     if isinstance(keys.z0, float):
+        if keys.z0 > LARGEST_LENGTH:
+            raise ConfigError(path, f"z0 = {shown(keys.z0)}: must be at most 1e6 m")
         _check_rest(shared.robot, sequence, keys.z0)
         return keys.z0
     for i, pose in enumerate(keys.pose):
@@ -56,9 +58,10 @@ def chosen_depth(shared: Any, sequence: Sequence) -> float:
     else:
         with within("fastest z0"):
             z0 = _fastest_depth(shared, sequence)
-    if not z0 > 0.0:
+    if not 0.0 < z0 <= LARGEST_LENGTH:
         raise ConfigError(
-            path, f'z0.choose = "{keys.z0.choose}": must be a number here, since no z0 > 0 follows from the poses'
+            path,
+            f'z0.choose = "{keys.z0.choose}": must be a number here, since no z0 in ]0, 1e6] m follows from the poses',
         )
     return z0
 

@@ -80,7 +80,8 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
         raise InputError(
             "platform_points", f"a singular reference pose (determinant {size:.2g})", "points apart from it"
         )
-    share = still / np.abs(still).mean()
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # of numbers near none at all
+        share = still / np.abs(still).mean()
     if not (np.isfinite(share) & (share > SMALLEST_TENSION)).all():
         slack = int(np.argmin(np.where(np.isfinite(share), share, -np.inf))) + 1
         raise InputError(
