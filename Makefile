@@ -1,8 +1,10 @@
-# `make demo` and `make test` work on a machine with Python 3.11 or newer and make; all goes into .venv.
+# `make demo` and `make test` work on Linux and macOS with Python 3.11 or newer and make; all goes into .venv.
+# The demo installs what the program needs; the others add what its tests need, to the same environment.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+TESTS := $(VENV)/.installed-tests
 
 .PHONY: demo test soak check bench docs clean
 
@@ -12,18 +14,18 @@ demo: $(STAMP)
 	$(BIN)/cspr plot results/demo/demo.h5 -o results/demo/demo.png
 	@echo "Look at results/demo/demo.png; the data are in results/demo/demo.h5."
 
-test: $(STAMP)
+test: $(TESTS)
 	$(BIN)/python -m pytest -m "not soak" -n 2 --dist loadfile
 
-soak: $(STAMP)
+soak: $(TESTS)
 	$(BIN)/python -m pytest -m soak
 
-check: $(STAMP)
-	$(BIN)/ruff format --check cspr_jax tests benchmarks
-	$(BIN)/ruff check cspr_jax tests benchmarks
+check: $(TESTS)
+	$(BIN)/ruff format --check cspr_jax tests benchmarks hatch_build.py
+	$(BIN)/ruff check cspr_jax tests benchmarks hatch_build.py
 	$(BIN)/mypy
 
-bench: $(STAMP)
+bench: $(TESTS)
 	$(BIN)/cspr bench
 	$(BIN)/python benchmarks/million_targets.py
 	$(BIN)/python benchmarks/million_transitions.py
@@ -35,12 +37,16 @@ bench: $(STAMP)
 docs: $(STAMP)
 	$(BIN)/python docs/generate_reference.py
 
-$(STAMP): pyproject.toml
+$(STAMP): pyproject.toml hatch_build.py
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "cspr_jax needs Python 3.11 or newer; call: make PYTHON=python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	touch $(STAMP)
+
+$(TESTS): $(STAMP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	touch $(TESTS)
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis results/demo

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cspr_jax.feasibility.verdicts import Verdict as Verdict
     from cspr_jax.results import open_result as open_result
     from cspr_jax.robots import point_mass_robot as point_mass_robot
+    from cspr_jax.xla import keep_compiled_code as keep_compiled_code
 
 __version__ = "0.1.0"
 
@@ -22,13 +23,24 @@ _PUBLIC = {
     "Limits": ("cspr_jax.feasibility.limits", "Limits"),
     "Verdict": ("cspr_jax.feasibility.verdicts", "Verdict"),
     "amplitude": ("cspr_jax.amplitudes", "named"),
+    "keep_compiled_code": ("cspr_jax.xla", "keep_compiled_code"),
     "load_robot": ("cspr_jax.api", "load_robot"),
     "minimum_arcs": ("cspr_jax.api", "minimum_arcs"),
     "open_result": ("cspr_jax.results", "open_result"),
     "plan": ("cspr_jax.api", "plan"),
     "point_mass_robot": ("cspr_jax.robots", "point_mass_robot"),
 }
-__all__ = ["Limits", "Verdict", "amplitude", "load_robot", "minimum_arcs", "open_result", "plan", "point_mass_robot"]
+__all__ = [
+    "Limits",
+    "Verdict",
+    "amplitude",
+    "keep_compiled_code",
+    "load_robot",
+    "minimum_arcs",
+    "open_result",
+    "plan",
+    "point_mass_robot",
+]
 
 
 def __getattr__(name: str) -> Any:

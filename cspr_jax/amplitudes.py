@@ -23,6 +23,8 @@ BOUNDARY_TOLERANCE = 1e-9
 # Shorter ends ask for accelerations that no robot has, and lose the digits of A'' to rounding.
 SMALLEST_EPSILON = 1e-3
 LARGEST_COEFFICIENT = 1e9
+# Coefficients below this part of the largest one do not change where a function is stationary.
+NEGLIGIBLE = 1e-100
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,7 +130,9 @@ def from_pieces(
 
 
 def _extremes(curve: np.polynomial.Polynomial, start: float, stop: float) -> tuple[float, float]:
-    stationary = curve.deriv().roots() if curve.degree() > 0 else np.zeros(0)
+    # Roots are found by dividing by the highest coefficient: one so small has roots far away alone, and would overflow.
+    slope = curve.deriv().trim(NEGLIGIBLE * float(np.abs(curve.coef).max()))
+    stationary = slope.roots() if slope.degree() > 0 else np.zeros(0)
     # A double root may come out as a close complex pair: its real part is near enough to evaluate.
     inside = [x.real for x in np.atleast_1d(stationary) if abs(x.imag) < 1e-3 and start < x.real < stop]
     values = curve(np.array([start, stop, *inside]))

@@ -12,8 +12,9 @@ from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.oscillations import best_inclination
-from cspr_jax.robots import AT_P0, HasSpools, rest_point, spool_radius
+from cspr_jax.robots import AT_P0, LARGEST_LENGTH, HasSpools, rest_point, spool_radius
 from cspr_jax.sequences import Sequence
+from cspr_jax.stages import within
 from cspr_jax.trajectories import depths
 from cspr_jax.trajectories.transition import depth_for, transition, weights
 
@@ -39,6 +40,8 @@ def chosen_depth(shared: Any, sequence: Sequence) -> float:
     keys, path, targets = sequence.keys, sequence.path, sequence.targets
     _check_depth_keys(sequence)
     if isinstance(keys.z0, float):
+        if keys.z0 > LARGEST_LENGTH:
+            raise ConfigError(path, f"z0 = {shown(keys.z0)}: must be at most 1e6 m")
         _check_rest(shared.robot, sequence, keys.z0)
         return keys.z0
     for i, pose in enumerate(keys.pose):
@@ -53,12 +56,12 @@ def chosen_depth(shared: Any, sequence: Sequence) -> float:
     elif keys.z0.choose == "conservative":
         z0 = depths.conservative_depth(shared.robot, targets) * (1.0 + ABOVE_BOUND)
     else:
-        z0 = _fastest_depth(shared, sequence)
-    if not z0 > 0.0:
+        with within("fastest z0"):
+            z0 = _fastest_depth(shared, sequence)
+    if not 0.0 < z0 <= LARGEST_LENGTH:
         hint = "".join(f" ({line})" for line in plan_hints(keys, sequence.spec))
-        raise ConfigError(
-            path, f'z0.choose = "{keys.z0.choose}": must be a number here, since no z0 > 0 follows from the poses{hint}'
-        )
+        why = f"since no z0 in ]0, 1e6] m follows from the poses{hint}"
+        raise ConfigError(path, f'z0.choose = "{keys.z0.choose}": must be a number here, {why}')
     return z0
 
 
@@ -142,7 +145,8 @@ def best_amplitude(shared: Any, sequence: Sequence, z0: float) -> tuple[Amplitud
         trial = shared._replace(amplitude=amplitude)
         depth = chosen_depth(trial, sequence) if sequence.keys.inclination == "best" else z0
         points = sequence.points(depth)
-        answers = sequence.answers(trial, points, np.full(len(sequence), depth))
+        with within(f"epsilon {epsilon:.2f} of {EPSILONS[-1]:.2f}"):
+            answers = sequence.answers(trial, points, np.full(len(sequence), depth))
         cost = np.where(answers.arcs > 0, answers.duration, np.inf).sum()
         ranked.append((round(float(cost), 9), -float(answers.margin.min()), len(ranked), amplitude, depth))
     return min(ranked)[-2:]

@@ -12,9 +12,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from cspr_jax import __version__
+from cspr_jax import __version__, compiled
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
-from cspr_jax.progress import progress
+from cspr_jax.progress import progress, waiting
+from cspr_jax.sweep.signals import Prompt, prompt_end, stop_signals
 
 EPILOGUE = (
     "exit codes: 0 done; 1 answered, not all feasible; 2 bad input; 3 refused; 4 I/O error or damaged file; "
@@ -41,7 +42,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         the exit code.
     """
     _mend_streams()
+    if sys.platform == "win32":
+        sys.stderr.write("cspr: Linux and macOS are supported, Windows is not; its subsystem for Linux will do\n")
+        return int(ExitCode.BAD_INPUT)
     options = _parser().parse_args(arguments)
+    with prompt_end(compiled.hand_over if arguments is None else None) as prompt:
+        return _exit_code(options, prompt)
+
+
+def _exit_code(options: argparse.Namespace, prompt: Prompt) -> int:
     try:
         return int(options.command(options))
     except CsprError as error:
@@ -49,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write("".join(f"cspr: {line}\n" for line in every or str(error).splitlines()))
         return int(error.exit_code)
     except KeyboardInterrupt:
-        sys.stderr.write("cspr: interrupted; nothing half-written was left\n")
+        prompt.tell()
         return int(ExitCode.INTERRUPTED)
     except BrokenPipeError:
         # The reader of our output has gone; there is nobody left to tell.
@@ -131,21 +140,31 @@ def _parser() -> argparse.ArgumentParser:
         sub.add_argument("--all-errors", action="store_true", help="print every mistake of a file, one a line")
     for sub in (run, plan, table, bench):
         sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
+    _add_listings(add)
+    return parser
+
+
+def _add_listings(add: Callable[..., argparse.ArgumentParser]) -> None:
     robots = add("robots", _robots, "list the catalogue of robots")
     robots.add_argument("--json", action="store_true", help="print one JSON array and nothing else")
     quantities = add("quantities", _quantities, "list the quantities that a result can hold")
     quantities.add_argument("--json", action="store_true", help="print one JSON array and nothing else")
-    return parser
+    examples = add("examples", _examples, "list sweep and plan files to start from, or copy them")
+    examples.add_argument("name", nargs="*", help="those to copy (default: list them)")
+    examples.add_argument("--all", action="store_true", help="copy all of them")
+    examples.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="to this folder (default .)")
+    examples.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 
 def _start_jax(options: argparse.Namespace) -> None:
     from cspr_jax import xla
 
-    xla.prepare(options.device)
+    xla.prepare(options.device, _warn)
     import jax
 
     jax.config.update("jax_enable_x64", True)
     xla.check_device(options.device)
+    xla.tell_compiling()
 
 
 def _print_json(value: Any) -> None:
@@ -163,7 +182,6 @@ def _run(options: argparse.Namespace) -> int:
     from cspr_jax.config.hints import robot_hints
     from cspr_jax.sweep import engine
     from cspr_jax.sweep.definition import read_sweep, run_directory
-    from cspr_jax.sweep.signals import stop_signals
 
     if options.workers < 1 or options.workers > LARGEST_WORKERS:
         raise ConfigError("--workers", f"{options.workers}: must be an integer from 1 to {LARGEST_WORKERS}")
@@ -174,7 +192,7 @@ def _run(options: argparse.Namespace) -> int:
     sweep = read_sweep(options.sweep)
     directory = options.output or run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
-    with stop_signals() as stop, progress() as on_tile:
+    with stop_signals(_warn) as stop, progress() as on_tile:
         hooks = engine.Hooks(stop, on_tile, warn=_warn)
         work = engine.Run(sweep, directory, choices, hooks)
         path = work.finished()
@@ -202,12 +220,13 @@ def _executor(options: argparse.Namespace, sweep: Any, stop: Any) -> Iterator[An
     from cspr_jax import xla
 
     if options.scheduler is None:  # the workers of a scheduler have settings of their own
-        xla.prepare(options.device)
+        xla.prepare(options.device, _warn)
     # These import jax, which is too late for settings.
     from cspr_jax.sweep import executors
     from cspr_jax.sweep.tile import TileMap
 
     xla.check_device(options.device)
+    xla.tell_compiling()
     tile_map = TileMap(sweep)  # refuses a hopeless sweep before anything is made
     if options.scheduler is not None:
         from cspr_jax.sweep.distributed import Scheduler
@@ -261,11 +280,13 @@ def _plan(options: argparse.Namespace) -> int:
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
     if options.rate is not None and not 0.0 < options.rate < float("inf"):
         raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
-    _start_jax(options)
-    from cspr_jax import motions, planning, reports
     from cspr_jax.config.hints import plan_hints, robot_hints
 
-    plan = planning.plan(options.plan)
+    with waiting():
+        _start_jax(options)
+        from cspr_jax import motions, planning, reports
+
+        plan = planning.plan(options.plan)
     feasible = reports.is_feasible(plan)
     for line in plan.warnings:
         _warn(line)
@@ -275,7 +296,8 @@ def _plan(options: argparse.Namespace) -> int:
     else:
         _print(reports.plan_table(plan))
     if options.output is not None and feasible:
-        motions.write_rows(plan, options.output, rate=options.rate)
+        with waiting():
+            motions.write_rows(plan, options.output, rate=options.rate)
     elif options.output is not None:
         sys.stderr.write(f"cspr: {options.output}: not written, since a segment is not proved feasible\n")
     return ExitCode.DONE if feasible else ExitCode.NOT_FEASIBLE
@@ -297,14 +319,16 @@ def _plot(options: argparse.Namespace) -> int:
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
     chosen = {"quantity": options.quantity, "at": at, "lines": options.lines, "envelope": options.envelope}
-    plot(options.result, output, **chosen)
+    with waiting():
+        plot(options.result, output, **chosen)
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE
 
 
 def _table(options: argparse.Namespace) -> int:
-    _start_jax(options)
-    from cspr_jax import tables
+    with waiting():
+        _start_jax(options)
+        from cspr_jax import tables
 
     if options.list:
         sys.stdout.write("".join(f"{name}  {source.title}\n" for name, source in tables.TABLES.items()))
@@ -312,7 +336,9 @@ def _table(options: argparse.Namespace) -> int:
     if options.name not in tables.TABLES:
         raise ConfigError("table", f"{shown(options.name)}: must be one of {', '.join(tables.TABLES)}")
     given = {"--definition": options.definition, "--amplitude": options.amplitude, "--fine": options.fine or None}
-    cells = tables.table_cells(options.name, tables.chosen(options.name, given))
+    choice = tables.chosen(options.name, given)
+    with waiting():
+        cells = tables.table_cells(options.name, choice)
     if options.json:
         _print_json(tables.table_object(options.name, cells))
     else:
@@ -321,53 +347,30 @@ def _table(options: argparse.Namespace) -> int:
 
 
 def _robots(options: argparse.Namespace) -> int:
-    from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
-    from cspr_jax.problem import fault_at_rest
+    from cspr_jax import listings
 
-    specs = [read_robot(CATALOGUE / f"{name}.toml") for name in catalogue_names()]
-    found = [spec.model_dump(exclude_none=True) | {"fault": fault_at_rest(spec)} for spec in specs]
-    if options.json:
-        _print_json(found)
-        return ExitCode.DONE
-    from rich.table import Table
-
-    table = Table()
-    for head in ("name", "cables", "mass (kg)", "z axis", "limits", "source", "at rest"):
-        table.add_column(head)
-    for robot in found:
-        limits = ", ".join(key for key in robot if key.startswith(("tension", "cable")))
-        row = (
-            robot["name"],
-            str(len(robot["base_points"])),
-            f"{robot['mass']:g}",
-            robot["z_axis"],
-            limits,
-            robot["source"],
-            robot["fault"] or "taut",
-        )
-        table.add_row(*row)
-    _print(table)
-    return ExitCode.DONE
+    return _listed(options, listings.robots(), listings.robots_table)
 
 
 def _quantities(options: argparse.Namespace) -> int:
-    import dataclasses
+    from cspr_jax import listings
 
-    from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY
+    return _listed(options, listings.quantities(), listings.quantities_table)
 
-    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY}
-    found = [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
-    if options.json:
-        _print_json(found)
-        return ExitCode.DONE
-    from rich.table import Table
 
-    table = Table()
-    for head in ("group", "name", "units", "description"):
-        table.add_column(head)
-    for row in found:
-        table.add_row(row["group"], row["name"], row["units"], row["description"])
-    _print(table)
+def _listed(options: argparse.Namespace, found: Any, table: Callable[[Any], Any]) -> int:
+    _print_json(found) if options.json else _print(table(found))
+    return ExitCode.DONE
+
+
+def _examples(options: argparse.Namespace) -> int:
+    from cspr_jax import example_files
+
+    known = example_files.examples()
+    names = list(known) if options.all else options.name
+    found = [str(path) for path in example_files.copy(names, options.output)] if names else known
+    lines = found if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
+    _print_json(found) if options.json else sys.stdout.write("".join(f"{line}\n" for line in lines))
     return ExitCode.DONE
 
 

@@ -16,6 +16,7 @@ from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps import attainable
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.reference_pose import aligned
+from cspr_jax.stages import within
 from cspr_jax.symmetries import folded, symmetries
 from cspr_jax.trajectories.pose_segment import Kind
 from cspr_jax.transition_tables import Key
@@ -113,7 +114,8 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
         checker = checker_of(amplitude)
         for definition in choice.definitions:
             places = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in PLACES.values()]
-            cells = [_cells(checker, places, definition, divisions) for divisions in steps]
+            with within(f"{amplitude}, {definition}"):
+                cells = [_cells(checker, places, definition, divisions) for divisions in steps]
             for row, fine, coarse in zip(PLACES, *cells, strict=True):
                 errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
                 found |= {(row, column, variant(definition, amplitude)): x for column, x in (fine | errors).items()}
@@ -157,8 +159,9 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
                     for radius in _RADII
                     for azimuth in azimuths
                 ]
-                sets = [(place, accessible(robot, place, definition, divisions).angles) for place in places]
-                smallest = min(good.mean() for good in attained(checker, sets))
+                with within(f"{amplitude}, {definition}, z = {depth:g}"):
+                    sets = [(place, accessible(robot, place, definition, divisions).angles) for place in places]
+                    smallest = min(good.mean() for good in attained(checker, sets))
                 found[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * float(smallest)
     return found
 

@@ -8,6 +8,7 @@ from typing import Any
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.planning import plan_of
+from cspr_jax.stages import within
 from cspr_jax.transition_tables import Key
 
 SEQUENCE = Path(__file__).parent / "published" / "table_3_2.toml"
@@ -38,7 +39,8 @@ def table_3_2() -> dict[Key, float | None]:
             changed = copy.deepcopy(data)
             changed["amplitude"] = key
             changed["pose"][_POSE]["tilt_torsion"][2] = angle
-            answers = plan_of(checked(PlanFile, changed, SEQUENCE), SEQUENCE).answers
+            with within(f"{amplitude}, pose 2 {torsion}"):
+                answers = plan_of(checked(PlanFile, changed, SEQUENCE), SEQUENCE).answers
             for i, arcs in enumerate(answers.arcs):
                 is_found = arcs > 0
                 found[str(i), "p", _variant(amplitude, torsion)] = float(arcs) if is_found else None

@@ -1,8 +1,60 @@
-"""The progress bar of a sweep."""
+"""What people see at a terminal while they wait: how far a sweep is, or what is being done. Elsewhere nothing."""
 
 import contextlib
+import datetime
 import sys
+import time
 from collections.abc import Callable, Iterator
+
+from cspr_jax import stages
+
+
+class Pace:
+    """How fast a sweep goes, and how long it will still take.
+
+    Args:
+        clock: gives seconds.
+
+    Fields:
+        rate: cells a second; None before the first tile.
+        ends: when it will be done, by that clock; None before the first tile.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """Nothing is known yet."""
+        self._clock, self._begin, self._first = clock, (0, clock()), (0, 0.0)
+        self._tiles = -1
+        self.rate: float | None = None
+        self.ends: float | None = None
+
+    def told(self, done: int, total: int) -> None:
+        """Take note of a finished tile; the first call says how many cells an earlier run has left.
+
+        Args:
+            done: cells done.
+            total: all cells.
+        """
+        now = self._clock()
+        self._tiles += 1
+        if self._tiles == 0:
+            self._begin = (done, now)
+            return
+        if self._tiles == 1:
+            self._first = (done, now)
+        # The first tile holds the time of compiling: once there are others, they are counted alone.
+        cells, since = self._begin if self._tiles == 1 else self._first
+        self.rate = (done - cells) / max(now - since, 1e-9)
+        self.ends = now + (total - done) / self.rate if self.rate > 0.0 else None
+
+    def left(self) -> str:
+        """Time that is left, in words.
+
+        Returns:
+            such as "0:12:34 left"; "" before the first tile.
+        """
+        if self.ends is None:
+            return ""
+        return f"{datetime.timedelta(seconds=round(max(self.ends - self._clock(), 0.0)))} left"
 
 
 @contextlib.contextmanager
@@ -15,16 +67,49 @@ def progress() -> Iterator[Callable[[int, int], None]]:
     if not sys.stderr.isatty():
         yield lambda done, total: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn
 
-    columns = (BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[rate]}"), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("cells", total=None, rate="compiling")
+    class Words(TextColumn):
+        """What is being done until the first tile is there; then how fast it goes and how long it takes."""
+
+        def render(self, task):
+            """The text of this moment; see `rich.progress.TextColumn`."""
+            self.text_format = task.description if pace.rate is None else f"{pace.rate:,.0f} cells/s  {pace.left()}"
+            return super().render(task)
+
+    pace = Pace()
+    with _bar(BarColumn(), TaskProgressColumn(), Words("", markup=False)) as bar:
+        task = bar.add_task("starting", total=None)
 
         def on_tile(done: int, total: int) -> None:
-            elapsed = bar.tasks[0].elapsed or 0.0
-            rate = f"{done / elapsed:,.0f} cells/s" if done and elapsed else "compiling"
-            bar.update(task, completed=done, total=total, rate=rate)
+            pace.told(done, total)
+            bar.update(task, completed=done, total=total)
 
-        yield on_tile
+        with stages.heard(lambda text: bar.update(task, description=text or "computing")):
+            yield on_tile
+
+
+@contextlib.contextmanager
+def waiting() -> Iterator[None]:
+    """Show what is being done while the block runs, where somebody looks; nothing may be printed meanwhile.
+
+    Yields:
+        nothing.
+    """
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    with _bar(SpinnerColumn("line"), TextColumn("{task.description}", markup=False), TimeElapsedColumn()) as bar:
+        task = bar.add_task("starting", total=None)
+        with stages.heard(lambda text: bar.update(task, description=text or "computing")):
+            yield
+
+
+def _bar(*columns):
+    from rich.console import Console
+    from rich.progress import Progress
+
+    # Standard output may go elsewhere: it is not drawn into the terminal of standard error.
+    return Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False)

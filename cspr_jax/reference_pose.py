@@ -90,7 +90,8 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     if not abs(size) > SMALLEST_CONDITIONING:
         fault = f"{place} is singular (determinant {size:.1g}, at least {SMALLEST_CONDITIONING:g} counts): "
         raise InputError("platform_points", None, _CHANGE_LINES, fault=fault + _free(turned, hub))
-    share = still / np.abs(still).mean()
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # of numbers near none at all
+        share = still / np.abs(still).mean()
     if not (np.isfinite(share) & (share > SMALLEST_TENSION)).all():
         slack = int(np.argmin(np.where(np.isfinite(share), share, -np.inf)))
         fault = f"in {place} cable {slack + 1} is slack: it would need {share[slack]:.3g} of the mean tension"

@@ -9,6 +9,7 @@ from cspr_jax import orientation_tables, pose_tables, transition_tables
 from cspr_jax.errors import ConfigError
 from cspr_jax.orientation_tables import Choice
 from cspr_jax.planning import plan
+from cspr_jax.stages import within
 from cspr_jax.table_layout import Cell, grid
 from cspr_jax.transition_tables import Key
 
@@ -110,7 +111,8 @@ def table_cells(name: str, choice: Choice | None = None) -> list[Cell]:
         its cells, row by row.
     """
     source = TABLES[name]
-    computed = source.compute(choice or Choice()) if source.with_choice else source.compute()
+    with within(f"table {name}"):
+        computed = source.compute(choice or Choice()) if source.with_choice else source.compute()
     return [
         Cell(row, column, value, source.published.get((row, column, variant), ""), variant)
         for (row, column, variant), value in computed.items()

@@ -18,6 +18,7 @@ from cspr_jax.feasibility.oscillations import (
     many_oscillations,
 )
 from cspr_jax.problem import point_mass_of
+from cspr_jax.stages import stage
 from cspr_jax.trajectories.transition import transition, weights
 
 Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one
@@ -52,6 +53,7 @@ def table_1_1() -> dict[Key, float | None]:
     }
     found: dict[Key, float | None] = {}
     for name, w in cases.items():
+        stage(name)
         found["w_max", name, ""] = float(jnp.max(jnp.abs(w)))
         found["n", name, ""] = _horizontal(named("A1"), w)
     return found
@@ -66,6 +68,7 @@ def table_1_2() -> dict[Key, float | None]:
     w = jnp.array([1.0, 1.0, -2.0])
     found: dict[Key, float | None] = {}
     for name in ("A1", "A2", "A3"):
+        stage(name)
         amplitude = named(name)
         best, least = best_inclination(amplitude, w)
         found[name, "optimal inclination", ""] = float(best)
@@ -92,8 +95,10 @@ def table_1_3() -> dict[Key, float | None]:
         w = jnp.array([largest, -largest, 0.0])
         found["n", "A_idl", reading] = float(zero_tension.least_oscillations(w, jnp.asarray(0.0)))
         for name in ("A1", "A2", "A3"):
+            stage(f"{reading}, {name}")
             found["n", name, reading] = _horizontal(named(name), w)
             found["n of (1.55)", name, reading] = float(many_oscillations(named(name), w))
+        stage(f"{reading}, A_eff")
         epsilon, least = best_epsilon(w)
         found["n", "A_eff", reading], found["epsilon", "A_eff", reading] = least, epsilon
         found["n of (1.55)", "A_eff", reading] = float(many_oscillations(named("effective", epsilon), w))

@@ -1,21 +1,25 @@
 """What the command line sets before jax starts: vector width, where compiled code is kept, device, arenas of memory.
 
 It is in environment variables, which processes that are started from here inherit; arenas are set for this one too.
-What the user has set wins, and the library itself never comes here.
+What the user has set wins. The library itself comes here only where its user asks it to keep compiled code.
 """
 
-import contextlib
 import ctypes
 import hashlib
 import importlib.metadata
 import json
 import os
 import platform
+import re
+import signal
 import subprocess
 import sys
+import warnings
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from cspr_jax import compiled
+from cspr_jax import compiled, stages
 from cspr_jax.errors import ConfigError
 
 # Twice as fast where the processor has it; XLA's own choice is half of it.
@@ -26,22 +30,35 @@ PROBE_SECONDS = 120
 # is M_ARENA_MAX of malloc.h.
 ARENAS, _FEW, _ARENA_MAX = "MALLOC_ARENA_MAX", 4, -8
 _PROBE = "import jax; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
+# jax tells when it has lowered a function, which it then compiles, and when that is done.
+_LOWERED = "/jax/core/compile/jaxpr_to_mlir_module_duration"
+_COMPILED = "/jax/core/compile/backend_compile_duration"
+_told: list[Any] = []
+# XLA complains of slow compiling, with advice to file a bug, as an error in its log; errors that stop something come as
+# exceptions, or are fatal and shown still.
+_ONLY_FATAL = ("TF_CPP_MIN_LOG_LEVEL", "3")
+CACHE = "JAX_COMPILATION_CACHE_DIR"
 _KEPT = {
     # Else the name of the folder is part of what entries are known by.
     "JAX_PERSISTENT_CACHE_ENABLE_XLA_CACHES": "none",
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.05",
     "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
 }
+# The same for a jax that is there already.
+_VALUES = {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": 0.05, "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": -1}
 
 
-def prepare(device: str | None = None) -> None:
+def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line: None) -> None:
     """Set what jax reads when it is imported; nothing if it has been.
 
     Args:
         device: "cpu"; "gpu" and None leave the choice to jax.
+        warn: called with a line for people where compiled code cannot be kept.
     """
     if "jax" in sys.modules:
         return
+    if device != "gpu":  # who asks for a GPU sees why there is none
+        os.environ.setdefault(*_ONLY_FATAL)
     if device == "cpu":
         os.environ["JAX_PLATFORMS"] = "cpu"
     _few_arenas()
@@ -49,11 +66,48 @@ def prepare(device: str | None = None) -> None:
     if folder is None:
         return
     os.environ["XLA_FLAGS"] = _flags(folder, os.environ.get("XLA_FLAGS", ""))
-    if "JAX_COMPILATION_CACHE_DIR" not in os.environ:
-        with contextlib.suppress(OSError):
-            os.environ["JAX_COMPILATION_CACHE_DIR"] = str(compiled.opened(folder))
-            for name, value in _KEPT.items():
-                os.environ.setdefault(name, value)
+    if CACHE not in os.environ:
+        _keep(folder, warn)
+
+
+def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
+    """Keep compiled code from one Python process to the next, as the command line does.
+
+    Call it once, before or after jax was imported; what was compiled before is not kept. What was set for jax wins.
+
+    Args:
+        folder: where; None: `CSPR_CACHE_DIR`, or ~/.cache/cspr_jax.
+
+    Returns:
+        where the entries of this process are; None where jax keeps its own already, CSPR_CACHE_DIR is empty, or nothing
+        can be written.
+    """
+    place = _folder(folder)
+    loaded = sys.modules.get("jax")
+    if place is None or CACHE in os.environ or (loaded is not None and loaded.config.jax_compilation_cache_dir):
+        return None
+    before = set(os.environ)
+    own = _keep(place, lambda line: warnings.warn(line, stacklevel=2))
+    if own is not None and loaded is not None:
+        # It has read the environment when it was imported.
+        for name in {CACHE, *_KEPT} - before:
+            loaded.config.update(name.lower(), _VALUES.get(name, os.environ[name]))
+        from jax.experimental.compilation_cache import compilation_cache
+
+        compilation_cache.reset_cache()  # else who has compiled without one goes on without
+    return own
+
+
+def _keep(folder: Path, warn: Callable[[str], None]) -> Path | None:
+    try:
+        own = compiled.opened(folder, warn)
+    except OSError as error:
+        warn(f"{folder}: compiled code cannot be kept: {error.strerror or error}")
+        return None
+    os.environ[CACHE] = str(own)
+    for name, value in _KEPT.items():
+        os.environ.setdefault(name, value)
+    return own
 
 
 def check_device(device: str | None) -> None:
@@ -74,6 +128,27 @@ def check_device(device: str | None) -> None:
         raise ConfigError("--device", f"gpu: must be cpu here, since jax finds no GPU (it has {found})")
 
 
+def tell_compiling() -> None:
+    """Let those who wait know which function is compiled; imports jax."""
+    import jax
+
+    def told(event: str, duration_secs: float, **keywords: str | int) -> None:
+        del duration_secs
+        if event == _LOWERED:
+            stages.compiling(_readable(str(keywords.get("fun_name", ""))))
+        elif event == _COMPILED:
+            stages.compiling(None)
+
+    if not _told:
+        _told.append(told)
+        jax.monitoring.register_event_duration_secs_listener(told)
+
+
+def _readable(name: str) -> str:
+    # Of jit(_first_look), or jit__first_look.
+    return re.sub(r"^jit[(_]|\)$", "", name).replace("_", " ").strip()
+
+
 def _few_arenas() -> None:
     # The variable is read when a process starts: it is for those that are started from here.
     is_set = ARENAS in os.environ or "arena_max" in os.environ.get("GLIBC_TUNABLES", "")
@@ -83,9 +158,9 @@ def _few_arenas() -> None:
     ctypes.CDLL(None).mallopt(_ARENA_MAX, _FEW)
 
 
-def _folder() -> Path | None:
+def _folder(given: str | Path | None = None) -> Path | None:
     # Of this processor, this jaxlib and this Python: code compiled for another one must not run here.
-    given = os.environ.get("CSPR_CACHE_DIR")
+    given = os.environ.get("CSPR_CACHE_DIR") if given is None else given
     if given == "":
         return None
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -123,9 +198,15 @@ def _is_known(folder: Path, flag: str) -> bool:
     if isinstance(known, dict) and isinstance(known.get(flag), bool):
         return known[flag]
     settings = os.environ | {"XLA_FLAGS": flag, "JAX_PLATFORMS": "cpu"}
+    # -P: nothing that lies in the working folder is executed. A session of its own: Ctrl-C is for us, not an answer.
+    words, silent = [sys.executable, "-P", "-c", _PROBE], subprocess.DEVNULL
     try:
-        done = subprocess.run([sys.executable, "-c", _PROBE], env=settings, capture_output=True, timeout=PROBE_SECONDS)
+        done = subprocess.run(
+            words, env=settings, stdout=silent, stderr=silent, timeout=PROBE_SECONDS, start_new_session=True
+        )
     except (OSError, subprocess.TimeoutExpired):
+        return False
+    if done.returncode in (-signal.SIGINT, -signal.SIGTERM, -signal.SIGKILL):  # somebody ended it: it has not answered
         return False
     partial = record.with_suffix(f".{os.getpid()}")
     try:

@@ -14,7 +14,7 @@ PACKAGE = ROOT / "cspr_jax"
 
 # From the bottom up, as docs/architecture.md draws them; a package stands for its modules, a longer name goes first.
 LAYERS = (
-    ("errors", "frames", "limits", "numerics", "bounds", "grids", "lanes"),
+    ("errors", "frames", "limits", "numerics", "bounds", "grids", "lanes", "stages"),
     ("amplitudes", "robots", "platforms", "rotations", "orientations", "symmetries"),
     ("tensions", "wrenches", "wrench_lanes", "reference_pose"),
     ("trajectories",),
@@ -45,6 +45,8 @@ LAYERS = (
         "motions",
         "plots",
         "progress",
+        "listings",
+        "example_files",
         "xla",
     ),
     ("cli", "__main__"),
@@ -53,6 +55,7 @@ KERNELS = tuple(name for layer in LAYERS[:6] for name in layer)
 WITHOUT_JAX = (
     "cli",
     "progress",
+    "stages",
     "errors",
     "config.hints",
     "config.kinds",

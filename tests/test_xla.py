@@ -6,6 +6,7 @@ import platform
 import subprocess
 import sys
 import types
+import zlib
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -23,7 +24,7 @@ ROOT = Path(__file__).parent.parent
 
 def told(folder, code, **settings):
     """What a fresh process prints, with its cache in a folder."""
-    names = ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS", "MALLOC_ARENA_MAX")
+    names = ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS", "MALLOC_ARENA_MAX", "TF_CPP_MIN_LOG_LEVEL")
     here = {name: value for name, value in os.environ.items() if name not in names}
     here |= {"CSPR_CACHE_DIR": str(folder)} | settings
     done = subprocess.run([sys.executable, "-c", code], env=here, cwd=ROOT, capture_output=True, text=True, timeout=300)
@@ -35,7 +36,8 @@ SEEN = """
 import json, os
 from cspr_jax import xla
 xla.prepare({device})
-print(json.dumps({{k: os.environ.get(k) for k in ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS")}}))
+print(json.dumps({{k: os.environ.get(k) for k in ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS",
+    "TF_CPP_MIN_LOG_LEVEL")}}))
 """
 
 
@@ -49,7 +51,10 @@ def test_settings_of_the_user_win(tmp_path):
     theirs = "--xla_cpu_prefer_vector_width=256"
     given = json.loads(told(tmp_path, code, XLA_FLAGS=theirs, JAX_COMPILATION_CACHE_DIR="/elsewhere"))
     assert given["XLA_FLAGS"].endswith(theirs) and given["JAX_COMPILATION_CACHE_DIR"] == "/elsewhere"
+    assert plain["TF_CPP_MIN_LOG_LEVEL"] == "3"
+    assert json.loads(told(tmp_path, code, TF_CPP_MIN_LOG_LEVEL="0"))["TF_CPP_MIN_LOG_LEVEL"] == "0"
     nothing = json.loads(told("", SEEN.format(device='"cpu"')))
+    assert nothing.pop("TF_CPP_MIN_LOG_LEVEL") == "3"
     assert nothing == {"XLA_FLAGS": None, "JAX_COMPILATION_CACHE_DIR": None, "JAX_PLATFORMS": "cpu"}
 
 
@@ -100,7 +105,91 @@ print(jax.jit(lambda x: jnp.sin(x @ x.T).sum())(jnp.ones((20, 20))))
     assert {entry.name: entry.stat().st_mtime_ns for entry in whole.iterdir()} == entries
 
 
-def test_what_killed_runs_left_is_swept(tmp_path):
+KEEP = """
+import resource, sys
+from cspr_jax import cli, xla
+{before}
+xla.prepare(None, cli._warn)
+import jax, jax.numpy as jnp
+found = [jax.jit(lambda x, k=k: jnp.sin(x @ x.T + k).sum())(jnp.ones((20, 20))) for k in range(3)]
+print(float(found[-1]))
+"""
+EVERY = {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
+
+
+def lines_told(folder, code, **settings):
+    """What a fresh process prints, and the lines that people see."""
+    code = "import sys, io; sys.stderr = io.StringIO()\n" + code + "\nprint(sys.stderr.getvalue(), end='')"
+    first, *lines = told(folder, code, **EVERY, **settings).splitlines()
+    return first, lines
+
+
+def test_damaged_entries_are_removed_with_one_line(tmp_path):
+    """Cut, flipped and without a checksum: one line, the same answer, and they are made again."""
+    code = KEEP.format(before="")
+    first, lines = lines_told(tmp_path, code)
+    (whole,) = tmp_path.glob("*/whole")
+    cut, flipped, old, *_ = sorted(whole.iterdir(), key=lambda entry: -entry.stat().st_size)
+    names, data = {entry.name.partition("~")[0] for entry in whole.iterdir()}, bytearray(flipped.read_bytes())
+    assert lines == [] and len(names) >= 3
+    data[len(data) // 2] ^= 4
+    cut.write_bytes(cut.read_bytes()[:-10])
+    flipped.write_bytes(data)
+    old.rename(whole / old.name.partition("~")[0])
+    told_line = f"cspr: {whole.parent}: 3 damaged entries of compiled code removed; it is compiled again"
+    assert lines_told(tmp_path, code) == (first, [told_line])
+    assert lines_told(tmp_path, code) == (first, []) and len(list(whole.iterdir())) == len(names)
+
+
+def test_a_disk_that_takes_no_entry_is_told_once(tmp_path):
+    """Files may have a kilobyte: each write fails half-way, as on a full disk; no half is kept."""
+    limit = "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))"
+    first, lines = lines_told(tmp_path, KEEP.format(before=limit))
+    assert len(lines) == 1 and "compiled code cannot be kept" in lines[0] and "File too large" in lines[0]
+    (whole,) = tmp_path.glob("*/whole")
+    assert [entry for entry in whole.iterdir() if entry.stat().st_size == 1000] == []
+    assert lines_told(tmp_path, KEEP.format(before="")) == (first, [])
+
+
+def test_python_users_keep_compiled_code(tmp_path):
+    """Before and after jax was imported and has compiled; another cache that is set stays."""
+    code = """
+{first}
+import cspr_jax
+own = cspr_jax.keep_compiled_code({place!r})
+import jax, jax.numpy as jnp
+jax.jit(lambda x: jnp.sin(x @ x.T).sum())(jnp.ones((20, 20)))
+print(own is not None and jax.config.jax_compilation_cache_dir == str(own))
+"""
+    late = "import jax; jax.jit(lambda x: x + 1.0)(1.0)"
+    for name, first in (("before", ""), ("after", late)):
+        place = str(tmp_path / name)
+        assert told("", code.format(first=first, place=place), **EVERY) == "True\n"
+        (whole,) = (tmp_path / name).glob("*/whole")
+        assert list(whole.iterdir())
+    theirs = f"import jax; jax.config.update('jax_compilation_cache_dir', {str(tmp_path / 'theirs')!r})"
+    assert told("", code.format(first=theirs, place=str(tmp_path / "ours"))) == "False\n"
+
+
+@pytest.mark.soak
+def test_xla_does_not_complain_of_slow_compiling(tmp_path):
+    """Its alarm of folding constants is the one of slow compiling, after one second instead of two minutes."""
+    code = """
+import os
+os.dup2(1, 2)
+from cspr_jax import xla
+xla.prepare({device!r})
+import jax, jax.numpy as jnp
+def slow(x):
+    known = jnp.ones((150, 150)) * x.dtype.type(2)
+    return x + jax.lax.reduce_window(known, 0.0, jax.lax.add, (12, 12), (1, 1), "SAME")
+jax.jit(slow)(jnp.ones(()))
+"""
+    assert "Constant folding" in told(tmp_path, code.format(device="gpu"))
+    assert told(tmp_path, code.format(device=None)) == ""
+
+
+def test_what_killed_runs_left_is_swept(tmp_path, monkeypatch):
     gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True)
     left = tmp_path / f"run-{compiled.socket.gethostname()}-{gone.stdout.strip()}"
     alive = tmp_path / f"run-{compiled.socket.gethostname()}-{os.getppid()}"
@@ -108,12 +197,16 @@ def test_what_killed_runs_left_is_swept(tmp_path):
         place.mkdir()
         (place / "entry").write_text("half")
     (tmp_path / "whole").mkdir()
-    (tmp_path / "whole" / "known").write_text("whole")
-    own = compiled.opened(tmp_path)
-    assert not left.exists() and alive.exists() and [entry.name for entry in own.iterdir()] == ["known"]
-    (own / "new").write_text("new")
-    compiled._hand_over(tmp_path / "whole", own, os.getpid())
-    assert {entry.name for entry in (tmp_path / "whole").iterdir()} == {"known", "new"} and not own.exists()
+    (tmp_path / "whole" / f"known~{zlib.crc32(b'whole'):08x}").write_text("whole")
+    monkeypatch.setattr(compiled, "_quiet", lambda *_: None)
+    lines = []
+    own = compiled.opened(tmp_path, lines.append)
+    assert not left.exists() and alive.exists() and [entry.name for entry in own.iterdir()] == ["known"] and not lines
+    (own / "new").write_bytes(zlib.compress(b"new"))
+    (own / "half").write_bytes(zlib.compress(b"new")[:-3])
+    compiled.hand_over()
+    names = {entry.name.partition("~")[0] for entry in (tmp_path / "whole").iterdir()}
+    assert names == {"known", "new"} and not own.exists()
 
 
 def test_a_device_that_is_not_there_is_refused(monkeypatch):

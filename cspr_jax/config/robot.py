@@ -69,13 +69,14 @@ class RobotFile(LimitKeys):
         None, description="rigid platform: where the cables are attached, six points in platform axes, m"
     )
     inertia: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = Field(
-        None, description="rigid platform: inertia tensor about the mass centre, platform axes, kg m^2"
+        None,
+        description="rigid platform: inertia tensor about the mass centre, platform axes, kg m^2, parts up to 1e18",
     )
     centre_of_mass: Point | None = Field(
         None, description="rigid platform: mass centre in platform axes, m (default [0, 0, 0])"
     )
     planar: bool = Field(False, description="true: two cables, everything in the plane y = 0")
-    mass: Positive = Field(description="mass of the effector, kg")
+    mass: Positive = Field(description="mass of the effector, kg, at most 1e9")
     gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
     z_axis: Literal["down", "up"] = Field("down", description='direction of the z axis, "down" or "up"')
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')

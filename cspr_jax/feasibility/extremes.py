@@ -9,6 +9,7 @@ from cspr_jax import tensions
 from cspr_jax.feasibility.blocks import INTERVALS, blocks
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.margins import Functions, smallest_values
+from cspr_jax.stages import stage
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -75,6 +76,7 @@ def extremes(shared: Shared, segments: Segment, arcs: np.ndarray, least_samples:
     Returns:
         the extremes.
     """
+    stage("extremes along the motion")
     table = blocks(shared.amplitude, int(arcs.max()), density=4, least=-(-least_samples // INTERVALS))
     functions = Functions(_demands, _groups(len(shared.robot.base_points)))
     found = smallest_values(functions, shared, segments, arcs, table, batch=BATCH)

@@ -15,6 +15,7 @@ from cspr_jax.feasibility.pose_samples import SAMPLES
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.grids import in_batches
 from cspr_jax.robots import plane_normal
+from cspr_jax.stages import stage
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, motion
 
 BATCH = 512
@@ -61,6 +62,7 @@ def pose_extremes(
     """
     found, samples = [], []
     for i, p in enumerate(arcs):
+        stage(f"extremes along segment {i + 1} of {len(arcs)}")
         segment = jax.tree.map(lambda x, i=i: x[i], segments)
         tau = np.linspace(0.0, 1.0, max(SAMPLES * int(p), least_samples) + 1)
 

@@ -18,6 +18,7 @@ from cspr_jax.feasibility.sights import Watch
 from cspr_jax.orientations import OrientationGrid, equal_volume_grid, tilt_torsion_grid
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.rotations import from_tilt_torsion
+from cspr_jax.stages import stage
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
 WHOLE = 8.0 * math.pi**2  # of SO(3), in the measure sin(theta) d phi d theta d sigma
@@ -54,6 +55,7 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
     Returns:
         the orientations; none where the reference orientation itself is singular, or the place above the spools.
     """
+    stage("accessible orientations")
     watch = Watch(robot, place)
     towards = np.array([math.atan2(place[1], place[0]), 0.0, 0.0])  # (3.98)
     if definition == "scan":

@@ -16,6 +16,7 @@ from cspr_jax.grids import in_batches, in_parts, room
 from cspr_jax.maps import sieve
 from cspr_jax.maps.answers import Answers, decided, end_slacks, joined, only
 from cspr_jax.robots import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
+from cspr_jax.stages import stage
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -88,6 +89,7 @@ def minimum_arcs(
         )
 
     def part(which: slice) -> Answers:
+        stage(f"numbers of arcs, 1 to {max_arcs}")
         parities, infinity = segments_between(shared, starts[which], ends[which], z0[which])
         upper = _sieved(shared, parities[0], parities[1], max_arcs, dtype)
         return decided(shared, parities, only(upper, None if arcs is None else np.asarray(arcs)[which]), infinity)

@@ -22,6 +22,7 @@ from cspr_jax.feasibility.transition_margins import transition_margins
 from cspr_jax.grids import in_batches
 from cspr_jax.maps.answers import BATCH, Answers, Known, decided, end_slacks, only
 from cspr_jax.maps.minimum_arcs import check_numbers
+from cspr_jax.stages import stage
 from cspr_jax.trajectories import transition
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -172,6 +173,7 @@ def minimum_oscillations(
         InputError: max_arcs below 1; z0 not positive; jax without 64 bits.
     """
     check_numbers(shared.robot, z0, max_arcs)
+    stage(f"numbers of oscillations, 1 to {max_arcs // 2}")
     largest = max(max_arcs // 2, 1)
     v, weights = np.asarray(transition.inclination(segments)), np.asarray(transition.weights(segments))
     envelopes = _level if (v == 0.0).all() else _envelopes

@@ -13,6 +13,7 @@ from cspr_jax.feasibility.pose_samples import rows
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.grids import in_batches
 from cspr_jax.platforms import PlatformRobot
+from cspr_jax.stages import stage
 from cspr_jax.trajectories.pose_segment import PoseSegment, pose_segment
 
 BATCH = 2048
@@ -118,6 +119,7 @@ def smallest_arcs(
     for arcs in range(1, max_arcs + 1):
         if not (last >= arcs).any():
             break
+        stage(f"arcs {arcs} of {max_arcs}")
         is_open = (last >= arcs) & ((only == 0) | (only == arcs))
         alive = np.flatnonzero((found == 0) & is_open[motion])
         alive = _sieved(checker, segments, arcs, alive, np.maximum(1.0 - TELLING / arcs, 0.0))
@@ -161,6 +163,7 @@ def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: i
         return best
     segments = _Segments(checker.shared.robot, candidates)
     for arcs in range(1, max_arcs + 1):
+        stage(f"best of what fails, arcs {arcs} of {max_arcs}")
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
         lowest = checker.look.lowest(segments(arcs, every), arcs, tau)
         best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)

@@ -1,18 +1,22 @@
 """From result files to a picture: which kind it is, and which part of the data it shows."""
 
+import io
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from cspr_jax.errors import ConfigError, InputError, StoreError
+from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.plots.envelope import AXES, envelope_figure
 from cspr_jax.plots.labels import PANELS, chosen, value
 from cspr_jax.plots.lines import Line, line_figure, lines_of, overlaid
 from cspr_jax.plots.motion import motion_figure
 from cspr_jax.plots.sections import POLAR, section_figure
 from cspr_jax.results import Result, open_result
+from cspr_jax.stages import stage
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.publishing import publish
 
 # What a map is asked for first.
 FIRST = ("arcs", "oscillations", "lower_envelope", "attainable_fraction", "accessible_volume")
@@ -59,7 +63,9 @@ def plot(
         StoreError: a file cannot be read, or the picture cannot be written.
         ConfigError: no such quantity or axis, nothing to draw, or an unknown picture format.
     """
+    stage("reading")
     results = [open_result(path) for path in paths]
+    stage("drawing")
     try:
         if envelope:
             figure = _envelope(results, quantity, at or {}, lines)
@@ -70,13 +76,14 @@ def plot(
         else:
             _refuse_choices(quantity, at, lines)
             figure = motion_figure(results[0])
-        figure.savefig(output, dpi=160, metadata={"Software": None} if output.suffix == ".png" else None)
+        picture, ending = io.BytesIO(), output.suffix.removeprefix(".")
+        metadata = {"Software": None} if ending == "png" else None
+        figure.savefig(picture, format=ending, dpi=160, metadata=metadata)
     except InputError as error:
         raise ConfigError(paths[0], str(error)) from error
     except ValueError as error:
         raise ConfigError(output, str(error).splitlines()[0]) from error
-    except OSError as error:
-        raise StoreError(f"{output}: cannot be written: {error.strerror or error}") from error
+    publish(Disk(), output, picture.getvalue())
 
 
 def _refuse_choices(quantity: str | None, at: dict[str, float] | None, lines: str | None) -> None:

@@ -63,6 +63,10 @@ class Scheduler:
             self._client = distributed.Client(address, timeout=SECONDS_TO_CONNECT)
         except ValueError as error:
             raise ConfigError("--scheduler", f"{address}: must be an address such as tcp://host:8786") from error
+        except (TypeError, RuntimeError) as error:  # tls:// without certificates; encryption required, but tcp://
+            raise ConfigError(
+                "--scheduler", f"{address}: {reason(error)}: must fit dask's TLS settings (docs/reliability.md)"
+            ) from error
         except OSError as error:
             raise ResourceError(
                 f"--scheduler {address}: no scheduler answers: start one, or mend the address"

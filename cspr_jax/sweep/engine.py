@@ -193,6 +193,7 @@ class Run:
         done = sum(self._cells(index) for index in kept)
         self._hooks.on_tile(done, self._sweep.grid.size)
         finished = set(kept)
+        self._hooks.stop.busy = True
         missing = [index for index in range(len(self._tiling)) if index not in finished]
         with contextlib.closing(_as_generator(executor.tiles(missing, self._hooks.stop))) as tiles:
             for computed in tiles:

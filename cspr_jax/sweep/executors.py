@@ -23,6 +23,7 @@ from cspr_jax.sweep.work import Computed
 
 # Times that the workers may die, one after another, without a tile between.
 DEATHS = 3
+SAFE_PATH = "PYTHONSAFEPATH"
 _NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
 
 
@@ -137,15 +138,16 @@ class Processes:
         if _NO_COMPLAINT not in sys.warnoptions:
             sys.warnoptions.append(_NO_COMPLAINT)
         context = multiprocessing.get_context("spawn")
-        pool = concurrent.futures.ProcessPoolExecutor(
-            self._count, mp_context=context, initializer=_start_worker, initargs=(os.getpid(), self._pickled)
-        )
+        with _safe_path():
+            pool = concurrent.futures.ProcessPoolExecutor(
+                self._count, mp_context=context, initializer=_start_worker, initargs=(os.getpid(), self._pickled)
+            )
         stop.at_once = lambda: _kill(pool)
         running: set[concurrent.futures.Future[Computed]] = set()
         try:
             while running or (waiting and not stop):
                 while waiting and not stop and len(running) < self._count:
-                    with _signals_blocked():  # workers inherit that, from their first moment on
+                    with _signals_blocked(), _safe_path():  # workers inherit that, from their first moment on
                         running.add(pool.submit(_worker_tile, waiting.popleft()))
                 done, running = concurrent.futures.wait(
                     running, timeout=0.1, return_when=concurrent.futures.FIRST_COMPLETED
@@ -170,6 +172,21 @@ def _signals_blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _safe_path() -> Iterator[None]:
+    # A child of multiprocessing is started with `python -c`, which looks for modules in the working folder first: a
+    # file struct.py that lies there would be executed. It reads this variable; no option of its own can be given.
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = before
 
 
 def _kill(pool: concurrent.futures.ProcessPoolExecutor) -> None:

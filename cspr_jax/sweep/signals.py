@@ -1,15 +1,25 @@
-"""Ctrl-C and SIGTERM: a flag that is looked at between tiles, so that the tile in progress is kept."""
+"""Ctrl-C and SIGTERM are noticed at once, whatever is being compiled, by a thread that waits for them.
+
+A run finishes the tile in progress, and keeps it; all else ends within two seconds.
+"""
 
 import contextlib
 import os
 import signal
+import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from types import FrameType
 
 from cspr_jax.errors import ExitCode
 
 CODES = {signal.SIGINT: ExitCode.INTERRUPTED, signal.SIGTERM: ExitCode.TERMINATED}
+# Where nothing must be finished, the main thread has so long to leave by itself; it cannot while it compiles.
+GRACE_SECONDS = 1.2
+FINISHING = "finishing the tile in progress; Ctrl-C again ends at once"
+STOPPING = "stopping; Ctrl-C again ends at once"
+# Takes the line of a progress display away, and shows the cursor that it hid.
+_TIDY = b"\r\x1b[2K\x1b[?25h"
 
 
 class Stop:
@@ -17,13 +27,17 @@ class Stop:
 
     Fields:
         code: exit code of the signal, or None.
+        busy: whether something is in progress that is to be finished.
         at_once: called before the process ends at a second signal.
+        tell: called with a line for people when somebody has asked.
     """
 
     def __init__(self) -> None:
         """Nobody asked yet."""
         self.code: ExitCode | None = None
+        self.busy = False
         self.at_once: Callable[[], None] = lambda: None
+        self.tell: Callable[[str], None] = lambda line: None
 
     def __bool__(self) -> bool:
         return self.code is not None
@@ -36,29 +50,144 @@ class Stop:
             frame: not used.
         """
         del frame
-        code = CODES[signal.Signals(number)]
         if self.code is None:
-            self.code = code
+            self.code = CODES[signal.Signals(number)]
+            self.tell(FINISHING if self.busy else STOPPING)
             return
+        self.end(CODES[signal.Signals(number)])
+
+    def end(self, code: ExitCode) -> None:
+        """End the process now.
+
+        Args:
+            code: its exit code.
+        """
         self.at_once()
-        os.write(2, b"cspr: stopped at once; finished tiles are kept, run it again to go on\n")
-        os._exit(code)
+        _end(code, b"cspr: stopped at once; finished tiles are kept, run it again to go on\n")
 
 
 @contextlib.contextmanager
-def stop_signals() -> Iterator[Stop]:
+def stop_signals(tell: Callable[[str], None] = lambda line: None) -> Iterator[Stop]:
     """Turn SIGINT and SIGTERM into a flag while the block runs; in the main thread only.
+
+    Args:
+        tell: called with a line for people when somebody has asked, from another thread.
 
     Yields:
         the flag.
     """
-    stop = Stop()
+    stop, over = Stop(), threading.Event()
+    stop.tell = tell
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
-    before = {number: signal.signal(number, stop.ask) for number in CODES}
+
+    def end_unless_over() -> None:
+        if not over.wait(GRACE_SECONDS) and not stop.busy and stop.code is not None:
+            stop.end(stop.code)
+
+    def asked(number: int) -> None:
+        stop.ask(number)
+        threading.Thread(target=end_unless_over, daemon=True).start()
+
+    before = {number: signal.signal(number, lambda number, frame: None) for number in CODES}
     try:
-        yield stop
+        with _watched(CODES, asked):
+            yield stop
     finally:
+        over.set()
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+class Prompt:
+    """Whether Ctrl-C was pressed while nothing had to be finished.
+
+    Fields:
+        told: whether people know that it was noticed.
+    """
+
+    def __init__(self) -> None:
+        """Nobody pressed it yet."""
+        self.told, self._lock = False, threading.Lock()
+
+    def tell(self) -> None:
+        """Say that it was noticed, once."""
+        with self._lock:
+            before, self.told = self.told, True
+        if not before:
+            with contextlib.suppress(OSError, ValueError):  # nobody may be there to be told
+                sys.stderr.write("cspr: interrupted; nothing half-written is left\n")
+                sys.stderr.flush()
+
+
+@contextlib.contextmanager
+def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
+    """Say at once that Ctrl-C was noticed, and end the process where KeyboardInterrupt does not do so soon.
+
+    Files get their names only when they are whole, so nothing half-written is left.
+
+    Args:
+        last: called before the process ends with the block, where Ctrl-C was pressed; None: the process goes on.
+
+    Yields:
+        whether it was pressed.
+    """
+    prompt, pressed, over = Prompt(), threading.Event(), threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield prompt
+        return
+
+    def end_unless_over() -> None:
+        if not over.wait(GRACE_SECONDS):
+            _end(ExitCode.INTERRUPTED)
+
+    def asked(number: int) -> None:
+        del number
+        if pressed.is_set():
+            _end(ExitCode.INTERRUPTED)
+        pressed.set()
+        prompt.tell()
+        threading.Thread(target=end_unless_over, daemon=True).start()
+
+    try:
+        with _watched((signal.SIGINT,), asked):
+            yield prompt
+    finally:
+        if last is not None and pressed.is_set():
+            # Other threads may be compiling still: the usual end would wait for them, or take from them what they use.
+            with contextlib.suppress(OSError, ValueError):
+                sys.stdout.flush()
+            last()
+            _end(ExitCode.INTERRUPTED)
+        over.set()
+
+
+@contextlib.contextmanager
+def _watched(numbers: Collection[int], asked: Callable[[int], None]) -> Iterator[None]:
+    # Python runs handlers when the main thread is back from what it has called, which may be a minute of compiling.
+    # It writes the number of a signal to this pipe at once, where another thread reads it.
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+
+    def watch() -> None:
+        while number := os.read(reading, 1):
+            if number[0] in numbers:
+                asked(number[0])
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    before = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        os.close(writing)
+        thread.join()
+        os.close(reading)
+
+
+def _end(code: ExitCode, line: bytes = b"") -> None:
+    with contextlib.suppress(OSError):
+        os.write(2, (_TIDY if os.isatty(2) else b"") + line)
+    os._exit(code)

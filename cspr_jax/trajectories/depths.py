@@ -57,7 +57,8 @@ def conservative_depth(robot: HasSpools, targets: np.ndarray) -> float:
     if not ((depth > 0.0) & (inside >= 0.0) & (height > 0.0)).all():
         return float("nan")
     root = np.sqrt(inside)
-    lowest = float((square / (height + root)).max())
+    with np.errstate(over="ignore"):  # a target a hair below the spools: no z0 will do
+        lowest = float((square / (height + root)).max())
     if slope > 0.0 and lowest >= float(((height + root) / slope).min()):
         return float("nan")
     return lowest

@@ -92,7 +92,9 @@ def stops(job, tmp_path, count):
             process.send_signal(number)
         code, err = finish(process, timeout=10)
         assert code == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
-        assert len(err.splitlines()) == 1 and err.startswith("cspr: stopped") and "run it again" in err
+        first, last = err.splitlines()
+        assert first.endswith("; Ctrl-C again ends at once")
+        assert last.startswith("cspr: stopped") and "run it again" in last
         check_prefix(directory, reference)
         complete(sweep, directory, reference)
 

@@ -1,0 +1,76 @@
+"""Sweep and plan files that come with the program, to be listed, copied and changed."""
+
+import difflib
+from pathlib import Path
+
+from cspr_jax.errors import ConfigError, RefusedError, StoreError, one_line, shown
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.publishing import make_folders
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def folder() -> Path:
+    """Where they are: in the package where it was installed from a wheel, in the checkout beside it else.
+
+    Returns:
+        the folder.
+
+    Raises:
+        StoreError: there is none.
+    """
+    for place in (_PACKAGE / "examples", _PACKAGE.parent / "sweeps"):
+        if place.is_dir():
+            return place
+    raise StoreError(f"{_PACKAGE / 'examples'}: is missing: install cspr_jax again")
+
+
+def examples() -> dict[str, str]:
+    """What there is.
+
+    Returns:
+        for each name what it is for: the first line of the file.
+
+    Raises:
+        StoreError: they cannot be read.
+    """
+    found = {}
+    for path in sorted(folder().glob("*.toml")):
+        first = path.read_text("utf-8").partition("\n")[0]
+        found[path.stem] = first.removeprefix("#").strip()
+    return found
+
+
+def copy(names: list[str], place: Path) -> list[Path]:
+    """Copy some of them; nothing is overwritten.
+
+    Args:
+        names: of them.
+        place: folder to copy them to; it is made if absent.
+
+    Returns:
+        the copies.
+
+    Raises:
+        ConfigError: no such example.
+        RefusedError: a file of that name is there.
+        StoreError: the folder or the disk refuses.
+    """
+    known, source = examples(), folder()
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise ConfigError("examples", f"{shown(name)}: {hint}must be one of those that `cspr examples` lists")
+    copies = {name: place / f"{name}.toml" for name in names}
+    for path in copies.values():
+        if path.exists():
+            raise RefusedError(one_line(f"{path}: is there already: remove it, or choose another folder with -o"))
+    make_folders(Disk(), place)
+    for name, path in copies.items():
+        try:
+            with path.open("xb") as file:
+                file.write((source / f"{name}.toml").read_bytes())
+        except FileExistsError as error:
+            raise RefusedError(one_line(f"{path}: is there already: choose another folder with -o")) from error
+    return list(copies.values())

@@ -1,0 +1,74 @@
+"""Lists of what there is: the catalogue of robots, the quantities of results. Plain values, and tables for people."""
+
+import dataclasses
+from typing import Any
+
+from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
+from cspr_jax.problem import fault_at_rest
+from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY
+
+
+def robots() -> list[dict[str, Any]]:
+    """The robots of the catalogue.
+
+    Returns:
+        the keys of each one's file, and why it cannot hang still, if it cannot.
+    """
+    specs = [read_robot(CATALOGUE / f"{name}.toml") for name in catalogue_names()]
+    return [spec.model_dump(exclude_none=True) | {"fault": fault_at_rest(spec)} for spec in specs]
+
+
+def robots_table(found: list[dict[str, Any]]):
+    """The robots for a terminal.
+
+    Args:
+        found: as `robots` gives them.
+
+    Returns:
+        a rich table.
+    """
+    rows = [
+        (
+            robot["name"],
+            str(len(robot["base_points"])),
+            f"{robot['mass']:g}",
+            robot["z_axis"],
+            ", ".join(key for key in robot if key.startswith(("tension", "cable"))),
+            robot["source"],
+            robot["fault"] or "taut",
+        )
+        for robot in found
+    ]
+    return _table(("name", "cables", "mass (kg)", "z axis", "limits", "source", "at rest"), rows)
+
+
+def quantities() -> list[dict[str, Any]]:
+    """The quantities that a result or a motion can hold.
+
+    Returns:
+        group, name, units and description of each.
+    """
+    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY}
+    return [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
+
+
+def quantities_table(found: list[dict[str, Any]]):
+    """The quantities for a terminal.
+
+    Args:
+        found: as `quantities` gives them.
+
+    Returns:
+        a rich table.
+    """
+    heads = ("group", "name", "units", "description")
+    return _table(heads, [tuple(row[head] for head in heads) for row in found])
+
+
+def _table(heads: tuple[str, ...], rows: list[tuple]):
+    from rich.table import Table  # only a terminal needs it
+
+    table = Table(*heads)
+    for row in rows:
+        table.add_row(*row)
+    return table

@@ -1,0 +1,87 @@
+"""What is being done, for people who wait. It is said here, and shown by whoever listens; nothing is printed."""
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
+
+Listener = Callable[[str], None]
+
+
+class _Board:
+    # What is being done: its parts from the outside in, and what each thread compiles.
+
+    def __init__(self) -> None:
+        self.listener: Listener | None = None
+        self.around: list[str] = []
+        self.now = ""
+        self.compiling: dict[int, str] = {}
+
+    def tell(self) -> None:
+        listener = self.listener
+        if listener is None:
+            return
+        parts = [*self.around, self.now]
+        # Most often the one that has begun last is waited for longest.
+        parts += [f"compiling {name}" for name in list(self.compiling.values())[-1:]]
+        listener(": ".join(part for part in parts if part))
+
+
+_board = _Board()
+
+
+def stage(text: str) -> None:
+    """Say what is being done from now on.
+
+    Args:
+        text: a few words, such as "arcs 5 of 20".
+    """
+    _board.now = text
+    _board.tell()
+
+
+@contextlib.contextmanager
+def within(text: str) -> Iterator[None]:
+    """Say of what the stages of a block are a part.
+
+    Args:
+        text: a few words, such as "table 3.2: quintic".
+
+    Yields:
+        nothing.
+    """
+    _board.around.append(text)
+    stage("")
+    try:
+        yield
+    finally:
+        _board.around.pop()
+        _board.now = ""
+
+
+def compiling(name: str | None) -> None:
+    """Say what this thread compiles.
+
+    Args:
+        name: of the function; None: it compiles nothing any more.
+    """
+    _board.compiling.pop(threading.get_ident(), None)
+    if name is not None:
+        _board.compiling[threading.get_ident()] = name
+    _board.tell()
+
+
+@contextlib.contextmanager
+def heard(listener: Listener) -> Iterator[None]:
+    """Hear what is being done while the block runs.
+
+    Args:
+        listener: called with a line, from any thread.
+
+    Yields:
+        nothing.
+    """
+    before, _board.listener = _board.listener, listener
+    try:
+        yield
+    finally:
+        _board.listener = before

@@ -1,0 +1,145 @@
+"""What people see while they wait, and what Ctrl-C does meanwhile, whatever the main thread is stuck in."""
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from cspr_jax import stages
+from cspr_jax.cli import main
+from cspr_jax.errors import StoreError
+from cspr_jax.plots.draw import plot
+from cspr_jax.progress import Pace, progress, waiting
+from reliability.support import go, sweep_of
+
+# In a call that no signal ends, as compiling is: the main thread waits for a lock that it holds itself.
+STUCK = """
+import contextlib, ctypes, sys, threading
+from cspr_jax import cli
+def stuck(*_):
+    system, lock = ctypes.CDLL(None), ctypes.create_string_buffer(256)
+    system.pthread_mutex_init(lock, None)
+    system.pthread_mutex_lock(lock)
+    threading.Timer(0.3, print, ("stuck",), {"flush": True}).start()  # by then the main thread is in the call
+    system.pthread_mutex_lock(lock)
+class Tiles:
+    environment = staticmethod(lambda: {"paper": 1})
+    tiles = staticmethod(stuck)
+cli._robots = stuck
+cli._executor = lambda *_: contextlib.nullcontext(Tiles)
+sys.argv[0] = "cspr"
+sys.exit(cli.main())
+"""
+
+
+@pytest.fixture
+def started():
+    processes = []
+
+    def start(*words):
+        command = [sys.executable, "-c", STUCK, *map(str, words)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        processes.append(subprocess.Popen(command, cwd=Path(__file__).parents[2], **pipes))
+        assert processes[-1].stdout.readline() == "stuck\n"
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def test_ctrl_c_where_nothing_must_be_finished(started):
+    process = started("robots")
+    process.send_signal(signal.SIGINT)
+    assert process.stderr.readline() == "cspr: interrupted; nothing half-written is left\n"
+    assert process.wait(timeout=5) == 130 and process.stderr.read() == ""
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_run_says_at_once_that_it_finishes_its_tile(started, tmp_path, number, code):
+    process = started("run", sweep_of(tmp_path, tiles=4).file, "-o", tmp_path / "run")
+    process.send_signal(number)
+    assert process.stderr.readline() == "cspr: finishing the tile in progress; Ctrl-C again ends at once\n"
+    process.send_signal(number)
+    assert process.wait(timeout=5) == code
+    assert process.stderr.read().startswith("cspr: stopped at once; finished tiles are kept")
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def at_terminal(monkeypatch):
+    """Standard error is a terminal, from within a test on: pytest puts its own there before."""
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "150")
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    return sys.stderr
+
+
+def test_a_terminal_is_told_the_stages_and_a_pipe_is_not(monkeypatch, capsys):
+    terminal = at_terminal(monkeypatch)
+    with waiting(), stages.within("table 3.3"):
+        stages.stage("arcs 5 of 20 [m]")
+        threading.Thread(target=stages.compiling, args=("first look",)).start()
+    assert "table 3.3: arcs 5 of 20 [m]" in terminal.getvalue()
+    assert main(["table", "1.1"]) == 0
+    assert "table 1.1: H_1" in terminal.getvalue() and "compiling" in terminal.getvalue()
+    shown = capsys.readouterr().out
+    assert "H_1" in shown and "\x1b" not in shown
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    assert main(["table", "1.1"]) == 0 and capsys.readouterr().out == shown and sys.stderr.getvalue() == ""
+
+
+def test_a_run_shows_what_it_does_until_the_first_tile(monkeypatch):
+    terminal = at_terminal(monkeypatch)
+    with progress() as on_tile:
+        stages.stage("arcs 1 to 30")
+        on_tile(0, 10)
+    assert "arcs 1 to 30" in terminal.getvalue()
+    with progress() as on_tile:
+        on_tile(0, 10)
+        on_tile(5, 10)
+    assert " left" in terminal.getvalue()
+
+
+def test_the_pace_of_a_sweep():
+    """Cells that an earlier run has left count for nothing, nor does compiling once there are two tiles."""
+    now = [100.0]
+    pace = Pace(lambda: now[0])
+    pace.told(500, 1000)
+    assert pace.rate is None and pace.left() == ""
+    now[0] = 110.0
+    pace.told(600, 1000)
+    assert (pace.rate, pace.left()) == (10.0, "0:00:40 left")
+    now[0] = 112.0
+    pace.told(700, 1000)
+    assert (pace.rate, pace.left()) == (50.0, "0:00:06 left")
+    now[0] = 115.0
+    assert pace.left() == "0:00:03 left"
+
+
+def test_a_picture_is_there_whole_or_not_at_all(tmp_path, monkeypatch):
+    sweep = sweep_of(tmp_path, tiles=4)
+    result, picture = go(sweep, tmp_path / "run").result, tmp_path / "map.png"
+
+    def interrupted(self, target, **keywords):
+        target.write(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        plot([result], picture)
+    assert not picture.exists()
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, target, **keywords: target.write(b"whole"))
+    plot([result], picture)
+    assert picture.read_bytes() == b"whole" and not [name for name in os.listdir(tmp_path) if name.endswith(".part")]
+    with pytest.raises(StoreError, match="cannot be written"):
+        plot([result], tmp_path / "nowhere" / "map.png")

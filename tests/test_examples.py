@@ -1,0 +1,44 @@
+"""Sweep and plan files that come with the program, and what the command line says of itself."""
+
+import json
+import sys
+
+import pytest
+
+from cspr_jax import __version__, example_files
+from cspr_jax.cli import main
+from cspr_jax.config.reading import read_toml
+from cspr_jax.config.robot import catalogue_names
+
+
+def test_they_are_listed_with_what_they_are_for(capsys):
+    assert main(["examples"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == len(example_files.examples()) > 15
+    assert all(len(purpose) > 30 and purpose[-1] == "." for purpose in example_files.examples().values())
+    assert main(["examples", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == example_files.examples()
+
+
+def test_copies_work_elsewhere_and_overwrite_nothing(tmp_path, capsys):
+    place = tmp_path / "new" / "folder"
+    assert main(["examples", "demo", "table_2_1", "-o", str(place)]) == 0
+    assert capsys.readouterr().out.splitlines() == [str(place / "demo.toml"), str(place / "table_2_1.toml")]
+    assert (place / "demo.toml").read_bytes() == (example_files.folder() / "demo.toml").read_bytes()
+    (place / "demo.toml").write_text("mine")
+    assert main(["examples", "--all", "-o", str(place)]) == 3
+    assert "demo.toml: is there already" in capsys.readouterr().err
+    assert (place / "demo.toml").read_text() == "mine" and len(list(place.iterdir())) == 2
+    assert main(["examples", "dmo", "-o", str(place)]) == 2
+    assert "did you mean demo?" in capsys.readouterr().err
+    # No path leads out of the folder that they are copied from.
+    assert {read_toml(path)["robot"] for path in example_files.folder().glob("*.toml")} <= set(catalogue_names())
+
+
+def test_version_and_platforms(capsys, monkeypatch):
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0 and capsys.readouterr().out == f"cspr {__version__}\n"
+    monkeypatch.setattr(sys, "platform", "win32")
+    assert main(["robots"]) == 2
+    assert capsys.readouterr().err.startswith("cspr: Linux and macOS are supported")
