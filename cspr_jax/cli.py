@@ -116,6 +116,9 @@ def _parser() -> argparse.ArgumentParser:
         "--envelope", action="store_true", help='outlines of all orientations of a place, of map = "orientations"'
     )
     plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
+    plot.add_argument("--size", metavar="WIDTHxHEIGHT", help="of the picture, cm, such as 16x10")
+    plot.add_argument("--dpi", type=float, metavar="N", help="pixels an inch (default 160)")
+    plot.add_argument("--font-size", type=float, metavar="PT", help="points (default 10)")
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
     table.add_argument("--list", action="store_true", help="list the tables")
@@ -282,12 +285,14 @@ def _plot(options: argparse.Namespace) -> int:
         if not math.isfinite(at[axis]):
             raise ConfigError("--at", f"{shown(text)}: must be a finite number")
     from cspr_jax.plots.draw import plot
+    from cspr_jax.plots.style import style_of
 
+    style = style_of(options.size, options.dpi, options.font_size)
     output = options.output or options.result[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
     chosen = {"quantity": options.quantity, "at": at, "lines": options.lines, "envelope": options.envelope}
-    plot(options.result, output, **chosen)
+    plot(options.result, output, **chosen, style=style)
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE
 

@@ -8,16 +8,18 @@ from matplotlib.figure import Figure
 
 from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.plots.envelope import AXES, envelope_figure
-from cspr_jax.plots.labels import PANELS, chosen, value
-from cspr_jax.plots.lines import Line, line_figure, lines_of, overlaid
+from cspr_jax.plots.labels import PANELS, chosen, heading, values
+from cspr_jax.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.plots.motion import motion_figure
+from cspr_jax.plots.notes import notes
 from cspr_jax.plots.sections import POLAR, section_figure
+from cspr_jax.plots.style import Style, in_style, save
 from cspr_jax.results import Result, open_result
 
 # What a map is asked for first.
 FIRST = ("arcs", "oscillations", "lower_envelope", "attainable_fraction", "accessible_volume")
-# Pairs of axes that belong into one plane; the last one is drawn in polar coordinates.
-PLANES = (("x", "y"), POLAR)
+# Pairs of axes that belong into one plane, the second upward; POLAR is drawn in polar coordinates.
+PLANES = (("x", "y"), POLAR, ("x", "z"), ("y", "z"), ("radius", "z"), ("from_x", "from_y"))
 
 
 class View(NamedTuple):
@@ -27,13 +29,13 @@ class View(NamedTuple):
         name: of the quantity.
         data: it, one dimension for each of `across`.
         across: axes that vary.
-        fixed: what was fixed, in words.
+        fixed: axes that were fixed, and where.
     """
 
     name: str
     data: np.ndarray
     across: list[str]
-    fixed: list[str]
+    fixed: dict[str, float]
 
 
 def plot(
@@ -44,6 +46,7 @@ def plot(
     at: dict[str, float] | None = None,
     lines: str | None = None,
     envelope: bool = False,
+    style: Style | None = None,
 ) -> None:
     """Draw one result file, or several maps as lines in one picture.
 
@@ -54,23 +57,26 @@ def plot(
         at: fixed values of axes, the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
+        style: size, resolution and letters; None: the default.
 
     Raises:
         StoreError: a file cannot be read, or the picture cannot be written.
         ConfigError: no such quantity or axis, nothing to draw, or an unknown picture format.
     """
     results = [open_result(path) for path in paths]
+    style = style or Style()
     try:
-        if envelope:
-            figure = _envelope(results, quantity, at or {}, lines)
-        elif len(results) > 1:
-            figure = _overlay(paths, results, quantity, at or {}, lines)
-        elif results[0].is_map:
-            figure = _map_figure(results[0], quantity, at or {}, lines)
-        else:
-            _refuse_choices(quantity, at, lines)
-            figure = motion_figure(results[0])
-        figure.savefig(output, dpi=160, metadata={"Software": None} if output.suffix == ".png" else None)
+        with in_style(style):
+            if envelope:
+                figure = _envelope(results, quantity, at or {}, lines)
+            elif len(results) > 1:
+                figure = _overlay(paths, results, quantity, at or {}, lines)
+            elif results[0].is_map:
+                figure = _map_figure(results[0], quantity, at or {}, lines)
+            else:
+                _refuse_choices(quantity, at, lines)
+                figure = motion_figure(results[0])
+            save(figure, output, style)
     except InputError as error:
         raise ConfigError(paths[0], str(error)) from error
     except ValueError as error:
@@ -102,7 +108,8 @@ def _envelope(results: list[Result], quantity: str | None, at: dict[str, float],
 def _overlay(
     paths: list[Path], results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None
 ) -> Figure:
-    found: list[tuple[str, Result, np.ndarray, str]] = []
+    found: list[tuple[Result, np.ndarray, str]] = []
+    constant: list[list[str]] = []
     if lines is not None:
         raise InputError("--lines", lines, "absent where several results are drawn")
     for path, result in zip(paths, results, strict=True):
@@ -111,10 +118,15 @@ def _overlay(
         view = _view(result, quantity, at)
         if len(view.across) != 1:
             raise InputError("results", f"{path} over {view.across}", "maps over one axis; --at fixes the others")
-        name = path.stem if [other.stem for other in paths].count(path.stem) == 1 else str(path)
-        found.append((name, result, view.data, view.across[0]))
-    across, drawn = overlaid(found)
-    return line_figure(results[0], view.name, {"": drawn}, across, view.fixed, [across])
+        found.append((result, view.data, view.across[0]))
+        constant.append(notes(result, view.name, view.fixed, view.across))
+    stems = [path.stem for path in paths]
+    names = names_of(results, stems if len(set(stems)) == len(stems) else [str(path) for path in paths])
+    across, drawn = overlaid(names, found)
+    same = [note for note in constant[0] if all(note in other for other in constant)]
+    robots = {result.attributes["robot"] for result in results}
+    title = heading(results[0], view.name) if len(robots) == 1 else results[0].labels[view.name]
+    return line_figure(results[0], view.name, {"": drawn}, across, title, same)
 
 
 def _map_figure(result: Result, quantity: str | None, at: dict[str, float], lines: str | None) -> Figure:
@@ -123,7 +135,9 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
         return _lines_figure(result, view, lines)
     if len(view.across) == 1:
         axis = view.across[0]
-        return line_figure(result, view.name, {"": [Line(result.axes[axis], view.data)]}, axis, view.fixed, view.across)
+        only = {"": [Line(result.axes[axis], view.data)]}
+        constant = notes(result, view.name, view.fixed, view.across)
+        return line_figure(result, view.name, only, axis, heading(result, view.name), constant)
     plane = next((pair for pair in PLANES if set(pair) <= set(view.across)), ())
     order = [*plane, *(axis for axis in view.across if axis not in plane)]
     name, data, across, fixed = _panelled(result, view, order)
@@ -142,18 +156,17 @@ def _lines_figure(result: Result, view: View, by: str) -> Figure:
     else:
         points = result.axes[across[2]]
         shown = chosen(len(points), PANELS)
-        groups = {
-            value(result, across[2], points[i], digits=3): lines_of(result, data[:, :, i], along, by) for i in shown
-        }
-    return line_figure(result, name, groups, along, fixed, across)
+        titles = values(result, across[2], points[shown])
+        groups = {t: lines_of(result, data[:, :, i], along, by) for t, i in zip(titles, shown, strict=True)}
+    return line_figure(result, name, groups, along, heading(result, name), notes(result, name, fixed, across))
 
 
 def _panelled(result: Result, view: View, order: list[str]) -> View:
     # At most three axes, in this order; the others at their first point.
-    data, fixed = view.data.transpose([view.across.index(axis) for axis in order]), list(view.fixed)
+    data, fixed = view.data.transpose([view.across.index(axis) for axis in order]), dict(view.fixed)
     for extra in order[3:]:
         data = data[:, :, :, 0]
-        fixed.append(value(result, extra, result.axes[extra][0]))
+        fixed[extra] = float(result.axes[extra][0])
     return View(view.name, data, order[:3], fixed)
 
 
@@ -162,12 +175,13 @@ def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
     name = quantity or (first[0] if first else next(iter(result.data)))
     if name not in result.data:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
-    data, fixed, place = result.data[name], [], {}
+    data, place = result.data[name], {}
+    fixed: dict[str, float] = {}
     for axis, wanted in at.items():
         if axis not in result.axes:
             raise InputError("--at", axis, "one of " + ", ".join(result.axes))
         place[axis] = int(np.argmin(np.abs(result.axes[axis] - wanted)))
-        fixed.append(value(result, axis, result.axes[axis][place[axis]]))
+        fixed[axis] = float(result.axes[axis][place[axis]])
     across = [axis for axis, points in result.axes.items() if len(points) > 1 and axis not in place]
     if not across:
         counts = {axis: 1 if axis in place else len(points) for axis, points in result.axes.items()}

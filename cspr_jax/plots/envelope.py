@@ -7,7 +7,8 @@ from matplotlib.ticker import MaxNLocator
 
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.plots.labels import COLOURS, chosen, notes
+from cspr_jax.plots.labels import COLOURS, chosen, robot_name
+from cspr_jax.plots.notes import notes
 from cspr_jax.results import Result
 
 AXES = ("torsion", "tilt_azimuth", "tilt")
@@ -15,13 +16,13 @@ SECTIONS = 17
 _ACCESSIBLE, _ATTAINED = "#9e9e9e", COLOURS[0]
 
 
-def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> Figure:
+def envelope_figure(result: Result, verdicts: np.ndarray, fixed: dict[str, float]) -> Figure:
     """Outlines of what is accessible and of what is attained, at some torsions.
 
     Args:
         result: gives axes, labels and constants.
         verdicts: (n_torsions, n_azimuths, n_tilts) flags.
-        fixed: what was fixed for the picture.
+        fixed: axes fixed for the picture, and where.
 
     Returns:
         the figure.
@@ -57,8 +58,8 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> F
             axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 3, 4.5, 9, 10], prune="both"))
     handles = [Line2D([], [], color=_ACCESSIBLE), Line2D([], [], color=_ATTAINED)]
     figure.legend(handles, ["accessible", "attained from rest"], loc="outside lower center", ncols=2, frameon=False)
-    title = f"{result.attributes['robot']}: orientations of a place"
-    figure.suptitle(f"{title}\n{notes(result, fixed, list(AXES))}", fontsize=11)
+    title = f"{robot_name(result)}: orientations of a place"
+    figure.suptitle(f"{title}\n{', '.join(notes(result, '', fixed, list(AXES)))}")
     return figure
 
 
