@@ -12,6 +12,8 @@ from matplotlib.ticker import MaxNLocator
 NONE_COLOUR = "#d0d0d0"
 # The scale ends where this part of the cells does, if all of it would be longer by this factor.
 MOST, STRETCH = 0.95, 1.5
+# As many counts have a colour each in any case.
+TOLD_APART = 12
 # Beyond it the arithmetic of colours overflows; no quantity of a robot is as large.
 LARGEST = 1e100
 
@@ -68,8 +70,8 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
     if most <= least:
         most = least + (abs(least) or 1.0)
     extend = {(False, False): "neither", (True, False): "max", (False, True): "min"}.get((above, below), "both")
-    words = [f"largest {float(data[data > most].max()):.3g}"] if above else []
-    words += [f"smallest {float(data[data < least].min()):.3g}"] if below else []
+    words = [f"up to {float(data[data > most].max()):.3g}"] if above else []
+    words += [f"down to {float(data[data < least].min()):.3g}"] if below else []
     whole = bool((inside == np.round(inside)).all())
     return Scale(
         colours,
@@ -91,7 +93,8 @@ def _of_counts(data: np.ndarray) -> Scale:
     counts = data[data > 0]
     least, most = (int(counts.min()), int(counts.max())) if counts.size else (1, 1)
     bulk = int(_bulk(counts)) if counts.size else 1
-    end = bulk if most - least + 1 > STRETCH * (bulk - least + 1) else most
+    stretched = most - least + 1 > max(TOLD_APART, STRETCH * (bulk - least + 1))
+    end = max(bulk, least + TOLD_APART // 2) if stretched else most
     number, more, none = end - least + 1, end < most, bool((data <= 0).any())
     every = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, number + more))
     bounds = np.arange(least, end + 2) - 0.5
@@ -103,7 +106,7 @@ def _of_counts(data: np.ndarray) -> Scale:
         ticks, texts = [float(bounds[:2].mean()), *ticks], ["none", *texts]
     shown = [NONE_COLOUR, *every[:number]] if none else list(every[:number])
     colours = ListedColormap(shown).with_extremes(over=every[-1])
-    beyond, extend = (f"largest {most}", "max") if more else ("", "neither")
+    beyond, extend = (f"up to {most}", "max") if more else ("", "neither")
     return Scale(colours, BoundaryNorm(bounds, len(shown)), extend, beyond, (ticks, texts), whole=True)
 
 

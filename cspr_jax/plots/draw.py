@@ -12,14 +12,16 @@ from cspr_jax.plots.labels import PANELS, chosen, heading, values
 from cspr_jax.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.plots.motion import motion_figure
 from cspr_jax.plots.notes import notes
-from cspr_jax.plots.sections import POLAR, section_figure
+from cspr_jax.plots.sections import AROUND, POLAR, section_figure
 from cspr_jax.plots.style import Style, in_style, save
 from cspr_jax.results import Result, open_result
 
 # What a map is asked for first.
 FIRST = ("arcs", "oscillations", "lower_envelope", "attainable_fraction", "accessible_volume")
-# Pairs of axes that belong into one plane, the second upward; POLAR is drawn in polar coordinates.
-PLANES = (("x", "y"), POLAR, ("x", "z"), ("y", "z"), ("radius", "z"), ("from_x", "from_y"))
+# Pairs of axes that belong into one plane, the second upward or, in polar coordinates, outward: the first of these that
+# vary, or the one of the others that has the most cells.
+PLANES = (("x", "y"), POLAR, ("from_x", "from_y"))
+OTHERS = (AROUND, ("x", "z"), ("y", "z"), ("radius", "z"))
 
 
 class View(NamedTuple):
@@ -138,7 +140,11 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
         only = {"": [Line(result.axes[axis], view.data)]}
         constant = notes(result, view.name, view.fixed, view.across)
         return line_figure(result, view.name, only, axis, heading(result, view.name), constant)
-    plane = next((pair for pair in PLANES if set(pair) <= set(view.across)), ())
+    plane = next((pair for pair in PLANES if set(pair) <= set(view.across)), None) or max(
+        (pair for pair in OTHERS if set(pair) <= set(view.across)),
+        key=lambda pair: len(result.axes[pair[0]]) * len(result.axes[pair[1]]),
+        default=(),
+    )
     order = [*plane, *(axis for axis in view.across if axis not in plane)]
     name, data, across, fixed = _panelled(result, view, order)
     panels = across[2] if len(across) > 2 else None

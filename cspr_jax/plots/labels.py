@@ -73,13 +73,22 @@ def axis_label(result: Result, axis: str) -> str:
 
 
 def _in_brackets(result: Result, name: str) -> str:
-    unit = _unit(result, name)
-    return f" ({unit})" if unit else ""
+    found = unit(result, name)
+    return f" ({found})" if found else ""
 
 
-def _unit(result: Result, name: str) -> str:
-    unit = "°" if is_angle(result, name) else shortened(result.units[name])
-    return "" if unit == "1" else unit
+def unit(result: Result, name: str) -> str:
+    """The unit that a picture shows.
+
+    Args:
+        result: gives that of the file.
+        name: of the axis or the quantity.
+
+    Returns:
+        the unit; empty for a pure number.
+    """
+    found = "°" if is_angle(result, name) else shortened(result.units[name])
+    return "" if found == "1" else found
 
 
 def is_angle(result: Result, name: str) -> bool:
@@ -134,7 +143,7 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
         such as "z0 = 1.7 m", "tilt = 45°", or "cable 1".
     """
     drawn = float(as_drawn(result, axis, np.asarray(point, float)))
-    unit = _unit(result, axis)
+    found = unit(result, axis)
     if is_angle(result, axis):
         drawn = turned(drawn)
     # A range that passes zero may miss it by rounding.
@@ -142,7 +151,7 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
     name = WORDS.get(axis, shortened(axis))
     if axis == "cable":
         return f"{name} {drawn:g}"
-    return f"{name} = {drawn:.{digits}g}" + (f" {unit}" if unit not in ("", "°") else unit)
+    return f"{name} = {drawn:.{digits}g}" + (f" {found}" if found not in ("", "°") else found)
 
 
 def values(result: Result, axis: str, points: np.ndarray) -> list[str]:

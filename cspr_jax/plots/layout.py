@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
@@ -73,16 +74,19 @@ def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
     axis.set_major_formatter(FuncFormatter(lambda tick, _: "none" if none and tick == 0.0 else f"{tick:.0f}"))
 
 
-def reach_polar(every: list[Axes], reach: float) -> None:
-    """Ticks of an azimuth and of a tilt around it.
+def reach_polar(every: list[Axes], reach: float, unit: str) -> None:
+    """Ticks around and outward.
 
     Args:
         every: polar panels with a common radius.
-        reach: the largest tilt shown, degrees.
+        reach: the largest radius shown.
+        unit: of the radius.
     """
     step = next((step for step in DEGREES if reach <= 4.5 * step), DEGREES[-1])
-    ticks = [k * step for k in range(1, 1 + int(0.95 * reach / step))]
+    every_tick = np.arange(0.0, reach, step) if unit == "°" else np.asarray(MaxNLocator(4).tick_values(0.0, reach))
+    ticks = every_tick[(every_tick > 0.0) & (every_tick < 0.95 * reach)]
     around = range(0, 360, 45)
+    gap = " " if unit.isalpha() else ""
     for panel in every:
         panel.set_ylim(0.0, reach)
         panel.set_yticks(ticks, labels=[""] * len(ticks))
@@ -92,4 +96,5 @@ def reach_polar(every: list[Axes], reach: float) -> None:
         panel.set_axisbelow(False)
         for tick in ticks:
             box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6}
-            panel.text(math.radians(-67.5), tick, f"{tick:g}°", fontsize="small", ha="center", va="center", bbox=box)
+            text = f"{tick:g}{gap}{unit}"
+            panel.text(math.radians(-67.5), tick, text, fontsize="small", ha="center", va="center", bbox=box)

@@ -1,12 +1,13 @@
 """What stands in a section of a map beside its cells: the spools, P0, and where the motions start."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
+from matplotlib.projections.polar import PolarAxes
 from matplotlib.transforms import Bbox
 
 from cspr_jax.plots.labels import as_drawn
@@ -18,10 +19,20 @@ OF_TARGETS, OF_STARTS = ("x", "y", "z", "radius", "azimuth"), ("from_x", "from_y
 _EDGE: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}
 
 
-def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
-    """Draw spools, P0 and start, as far as they belong into a section and fit into its range.
+class _Section(NamedTuple):
+    # What a mark has to know of its section: where it is, which axes it has, and their names without "from_".
+    panel: Axes
+    result: Result
+    across: list[str]
+    names: list[str]
+    place: dict[str, float]
+    centre: np.ndarray
 
-    P0 and the start are marked only where the section contains them, to half a step of the grid. The spools are
+
+def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
+    """Draw spools, P0 and the fixed end of the motions, as far as they belong into a section and fit into its range.
+
+    P0 and that end are marked only where the section contains them, to half a step of the grid. The spools are
     projected onto it.
 
     Args:
@@ -38,28 +49,27 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
     base = np.asarray(result.attributes.get("base_points", 0.0), float)
     if space is None or base.ndim != 2 or base.shape[1] != 3 or not np.isfinite(base).all():
         return {}
+    known = {axis: point for axis, point in place.items() if axis in (*space, "z0", "inclination")}
     names = [axis.removeprefix("from_") for axis in across]
-    place = {axis.removeprefix("from_"): point for axis, point in place.items() if axis in space} | {
-        axis: place[axis] for axis in ("z0", "inclination") if axis in place
-    }
+    section = _Section(panel, result, across, names, known, base.mean(axis=0))
     limits = panel.get_xlim(), panel.get_ylim()
-    found = _spools(panel, result, across, names, base, place.get("azimuth"))
-    centre = base.mean(axis=0)
-    marks = [("P0", "P", _rest_point(result, name, centre, place))]
-    begin = start(result)
-    if space is OF_TARGETS and len(begin) == 3:
-        marks.append(("start", "o", np.array([begin[axis] for axis in "xyz"], float)))
+    found = _spools(section, base)
+    words, end = ("start", start(result)) if space is OF_TARGETS else ("target", place)
+    marks = [("P0", "P", _rest_point(section, name))]
+    if all(axis in end for axis in "xyz"):
+        marks.append((words, "o", np.array([end[axis] for axis in "xyz"], float)))
     for words, symbol, point in marks:
-        if point is not None and _contains(result, space, place, point, centre):
-            at = _drawn(result, across, names, point[None], centre, place.get("azimuth"))
-            if at is not None and _inside(limits, at).any():
+        if point is not None and _contains(section, space, point):
+            at = _drawn(section, point[None])
+            if _inside(limits, at).any():
                 found[words] = panel.plot(*at[0], symbol, markersize=7 if symbol == "P" else 5.5, **_EDGE)[0]
     panel.set(xlim=limits[0], ylim=limits[1])
     return found
 
 
-def _rest_point(result: Result, name: str, centre: np.ndarray, place: dict[str, float]) -> np.ndarray | None:
+def _rest_point(section: _Section, name: str) -> np.ndarray | None:
     # P0 lies below the centroid of the spools; None where it is not one point.
+    place, result = section.place, section.result
     down = -1.0 if result.attributes.get("z_axis") == "up" else 1.0
     depth = place.get("z0")
     if depth is None and "z" in place and starts_at_rest(result, name):
@@ -67,8 +77,8 @@ def _rest_point(result: Result, name: str, centre: np.ndarray, place: dict[str, 
         given = table(result.settings, "trajectory").get("inclination")
         inclination = place.get("inclination", 0.0 if given is None else given)
         if isinstance(inclination, float) and inclination > -1.0:
-            depth = (place["z"] - centre[2]) * down / (1.0 + inclination)
-    return None if depth is None else centre + np.array([0.0, 0.0, down * depth])
+            depth = (place["z"] - section.centre[2]) * down / (1.0 + inclination)
+    return None if depth is None else section.centre + np.array([0.0, 0.0, down * depth])
 
 
 def _coordinate(name: str, points: np.ndarray, centre: np.ndarray, azimuth: float | None) -> np.ndarray:
@@ -81,80 +91,78 @@ def _coordinate(name: str, points: np.ndarray, centre: np.ndarray, azimuth: floa
     return np.hypot(x, y) if azimuth is None else x * np.cos(azimuth) + y * np.sin(azimuth)
 
 
-def _drawn(
-    result: Result, across: list[str], names: list[str], points: np.ndarray, centre: np.ndarray, azimuth: float | None
-) -> np.ndarray | None:
-    # (n, 2) in the units of the picture; the azimuth within the turn that the axis shows.
+def _drawn(section: _Section, points: np.ndarray) -> np.ndarray:
+    # (n, 2) of (n, 3), in the units of the picture; an azimuth within the turn that the axis shows.
     columns = []
-    for axis, name in zip(across, names, strict=True):
-        column = _coordinate(name, points, centre, azimuth)
+    for axis, name in zip(section.across, section.names, strict=True):
+        column = _coordinate(name, points, section.centre, section.place.get("azimuth"))
+        if name == "azimuth" and isinstance(section.panel, PolarAxes):
+            columns.append(column % (2.0 * np.pi))
+            continue
         if name == "azimuth":
-            middle = 0.5 * (result.axes[axis].min() + result.axes[axis].max())
+            shown = section.result.axes[axis]
+            middle = 0.5 * (shown.min() + shown.max())
             column = middle + (column - middle + np.pi) % (2.0 * np.pi) - np.pi
-        columns.append(as_drawn(result, axis, column))
-    found = np.stack(columns, axis=1)
-    return found if np.isfinite(found).all() else None
+        columns.append(as_drawn(section.result, axis, column))
+    return np.stack(columns, axis=1)
 
 
-def _contains(
-    result: Result, space: tuple[str, ...], place: dict[str, float], point: np.ndarray, centre: np.ndarray
-) -> bool:
+def _contains(section: _Section, space: tuple[str, ...], point: np.ndarray) -> bool:
     for axis in space:
         name = axis.removeprefix("from_")
-        if name not in place:
+        if axis not in section.place:
             continue
-        points = result.axes.get(axis, np.array([place[name]]))
-        gaps = points - _coordinate(name, point[None], centre, None)[0]
+        here = section.place[axis]
+        points = section.result.axes.get(axis, np.array([here]))
+        gaps = points - _coordinate(name, point[None], section.centre, None)[0]
         if name == "azimuth":
-            if np.hypot(*(point - centre)[:2]) < 1e-9:
+            if np.hypot(*(point - section.centre)[:2]) < 1e-9:
                 continue  # on the vertical about which it turns
             gaps = (gaps + np.pi) % (2.0 * np.pi) - np.pi
         nearest = int(np.argmin(np.abs(gaps)))
         step = np.diff(np.sort(points)).max(initial=2e-6 * max(1.0, abs(points[nearest])))
-        if points[nearest] != place[name] or abs(gaps[nearest]) > 0.5 * step:
+        if points[nearest] != here or abs(gaps[nearest]) > 0.5 * step:
             return False
     return True
 
 
-def _spools(
-    panel: Axes,
-    result: Result,
-    across: list[str],
-    names: list[str],
-    base: np.ndarray,
-    azimuth: float | None,
-) -> dict[str, Artist]:
-    drawn = _drawn(result, across, names, base, base.mean(axis=0), azimuth)
-    if drawn is None or ("radius" in names and azimuth is None and "azimuth" not in names):
+def _spools(section: _Section, base: np.ndarray) -> dict[str, Artist]:
+    panel, names = section.panel, section.names
+    polar = isinstance(panel, PolarAxes)
+    if "radius" in names and "azimuth" not in (*section.place, *names):
         return {}
     # Two cables may share a spool; the order is the cables'.
-    keys = list(dict.fromkeys(map(tuple, np.round(drawn, 9).tolist())))
-    points = np.array(keys)
-    size = np.ptp(points, axis=0).max()
-    outline = "azimuth" not in names and len(points) > 1 and size > 0.0 and not _crosses(points)
+    flat = base[:, :2] if polar else _drawn(section, base)
+    _, first = np.unique(np.round(flat, 9), axis=0, return_index=True)
+    base, flat = base[np.sort(first)], flat[np.sort(first)]
+    points = _drawn(section, base)
     limits = panel.get_xlim(), panel.get_ylim()
-    symbol = "" if outline and set(names) == {"x", "y"} and len(points) > 2 else "s"
+    outline = len(points) > 1 and (polar or "azimuth" not in names) and not _crosses(flat)
+    symbol = "" if outline and (polar or set(names) == {"x", "y"}) and len(points) > 2 else "s"
     look: dict[str, Any] = {"marker": symbol, "markersize": 4.5, "markeredgecolor": "white", "markerfacecolor": "black"}
-    if not outline:
-        panel.plot(*points.T, linestyle="none", **look)
-        seen = _inside(limits, points).any()
-        return {"spools": Line2D([], [], linestyle="none", **look)} if seen else {}
-    ring = np.concatenate([points, points[:1]])
-    panel.plot(*ring.T, color="white", linewidth=2.4)
-    panel.plot(*ring.T, color="black", linewidth=1.0, **look)
+    if outline:
+        ring = np.concatenate([points, points[:1]])
+        panel.plot(*ring.T, color="white", linewidth=2.4)
+    else:
+        ring = points
+    panel.plot(*ring.T, color="black", linewidth=1.0 if outline else 0.0, **look)
     (left, right), (bottom, top) = map(sorted, limits)
-    if not Path(ring).intersects_bbox(Bbox([[left, bottom], [right, top]]), filled=False):
+    through = outline and not polar and Path(ring).intersects_bbox(Bbox([[left, bottom], [right, top]]), filled=False)
+    if not through and not _inside(limits, points).any():
         return {}
     if symbol:
-        return {"spools": Line2D([], [], color="black", linewidth=1.0, **look)}
+        return {"spools": Line2D([], [], color="black", linewidth=1.0 if outline else 0.0, **look)}
     # The same shape in the legend.
-    shape = Path((ring - 0.5 * (points.min(axis=0) + points.max(axis=0))) / size, closed=True)
+    middle, size = 0.5 * (flat.min(axis=0) + flat.max(axis=0)), np.ptp(flat, axis=0).max()
+    shape = Path(np.concatenate([flat, flat[:1]]) / size - middle / size, closed=True)
     return {"spools": Line2D([], [], marker=shape, markersize=13, markerfacecolor="none", color="black", linestyle="")}
 
 
 def _inside(limits: tuple, points: np.ndarray) -> np.ndarray:
+    # What lies on an edge is seen too.
     low, high = (np.array([f(pair) for pair in limits]) for f in (min, max))
-    return np.all((points >= low) & (points <= high), axis=1)
+    slack = 0.01 * (high - low)
+    return np.all((points >= low - slack) & (points <= high + slack), axis=1)
 
 
 def _crosses(points: np.ndarray) -> bool:

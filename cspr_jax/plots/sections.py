@@ -9,7 +9,7 @@ from matplotlib.projections.polar import PolarAxes
 
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar, scale_of
-from cspr_jax.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, values
+from cspr_jax.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
 from cspr_jax.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
 from cspr_jax.plots.marks import mark
 from cspr_jax.plots.notes import notes
@@ -20,6 +20,8 @@ from cspr_jax.results import Result
 SIGNED = ("used_inclination",)
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
+# A top view: straight from above, in true shape.
+AROUND = ("azimuth", "radius")
 PANEL, SINGLE = 3.1, 5.2  # inches, the longer side
 
 
@@ -39,9 +41,9 @@ def section_figure(
     Returns:
         the figure.
     """
-    polar = tuple(across) == POLAR
+    polar = tuple(across) in (POLAR, AROUND)
     # Most of all orientations are none that a robot can take.
-    tells = _tells(name, data) if polar else np.ones(data.shape, bool)
+    tells = _tells(name, data) if tuple(across) == POLAR else np.ones(data.shape, bool)
     told = np.flatnonzero(tells.any((0, 1)))
     shown = told[chosen(len(told), PANELS)] if len(told) else chosen(data.shape[2], PANELS)
     figure = Figure(figsize=_size(result, across, len(shown)), layout="constrained")
@@ -65,7 +67,7 @@ def section_figure(
     words = notes(result, name, fixed, [*across, *([over] if over else [])])
     if polar:
         told = np.flatnonzero(tells[:, orders[1]][:, :, shown].any((0, 2)))
-        reach_polar(every, _edges(points[1])[told[-1] + 1 if len(told) else -1])
+        reach_polar(every, _edges(points[1])[told[-1] + 1 if len(told) else -1], unit(result, across[1]))
         words.append(f"around: {axis_label(result, across[0])}, outward: {axis_label(result, across[1])}")
     else:
         _name_axes(result, across, bottom, left)
@@ -113,7 +115,10 @@ def _tells(name: str, data: np.ndarray) -> np.ndarray:
 def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], points: list[np.ndarray], scale: Scale):
     x, y = map(_edges, points)
     if isinstance(panel, PolarAxes):
-        x, y = np.radians(x), np.maximum(y, 0.0)
+        # Sides of a cell are straight: narrow ones look round.
+        parts = int(np.ceil(np.diff(x).max() / 3.0))
+        x = np.interp(np.arange(parts * (len(x) - 1) + 1) / parts, np.arange(len(x)), np.radians(x))
+        y, cells = np.maximum(y, 0.0), np.repeat(cells, parts, axis=0)
     if cells.dtype.kind == "f":
         # What is infinite lies beyond an end of the scale; only what is not a number has no value.
         cells = np.ma.masked_invalid(np.clip(cells, -LARGEST, LARGEST))
