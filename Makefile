@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test soak check bench docs clean
+.PHONY: demo test soak check bench docs images clean
 
 demo: $(STAMP)
 	$(BIN)/cspr table 2.1
@@ -34,6 +34,11 @@ bench: $(STAMP)
 
 docs: $(STAMP)
 	$(BIN)/python docs/generate_reference.py
+	$(BIN)/python docs/make_images.py --page
+
+# Sweeps and plans first, some two minutes; their results stay in results/images.
+images: $(STAMP)
+	$(BIN)/python docs/make_images.py
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

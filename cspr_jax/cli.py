@@ -116,9 +116,7 @@ def _parser() -> argparse.ArgumentParser:
         "--envelope", action="store_true", help='outlines of all orientations of a place, of map = "orientations"'
     )
     plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
-    plot.add_argument("--size", metavar="WIDTHxHEIGHT", help="of the picture, cm, such as 16x10")
-    plot.add_argument("--dpi", type=float, metavar="N", help="pixels an inch (default 160)")
-    plot.add_argument("--font-size", type=float, metavar="PT", help="points (default 10)")
+    _add_style(plot)
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
     table.add_argument("--list", action="store_true", help="list the tables")
@@ -159,6 +157,12 @@ def _print(renderable: Any) -> None:
 
     # A pipe gets lines of a width of their own, so that no column is folded.
     Console(width=None if sys.stdout.isatty() else 140, highlight=False).print(renderable)
+
+
+def _add_style(plot: argparse.ArgumentParser) -> None:
+    plot.add_argument("--size", metavar="WIDTHxHEIGHT", help="of the picture, cm, such as 16x10")
+    plot.add_argument("--dpi", type=float, metavar="N", help="pixels an inch (default 160)")
+    plot.add_argument("--font-size", type=float, metavar="PT", help="points (default 10)")
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 NONE_COLOUR = "#d0d0d0"
-# The scale ends where this part of the cells does, if all of it would be longer by this factor.
-MOST, STRETCH = 0.95, 1.5
+# The scale ends where this part of the cells does, if all of it would be longer by this factor; of as few cells as the
+# third number all count, of more at least one may lie beyond.
+MOST, STRETCH, FEW = 0.98, 1.5, 10
 # As many counts have a colour each in any case.
 TOLD_APART = 12
 # Beyond it the arithmetic of colours overflows; no quantity of a robot is as large.
@@ -85,7 +86,8 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
 
 def _bulk(values: np.ndarray) -> float:
     # A value that occurs, not one between two.
-    return float(np.quantile(values, MOST, method="inverted_cdf"))
+    part = 1.0 if values.size <= FEW else min(MOST, 1.0 - 1.5 / values.size)
+    return float(np.quantile(values, part, method="inverted_cdf"))
 
 
 def _of_counts(data: np.ndarray) -> Scale:

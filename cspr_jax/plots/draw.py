@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 
 from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.plots.envelope import AXES, envelope_figure
-from cspr_jax.plots.labels import PANELS, chosen, heading, values
+from cspr_jax.plots.labels import PANELS, chosen, heading, value, values
 from cspr_jax.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.plots.motion import motion_figure
 from cspr_jax.plots.notes import notes
-from cspr_jax.plots.sections import AROUND, POLAR, section_figure
+from cspr_jax.plots.sections import AROUND, POLAR, Section, section_figure, tells
 from cspr_jax.plots.style import Style, in_style, save
 from cspr_jax.results import Result, open_result
 
@@ -31,13 +31,15 @@ class View(NamedTuple):
         name: of the quantity.
         data: it, one dimension for each of `across`.
         across: axes that vary.
-        fixed: axes that were fixed, and where.
+        fixed: what was fixed, in words.
+        place: the axes that were fixed, and where.
     """
 
     name: str
     data: np.ndarray
     across: list[str]
-    fixed: dict[str, float]
+    fixed: list[str]
+    place: dict[str, float]
 
 
 def plot(
@@ -104,7 +106,9 @@ def _envelope(results: list[Result], quantity: str | None, at: dict[str, float],
     view = _view(result, "verdict", elsewhere | at)
     if set(view.across) != set(AXES):
         raise InputError("--at", sorted(at), "no axis of " + ", ".join(AXES))
-    return envelope_figure(result, view.data.transpose([view.across.index(axis) for axis in AXES]), view.fixed)
+    return envelope_figure(
+        result, view.data.transpose([view.across.index(axis) for axis in AXES]), _constant(result, view, "")
+    )
 
 
 def _overlay(
@@ -121,7 +125,7 @@ def _overlay(
         if len(view.across) != 1:
             raise InputError("results", f"{path} over {view.across}", "maps over one axis; --at fixes the others")
         found.append((result, view.data, view.across[0]))
-        constant.append(notes(result, view.name, view.fixed, view.across))
+        constant.append(_constant(result, view))
     stems = [path.stem for path in paths]
     names = names_of(results, stems if len(set(stems)) == len(stems) else [str(path) for path in paths])
     across, drawn = overlaid(names, found)
@@ -138,17 +142,31 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     if len(view.across) == 1:
         axis = view.across[0]
         only = {"": [Line(result.axes[axis], view.data)]}
-        constant = notes(result, view.name, view.fixed, view.across)
-        return line_figure(result, view.name, only, axis, heading(result, view.name), constant)
+        return line_figure(result, view.name, only, axis, heading(result, view.name), _constant(result, view))
     plane = next((pair for pair in PLANES if set(pair) <= set(view.across)), None) or max(
         (pair for pair in OTHERS if set(pair) <= set(view.across)),
         key=lambda pair: len(result.axes[pair[0]]) * len(result.axes[pair[1]]),
         default=(),
     )
     order = [*plane, *(axis for axis in view.across if axis not in plane)]
-    name, data, across, fixed = _panelled(result, view, order)
-    panels = across[2] if len(across) > 2 else None
-    return section_figure(result, name, data if panels else data[..., None], across[:2], panels, fixed)
+    view = _panelled(result, view, order)
+    data, panels = view.data, view.across[2] if len(view.across) > 2 else None
+    told = _told(result, at, order) if tuple(view.across[:2]) == POLAR else None
+    if not panels:
+        data, told = data[..., None], None if told is None else told[..., None]
+    section = Section(view.name, view.across[:2], panels, view.place, _constant(result, view))
+    return section_figure(result, section, data, told)
+
+
+def _constant(result: Result, view: View, name: str | None = None) -> list[str]:
+    return notes(result, view.name if name is None else name, view.fixed, [*view.across, *view.place])
+
+
+def _told(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
+    # The same for every quantity of a file, so that their pictures show the same sections.
+    names = ["verdict"] if "verdict" in result.data else list(result.data)
+    found = [tells(name, _panelled(result, _view(result, name, at), order).data) for name in names]
+    return np.any(found, axis=0)
 
 
 def _lines_figure(result: Result, view: View, by: str) -> Figure:
@@ -156,24 +174,26 @@ def _lines_figure(result: Result, view: View, by: str) -> Figure:
         raise InputError("--lines", by, "one of two or more axes that vary: " + ", ".join(view.across))
     along = next(axis for axis in view.across if axis != by)
     order = [along, by, *(axis for axis in view.across if axis not in (along, by))]
-    name, data, across, fixed = _panelled(result, view, order)
-    if len(across) == 2:
-        groups = {"": lines_of(result, data, along, by)}
+    view = _panelled(result, view, order)
+    if len(view.across) == 2:
+        groups = {"": lines_of(result, view.data, along, by)}
     else:
-        points = result.axes[across[2]]
+        points = result.axes[view.across[2]]
         shown = chosen(len(points), PANELS)
-        titles = values(result, across[2], points[shown])
-        groups = {t: lines_of(result, data[:, :, i], along, by) for t, i in zip(titles, shown, strict=True)}
-    return line_figure(result, name, groups, along, heading(result, name), notes(result, name, fixed, across))
+        titles = values(result, view.across[2], points[shown])
+        groups = {t: lines_of(result, view.data[:, :, i], along, by) for t, i in zip(titles, shown, strict=True)}
+    return line_figure(result, view.name, groups, along, heading(result, view.name), _constant(result, view))
 
 
 def _panelled(result: Result, view: View, order: list[str]) -> View:
     # At most three axes, in this order; the others at their first point.
-    data, fixed = view.data.transpose([view.across.index(axis) for axis in order]), dict(view.fixed)
+    data, fixed = view.data.transpose([view.across.index(axis) for axis in order]), list(view.fixed)
+    place = dict(view.place)
     for extra in order[3:]:
         data = data[:, :, :, 0]
-        fixed[extra] = float(result.axes[extra][0])
-    return View(view.name, data, order[:3], fixed)
+        place[extra] = float(result.axes[extra][0])
+        fixed.append(value(result, extra, place[extra]))
+    return View(view.name, data, order[:3], fixed, place)
 
 
 def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
@@ -181,16 +201,15 @@ def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
     name = quantity or (first[0] if first else next(iter(result.data)))
     if name not in result.data:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
-    data, place = result.data[name], {}
-    fixed: dict[str, float] = {}
+    data, fixed, place = result.data[name], [], {}
     for axis, wanted in at.items():
         if axis not in result.axes:
             raise InputError("--at", axis, "one of " + ", ".join(result.axes))
         place[axis] = int(np.argmin(np.abs(result.axes[axis] - wanted)))
-        fixed[axis] = float(result.axes[axis][place[axis]])
+        fixed.append(value(result, axis, result.axes[axis][place[axis]]))
     across = [axis for axis, points in result.axes.items() if len(points) > 1 and axis not in place]
     if not across:
         counts = {axis: 1 if axis in place else len(points) for axis, points in result.axes.items()}
         raise InputError("axes", counts, "one with more than one point")
     data = data[tuple(slice(None) if axis in across else place.get(axis, 0) for axis in result.axes)]
-    return View(name, data, across, fixed)
+    return View(name, data, across, fixed, {axis: float(result.axes[axis][i]) for axis, i in place.items()})

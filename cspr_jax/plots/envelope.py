@@ -8,7 +8,6 @@ from matplotlib.ticker import MaxNLocator
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.plots.labels import COLOURS, chosen, robot_name
-from cspr_jax.plots.notes import notes
 from cspr_jax.results import Result
 
 AXES = ("torsion", "tilt_azimuth", "tilt")
@@ -17,13 +16,13 @@ SECTIONS = 17
 _ACCESSIBLE, _ATTAINED = ("#b0b0b0", 2.6), (COLOURS[0], 1.0)
 
 
-def envelope_figure(result: Result, verdicts: np.ndarray, fixed: dict[str, float]) -> Figure:
+def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> Figure:
     """Outlines of what is accessible and of what is attained, at some torsions.
 
     Args:
         result: gives axes, labels and constants.
         verdicts: (n_torsions, n_azimuths, n_tilts) flags.
-        fixed: axes fixed for the picture, and where.
+        fixed: what is constant, in words.
 
     Returns:
         the figure.
@@ -63,7 +62,7 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: dict[str, float
     handles = [Line2D([], [], color=colour, linewidth=width) for colour, width in (_ACCESSIBLE, _ATTAINED)]
     figure.legend(handles, ["accessible", "attained from rest"], loc="outside lower center", ncols=2, frameon=False)
     title = f"{robot_name(result)}: orientations of a place"
-    figure.suptitle(f"{title}\n{', '.join(notes(result, '', fixed, list(AXES)))}")
+    figure.suptitle(f"{title}\n{', '.join(fixed)}")
     return figure
 
 

@@ -20,13 +20,19 @@ _EDGE: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyl
 
 
 class _Section(NamedTuple):
-    # What a mark has to know of its section: where it is, which axes it has, and their names without "from_".
-    panel: Axes
+    # What a mark has to know of its section: its space, its axes, their names without "from_", where it is, the spools.
+    panel: Axes | None
     result: Result
+    space: tuple[str, ...]
     across: list[str]
     names: list[str]
     place: dict[str, float]
-    centre: np.ndarray
+    base: np.ndarray
+
+    @property
+    def centre(self) -> np.ndarray:
+        # The centroid of the spools.
+        return self.base.mean(axis=0)
 
 
 def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
@@ -45,26 +51,63 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
     Returns:
         what to show in the legend, by its words.
     """
+    section = _section(panel, result, across, place)
+    if section is None:
+        return {}
+    limits = panel.get_xlim(), panel.get_ylim()
+    found = _spools(section)
+    for words, point in _points(section, name).items():
+        if _contains(section, point):
+            at = _drawn(section, point[None])
+            if _inside(limits, at).any():
+                symbol, size = ("P", 7.0) if words == "P0" else ("o", 5.5)
+                found[words] = panel.plot(*at[0], symbol, markersize=size, **_EDGE)[0]
+    panel.set(xlim=limits[0], ylim=limits[1])
+    return found
+
+
+def marked(result: Result, name: str, across: list[str], over: str, place: dict[str, float]) -> list[int]:
+    """Which of many parallel sections contain P0 or the fixed end of the motions.
+
+    Args:
+        result: the map.
+        name: of the quantity.
+        across: the two axes of a section.
+        over: the axis along which the sections lie.
+        place: the axes that are the same for all, and where.
+
+    Returns:
+        their indices along that axis, at most two; empty where P0 is in each of them.
+    """
+    section = _section(None, result, across, place)
+    if section is None or over not in section.space:
+        return []
+    every = result.axes[over]
+    found = []
+    for point in _points(section, name).values():
+        gaps = every - _coordinate(over.removeprefix("from_"), point[None], section.centre, None)[0]
+        nearest = int(np.argmin(np.abs(gaps)))
+        if _contains(section._replace(place=section.place | {over: float(every[nearest])}), point):
+            found.append(nearest)
+    return sorted(set(found))
+
+
+def _section(panel: Axes | None, result: Result, across: list[str], place: dict[str, float]) -> _Section | None:
+    # None where nothing of this space can be marked.
     space = next((space for space in (OF_TARGETS, OF_STARTS) if set(across) <= set(space)), None)
     base = np.asarray(result.attributes.get("base_points", 0.0), float)
     if space is None or base.ndim != 2 or base.shape[1] != 3 or not np.isfinite(base).all():
-        return {}
-    known = {axis: point for axis, point in place.items() if axis in (*space, "z0", "inclination")}
-    names = [axis.removeprefix("from_") for axis in across]
-    section = _Section(panel, result, across, names, known, base.mean(axis=0))
-    limits = panel.get_xlim(), panel.get_ylim()
-    found = _spools(section, base)
-    words, end = ("start", start(result)) if space is OF_TARGETS else ("target", place)
-    marks = [("P0", "P", _rest_point(section, name))]
+        return None
+    return _Section(panel, result, space, across, [axis.removeprefix("from_") for axis in across], place, base)
+
+
+def _points(section: _Section, name: str) -> dict[str, np.ndarray]:
+    # P0, and the end that all motions share, by their words.
+    words, end = ("start", start(section.result)) if section.space is OF_TARGETS else ("target", section.place)
+    found = {"P0": _rest_point(section, name)}
     if all(axis in end for axis in "xyz"):
-        marks.append((words, "o", np.array([end[axis] for axis in "xyz"], float)))
-    for words, symbol, point in marks:
-        if point is not None and _contains(section, space, point):
-            at = _drawn(section, point[None])
-            if _inside(limits, at).any():
-                found[words] = panel.plot(*at[0], symbol, markersize=7 if symbol == "P" else 5.5, **_EDGE)[0]
-    panel.set(xlim=limits[0], ylim=limits[1])
-    return found
+        found[words] = np.array([end[axis] for axis in "xyz"], float)
+    return {words: point for words, point in found.items() if point is not None}
 
 
 def _rest_point(section: _Section, name: str) -> np.ndarray | None:
@@ -107,8 +150,8 @@ def _drawn(section: _Section, points: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-def _contains(section: _Section, space: tuple[str, ...], point: np.ndarray) -> bool:
-    for axis in space:
+def _contains(section: _Section, point: np.ndarray) -> bool:
+    for axis in section.space:
         name = axis.removeprefix("from_")
         if axis not in section.place:
             continue
@@ -126,8 +169,10 @@ def _contains(section: _Section, space: tuple[str, ...], point: np.ndarray) -> b
     return True
 
 
-def _spools(section: _Section, base: np.ndarray) -> dict[str, Artist]:
-    panel, names = section.panel, section.names
+def _spools(section: _Section) -> dict[str, Artist]:
+    panel, names, base = section.panel, section.names, section.base
+    if panel is None:
+        return {}
     polar = isinstance(panel, PolarAxes)
     if "radius" in names and "azimuth" not in (*section.place, *names):
         return {}

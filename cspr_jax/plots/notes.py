@@ -53,14 +53,14 @@ def starts_at_rest(result: Result, name: str) -> bool:
     return bool(table(table(result.settings, "trajectory"), "from").get("rest"))
 
 
-def notes(result: Result, name: str, fixed: dict[str, float], used: list[str]) -> list[str]:
+def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[str]:
     """What a picture of a map keeps constant.
 
     Args:
         result: the map.
         name: of the quantity; empty where the picture shows several.
-        fixed: axes fixed for the picture, and where.
-        used: axes that the picture shows.
+        fixed: what was fixed for the picture, in words.
+        used: axes that the picture shows, or of which `fixed` speaks.
 
     Returns:
         phrases.
@@ -71,8 +71,8 @@ def notes(result: Result, name: str, fixed: dict[str, float], used: list[str]) -
         found.append(f"from ({', '.join(f'{number:.4g}' for number in place.values())}) m")
     elif name and starts_at_rest(result, name):
         found.append("from rest")
-    constant = {axis: points[0] for axis, points in result.axes.items() if axis not in used and len(points) == 1}
-    found += [value(result, axis, point) for axis, point in (fixed | constant).items()]
+    found += fixed
+    found += [value(result, a, p[0]) for a, p in result.axes.items() if a not in used and len(p) == 1]
     if "z" in result.axes:
         found.append(f"z axis {shortened(str(result.attributes.get('z_axis', 'down')))}")
     return list(dict.fromkeys(found))

@@ -1,5 +1,7 @@
 """Sections of maps, in colours."""
 
+from typing import NamedTuple
+
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -11,8 +13,7 @@ from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar, scale_of
 from cspr_jax.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
 from cspr_jax.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
-from cspr_jax.plots.marks import mark
-from cspr_jax.plots.notes import notes
+from cspr_jax.plots.marks import mark, marked
 from cspr_jax.plots.reasons import VERDICTS, reason_scale
 from cspr_jax.results import Result
 
@@ -25,27 +26,44 @@ AROUND = ("azimuth", "radius")
 PANEL, SINGLE = 3.1, 5.2  # inches, the longer side
 
 
-def section_figure(
-    result: Result, name: str, data: np.ndarray, across: list[str], over: str | None, fixed: dict[str, float]
-) -> Figure:
+class Section(NamedTuple):
+    """What sections of a map show.
+
+    Fields:
+        name: of the quantity.
+        across: the two axes of a panel.
+        over: the axis that differs between the panels; None: there is one panel.
+        place: axes fixed for the picture, and where.
+        fixed: what is constant, in words.
+    """
+
+    name: str
+    across: list[str]
+    over: str | None
+    place: dict[str, float]
+    fixed: list[str]
+
+
+def section_figure(result: Result, section: Section, data: np.ndarray, told: np.ndarray | None = None) -> Figure:
     """Sections of a map, one a panel.
 
     Args:
         result: gives axes, labels and constants.
-        name: of the quantity.
+        section: what to show.
         data: (n_first, n_second, n_panels).
-        across: the two axes of a panel.
-        over: the axis that differs between the panels; None: there is one panel.
-        fixed: axes fixed for the picture, and where.
+        told: of data's shape, the cells that say more than that there is nothing; None: all.
 
     Returns:
         the figure.
     """
+    name, across, over = section.name, section.across, section.over
     polar = tuple(across) in (POLAR, AROUND)
-    # Most of all orientations are none that a robot can take.
-    tells = _tells(name, data) if tuple(across) == POLAR else np.ones(data.shape, bool)
-    told = np.flatnonzero(tells.any((0, 1)))
-    shown = told[chosen(len(told), PANELS)] if len(told) else chosen(data.shape[2], PANELS)
+    says = np.ones(data.shape, bool) if told is None else told
+    saying = np.flatnonzero(says.any((0, 1)))
+    shown = saying[chosen(len(saying), PANELS)] if len(saying) else chosen(data.shape[2], PANELS)
+    alone = {axis: float(points[0]) for axis, points in result.axes.items() if len(points) == 1} | section.place
+    if over is not None:
+        shown = _moved(shown, marked(result, name, across, over, alone))
     figure = Figure(figsize=_size(result, across, len(shown)), layout="constrained")
     every, bottom, left = panels(figure, len(shown), polar=polar)
     # The points of an axis may come in any order.
@@ -55,7 +73,6 @@ def section_figure(
     cells, scale = reason_scale(data, name) if name in VERDICTS else (data, scale_of(data, signed=name in SIGNED))
     titles = values(result, over, result.axes[over][shown]) if over is not None else []
     legend: dict[str, Artist] = {"no value": Patch(color=NONE_COLOUR)} if scale.missing else {}
-    alone = {axis: float(points[0]) for axis, points in result.axes.items() if len(points) == 1} | fixed
     for k, panel in enumerate(every):
         image = _section(panel, result, cells[:, :, k], across, points, scale)
         if name == "least_oscillations" and not polar:
@@ -64,10 +81,10 @@ def section_figure(
         legend |= mark(panel, result, name, across, {a: p for a, p in place.items() if a not in across})
         if titles:
             panel.set_title(titles[k])
-    words = notes(result, name, fixed, [*across, *([over] if over else [])])
+    words = list(section.fixed)
     if polar:
-        told = np.flatnonzero(tells[:, orders[1]][:, :, shown].any((0, 2)))
-        reach_polar(every, _edges(points[1])[told[-1] + 1 if len(told) else -1], unit(result, across[1]))
+        outward = np.flatnonzero(says[:, orders[1]][:, :, shown].any((0, 2)))
+        reach_polar(every, _edges(points[1])[outward[-1] + 1 if len(outward) else -1], unit(result, across[1]))
         words.append(f"around: {axis_label(result, across[0])}, outward: {axis_label(result, across[1])}")
     else:
         _name_axes(result, across, bottom, left)
@@ -76,6 +93,17 @@ def section_figure(
         figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=len(legend))
     figure.suptitle(f"{heading(result, name)}\n{', '.join(words)}")
     return figure
+
+
+def _moved(shown: np.ndarray, wanted: list[int]) -> np.ndarray:
+    # Evenly chosen sections, the nearest ones moved to where there is something to mark.
+    found = shown.tolist()
+    for index in wanted:
+        if index not in found:
+            free = [other for other in found if other not in wanted]
+            if free:
+                found[found.index(min(free, key=lambda other: abs(other - index)))] = index
+    return np.sort(found)
 
 
 def _size(result: Result, across: list[str], count: int) -> tuple[float, float]:
@@ -105,8 +133,16 @@ def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list
             in_whole_numbers(axis)
 
 
-def _tells(name: str, data: np.ndarray) -> np.ndarray:
-    # Cells that say more than that there is nothing.
+def tells(name: str, data: np.ndarray) -> np.ndarray:
+    """Which cells say more than that there is nothing: most of all orientations are none that a robot can take.
+
+    Args:
+        name: of the quantity.
+        data: it.
+
+    Returns:
+        of data's shape.
+    """
     if name in VERDICTS:
         return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0
     return data > 0 if data.dtype.kind == "i" else np.isfinite(data)
