@@ -77,7 +77,7 @@ def commands_of(name: str) -> list[str]:
     else:
         results = [f"{RESULTS}/{source}/{source}.h5" for source in sources]
         made = [f"cspr run sweeps/{source}.toml -o {RESULTS}/{source}" for source in sources]
-    words = ["cspr plot", *results, *image.plot.split(), f"--dpi 110 -o docs/images/{name}.png"]
+    words = ["cspr plot", *results, *image.plot.split(), f"--dpi 90 -o docs/images/{name}.png"]
     return [*made, " ".join(words)]
 
 
