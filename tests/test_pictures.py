@@ -87,6 +87,20 @@ def test_spools_p0_and_start_stand_where_they_are(capsys, tmp_path, figures):  #
     assert side.get_ylim() == (2.25, 0.75)
 
 
+def test_what_lies_elsewhere_is_not_marked(capsys, tmp_path, figures):  # noqa: F811
+    """The start half a metre below the only section; beyond the lowest one; P0 upward of z = up."""
+    for k, (z, height) in enumerate((([1.5], 2.0), ([1.0, 1.2, 1.4], 2.0))):
+        start = {"from": {"position": [0.5, -0.5, height]}}
+        cspr(capsys, "plot", made(tmp_path / f"{k}.h5", GRID | {"z": z}, trajectory=start))
+        assert not any("end" in marked(panel) for panel in panels(figures[k]))
+    up = made(tmp_path / "up.h5", GRID | {"z": [-1.3, -1.0]}, z_axis="up")
+    cspr(capsys, "plot", up)
+    assert [list(marked(panel)) for panel in panels(figures[2])] == [["P0"], []]
+    cspr(capsys, "plot", up, "--at", "y=0")
+    assert marked(panels(figures[3])[0]) == {"P0": pytest.approx((0.0, -1.3))}
+    assert not panels(figures[3])[0].yaxis_inverted() and panels(figures[3])[0].get_ylim()[1] < 0.0
+
+
 @pytest.mark.parametrize(
     ("base", "sides"),
     [

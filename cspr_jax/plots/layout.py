@@ -58,8 +58,8 @@ def in_degrees(axis: Axis, span: float) -> None:
         axis: of a panel.
         span: of its values, degrees.
     """
-    step = next((step for step in DEGREES if span <= 7.0 * step), DEGREES[-1])
-    axis.set_major_locator(MultipleLocator(step) if span >= 2.0 else MaxNLocator(5))
+    step = next((step for step in DEGREES if span <= 7.0 * step), None)
+    axis.set_major_locator(MaxNLocator(5) if step is None or span < 2.0 else MultipleLocator(step))
     axis.set_major_formatter(FuncFormatter(lambda tick, _: f"{turned(tick) + 0.0:.6g}"))
 
 
@@ -82,8 +82,9 @@ def reach_polar(every: list[Axes], reach: float, unit: str) -> None:
         reach: the largest radius shown.
         unit: of the radius.
     """
-    step = next((step for step in DEGREES if reach <= 4.5 * step), DEGREES[-1])
-    every_tick = np.arange(0.0, reach, step) if unit == "°" else np.asarray(MaxNLocator(4).tick_values(0.0, reach))
+    step = next((step for step in DEGREES if reach <= 4.5 * step), None)
+    even = step is None or unit != "°"
+    every_tick = np.asarray(MaxNLocator(4).tick_values(0.0, reach)) if even else np.arange(0.0, reach, step)
     ticks = every_tick[(every_tick > 0.0) & (every_tick < 0.95 * reach)]
     around = range(0, 360, 45)
     gap = " " if unit.isalpha() else ""

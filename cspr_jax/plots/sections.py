@@ -66,8 +66,8 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
         shown = _moved(shown, marked(result, name, across, over, alone))
     figure = Figure(figsize=_size(result, across, len(shown)), layout="constrained")
     every, bottom, left = panels(figure, len(shown), polar=polar)
-    # The points of an axis may come in any order.
-    orders = [np.argsort(result.axes[axis], kind="stable") for axis in across]
+    # The points of an axis may come in any order, and twice.
+    orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in across]
     points = [as_drawn(result, axis, result.axes[axis][order]) for axis, order in zip(across, orders, strict=True)]
     data = as_drawn(result, name, data[np.ix_(*orders, shown)])
     cells, scale = reason_scale(data, name) if name in VERDICTS else (data, scale_of(data, signed=name in SIGNED))
@@ -113,7 +113,7 @@ def _size(result: Result, across: list[str], count: int) -> tuple[float, float]:
     width, height = side, side
     if _equal(result, across):
         x, y = (float(np.ptp(result.axes[axis])) for axis in across)
-        width, height = side * min(1.0, max(0.4, x / y)), side * min(1.0, max(0.3, y / x))
+        width, height = side * min(1.0, max(0.4, x / (y or x or 1.0))), side * min(1.0, max(0.3, y / (x or y or 1.0)))
     return columns * (width + 0.15) + 1.9, -(-count // columns) * (height + 0.35) + 1.15
 
 
@@ -152,7 +152,7 @@ def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], 
     x, y = map(_edges, points)
     if isinstance(panel, PolarAxes):
         # Sides of a cell are straight: narrow ones look round.
-        parts = int(np.ceil(np.diff(x).max() / 3.0))
+        parts = int(min(120.0, np.ceil(np.diff(x).max() / 3.0)))
         x = np.interp(np.arange(parts * (len(x) - 1) + 1) / parts, np.arange(len(x)), np.radians(x))
         y, cells = np.maximum(y, 0.0), np.repeat(cells, parts, axis=0)
     if cells.dtype.kind == "f":
@@ -177,5 +177,7 @@ def _loci(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
 
 
 def _edges(points: np.ndarray) -> np.ndarray:
+    if len(points) == 1:
+        return points[0] + np.array([-0.5, 0.5]) * max(1.0, abs(points[0]))
     middles = 0.5 * (points[1:] + points[:-1])
     return np.concatenate([[1.5 * points[0] - 0.5 * points[1]], middles, [1.5 * points[-1] - 0.5 * points[-2]]])
