@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
+from cspr_jax.plots.options import add_style
 from cspr_jax.progress import progress
 
 EPILOGUE = (
@@ -116,7 +117,7 @@ def _parser() -> argparse.ArgumentParser:
         "--envelope", action="store_true", help='outlines of all orientations of a place, of map = "orientations"'
     )
     plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
-    _add_style(plot)
+    add_style(plot)
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
     table.add_argument("--list", action="store_true", help="list the tables")
@@ -157,12 +158,6 @@ def _print(renderable: Any) -> None:
 
     # A pipe gets lines of a width of their own, so that no column is folded.
     Console(width=None if sys.stdout.isatty() else 140, highlight=False).print(renderable)
-
-
-def _add_style(plot: argparse.ArgumentParser) -> None:
-    plot.add_argument("--size", metavar="WIDTHxHEIGHT", help="of the picture, cm, such as 16x10")
-    plot.add_argument("--dpi", type=float, metavar="N", help="pixels an inch (default 160)")
-    plot.add_argument("--font-size", type=float, metavar="PT", help="points (default 10)")
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -291,12 +286,11 @@ def _plot(options: argparse.Namespace) -> int:
     from cspr_jax.plots.draw import plot
     from cspr_jax.plots.style import style_of
 
-    style = style_of(options.size, options.dpi, options.font_size)
     output = options.output or options.result[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
     chosen = {"quantity": options.quantity, "at": at, "lines": options.lines, "envelope": options.envelope}
-    plot(options.result, output, **chosen, style=style)
+    plot(options.result, output, **chosen, style=style_of(options.size, options.dpi, options.font_size))
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE
 

@@ -89,16 +89,16 @@ def test_spools_p0_and_start_stand_where_they_are(capsys, tmp_path, figures):  #
 
 def test_what_lies_elsewhere_is_not_marked(capsys, tmp_path, figures):  # noqa: F811
     """The start half a metre below the only section; beyond the lowest one; P0 upward of z = up."""
-    for k, (z, height) in enumerate((([1.5], 2.0), ([1.0, 1.2, 1.4], 2.0))):
+    for k, (z, height) in enumerate((([1.5], 2.0), ([1.0, 1.2, 1.4], 2.0), ([0.1, 1.2, 1.4], 1.6))):
         start = {"from": {"position": [0.5, -0.5, height]}}
         cspr(capsys, "plot", made(tmp_path / f"{k}.h5", GRID | {"z": z}, trajectory=start))
         assert not any("end" in marked(panel) for panel in panels(figures[k]))
     up = made(tmp_path / "up.h5", GRID | {"z": [-1.3, -1.0]}, z_axis="up")
     cspr(capsys, "plot", up)
-    assert [list(marked(panel)) for panel in panels(figures[2])] == [["P0"], []]
+    assert [list(marked(panel)) for panel in panels(figures[3])] == [["P0"], []]
     cspr(capsys, "plot", up, "--at", "y=0")
-    assert marked(panels(figures[3])[0]) == {"P0": pytest.approx((0.0, -1.3))}
-    assert not panels(figures[3])[0].yaxis_inverted() and panels(figures[3])[0].get_ylim()[1] < 0.0
+    assert marked(panels(figures[4])[0]) == {"P0": pytest.approx((0.0, -1.3))}
+    assert not panels(figures[4])[0].yaxis_inverted() and panels(figures[4])[0].get_ylim()[1] < 0.0
 
 
 @pytest.mark.parametrize(
@@ -343,6 +343,20 @@ def test_sizes_that_cannot_be(capsys, tmp_path, arguments, told):
     line = cspr(capsys, "plot", path, *arguments, code=2)
     assert all(word in line for word in told), line
     assert [file.name for file in tmp_path.iterdir()] == ["map.h5"]
+
+
+def test_titles_stand_clear_of_panels(capsys, tmp_path, figures):  # noqa: F811
+    """Of sections, whose upper row has ticks below, and of polar ones, which have angles around."""
+    tilts = {"tilt_azimuth": (np.arange(8) - 4) * np.pi / 4.0, "tilt": np.arange(1, 4) * 0.3}
+    for k, axes in enumerate((GRID | {"z": [1.0, 1.2, 1.5, 2.0]}, {"z": [1.0, 1.2, 1.5, 2.0]} | tilts)):
+        cspr(capsys, "plot", made(tmp_path / f"{k}.h5", axes, kind="poses"))
+        figures[k].draw_without_rendering()
+        every = panels(figures[k])
+        inner = [panel.get_window_extent() for panel in every]
+        inner += [text.get_window_extent() for panel in every for text in panel.get_xticklabels() if text.get_text()]
+        titles = [panel.title.get_window_extent() for panel in every]
+        titles.append(figures[k].suptitle(figures[k].get_suptitle()).get_window_extent())
+        assert len(titles) == 5 and not any(title.overlaps(box) for title in titles for box in inner)
 
 
 def test_long_titles_are_broken(capsys, tmp_path, figures):  # noqa: F811

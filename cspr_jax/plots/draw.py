@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.plots.envelope import AXES, envelope_figure
-from cspr_jax.plots.labels import PANELS, chosen, heading, value, values
+from cspr_jax.plots.labels import PANELS, chosen, heading, robot_name, value, values
 from cspr_jax.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.plots.motion import motion_figure
 from cspr_jax.plots.notes import notes
@@ -131,7 +131,9 @@ def _overlay(
     across, drawn = overlaid(names, found)
     same = [note for note in constant[0] if all(note in other for other in constant)]
     robots = {result.attributes["robot"] for result in results}
-    title = heading(results[0], view.name) if len(robots) == 1 else results[0].labels[view.name]
+    title = heading(results[0], view.name)
+    if len(robots) > 1:
+        title = title.removeprefix(f"{robot_name(results[0])}: ")
     return line_figure(results[0], view.name, {"": drawn}, across, title, same)
 
 

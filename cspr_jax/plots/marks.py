@@ -163,7 +163,11 @@ def _contains(section: _Section, point: np.ndarray) -> bool:
                 continue  # on the vertical about which it turns
             gaps = (gaps + np.pi) % (2.0 * np.pi) - np.pi
         nearest = int(np.argmin(np.abs(gaps)))
-        step = np.diff(np.sort(points)).max(initial=2e-6 * max(1.0, abs(points[nearest])))
+        ordered = np.unique(points)
+        steps = np.diff(ordered)
+        # That towards the point; beyond the last one the last.
+        side = int(np.searchsorted(ordered, points[nearest])) - (gaps[nearest] > 0.0)
+        step = steps[min(max(side, 0), len(steps) - 1)] if len(steps) else 2e-6 * max(1.0, abs(here))
         if points[nearest] != here or abs(gaps[nearest]) > 0.5 * step:
             return False
     return True
