@@ -331,7 +331,7 @@ def test_size_resolution_and_letters(capsys, tmp_path, monkeypatch):
         (["--size", "-16x10"], ["--size"]),
         (["--dpi", "nan"], ["--dpi", "nan", "30 to 1200"]),
         (["--dpi", "1"], ["--dpi", "30 to 1200"]),
-        (["--dpi", "1200", "--size", "100x100"], ["--dpi", "at most 254 with --size 100x100"]),
+        (["--dpi", "1200", "--size", "100x100"], ["--dpi", "at most 253 for 100x100 cm"]),
         (["--font-size", "0"], ["--font-size", "4 to 40"]),
         (["--size", "5x5", "--font-size", "40"], ["--size", "larger, or --font-size smaller"]),
     ],

@@ -72,20 +72,11 @@ def style_of(size: str | None, dpi: float | None, font_size: float | None) -> St
         ConfigError: a wrong text, or a number out of bounds.
     """
     default = Style()
-    found = Style(
+    return Style(
         None if size is None else _sides(size),
         default.dpi if dpi is None else _bounded("--dpi", dpi, DPIS),
         default.font_size if font_size is None else _bounded("--font-size", font_size, FONT_SIZES),
     )
-    if found.size is not None and _pixels(found) > LARGEST_PIXELS:
-        most = found.dpi * math.sqrt(LARGEST_PIXELS / _pixels(found))
-        raise ConfigError("--dpi", f"{found.dpi:g}: must be at most {math.floor(most)} with --size {size}")
-    return found
-
-
-def _pixels(style: Style) -> float:
-    width, height = style.size or (0.0, 0.0)
-    return width * height * (style.dpi / INCH) ** 2
 
 
 def _sides(text: str) -> tuple[float, float]:
@@ -128,12 +119,16 @@ def save(figure: Figure, output: Path, style: Style) -> None:
         style: the chosen one.
 
     Raises:
-        InputError: there is no room for the panels.
+        InputError: too many pixels, or no room for the panels.
         ValueError: an unknown format.
         OSError: it cannot be written.
     """
     if style.size is not None:
         figure.set_size_inches(style.size[0] / INCH, style.size[1] / INCH)
+    width, height = figure.get_size_inches()
+    most = math.floor(math.sqrt(LARGEST_PIXELS / (width * height)))
+    if style.dpi > most:
+        raise InputError("--dpi", style.dpi, f"at most {most} for {width * INCH:.3g}x{height * INCH:.3g} cm")
     content, ending = io.BytesIO(), output.suffix.lower()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from")  # a letter that the font lacks is drawn as a box
@@ -142,6 +137,6 @@ def save(figure: Figure, output: Path, style: Style) -> None:
         try:
             figure.savefig(content, format=ending[1:], dpi=style.dpi, metadata=METADATA.get(ending))
         except UserWarning as warning:
-            size = "x".join(f"{side * INCH:.3g}" for side in figure.get_size_inches())
+            size = f"{width * INCH:.3g}x{height * INCH:.3g}"
             raise InputError("--size", size, "larger, or --font-size smaller: the texts leave no room") from warning
     output.write_bytes(content.getvalue())
