@@ -13,7 +13,7 @@ from cspr_jax.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.plots.motion import motion_figure
 from cspr_jax.plots.notes import notes
 from cspr_jax.plots.sections import AROUND, POLAR, Section, section_figure, tells
-from cspr_jax.plots.style import Style, in_style, save
+from cspr_jax.plots.style import Style, in_style, rendered
 from cspr_jax.results import Result, open_result
 
 # What a map is asked for first.
@@ -80,11 +80,13 @@ def plot(
             else:
                 _refuse_choices(quantity, at, lines)
                 figure = motion_figure(results[0])
-            save(figure, output, style)
+            picture = rendered(figure, output.suffix, style)
     except InputError as error:
         raise ConfigError(paths[0], str(error)) from error
     except ValueError as error:
         raise ConfigError(output, str(error).splitlines()[0]) from error
+    try:
+        output.write_bytes(picture)
     except OSError as error:
         raise StoreError(f"{output}: cannot be written: {error.strerror or error}") from error
 

@@ -6,7 +6,6 @@ import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import NamedTuple
 
 import matplotlib.style
@@ -110,18 +109,20 @@ def in_style(style: Style) -> Iterator[None]:
         yield
 
 
-def save(figure: Figure, output: Path, style: Style) -> None:
-    """Write a picture, whole or not at all.
+def rendered(figure: Figure, ending: str, style: Style) -> bytes:
+    """The content of a picture's file.
 
     Args:
         figure: the picture, made inside `in_style`.
-        output: its file; the ending is the format.
+        ending: of its file, such as ".png": the format.
         style: the chosen one.
+
+    Returns:
+        the content.
 
     Raises:
         InputError: too many pixels, or no room for the panels.
         ValueError: an unknown format.
-        OSError: it cannot be written.
     """
     if style.size is not None:
         figure.set_size_inches(style.size[0] / INCH, style.size[1] / INCH)
@@ -129,7 +130,7 @@ def save(figure: Figure, output: Path, style: Style) -> None:
     most = math.floor(math.sqrt(LARGEST_PIXELS / (width * height)))
     if style.dpi > most:
         raise InputError("--dpi", style.dpi, f"at most {most} for {width * INCH:.3g}x{height * INCH:.3g} cm")
-    content, ending = io.BytesIO(), output.suffix.lower()
+    content, ending = io.BytesIO(), ending.lower()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from")  # a letter that the font lacks is drawn as a box
         warnings.filterwarnings("error", "constrained_layout not applied")
@@ -139,4 +140,4 @@ def save(figure: Figure, output: Path, style: Style) -> None:
         except UserWarning as warning:
             size = f"{width * INCH:.3g}x{height * INCH:.3g}"
             raise InputError("--size", size, "larger, or --font-size smaller: the texts leave no room") from warning
-    output.write_bytes(content.getvalue())
+    return content.getvalue()
