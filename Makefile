@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TESTS := $(VENV)/.installed-tests
 
-.PHONY: demo test soak check bench docs clean
+.PHONY: demo test soak check bench docs images clean
 
 demo: $(STAMP)
 	$(BIN)/cspr table 2.1
@@ -36,6 +36,11 @@ bench: $(TESTS)
 
 docs: $(STAMP)
 	$(BIN)/python docs/generate_reference.py
+	$(BIN)/python docs/make_images.py --page
+
+# Sweeps and plans first, some two minutes; their results stay in results/images.
+images: $(STAMP)
+	$(BIN)/python docs/make_images.py
 
 $(STAMP): pyproject.toml hatch_build.py
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

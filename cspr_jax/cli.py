@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 from cspr_jax import __version__, compiled
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
+from cspr_jax.plots.options import add_style
 from cspr_jax.progress import progress, waiting
 from cspr_jax.sweep.signals import Prompt, prompt_end, stop_signals
 
@@ -124,6 +125,7 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
     plot.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
     plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
+    add_style(plot)
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
     table.add_argument("--list", action="store_true", help="list the tables")
@@ -314,13 +316,14 @@ def _plot(options: argparse.Namespace) -> int:
         if not math.isfinite(at[axis]):
             raise ConfigError("--at", f"{shown(text)}: must be a finite number")
     from cspr_jax.plots.draw import plot
+    from cspr_jax.plots.style import style_of
 
     output = options.output or options.result[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
     chosen = {"quantity": options.quantity, "at": at, "lines": options.lines, "envelope": options.envelope}
     with waiting():
-        plot(options.result, output, **chosen)
+        plot(options.result, output, **chosen, style=style_of(options.size, options.dpi, options.font_size))
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE
 

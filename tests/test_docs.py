@@ -114,15 +114,36 @@ def test_files_in_sweeps_are_read():
             assert read_sweep(path).grid.size > 0
 
 
-def test_the_reference_is_generated():
-    place = ROOT / "docs" / "generate_reference.py"
-    spec = importlib.util.spec_from_file_location("generate_reference", place)
+def script(name: str):
+    """A program of docs, as a module."""
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    text = module.reference_text()
+    return module
+
+
+def test_the_reference_is_generated():
+    text = script("generate_reference").reference_text()
     assert text == (ROOT / "docs" / "reference.md").read_text("utf-8"), "call `make docs`"
     wanted = [*QUANTITIES, "schema", "from_x", "cable_speed_max", "epsilon", "z_axis", "max_arcs", "samples", "tile"]
     assert all(f"`{name}`" in text for name in wanted)
+
+
+def test_every_picture_has_its_commands():
+    """None is left of an older way to make it, and the README gives the arguments that made those it shows."""
+    images = script("make_images")
+    assert images.page_text() == (ROOT / "docs" / "images.md").read_text("utf-8"), "call `make docs`"
+    assert {path.name for path in (ROOT / "docs" / "images").iterdir()} == {f"{name}.png" for name in images.IMAGES}
+    text = (ROOT / "README.md").read_text("utf-8")
+    shown = re.findall(r"!\[[^]]*\]\(docs/images/(\w+)\.png\)\n\n\*(.*?)\*\n\n", text, re.DOTALL)
+    assert len(shown) >= 4
+    for name, caption in shown:
+        image = images.IMAGES[name]
+        run, plot = (shlex.split(words)[1:] for words in re.findall(r"`(cspr (?:run|plot) [^`]*)`", caption))
+        assert cli._parser().parse_args(run).sweep == Path(f"sweeps/{(image.sources or (name,))[0]}.toml")
+        drawn, wanted = cli._parser().parse_args(plot), cli._parser().parse_args(["plot", "x", *image.plot.split()])
+        assert drawn.result[0].parent == cli._parser().parse_args(run).output
+        assert {**vars(drawn), "result": 0} == {**vars(wanted), "result": 0}, name
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -1,6 +1,5 @@
 """From result files to a picture: which kind it is, and which part of the data it shows."""
 
-import io
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,10 +8,12 @@ from matplotlib.figure import Figure
 
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.plots.envelope import AXES, envelope_figure
-from cspr_jax.plots.labels import PANELS, chosen, value
-from cspr_jax.plots.lines import Line, line_figure, lines_of, overlaid
+from cspr_jax.plots.labels import PANELS, chosen, heading, robot_name, value, values
+from cspr_jax.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.plots.motion import motion_figure
-from cspr_jax.plots.sections import POLAR, section_figure
+from cspr_jax.plots.notes import notes
+from cspr_jax.plots.sections import AROUND, POLAR, Section, section_figure, tells
+from cspr_jax.plots.style import Style, in_style, rendered
 from cspr_jax.results import Result, open_result
 from cspr_jax.stages import stage
 from cspr_jax.store.disk import Disk
@@ -20,8 +21,10 @@ from cspr_jax.store.publishing import publish
 
 # What a map is asked for first.
 FIRST = ("arcs", "oscillations", "lower_envelope", "attainable_fraction", "accessible_volume")
-# Pairs of axes that belong into one plane; the last one is drawn in polar coordinates.
-PLANES = (("x", "y"), POLAR)
+# Pairs of axes that belong into one plane, the second upward or, in polar coordinates, outward: the first of these that
+# vary, or the one of the others that has the most cells.
+PLANES = (("x", "y"), POLAR, ("from_x", "from_y"))
+OTHERS = (AROUND, ("x", "z"), ("y", "z"), ("radius", "z"))
 
 
 class View(NamedTuple):
@@ -32,12 +35,14 @@ class View(NamedTuple):
         data: it, one dimension for each of `across`.
         across: axes that vary.
         fixed: what was fixed, in words.
+        place: the axes that were fixed, and where.
     """
 
     name: str
     data: np.ndarray
     across: list[str]
     fixed: list[str]
+    place: dict[str, float]
 
 
 def plot(
@@ -48,6 +53,7 @@ def plot(
     at: dict[str, float] | None = None,
     lines: str | None = None,
     envelope: bool = False,
+    style: Style | None = None,
 ) -> None:
     """Draw one result file, or several maps as lines in one picture.
 
@@ -58,6 +64,7 @@ def plot(
         at: fixed values of axes, the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
+        style: size, resolution and letters; None: the default.
 
     Raises:
         StoreError: a file cannot be read, or the picture cannot be written.
@@ -66,24 +73,24 @@ def plot(
     stage("reading")
     results = [open_result(path) for path in paths]
     stage("drawing")
+    style = style or Style()
     try:
-        if envelope:
-            figure = _envelope(results, quantity, at or {}, lines)
-        elif len(results) > 1:
-            figure = _overlay(paths, results, quantity, at or {}, lines)
-        elif results[0].is_map:
-            figure = _map_figure(results[0], quantity, at or {}, lines)
-        else:
-            _refuse_choices(quantity, at, lines)
-            figure = motion_figure(results[0])
-        picture, ending = io.BytesIO(), output.suffix.removeprefix(".")
-        metadata = {"Software": None} if ending == "png" else None
-        figure.savefig(picture, format=ending, dpi=160, metadata=metadata)
+        with in_style(style):
+            if envelope:
+                figure = _envelope(results, quantity, at or {}, lines)
+            elif len(results) > 1:
+                figure = _overlay(paths, results, quantity, at or {}, lines)
+            elif results[0].is_map:
+                figure = _map_figure(results[0], quantity, at or {}, lines)
+            else:
+                _refuse_choices(quantity, at, lines)
+                figure = motion_figure(results[0])
+            picture = rendered(figure, output.suffix, style)
     except InputError as error:
         raise ConfigError(paths[0], str(error)) from error
     except ValueError as error:
         raise ConfigError(output, str(error).splitlines()[0]) from error
-    publish(Disk(), output, picture.getvalue())
+    publish(Disk(), output, picture)
 
 
 def _refuse_choices(quantity: str | None, at: dict[str, float] | None, lines: str | None) -> None:
@@ -103,13 +110,16 @@ def _envelope(results: list[Result], quantity: str | None, at: dict[str, float],
     view = _view(result, "verdict", elsewhere | at)
     if set(view.across) != set(AXES):
         raise InputError("--at", sorted(at), "no axis of " + ", ".join(AXES))
-    return envelope_figure(result, view.data.transpose([view.across.index(axis) for axis in AXES]), view.fixed)
+    return envelope_figure(
+        result, view.data.transpose([view.across.index(axis) for axis in AXES]), _constant(result, view, "")
+    )
 
 
 def _overlay(
     paths: list[Path], results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None
 ) -> Figure:
-    found: list[tuple[str, Result, np.ndarray, str]] = []
+    found: list[tuple[Result, np.ndarray, str]] = []
+    constant: list[list[str]] = []
     if lines is not None:
         raise InputError("--lines", lines, "absent where several results are drawn")
     for path, result in zip(paths, results, strict=True):
@@ -118,10 +128,17 @@ def _overlay(
         view = _view(result, quantity, at)
         if len(view.across) != 1:
             raise InputError("results", f"{path} over {view.across}", "maps over one axis; --at fixes the others")
-        name = path.stem if [other.stem for other in paths].count(path.stem) == 1 else str(path)
-        found.append((name, result, view.data, view.across[0]))
-    across, drawn = overlaid(found)
-    return line_figure(results[0], view.name, {"": drawn}, across, view.fixed, [across])
+        found.append((result, view.data, view.across[0]))
+        constant.append(_constant(result, view))
+    stems = [path.stem for path in paths]
+    names = names_of(results, stems if len(set(stems)) == len(stems) else [str(path) for path in paths])
+    across, drawn = overlaid(names, found)
+    same = [note for note in constant[0] if all(note in other for other in constant)]
+    robots = {result.attributes["robot"] for result in results}
+    title = heading(results[0], view.name)
+    if len(robots) > 1:
+        title = title.removeprefix(f"{robot_name(results[0])}: ")
+    return line_figure(results[0], view.name, {"": drawn}, across, title, same)
 
 
 def _map_figure(result: Result, quantity: str | None, at: dict[str, float], lines: str | None) -> Figure:
@@ -130,12 +147,32 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
         return _lines_figure(result, view, lines)
     if len(view.across) == 1:
         axis = view.across[0]
-        return line_figure(result, view.name, {"": [Line(result.axes[axis], view.data)]}, axis, view.fixed, view.across)
-    plane = next((pair for pair in PLANES if set(pair) <= set(view.across)), ())
+        only = {"": [Line(result.axes[axis], view.data)]}
+        return line_figure(result, view.name, only, axis, heading(result, view.name), _constant(result, view))
+    plane = next((pair for pair in PLANES if set(pair) <= set(view.across)), None) or max(
+        (pair for pair in OTHERS if set(pair) <= set(view.across)),
+        key=lambda pair: len(result.axes[pair[0]]) * len(result.axes[pair[1]]),
+        default=(),
+    )
     order = [*plane, *(axis for axis in view.across if axis not in plane)]
-    name, data, across, fixed = _panelled(result, view, order)
-    panels = across[2] if len(across) > 2 else None
-    return section_figure(result, name, data if panels else data[..., None], across[:2], panels, fixed)
+    view = _panelled(result, view, order)
+    data, panels = view.data, view.across[2] if len(view.across) > 2 else None
+    told = _told(result, at, order) if tuple(view.across[:2]) == POLAR else None
+    if not panels:
+        data, told = data[..., None], None if told is None else told[..., None]
+    section = Section(view.name, view.across[:2], panels, view.place, _constant(result, view))
+    return section_figure(result, section, data, told)
+
+
+def _constant(result: Result, view: View, name: str | None = None) -> list[str]:
+    return notes(result, view.name if name is None else name, view.fixed, [*view.across, *view.place])
+
+
+def _told(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
+    # The same for every quantity of a file, so that their pictures show the same sections.
+    names = ["verdict"] if "verdict" in result.data else list(result.data)
+    found = [tells(name, _panelled(result, _view(result, name, at), order).data) for name in names]
+    return np.any(found, axis=0)
 
 
 def _lines_figure(result: Result, view: View, by: str) -> Figure:
@@ -143,25 +180,26 @@ def _lines_figure(result: Result, view: View, by: str) -> Figure:
         raise InputError("--lines", by, "one of two or more axes that vary: " + ", ".join(view.across))
     along = next(axis for axis in view.across if axis != by)
     order = [along, by, *(axis for axis in view.across if axis not in (along, by))]
-    name, data, across, fixed = _panelled(result, view, order)
-    if len(across) == 2:
-        groups = {"": lines_of(result, data, along, by)}
+    view = _panelled(result, view, order)
+    if len(view.across) == 2:
+        groups = {"": lines_of(result, view.data, along, by)}
     else:
-        points = result.axes[across[2]]
+        points = result.axes[view.across[2]]
         shown = chosen(len(points), PANELS)
-        groups = {
-            value(result, across[2], points[i], digits=3): lines_of(result, data[:, :, i], along, by) for i in shown
-        }
-    return line_figure(result, name, groups, along, fixed, across)
+        titles = values(result, view.across[2], points[shown])
+        groups = {t: lines_of(result, view.data[:, :, i], along, by) for t, i in zip(titles, shown, strict=True)}
+    return line_figure(result, view.name, groups, along, heading(result, view.name), _constant(result, view))
 
 
 def _panelled(result: Result, view: View, order: list[str]) -> View:
     # At most three axes, in this order; the others at their first point.
     data, fixed = view.data.transpose([view.across.index(axis) for axis in order]), list(view.fixed)
+    place = dict(view.place)
     for extra in order[3:]:
         data = data[:, :, :, 0]
-        fixed.append(value(result, extra, result.axes[extra][0]))
-    return View(view.name, data, order[:3], fixed)
+        place[extra] = float(result.axes[extra][0])
+        fixed.append(value(result, extra, place[extra]))
+    return View(view.name, data, order[:3], fixed, place)
 
 
 def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
@@ -180,4 +218,4 @@ def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
         counts = {axis: 1 if axis in place else len(points) for axis, points in result.axes.items()}
         raise InputError("axes", counts, "one with more than one point")
     data = data[tuple(slice(None) if axis in across else place.get(axis, 0) for axis in result.axes)]
-    return View(name, data, across, fixed)
+    return View(name, data, across, fixed, {axis: float(result.axes[axis][i]) for axis, i in place.items()})

@@ -7,12 +7,13 @@ from matplotlib.ticker import MaxNLocator
 
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.plots.labels import COLOURS, chosen, notes
+from cspr_jax.plots.labels import COLOURS, chosen, robot_name
 from cspr_jax.results import Result
 
 AXES = ("torsion", "tilt_azimuth", "tilt")
 SECTIONS = 17
-_ACCESSIBLE, _ATTAINED = "#9e9e9e", COLOURS[0]
+# The wide line shows on both sides of the narrow one where both have the same outline.
+_ACCESSIBLE, _ATTAINED = ("#b0b0b0", 2.6), (COLOURS[0], 1.0)
 
 
 def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> Figure:
@@ -21,7 +22,7 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> F
     Args:
         result: gives axes, labels and constants.
         verdicts: (n_torsions, n_azimuths, n_tilts) flags.
-        fixed: what was fixed for the picture.
+        fixed: what is constant, in words.
 
     Returns:
         the figure.
@@ -37,28 +38,31 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> F
     if not len(levels):
         raise InputError("--envelope", "nothing is accessible", "a place with accessible orientations")
     shown = levels[chosen(len(levels), SECTIONS)]
-    figure = Figure(figsize=(11.0, 5.6), layout="constrained")
+    figure = Figure(figsize=(10.5, 4.8), layout="constrained")
     reach = np.degrees(tilt[accessible.any((0, 1))].max()) + 10.0
     for place, view in enumerate(((22.0, -60.0), (12.0, 30.0)), start=1):
-        panel = figure.add_subplot(1, 2, place, projection="3d", elev=view[0], azim=view[1])
-        for which, colour, width in ((accessible, _ACCESSIBLE, 0.9), (attained, _ATTAINED, 1.4)):
+        panel = figure.add_subplot(1, 2, place, projection="3d", elev=view[0], azim=view[1], computed_zorder=False)
+        panel.set_box_aspect((4.0, 4.0, 3.0), zoom=1.12)
+        for which, look in ((accessible, _ACCESSIBLE), (attained, _ATTAINED)):
             for level in shown:
-                _outline(panel, azimuth, tilt, which[level], float(np.degrees(torsion[level])), (colour, width))
+                _outline(panel, azimuth, tilt, which[level], float(np.degrees(torsion[level])), look)
         panel.set(
             xlim=(-reach, reach),
             ylim=(-reach, reach),
             zlim=(np.degrees(torsion[levels[0]]), np.degrees(torsion[levels[-1]])),
             xlabel="tilt · cos azimuth (°)",
             ylabel="tilt · sin azimuth (°)",
-            zlabel="torsion (°)",
         )
+        # Turned by itself, it may stand on its head.
+        panel.zaxis.set_rotate_label(False)
+        panel.set_zlabel("torsion (°)", rotation=90.0)
         # Few ticks: an axis may be seen nearly from its end.
         for axis in (panel.xaxis, panel.yaxis):
             axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 3, 4.5, 9, 10], prune="both"))
-    handles = [Line2D([], [], color=_ACCESSIBLE), Line2D([], [], color=_ATTAINED)]
+    handles = [Line2D([], [], color=colour, linewidth=width) for colour, width in (_ACCESSIBLE, _ATTAINED)]
     figure.legend(handles, ["accessible", "attained from rest"], loc="outside lower center", ncols=2, frameon=False)
-    title = f"{result.attributes['robot']}: orientations of a place"
-    figure.suptitle(f"{title}\n{notes(result, fixed, list(AXES))}", fontsize=11)
+    title = f"{robot_name(result)}: orientations of a place"
+    figure.suptitle(f"{title}\n{', '.join(fixed)}")
     return figure
 
 

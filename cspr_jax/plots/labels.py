@@ -1,15 +1,49 @@
-"""Words and colours that all pictures share."""
+"""Words and colours that all pictures share: names, units, numbers."""
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
+from cspr_jax.plots.fitting import shortened
 from cspr_jax.results import Result
 
+# Axes whose names in files are no words.
+WORDS = {
+    "tilt_azimuth": "azimuth of the tilt",
+    "tau": "normalised time",
+    "inclination": "inclination v",
+    "from_x": "x of the start",
+    "from_y": "y of the start",
+    "from_z": "z of the start",
+}
+LONGEST_LABEL = 80
 PANELS = 6
 # Okabe and Ito: told apart by the colour-blind; the dashes help in grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)))
+
+
+def robot_name(result: Result) -> str:
+    """The robot, as a title names it.
+
+    Args:
+        result: any result.
+
+    Returns:
+        its name, shortened.
+    """
+    return shortened(result.attributes["robot"])
+
+
+def heading(result: Result, name: str) -> str:
+    """The first line of a title.
+
+    Args:
+        result: gives the robot and the long name.
+        name: of the quantity.
+
+    Returns:
+        both, shortened.
+    """
+    return f"{robot_name(result)}: {shortened(result.labels[name], LONGEST_LABEL)}"
 
 
 def label(result: Result, name: str) -> str:
@@ -22,7 +56,7 @@ def label(result: Result, name: str) -> str:
     Returns:
         the words, with the unit if it has one.
     """
-    return result.labels[name] + _unit(result, name)
+    return shortened(result.labels[name], LONGEST_LABEL) + _in_brackets(result, name)
 
 
 def axis_label(result: Result, axis: str) -> str:
@@ -35,12 +69,65 @@ def axis_label(result: Result, axis: str) -> str:
     Returns:
         the words, with the unit if it has one.
     """
-    return axis + _unit(result, axis)
+    return WORDS.get(axis, shortened(axis)) + _in_brackets(result, axis)
 
 
-def _unit(result: Result, name: str) -> str:
-    unit = result.units[name]
-    return f" ({unit})" if unit not in ("", "1") else ""
+def _in_brackets(result: Result, name: str) -> str:
+    found = unit(result, name)
+    return f" ({found})" if found else ""
+
+
+def unit(result: Result, name: str) -> str:
+    """The unit that a picture shows.
+
+    Args:
+        result: gives that of the file.
+        name: of the axis or the quantity.
+
+    Returns:
+        the unit; empty for a pure number.
+    """
+    found = "°" if is_angle(result, name) else shortened(result.units[name])
+    return "" if found == "1" else found
+
+
+def is_angle(result: Result, name: str) -> bool:
+    """Whether an axis or a quantity is an angle, in radians in the file and in degrees in pictures.
+
+    Args:
+        result: gives its unit.
+        name: of the axis or the quantity.
+
+    Returns:
+        whether it is one.
+    """
+    return result.units.get(name) == "rad"
+
+
+def as_drawn(result: Result, name: str, values: np.ndarray) -> np.ndarray:
+    """Values in the unit of the picture.
+
+    Args:
+        result: gives the unit of the file.
+        name: of the axis or the quantity.
+        values: as in the file.
+
+    Returns:
+        the same, angles in degrees.
+    """
+    return np.degrees(values) if is_angle(result, name) else values
+
+
+def turned(degrees: float) -> float:
+    """An angle without whole turns.
+
+    Args:
+        degrees: any.
+
+    Returns:
+        between -180 and 180; what lies there already stays.
+    """
+    return degrees if abs(degrees) <= 180.0 + 1e-9 else (degrees + 180.0) % 360.0 - 180.0
 
 
 def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
@@ -49,83 +136,41 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
     Args:
         result: gives its unit.
         axis: its name.
-        point: the value.
+        point: the value, as in the file.
         digits: significant.
 
     Returns:
-        such as "z0 = 1.7 m".
+        such as "z0 = 1.7 m", "tilt = 45°", or "cable 1".
     """
-    unit = result.units[axis]
-    return f"{axis} = {point:.{digits}g}" + (f" {unit}" if unit not in ("", "1") else "")
+    drawn = float(as_drawn(result, axis, np.asarray(point, float)))
+    found = unit(result, axis)
+    if is_angle(result, axis):
+        drawn = turned(drawn)
+    # A range that passes zero may miss it by rounding.
+    drawn = 0.0 if abs(drawn) <= 1e-12 else drawn
+    name = WORDS.get(axis, shortened(axis))
+    if axis == "cable":
+        return f"{name} {drawn:g}"
+    return f"{name} = {drawn:.{digits}g}" + (f" {found}" if found not in ("", "°") else found)
 
 
-def start(result: Result) -> dict[str, float]:
-    """Where all segments of a map start, if it is one place.
+def values(result: Result, axis: str, points: np.ndarray) -> list[str]:
+    """Coordinates with their values, in as few digits as tell them apart, but three.
 
     Args:
-        result: a map.
+        result: gives the unit.
+        axis: its name.
+        points: (n,) values, as in the file.
 
     Returns:
-        its coordinates; empty if it is none.
+        one text a point.
     """
-    given = result.settings.get("trajectory", {}).get("from") or {}
-    moving = any(axis.startswith("from_") for axis in result.axes)
-    return {} if moving else dict(zip("xyz", given.get("position") or (), strict=False))
-
-
-def notes(result: Result, fixed: list[str], used: list[str]) -> str:
-    """What a picture of a map keeps constant.
-
-    Args:
-        result: the map.
-        fixed: what was fixed for the picture.
-        used: axes that the picture shows.
-
-    Returns:
-        one line.
-    """
-    place = start(result)
-    found = []
-    if place:
-        found.append(f"from ({', '.join(f'{number:.4g}' for number in place.values())}) m")
-    elif not any(axis.startswith("from_") for axis in result.axes):
-        found.append("from rest")
-    found += fixed
-    found += [value(result, a, p[0]) for a, p in result.axes.items() if a not in used and len(p) == 1]
-    found.append(f"z axis {result.attributes.get('z_axis', 'down')}")
-    return ", ".join(dict.fromkeys(found))
-
-
-def columns_of(count: int) -> int:
-    """How many panels stand side by side.
-
-    Args:
-        count: of all panels.
-
-    Returns:
-        at most three, in a full rectangle where that is possible.
-    """
-    return 2 if count == 4 else min(3, count)
-
-
-def panels(figure: Figure, count: int, *, polar: bool = False) -> tuple[list[Axes], list[Axes], list[Axes]]:
-    """Panels with common axes.
-
-    Args:
-        figure: where.
-        count: how many.
-        polar: whether in polar coordinates.
-
-    Returns:
-        all of them, those at the bottom, those at the left.
-    """
-    columns = columns_of(count)
-    lines = -(-count // columns)
-    kind = {"projection": "polar"} if polar else {}
-    grid = figure.subplots(lines, columns, squeeze=False, sharex=not polar, sharey=True, subplot_kw=kind)
-    for panel in grid.flat[count:]:
-        panel.set_visible(False)
-    return list(grid.flat[:count]), list(grid[-1]), list(grid[:, 0])
+    found: list[str] = []
+    for digits in range(3, 17):
+        found = [value(result, axis, point, digits=digits) for point in points]
+        if len(set(found)) == len(set(points.tolist())):
+            break
+    return found
 
 
 def chosen(count: int, most: int) -> np.ndarray:

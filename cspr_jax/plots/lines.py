@@ -7,7 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cspr_jax.errors import InputError
-from cspr_jax.plots.labels import COLOURS, STYLES, axis_label, chosen, label, notes, panels, value
+from cspr_jax.plots.fitting import shortened
+from cspr_jax.plots.labels import COLOURS, STYLES, as_drawn, axis_label, chosen, is_angle, label, robot_name, values
+from cspr_jax.plots.layout import in_degrees, in_whole_numbers, panels
+from cspr_jax.plots.notes import table
+from cspr_jax.plots.reasons import VERDICTS, reasons
 from cspr_jax.results import Result
 
 LINES = len(COLOURS)
@@ -29,17 +33,17 @@ class Line:
 
 
 def line_figure(
-    result: Result, name: str, groups: dict[str, list[Line]], across: str, fixed: list[str], used: list[str]
+    result: Result, name: str, groups: dict[str, list[Line]], across: str, title: str, fixed: list[str]
 ) -> Figure:
     """Lines over one axis, in one panel or several.
 
     Args:
-        result: gives labels and constants.
+        result: gives labels and units.
         name: of the quantity.
-        groups: the lines of each panel, by its title.
+        groups: the lines of each panel, by its title; as in the file.
         across: the axis.
-        fixed: what was fixed for the picture.
-        used: axes that the picture shows.
+        title: of the picture.
+        fixed: what is constant, in words.
 
     Returns:
         the figure.
@@ -48,27 +52,41 @@ def line_figure(
     figure = Figure(figsize=(6.8, 4.4) if count == 1 else (3.4 * min(3, count) + 1.0, 3.4 * -(-count // 3) + 0.9))
     figure.set_layout_engine("constrained")
     every, bottom, left = panels(figure, count)
-    for panel, (title, lines) in zip(every, groups.items(), strict=True):
+    drawn = [[_as_drawn(result, name, across, line) for line in lines] for lines in groups.values()]
+    words: list[str] = []
+    if name in VERDICTS:
+        drawn, words = _as_reasons(drawn, name)
+    for panel, heading, lines in zip(every, groups, drawn, strict=True):
         _draw(panel, lines)
-        panel.set_title(title, fontsize=10)
+        panel.set_title(heading)
     for panel in bottom:
         panel.set_xlabel(axis_label(result, across))
     for panel in left:
         panel.set_ylabel(label(result, name))
-    if every[0].get_legend_handles_labels()[0]:
-        every[0].legend(fontsize=9, framealpha=0.9)
-    figure.suptitle(f"{result.attributes['robot']}: {notes(result, fixed, used)}", fontsize=10)
+    _ticks(every[0], result, across, drawn, words)
+    if any(line.name for line in drawn[0]):
+        found = every[0].legend(every[0].lines, [""] * len(drawn[0]), frameon=True, framealpha=0.9, fontsize="small")
+        # Set afterwards: a name that begins with an underscore would be left out.
+        for text, line in zip(found.get_texts(), drawn[0], strict=True):
+            text.set_text(line.name)
+    figure.suptitle("\n".join([title, ", ".join(fixed)]).strip())
     return figure
+
+
+def _as_drawn(result: Result, name: str, across: str, line: Line) -> Line:
+    # The points of an axis may come in any order.
+    order = np.argsort(line.points, kind="stable")
+    points, found = as_drawn(result, across, line.points[order]), as_drawn(result, name, line.values[order])
+    return Line(points, found, line.name)
 
 
 def _draw(panel: Axes, lines: list[Line]) -> None:
     for i, line in enumerate(lines):
         whole = line.values.dtype.kind in "iu"
-        marker = "." if len(line.points) <= 60 else ""
         panel.plot(
             line.points,
             line.values,
-            marker=marker,
+            marker="." if len(line.points) <= 60 else "",
             linestyle=STYLES[i],
             color=COLOURS[i],
             linewidth=1.3,
@@ -76,6 +94,26 @@ def _draw(panel: Axes, lines: list[Line]) -> None:
             label=line.name or None,
         )
     panel.grid(alpha=0.3)
+
+
+def _as_reasons(groups: list[list[Line]], name: str) -> tuple[list[list[Line]], list[str]]:
+    # Flags of verdicts become numbers of reasons, one above the other, with their words.
+    every = [line.values for lines in groups for line in lines]
+    numbers, words, _ = reasons(np.concatenate(every), name)
+    parts = iter(np.split(numbers, np.cumsum([len(values) for values in every])[:-1]))
+    return [[dataclasses.replace(line, values=next(parts)) for line in lines] for lines in groups], words
+
+
+def _ticks(panel: Axes, result: Result, across: str, groups: list[list[Line]], words: list[str]) -> None:
+    every = np.concatenate([line.values for lines in groups for line in lines])
+    if words:
+        panel.set_yticks(range(len(words)), labels=words)
+    elif every.dtype.kind in "iu":
+        in_whole_numbers(panel.yaxis, none=bool((every == 0).any()))
+    if is_angle(result, across):
+        in_degrees(panel.xaxis, float(np.ptp(groups[0][0].points)))
+    elif across == "cable":
+        in_whole_numbers(panel.xaxis)
 
 
 def lines_of(result: Result, data: np.ndarray, across: str, by: str) -> list[Line]:
@@ -91,17 +129,45 @@ def lines_of(result: Result, data: np.ndarray, across: str, by: str) -> list[Lin
         the lines.
     """
     points = result.axes[by]
-    return [
-        Line(result.axes[across], data[:, i], value(result, by, points[i], digits=3))
-        for i in chosen(len(points), LINES)
-    ]
+    shown = chosen(len(points), LINES)
+    names = values(result, by, points[shown])
+    return [Line(result.axes[across], data[:, i], name) for i, name in zip(shown, names, strict=True)]
 
 
-def overlaid(results: list[tuple[str, Result, np.ndarray, str]]) -> tuple[str, list[Line]]:
+def names_of(results: list[Result], stems: list[str]) -> list[str]:
+    """What tells results of one picture apart: their amplitude functions, else robots, else files.
+
+    Args:
+        results: the results.
+        stems: names of their files, all different.
+
+    Returns:
+        one name a result.
+    """
+    if len(results) > 1:
+        for words in (_amplitude, robot_name):
+            found = [words(result) for result in results]
+            if len(set(found)) == len(results) and all(found):
+                return found
+    return [shortened(stem) for stem in stems]
+
+
+def _amplitude(result: Result) -> str:
+    given = table(result.settings, "trajectory").get("amplitude")
+    if isinstance(given, dict):
+        given = ", ".join(
+            f"epsilon = {part}" if key == "epsilon" else f"{key} {part}" if key == "polynomial" else str(part)
+            for key, part in sorted(given.items(), reverse=True)
+        )
+    return shortened(given) if isinstance(given, str) else ""
+
+
+def overlaid(names: list[str], results: list[tuple[Result, np.ndarray, str]]) -> tuple[str, list[Line]]:
     """One line a result, over the same axis.
 
     Args:
-        results: of each its name, itself, its values (n,), its axis.
+        names: of the results.
+        results: of each itself, its values (n,), its axis.
 
     Returns:
         the axis and the lines.
@@ -111,7 +177,8 @@ def overlaid(results: list[tuple[str, Result, np.ndarray, str]]) -> tuple[str, l
     """
     if len(results) > LINES:
         raise InputError("results", len(results), f"at most {LINES} in one picture")
-    axes = sorted({axis for _, _, _, axis in results})
+    axes = sorted({axis for _, _, axis in results})
     if len(axes) > 1:
         raise InputError("results", axes, "results that vary along the same axis")
-    return axes[0], [Line(result.axes[axis], values, name) for name, result, values, axis in results]
+    lines = zip(names, results, strict=True)
+    return axes[0], [Line(result.axes[axis], found, name) for name, (result, found, axis) in lines]

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cspr_jax.plots.labels import COLOURS, STYLES
+from cspr_jax.plots.labels import COLOURS, STYLES, robot_name
 from cspr_jax.results import Result
 
 
@@ -37,7 +37,7 @@ def motion_figure(result: Result) -> Figure:
         drawn["xz"].invert_yaxis()
     _tensions(drawn["tension"], time, tension, result.attributes.get("mass"))
     z_axis, z0 = result.attributes.get("z_axis", "down"), float(result.attributes["z0"])
-    figure.suptitle(f"{result.attributes['robot']}: z0 = {z0:.4g} m, z axis {z_axis}", fontsize=11)
+    figure.suptitle(f"{robot_name(result)}: z0 = {z0:.4g} m, z axis {z_axis}")
     return figure
 
 

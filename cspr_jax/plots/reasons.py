@@ -4,6 +4,10 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from cspr_jax.feasibility.verdicts import NO_REASON, Verdict
+from cspr_jax.plots.colours import Scale
+
+# Quantities that are flags of a verdict, and what it is called where none is set.
+VERDICTS = {"verdict": "feasible", "main_reason": "all attained"}
 
 # In this order: what lies deeper comes first. The colours are Okabe and Ito's, and greys.
 REASONS = {
@@ -21,14 +25,15 @@ REASONS = {
     Verdict.CABLE_TOO_FAST: ("cable too fast", "#7b4173"),
     Verdict.CABLE_OVER_ACCELERATION: ("cable acceleration", "#bd9e39"),
 }
-FEASIBLE = ("feasible", "#009E73")
+FEASIBLE_COLOUR = "#009E73"
 
 
-def reasons(verdicts: np.ndarray) -> tuple[np.ndarray, list[str], list[str]]:
+def reasons(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, list[str], list[str]]:
     """Verdicts as numbers of reasons.
 
     Args:
         verdicts: (...) flags.
+        name: of the quantity, one of VERDICTS.
 
     Returns:
         (...) number of the reason, from 0 on; the words of those that occur; their colours.
@@ -38,18 +43,21 @@ def reasons(verdicts: np.ndarray) -> tuple[np.ndarray, list[str], list[str]]:
     for number, flag in reversed(list(enumerate(REASONS, start=1))):
         found = np.where(flags & flag.value, number, found)
     used = np.unique(found)
-    every = [FEASIBLE, *REASONS.values()]
+    every = [(VERDICTS[name], FEASIBLE_COLOUR), *REASONS.values()]
     words, colours = zip(*(every[number] for number in used), strict=True)
     return np.searchsorted(used, found), list(words), list(colours)
 
 
-def colours_of(colours: list[str]) -> tuple[ListedColormap, BoundaryNorm]:
-    """Their colour map.
+def reason_scale(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, Scale]:
+    """Verdicts as cells of a map.
 
     Args:
-        colours: of `reasons`.
+        verdicts: (...) flags.
+        name: of the quantity, one of VERDICTS.
 
     Returns:
-        the map, and its bounds.
+        (...) number of the reason, and the scale of those that occur.
     """
-    return ListedColormap(colours), BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
+    cells, words, colours = reasons(verdicts, name)
+    norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
+    return cells, Scale(ListedColormap(colours), norm, ticks=([float(i) for i in range(len(words))], words))

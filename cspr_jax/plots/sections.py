@@ -1,82 +1,124 @@
 """Sections of maps, in colours."""
 
-import matplotlib
+from typing import NamedTuple
+
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.projections.polar import PolarAxes
 
 from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.plots.labels import PANELS, axis_label, chosen, columns_of, label, notes, panels, start, value
-from cspr_jax.plots.reasons import colours_of, reasons
+from cspr_jax.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar, scale_of
+from cspr_jax.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
+from cspr_jax.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
+from cspr_jax.plots.marks import mark, marked
+from cspr_jax.plots.reasons import VERDICTS, reason_scale
 from cspr_jax.results import Result
 
 # Quantities of which either sign is as good as the other.
 SIGNED = ("used_inclination",)
-# Quantities that are flags of a verdict.
-VERDICTS = ("verdict", "main_reason")
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
-NONE_COLOUR = "#d0d0d0"
+# A top view: straight from above, in true shape.
+AROUND = ("azimuth", "radius")
+PANEL, SINGLE = 3.1, 5.2  # inches, the longer side
 
 
-def section_figure(
-    result: Result, name: str, data: np.ndarray, across: list[str], over: str | None, fixed: list[str]
-) -> Figure:
+class Section(NamedTuple):
+    """What sections of a map show.
+
+    Fields:
+        name: of the quantity.
+        across: the two axes of a panel.
+        over: the axis that differs between the panels; None: there is one panel.
+        place: axes fixed for the picture, and where.
+        fixed: what is constant, in words.
+    """
+
+    name: str
+    across: list[str]
+    over: str | None
+    place: dict[str, float]
+    fixed: list[str]
+
+
+def section_figure(result: Result, section: Section, data: np.ndarray, told: np.ndarray | None = None) -> Figure:
     """Sections of a map, one a panel.
 
     Args:
         result: gives axes, labels and constants.
-        name: of the quantity.
+        section: what to show.
         data: (n_first, n_second, n_panels).
-        across: the two axes of a panel.
-        over: the axis that differs between the panels; None: there is one panel.
-        fixed: what was fixed for the picture.
+        told: of data's shape, the cells that say more than that there is nothing; None: all.
 
     Returns:
         the figure.
     """
-    polar = tuple(across) == POLAR
-    # Most of all orientations are none that a robot can take.
-    tells = _tells(name, data) if polar else np.ones(data.shape, bool)
-    told = np.flatnonzero(tells.any((0, 1)))
-    shown = told[chosen(len(told), PANELS)] if len(told) else chosen(data.shape[2], PANELS)
-    columns, count = columns_of(len(shown)), len(shown)
-    size = (3.1 * columns + 1.3, 3.2 * -(-count // columns) + 0.8) if count > 1 else (7.0, 5.6)
-    figure = Figure(figsize=size, layout="constrained")
-    every, bottom, left = panels(figure, count, polar=polar)
-    data = data[:, :, shown]
-    words: list[str] = []
-    if name in VERDICTS:
-        data, words, used = reasons(data)
-        colours, norm = colours_of(used)
+    name, across, over = section.name, section.across, section.over
+    polar = tuple(across) in (POLAR, AROUND)
+    says = np.ones(data.shape, bool) if told is None else told
+    saying = np.flatnonzero(says.any((0, 1)))
+    shown = saying[chosen(len(saying), PANELS)] if len(saying) else chosen(data.shape[2], PANELS)
+    alone = {axis: float(points[0]) for axis, points in result.axes.items() if len(points) == 1} | section.place
+    if over is not None:
+        shown = _moved(shown, marked(result, name, across, over, alone))
+    figure = Figure(figsize=_size(result, across, len(shown)), layout="constrained")
+    every, bottom, left = panels(figure, len(shown), polar=polar)
+    # The points of an axis may come in any order, and twice.
+    orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in across]
+    points = [as_drawn(result, axis, result.axes[axis][order]) for axis, order in zip(across, orders, strict=True)]
+    data = as_drawn(result, name, data[np.ix_(*orders, shown)])
+    cells, scale = reason_scale(data, name) if name in VERDICTS else (data, scale_of(data, signed=name in SIGNED))
+    titles = values(result, over, result.axes[over][shown]) if over is not None else []
+    legend: dict[str, Artist] = {"no value": Patch(color=NONE_COLOUR)} if scale.missing else {}
+    for k, panel in enumerate(every):
+        image = _section(panel, result, cells[:, :, k], across, points, scale)
+        if name == "least_oscillations" and not polar:
+            _loci(panel, cells[:, :, k], points)
+        place = alone | ({over: float(result.axes[over][shown[k]])} if over is not None else {})
+        legend |= mark(panel, result, name, across, {a: p for a, p in place.items() if a not in across})
+        if titles:
+            panel.set_title(titles[k])
+    words = list(section.fixed)
+    if polar:
+        outward = np.flatnonzero(says[:, orders[1]][:, :, shown].any((0, 2)))
+        reach_polar(every, _edges(points[1])[outward[-1] + 1 if len(outward) else -1], unit(result, across[1]))
+        words.append(f"around: {axis_label(result, across[0])}, outward: {axis_label(result, across[1])}")
     else:
-        colours, norm = _colours(data, signed=name in SIGNED)
-    for k, (panel, i) in enumerate(zip(every, shown, strict=True)):
-        image = _section(panel, result, data[:, :, k], across, colours, norm)
-        if name == "least_oscillations":
-            _loci(panel, result, data[:, :, k], across)
-        if over is not None:
-            panel.set_title(value(result, over, result.axes[over][i], digits=3), fontsize=10)
-    if polar and len(told):
-        farthest = np.flatnonzero(tells[:, :, shown].any((0, 2)))[-1]
-        every[0].set_ylim(0.0, _edges(result.axes[across[1]])[farthest + 1])
-        fixed = [*fixed, f"around: {across[0]}, outward: {across[1]} (rad)"]
-    elif not polar:
         _name_axes(result, across, bottom, left)
-    bar = figure.colorbar(image, ax=every, shrink=0.9, label=label(result, name))
-    if words:
-        bar.set_ticks(range(len(words)), labels=words)
-        bar.ax.minorticks_off()
-    elif data.dtype.kind == "i":
-        _count_ticks(bar, int(data.max()))
-    handles, labels = every[0].get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside lower left", ncols=len(handles), fontsize=9, frameon=False)
-    used = [*across, *([over] if over else [])]
-    figure.suptitle(f"{result.attributes['robot']}: {result.labels[name]}\n{notes(result, fixed, used)}", fontsize=11)
+    add_bar(figure, image, every, scale, label(result, name))
+    if legend:
+        figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=len(legend))
+    figure.suptitle(f"{heading(result, name)}\n{', '.join(words)}")
     return figure
+
+
+def _moved(shown: np.ndarray, wanted: list[int]) -> np.ndarray:
+    # Evenly chosen sections, the nearest ones moved to where there is something to mark.
+    found = shown.tolist()
+    for index in wanted:
+        if index not in found:
+            free = [other for other in found if other not in wanted]
+            if free:
+                found[found.index(min(free, key=lambda other: abs(other - index)))] = index
+    return np.sort(found)
+
+
+def _size(result: Result, across: list[str], count: int) -> tuple[float, float]:
+    # Inches. Panels in metres have the shape of their range.
+    columns = columns_of(count)
+    side = SINGLE if count == 1 else PANEL
+    width, height = side, side
+    if _equal(result, across):
+        x, y = (float(np.ptp(result.axes[axis])) for axis in across)
+        width, height = side * min(1.0, max(0.4, x / (y or x or 1.0))), side * min(1.0, max(0.3, y / (x or y or 1.0)))
+    return columns * (width + 0.15) + 1.9, -(-count // columns) * (height + 0.35) + 1.15
+
+
+def _equal(result: Result, across: list[str]) -> bool:
+    return all(result.units[axis] == "m" for axis in across)
 
 
 def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list[Axes]) -> None:
@@ -84,67 +126,58 @@ def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list
         panel.set_xlabel(axis_label(result, across[0]))
     for panel in left:
         panel.set_ylabel(axis_label(result, across[1]))
+    for name, axis in zip(across, (bottom[0].xaxis, left[0].yaxis), strict=True):
+        if is_angle(result, name):
+            in_degrees(axis, float(np.ptp(np.degrees(result.axes[name]))))
+        elif name == "cable":
+            in_whole_numbers(axis)
 
 
-def _tells(name: str, data: np.ndarray) -> np.ndarray:
-    # Cells that say more than that there is nothing.
+def tells(name: str, data: np.ndarray) -> np.ndarray:
+    """Which cells say more than that there is nothing: most of all orientations are none that a robot can take.
+
+    Args:
+        name: of the quantity.
+        data: it.
+
+    Returns:
+        of data's shape.
+    """
     if name in VERDICTS:
         return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0
     return data > 0 if data.dtype.kind == "i" else np.isfinite(data)
 
 
-def _section(panel: Axes, result: Result, values: np.ndarray, across: list[str], colours, norm):
-    x, y = (_edges(result.axes[axis]) for axis in across)
+def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], points: list[np.ndarray], scale: Scale):
+    x, y = map(_edges, points)
     if isinstance(panel, PolarAxes):
-        panel.grid(False)
-        panel.set_rlabel_position(270.0)
-        y = np.maximum(y, 0.0)
-    image = panel.pcolormesh(x, y, values.T, cmap=colours, norm=norm, rasterized=True)
-    if all(result.units[axis] == "m" for axis in across):
+        # Sides of a cell are straight: narrow ones look round.
+        parts = int(min(120.0, np.ceil(np.diff(x).max() / 3.0)))
+        x = np.interp(np.arange(parts * (len(x) - 1) + 1) / parts, np.arange(len(x)), np.radians(x))
+        y, cells = np.maximum(y, 0.0), np.repeat(cells, parts, axis=0)
+    if cells.dtype.kind == "f":
+        # What is infinite lies beyond an end of the scale; only what is not a number has no value.
+        cells = np.ma.masked_invalid(np.clip(cells, -LARGEST, LARGEST))
+    image = panel.pcolormesh(x, y, cells.T, cmap=scale.colours, norm=scale.norm, rasterized=True)
+    if _equal(result, across):
         panel.set_aspect("equal")
     if across[1] == "z" and result.attributes.get("z_axis", "down") == "down":
         panel.yaxis.set_inverted(True)
-    if across == ["x", "y"] and "base_points" in result.attributes:
-        base = np.asarray(result.attributes["base_points"])
-        panel.fill(base[:, 0], base[:, 1], fill=False, edgecolor="white", linewidth=2.4)
-        panel.fill(base[:, 0], base[:, 1], fill=False, edgecolor="black", linewidth=1.0, label="spools")
-    place = start(result)
-    if all(axis in place for axis in across):
-        panel.plot(
-            *(place[axis] for axis in across), "o", color="white", markeredgecolor="black", markersize=5, label="start"
-        )
     return image
 
 
-def _loci(panel: Axes, result: Result, values: np.ndarray, across: list[str]) -> None:
+def _loci(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
     # Where a whole number of oscillations is just too few: the hexagons of thesis Fig. 1.6 on horizontal transitions.
-    x, y = (result.axes[axis] for axis in across)
-    levels = np.arange(1.0, np.nanmax(values, initial=1.0))
-    if min(values.shape) > 1 and len(levels):
-        lines = panel.contour(x, y, values.T, levels=levels, colors="white", linewidths=0.8)
-        panel.clabel(lines, fmt="%d", fontsize=8)
+    levels = np.arange(1.0, np.nanmax(np.where(np.abs(cells) < 1e4, cells, np.nan), initial=1.0))
+    if min(cells.shape) < 2 or not 0 < len(levels) <= 40:
+        return
+    lines = panel.contour(*points, cells.T, levels=levels, colors="white", linewidths=0.8)
+    for text in panel.clabel(lines, fmt="%d", fontsize="small"):
+        text.set_rotation(0.0)  # turned, a 6 could be a 9
 
 
 def _edges(points: np.ndarray) -> np.ndarray:
+    if len(points) == 1:
+        return points[0] + np.array([-0.5, 0.5]) * max(1.0, abs(points[0]))
     middles = 0.5 * (points[1:] + points[:-1])
     return np.concatenate([[1.5 * points[0] - 0.5 * points[1]], middles, [1.5 * points[-1] - 0.5 * points[-2]]])
-
-
-def _colours(data: np.ndarray, *, signed: bool):
-    if data.dtype.kind == "i":
-        most = max(int(data.max()), 1)
-        colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, most))
-        return ListedColormap([NONE_COLOUR, *colours]), BoundaryNorm(np.arange(-0.5, most + 1), most + 1)
-    finite = data[np.isfinite(data)]
-    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-    if signed:
-        size = max(abs(low), abs(high)) or 1.0
-        return matplotlib.colormaps["PuOr_r"], Normalize(-size, size)
-    return matplotlib.colormaps["cividis"], Normalize(low, high if high > low else low + 1.0)
-
-
-def _count_ticks(bar, most: int) -> None:
-    step = -(-max(most, 1) // 12)
-    ticks = [0, *range(step, most + 1, step)]
-    bar.set_ticks(ticks, labels=["none", *(str(tick) for tick in ticks[1:])])
-    bar.ax.minorticks_off()

@@ -1,0 +1,101 @@
+"""Panels of a picture: how many, where, how large, and their axes in degrees."""
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
+
+from cspr_jax.plots.labels import turned
+
+# Steps between ticks of angles, degrees.
+DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
+
+
+def columns_of(count: int) -> int:
+    """How many panels stand side by side.
+
+    Args:
+        count: of all panels.
+
+    Returns:
+        at most three, in a full rectangle where that is possible.
+    """
+    return 2 if count == 4 else min(3, count)
+
+
+def panels(figure: Figure, count: int, *, polar: bool = False) -> tuple[list[Axes], list[Axes], list[Axes]]:
+    """Panels with common axes.
+
+    Args:
+        figure: where.
+        count: how many.
+        polar: whether in polar coordinates.
+
+    Returns:
+        all of them, those with nothing below, those at the left.
+    """
+    columns = columns_of(count)
+    lines = -(-count // columns)
+    kind = {"projection": "polar"} if polar else {}
+    grid = figure.subplots(lines, columns, squeeze=False, sharex=not polar, sharey=True, subplot_kw=kind)
+    every = list(grid.flat[:count])
+    bottom = every[max(0, count - columns) :]
+    for panel in grid.flat[count:]:
+        panel.set_visible(False)
+    if not polar:
+        for panel in bottom:
+            panel.tick_params(labelbottom=True)
+    return every, bottom, list(grid[:, 0])
+
+
+def in_degrees(axis: Axis, span: float) -> None:
+    """Ticks of an angle, without whole turns.
+
+    Args:
+        axis: of a panel.
+        span: of its values, degrees.
+    """
+    step = next((step for step in DEGREES if span <= 7.0 * step), None)
+    axis.set_major_locator(MaxNLocator(5) if step is None or span < 2.0 else MultipleLocator(step))
+    axis.set_major_formatter(FuncFormatter(lambda tick, _: f"{turned(tick) + 0.0:.6g}"))
+
+
+def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
+    """Ticks at whole numbers only.
+
+    Args:
+        axis: of a panel.
+        none: whether zero means that there is none.
+    """
+    axis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
+    axis.set_major_formatter(FuncFormatter(lambda tick, _: "none" if none and tick == 0.0 else f"{tick:.0f}"))
+
+
+def reach_polar(every: list[Axes], reach: float, unit: str) -> None:
+    """Ticks around and outward.
+
+    Args:
+        every: polar panels with a common radius.
+        reach: the largest radius shown.
+        unit: of the radius.
+    """
+    step = next((step for step in DEGREES if reach <= 4.5 * step), None)
+    even = step is None or unit != "°"
+    every_tick = np.asarray(MaxNLocator(4).tick_values(0.0, reach)) if even else np.arange(0.0, reach, step)
+    ticks = every_tick[(every_tick > 0.0) & (every_tick < 0.95 * reach)]
+    around = range(0, 360, 45)
+    gap = " " if unit.isalpha() else ""
+    for panel in every:
+        panel.set_ylim(0.0, reach)
+        panel.set_yticks(ticks, labels=[""] * len(ticks))
+        panel.set_xticks([math.radians(angle) for angle in around], labels=[f"{turned(angle):g}°" for angle in around])
+        panel.tick_params(pad=0.0, labelsize="small")
+        panel.grid(True, color="black", alpha=0.25, linewidth=0.5)
+        panel.set_axisbelow(False)
+        for tick in ticks:
+            box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6}
+            text = f"{tick:g}{gap}{unit}"
+            panel.text(math.radians(-67.5), tick, text, fontsize="small", ha="center", va="center", bbox=box)

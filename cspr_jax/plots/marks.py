@@ -1,0 +1,228 @@
+"""What stands in a section of a map beside its cells: the spools, P0, and where the motions start."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.path import Path
+from matplotlib.projections.polar import PolarAxes
+from matplotlib.transforms import Bbox
+
+from cspr_jax.plots.labels import as_drawn
+from cspr_jax.plots.notes import start, starts_at_rest, table
+from cspr_jax.results import Result
+
+# Axes of one and the same space: of the targets, or of the start points.
+OF_TARGETS, OF_STARTS = ("x", "y", "z", "radius", "azimuth"), ("from_x", "from_y", "from_z")
+_EDGE: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyle": "none"}
+
+
+class _Section(NamedTuple):
+    # What a mark has to know of its section: its space, its axes, their names without "from_", where it is, the spools.
+    panel: Axes | None
+    result: Result
+    space: tuple[str, ...]
+    across: list[str]
+    names: list[str]
+    place: dict[str, float]
+    base: np.ndarray
+
+    @property
+    def centre(self) -> np.ndarray:
+        # The centroid of the spools.
+        return self.base.mean(axis=0)
+
+
+def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
+    """Draw spools, P0 and the fixed end of the motions, as far as they belong into a section and fit into its range.
+
+    P0 and that end are marked only where the section contains them, to half a step of the grid. The spools are
+    projected onto it.
+
+    Args:
+        panel: the section, with its cells.
+        result: the map.
+        name: of the quantity.
+        across: the two axes of the section.
+        place: the other axes, and where the section is.
+
+    Returns:
+        what to show in the legend, by its words.
+    """
+    section = _section(panel, result, across, place)
+    if section is None:
+        return {}
+    limits = panel.get_xlim(), panel.get_ylim()
+    found = _spools(section)
+    for words, point in _points(section, name).items():
+        if _contains(section, point):
+            at = _drawn(section, point[None])
+            if _inside(limits, at).any():
+                symbol, size = ("P", 7.0) if words == "P0" else ("o", 5.5)
+                found[words] = panel.plot(*at[0], symbol, markersize=size, **_EDGE)[0]
+    panel.set(xlim=limits[0], ylim=limits[1])
+    return found
+
+
+def marked(result: Result, name: str, across: list[str], over: str, place: dict[str, float]) -> list[int]:
+    """Which of many parallel sections contain P0 or the fixed end of the motions.
+
+    Args:
+        result: the map.
+        name: of the quantity.
+        across: the two axes of a section.
+        over: the axis along which the sections lie.
+        place: the axes that are the same for all, and where.
+
+    Returns:
+        their indices along that axis, at most two; empty where P0 is in each of them.
+    """
+    section = _section(None, result, across, place)
+    if section is None or over not in section.space:
+        return []
+    every = result.axes[over]
+    found = []
+    for point in _points(section, name).values():
+        gaps = every - _coordinate(over.removeprefix("from_"), point[None], section.centre, None)[0]
+        nearest = int(np.argmin(np.abs(gaps)))
+        if _contains(section._replace(place=section.place | {over: float(every[nearest])}), point):
+            found.append(nearest)
+    return sorted(set(found))
+
+
+def _section(panel: Axes | None, result: Result, across: list[str], place: dict[str, float]) -> _Section | None:
+    # None where nothing of this space can be marked.
+    space = next((space for space in (OF_TARGETS, OF_STARTS) if set(across) <= set(space)), None)
+    base = np.asarray(result.attributes.get("base_points", 0.0), float)
+    if space is None or base.ndim != 2 or base.shape[1] != 3 or not np.isfinite(base).all():
+        return None
+    return _Section(panel, result, space, across, [axis.removeprefix("from_") for axis in across], place, base)
+
+
+def _points(section: _Section, name: str) -> dict[str, np.ndarray]:
+    # P0, and the end that all motions share, by their words.
+    words, end = ("start", start(section.result)) if section.space is OF_TARGETS else ("target", section.place)
+    found = {"P0": _rest_point(section, name)}
+    if all(axis in end for axis in "xyz"):
+        found[words] = np.array([end[axis] for axis in "xyz"], float)
+    return {words: point for words, point in found.items() if point is not None}
+
+
+def _rest_point(section: _Section, name: str) -> np.ndarray | None:
+    # P0 lies below the centroid of the spools; None where it is not one point.
+    place, result = section.place, section.result
+    down = -1.0 if result.attributes.get("z_axis") == "up" else 1.0
+    depth = place.get("z0")
+    if depth is None and "z" in place and starts_at_rest(result, name):
+        # z0 is chosen for each target: its own depth, or by the inclination.
+        given = table(result.settings, "trajectory").get("inclination")
+        inclination = place.get("inclination", 0.0 if given is None else given)
+        if isinstance(inclination, float) and inclination > -1.0:
+            depth = (place["z"] - section.centre[2]) * down / (1.0 + inclination)
+    return None if depth is None else section.centre + np.array([0.0, 0.0, down * depth])
+
+
+def _coordinate(name: str, points: np.ndarray, centre: np.ndarray, azimuth: float | None) -> np.ndarray:
+    # Of (n, 3) points. A vertical half-plane takes what is projected onto it.
+    if name in "xyz":
+        return points[:, "xyz".index(name)]
+    x, y = (points - centre)[:, :2].T
+    if name == "azimuth":
+        return np.arctan2(y, x)
+    return np.hypot(x, y) if azimuth is None else x * np.cos(azimuth) + y * np.sin(azimuth)
+
+
+def _drawn(section: _Section, points: np.ndarray) -> np.ndarray:
+    # (n, 2) of (n, 3), in the units of the picture; an azimuth within the turn that the axis shows.
+    columns = []
+    for axis, name in zip(section.across, section.names, strict=True):
+        column = _coordinate(name, points, section.centre, section.place.get("azimuth"))
+        if name == "azimuth" and isinstance(section.panel, PolarAxes):
+            columns.append(column % (2.0 * np.pi))
+            continue
+        if name == "azimuth":
+            shown = section.result.axes[axis]
+            middle = 0.5 * (shown.min() + shown.max())
+            column = middle + (column - middle + np.pi) % (2.0 * np.pi) - np.pi
+        columns.append(as_drawn(section.result, axis, column))
+    return np.stack(columns, axis=1)
+
+
+def _contains(section: _Section, point: np.ndarray) -> bool:
+    for axis in section.space:
+        name = axis.removeprefix("from_")
+        if axis not in section.place:
+            continue
+        here = section.place[axis]
+        points = section.result.axes.get(axis, np.array([here]))
+        gaps = points - _coordinate(name, point[None], section.centre, None)[0]
+        if name == "azimuth":
+            if np.hypot(*(point - section.centre)[:2]) < 1e-9:
+                continue  # on the vertical about which it turns
+            gaps = (gaps + np.pi) % (2.0 * np.pi) - np.pi
+        nearest = int(np.argmin(np.abs(gaps)))
+        ordered = np.unique(points)
+        steps = np.diff(ordered)
+        # That towards the point; beyond the last one the last.
+        side = int(np.searchsorted(ordered, points[nearest])) - (gaps[nearest] > 0.0)
+        step = steps[min(max(side, 0), len(steps) - 1)] if len(steps) else 2e-6 * max(1.0, abs(here))
+        if points[nearest] != here or abs(gaps[nearest]) > 0.5 * step:
+            return False
+    return True
+
+
+def _spools(section: _Section) -> dict[str, Artist]:
+    panel, names, base = section.panel, section.names, section.base
+    if panel is None:
+        return {}
+    polar = isinstance(panel, PolarAxes)
+    if "radius" in names and "azimuth" not in (*section.place, *names):
+        return {}
+    # Two cables may share a spool; the order is the cables'.
+    flat = base[:, :2] if polar else _drawn(section, base)
+    _, first = np.unique(np.round(flat, 9), axis=0, return_index=True)
+    base, flat = base[np.sort(first)], flat[np.sort(first)]
+    points = _drawn(section, base)
+    limits = panel.get_xlim(), panel.get_ylim()
+    outline = len(points) > 1 and (polar or "azimuth" not in names) and not _crosses(flat)
+    symbol = "" if outline and (polar or set(names) == {"x", "y"}) and len(points) > 2 else "s"
+    look: dict[str, Any] = {"marker": symbol, "markersize": 4.5, "markeredgecolor": "white", "markerfacecolor": "black"}
+    if outline:
+        ring = np.concatenate([points, points[:1]])
+        panel.plot(*ring.T, color="white", linewidth=2.4)
+    else:
+        ring = points
+    panel.plot(*ring.T, color="black", linewidth=1.0 if outline else 0.0, **look)
+    (left, right), (bottom, top) = map(sorted, limits)
+    through = outline and not polar and Path(ring).intersects_bbox(Bbox([[left, bottom], [right, top]]), filled=False)
+    if not through and not _inside(limits, points).any():
+        return {}
+    if symbol:
+        return {"spools": Line2D([], [], color="black", linewidth=1.0 if outline else 0.0, **look)}
+    # The same shape in the legend.
+    middle, size = 0.5 * (flat.min(axis=0) + flat.max(axis=0)), np.ptp(flat, axis=0).max()
+    shape = Path(np.concatenate([flat, flat[:1]]) / size - middle / size, closed=True)
+    return {"spools": Line2D([], [], marker=shape, markersize=13, markerfacecolor="none", color="black", linestyle="")}
+
+
+def _inside(limits: tuple, points: np.ndarray) -> np.ndarray:
+    # What lies on an edge is seen too.
+    low, high = (np.array([f(pair) for pair in limits]) for f in (min, max))
+    slack = 0.01 * (high - low)
+    return np.all((points >= low - slack) & (points <= high + slack), axis=1)
+
+
+def _crosses(points: np.ndarray) -> bool:
+    # Whether two sides of the closed polygon cross, other than at a common corner.
+    ends = np.roll(points, -1, axis=0)
+
+    def side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+        return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+    for i, (a, b) in enumerate(zip(points, ends, strict=True)):
+        for c, d in list(zip(points, ends, strict=True))[i + 1 :]:
+            if side(a, b, c) * side(a, b, d) < 0.0 and side(c, d, a) * side(c, d, b) < 0.0:
+                return True
+    return False

@@ -1,0 +1,78 @@
+"""What a picture of a map keeps constant: where the motions start, and the axes that it does not show."""
+
+from cspr_jax.plots.fitting import shortened
+from cspr_jax.plots.labels import value
+from cspr_jax.results import Result
+
+# Maps whose segments all start at rest, and those of their quantities that are not of a motion.
+OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
+FROM_REST = {"minimum-oscillations": (), "orientations": (), "attainability": OF_PLACES}
+
+
+def table(settings: object, key: str) -> dict:
+    """A table of a sweep's settings.
+
+    Args:
+        settings: of a result, or a table in them.
+        key: its name.
+
+    Returns:
+        the table; empty if there is none.
+    """
+    found = settings.get(key) if isinstance(settings, dict) else None
+    return found if isinstance(found, dict) else {}
+
+
+def start(result: Result) -> dict[str, float]:
+    """Where all segments of a map start, if it is one place.
+
+    Args:
+        result: a map.
+
+    Returns:
+        its coordinates; empty if it is none.
+    """
+    given = table(table(result.settings, "trajectory"), "from").get("position") or ()
+    moving = any(axis.startswith("from_") for axis in result.axes)
+    return {} if moving else dict(zip("xyz", given, strict=False))
+
+
+def starts_at_rest(result: Result, name: str) -> bool:
+    """Whether a quantity belongs to motions that start at rest.
+
+    Args:
+        result: a map.
+        name: of the quantity.
+
+    Returns:
+        whether it does.
+    """
+    kind = result.attributes.get("map")
+    if kind in FROM_REST:
+        return name not in FROM_REST[kind]
+    return bool(table(table(result.settings, "trajectory"), "from").get("rest"))
+
+
+def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[str]:
+    """What a picture of a map keeps constant.
+
+    Args:
+        result: the map.
+        name: of the quantity; empty where the picture shows several.
+        fixed: what was fixed for the picture, in words.
+        used: axes that the picture shows, or of which `fixed` speaks.
+
+    Returns:
+        phrases.
+    """
+    place = start(result)
+    found = []
+    if place:
+        found.append(f"from ({', '.join(f'{number:.4g}' for number in place.values())}) m")
+    elif name and starts_at_rest(result, name):
+        found.append("from rest")
+    found += fixed
+    found += [value(result, a, p[0]) for a, p in result.axes.items() if a not in used and len(p) == 1]
+    if "z" in result.axes:
+        found.append(f"z axis {shortened(str(result.attributes.get('z_axis', 'down')))}")
+    return list(dict.fromkeys(found))

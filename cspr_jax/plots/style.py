@@ -1,0 +1,143 @@
+"""How all pictures look, and how large they are; files have the same bytes for the same data."""
+
+import io
+import math
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import matplotlib.style
+from matplotlib.figure import Figure
+
+from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.plots.fitting import fit
+
+# Over matplotlib's own defaults, so that a user's matplotlibrc changes nothing. Letters stay letters: TrueType in PDF,
+# text in SVG, and a dollar sign in a name is no mathematics. Sizes of letters are relative to font.size.
+LOOK = {
+    "text.parse_math": False,
+    "axes.formatter.useoffset": False,
+    "axes.unicode_minus": False,
+    "pdf.fonttype": 42,
+    "ps.fonttype": 42,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "cspr",
+    "figure.titlesize": "medium",
+    "axes.titlesize": "medium",
+    "axes.titlepad": 5.0,
+    "legend.fontsize": "medium",
+    "legend.frameon": False,
+    "figure.constrained_layout.h_pad": 0.07,
+    "figure.constrained_layout.w_pad": 0.07,
+    "figure.constrained_layout.hspace": 0.04,
+    "figure.constrained_layout.wspace": 0.03,
+}
+# No dates and versions in the files.
+METADATA: dict[str, dict] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+INCH = 2.54  # cm
+SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
+# A picture is held in memory as a whole, several bytes a pixel.
+LARGEST_PIXELS = 1e8
+
+
+class Style(NamedTuple):
+    """What a user chooses.
+
+    Fields:
+        size: width and height, cm; None: what suits the picture.
+        dpi: pixels an inch, of PNG and of the coloured cells in PDF and SVG.
+        font_size: points.
+    """
+
+    size: tuple[float, float] | None = None
+    dpi: float = 160.0
+    font_size: float = 10.0
+
+
+def style_of(size: str | None, dpi: float | None, font_size: float | None) -> Style:
+    """The style that command-line options ask for.
+
+    Args:
+        size: such as "16x10", cm; None: what suits the picture.
+        dpi: pixels an inch; None: the default.
+        font_size: points; None: the default.
+
+    Returns:
+        the style.
+
+    Raises:
+        ConfigError: a wrong text, or a number out of bounds.
+    """
+    default = Style()
+    return Style(
+        None if size is None else _sides(size),
+        default.dpi if dpi is None else _bounded("--dpi", dpi, DPIS),
+        default.font_size if font_size is None else _bounded("--font-size", font_size, FONT_SIZES),
+    )
+
+
+def _sides(text: str) -> tuple[float, float]:
+    number = r"(\d{1,6}(?:\.\d{0,6})?)"
+    match = re.fullmatch(f"{number}x{number}", text, re.ASCII)
+    sides = tuple(float(side) for side in match.groups()) if match else ()
+    if len(sides) != 2 or not all(SIDES[0] <= side <= SIDES[1] for side in sides):
+        low, high = SIDES
+        raise ConfigError("--size", f"{shown(text)}: must be WIDTHxHEIGHT in cm, {low:g} to {high:g} each, as in 16x10")
+    return sides[0], sides[1]
+
+
+def _bounded(key: str, value: float, bounds: tuple[float, float]) -> float:
+    low, high = bounds
+    if not low <= value <= high:
+        raise ConfigError(key, f"{value:g}: must be a number from {low:g} to {high:g}")
+    return value
+
+
+@contextmanager
+def in_style(style: Style) -> Iterator[None]:
+    """Make figures look alike, whatever the user's matplotlib is set to.
+
+    Args:
+        style: the chosen one.
+
+    Yields:
+        nothing; figures are to be made and saved inside.
+    """
+    with matplotlib.style.context(["default", LOOK | {"font.size": style.font_size}]):
+        yield
+
+
+def rendered(figure: Figure, ending: str, style: Style) -> bytes:
+    """The content of a picture's file.
+
+    Args:
+        figure: the picture, made inside `in_style`.
+        ending: of its file, such as ".png": the format.
+        style: the chosen one.
+
+    Returns:
+        the content.
+
+    Raises:
+        InputError: too many pixels, or no room for the panels.
+        ValueError: an unknown format.
+    """
+    if style.size is not None:
+        figure.set_size_inches(style.size[0] / INCH, style.size[1] / INCH)
+    width, height = figure.get_size_inches()
+    most = math.floor(math.sqrt(LARGEST_PIXELS / (width * height)))
+    if style.dpi > most:
+        raise InputError("--dpi", style.dpi, f"at most {most} for {width * INCH:.3g}x{height * INCH:.3g} cm")
+    content, ending = io.BytesIO(), ending.lower()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from")  # a letter that the font lacks is drawn as a box
+        warnings.filterwarnings("error", "constrained_layout not applied")
+        fit(figure)
+        try:
+            figure.savefig(content, format=ending[1:], dpi=style.dpi, metadata=METADATA.get(ending))
+        except UserWarning as warning:
+            size = f"{width * INCH:.3g}x{height * INCH:.3g}"
+            raise InputError("--size", size, "larger, or --font-size smaller: the texts leave no room") from warning
+    return content.getvalue()
