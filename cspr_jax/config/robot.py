@@ -45,7 +45,7 @@ class LimitKeys(Table):
 class RobotFile(LimitKeys):
     """A point mass on three cables, or on two in the plane y = 0; or a rigid platform on six."""
 
-    name: str = Field(description="name of the robot", min_length=1)
+    name: str = Field(description="name of the robot, at most 200 characters", min_length=1, max_length=200)
     base_points: Annotated[list[Point], Field(min_length=2, max_length=6)] = Field(
         description="where the cables leave their spools: three points [x, y, z] in cable order, m; two if planar, "
         "six with a rigid platform"

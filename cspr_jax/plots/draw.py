@@ -11,7 +11,8 @@ from cspr_jax.plots.envelope import AXES, envelope_figure
 from cspr_jax.plots.labels import PANELS, chosen, value
 from cspr_jax.plots.lines import Line, line_figure, lines_of, overlaid
 from cspr_jax.plots.motion import motion_figure
-from cspr_jax.plots.sections import POLAR, section_figure
+from cspr_jax.plots.sections import POLAR, section_figure, tells
+from cspr_jax.plots.selection import nearest
 from cspr_jax.results import Result, open_result
 
 # What a map is asked for first.
@@ -51,7 +52,7 @@ def plot(
         paths: results of `cspr run`, or one motion of `cspr plan -o`.
         output: picture to write; its ending is the format.
         quantity: which one of a map; None: "arcs", or the first there is.
-        at: fixed values of axes, the nearest point is taken.
+        at: fixed values of axes, within their ranges; the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
 
@@ -128,7 +129,17 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     order = [*plane, *(axis for axis in view.across if axis not in plane)]
     name, data, across, fixed = _panelled(result, view, order)
     panels = across[2] if len(across) > 2 else None
-    return section_figure(result, name, data if panels else data[..., None], across[:2], panels, fixed)
+    told = _told(result, at, order) if tuple(across[:2]) == POLAR else None
+    if not panels:
+        data, told = data[..., None], None if told is None else told[..., None]
+    return section_figure(result, name, data, across[:2], panels, fixed, told)
+
+
+def _told(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
+    # The same for every quantity of a file, so that their pictures show the same sections.
+    names = ["verdict"] if "verdict" in result.data else list(result.data)
+    found = [tells(name, _panelled(result, _view(result, name, at), order).data) for name in names]
+    return np.any(found, axis=0)
 
 
 def _lines_figure(result: Result, view: View, by: str) -> Figure:
@@ -164,10 +175,8 @@ def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
     data, fixed, place = result.data[name], [], {}
     for axis, wanted in at.items():
-        if axis not in result.axes:
-            raise InputError("--at", axis, "one of " + ", ".join(result.axes))
-        place[axis] = int(np.argmin(np.abs(result.axes[axis] - wanted)))
-        fixed.append(value(result, axis, result.axes[axis][place[axis]]))
+        place[axis], words = nearest(result, axis, wanted)
+        fixed.append(words)
     across = [axis for axis, points in result.axes.items() if len(points) > 1 and axis not in place]
     if not across:
         counts = {axis: 1 if axis in place else len(points) for axis, points in result.axes.items()}

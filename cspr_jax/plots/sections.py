@@ -18,11 +18,19 @@ SIGNED = ("used_inclination",)
 VERDICTS = ("verdict", "main_reason")
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
+# More lines than that say nothing.
+LOCI = 100.0
 NONE_COLOUR = "#d0d0d0"
 
 
 def section_figure(
-    result: Result, name: str, data: np.ndarray, across: list[str], over: str | None, fixed: list[str]
+    result: Result,
+    name: str,
+    data: np.ndarray,
+    across: list[str],
+    over: str | None,
+    fixed: list[str],
+    told: np.ndarray | None = None,
 ) -> Figure:
     """Sections of a map, one a panel.
 
@@ -33,15 +41,15 @@ def section_figure(
         across: the two axes of a panel.
         over: the axis that differs between the panels; None: there is one panel.
         fixed: what was fixed for the picture.
+        told: of data's shape, the cells that say more than that there is nothing; None: all.
 
     Returns:
         the figure.
     """
     polar = tuple(across) == POLAR
-    # Most of all orientations are none that a robot can take.
-    tells = _tells(name, data) if polar else np.ones(data.shape, bool)
-    told = np.flatnonzero(tells.any((0, 1)))
-    shown = told[chosen(len(told), PANELS)] if len(told) else chosen(data.shape[2], PANELS)
+    says = np.ones(data.shape, bool) if told is None else told
+    saying = np.flatnonzero(says.any((0, 1)))
+    shown = saying[chosen(len(saying), PANELS)] if len(saying) else chosen(data.shape[2], PANELS)
     columns, count = columns_of(len(shown)), len(shown)
     size = (3.1 * columns + 1.3, 3.2 * -(-count // columns) + 0.8) if count > 1 else (7.0, 5.6)
     figure = Figure(figsize=size, layout="constrained")
@@ -59,8 +67,8 @@ def section_figure(
             _loci(panel, result, data[:, :, k], across)
         if over is not None:
             panel.set_title(value(result, over, result.axes[over][i], digits=3), fontsize=10)
-    if polar and len(told):
-        farthest = np.flatnonzero(tells[:, :, shown].any((0, 2)))[-1]
+    if polar and len(saying):
+        farthest = np.flatnonzero(says[:, :, shown].any((0, 2)))[-1]
         every[0].set_ylim(0.0, _edges(result.axes[across[1]])[farthest + 1])
         fixed = [*fixed, f"around: {across[0]}, outward: {across[1]} (rad)"]
     elif not polar:
@@ -86,8 +94,16 @@ def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list
         panel.set_ylabel(axis_label(result, across[1]))
 
 
-def _tells(name: str, data: np.ndarray) -> np.ndarray:
-    # Cells that say more than that there is nothing.
+def tells(name: str, data: np.ndarray) -> np.ndarray:
+    """Which cells say more than that there is nothing: most of all orientations are none that a robot can take.
+
+    Args:
+        name: of the quantity.
+        data: it.
+
+    Returns:
+        of data's shape.
+    """
     if name in VERDICTS:
         return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0
     return data > 0 if data.dtype.kind == "i" else np.isfinite(data)
@@ -119,7 +135,7 @@ def _section(panel: Axes, result: Result, values: np.ndarray, across: list[str],
 def _loci(panel: Axes, result: Result, values: np.ndarray, across: list[str]) -> None:
     # Where a whole number of oscillations is just too few: the hexagons of thesis Fig. 1.6 on horizontal transitions.
     x, y = (result.axes[axis] for axis in across)
-    levels = np.arange(1.0, np.nanmax(values, initial=1.0))
+    levels = np.arange(1.0, min(np.nanmax(values, initial=1.0, where=np.isfinite(values)), LOCI))
     if min(values.shape) > 1 and len(levels):
         lines = panel.contour(x, y, values.T, levels=levels, colors="white", linewidths=0.8)
         panel.clabel(lines, fmt="%d", fontsize=8)
