@@ -369,9 +369,9 @@ def _robots(options: argparse.Namespace) -> int:
 def _quantities(options: argparse.Namespace) -> int:
     import dataclasses
 
-    from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY
+    from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 
-    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY}
+    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY, "segment": SEGMENTS}
     found = [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
     if options.json:
         _print_json(found)

@@ -16,7 +16,7 @@ from cspr_jax.store.isolated import fetch
 from cspr_jax.store.seal import DamagedError
 
 # No number of a result is larger, but those that are infinite.
-LARGEST_NUMBER = 1e30
+LARGEST_NUMBER, LARGEST_MASS = 1e30, 1e9
 # Settings have some ten tables and lists, and some fifty keys.
 _MOST_PARTS = 10_000
 _BLOCK = 1 << 20
@@ -155,8 +155,9 @@ def _motion(
         raise DamagedError("it is not a result of cspr: it has no quantities with named axes")
     if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= 6:
         raise DamagedError("it is not a motion of two to six cables")
-    if not 0.0 < attributes.get("z0", 0.0) < LARGEST_LENGTH:
-        raise DamagedError(f"z0 = {shown(attributes.get('z0'))}: must be a number > 0")
+    for name, most in (("z0", LARGEST_LENGTH), ("mass", LARGEST_MASS)):
+        if not 1.0 / most <= attributes.get(name, 0.0) <= most:
+            raise DamagedError(f"{name} = {shown(attributes.get(name))}: must be a number > 0")
     widths = {"quaternion": 4, "length": tension.shape[1], "rate": tension.shape[1], "tension": tension.shape[1]}
     segments = {name: array for name, array in arrays.items() if name in SEGMENTS}
     for name, array in arrays.items():

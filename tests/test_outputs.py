@@ -14,7 +14,7 @@ from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.feasibility.verdicts import SENTENCES
 from cspr_jax.plots.sections import NONE_COLOUR
-from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY, flag_attributes
+from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.reports import plan_object
 from cspr_jax.store.netcdf import make_datasets, new_hdf5
 
@@ -80,7 +80,7 @@ def test_robots(capsys):
 
 def test_quantities(capsys):
     found = {(row["group"], row["name"]): row for row in strict_json(cspr(capsys, "quantities", "--json"))}
-    tables = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY}
+    tables = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY, "segment": SEGMENTS}
     assert set(found) == {(group, name) for group, table in tables.items() for name in table}
     assert found["map", "duration"]["units"] == "s" and found["motion", "tension"]["units"] == "N"
     people = cspr(capsys, "quantities")
@@ -94,13 +94,27 @@ def test_verdicts_have_names_and_sentences():
     assert len(flags["flag_masks"]) == len(set(flags["flag_masks"])) == len(flags["flag_meanings"].split())
 
 
+def settings_of(axes: dict[str, list[float]]) -> dict[str, object]:
+    """Settings of a sweep over these axes."""
+    robot = {"name": "prototype", "mass": 0.2, "base_points": (np.eye(3) * 0.3).tolist(), "z_axis": "down"}
+    start = {"from": {"position": [0.7, 0.7, 3.0]}}
+    return {
+        "schema": 1,
+        "map": "minimum-arcs",
+        "robot": robot,
+        "axes": axes,
+        "trajectory": start,
+        "dimensions": list(axes),
+    }
+
+
 def made(path: Path, sizes: dict[str, int] = SHAPE, **attributes: object) -> Path:
     """A map with invented numbers: arcs 10 x + y + z from 0 on, margins from -2 up."""
     axes = {name: np.linspace(0.5, 1.5, size) if size > 1 else np.array([1.7]) for name, size in sizes.items()}
     index = np.indices(tuple(sizes.values()))
     arcs = sum(i * w for i, w in zip(index, (10, 1, 1, 0), strict=True))
     known = {"map": "minimum-arcs", "robot": "prototype", "z_axis": "down", "base_points": np.eye(3) * 0.3}
-    known["settings"] = json.dumps({"dimensions": list(sizes), "trajectory": {"from": {"position": [0.7, 0.7, 3.0]}}})
+    known["settings"] = json.dumps(settings_of({name: points.tolist() for name, points in axes.items()}))
     store, tile = ["arcs", "margin"], tuple(sizes.values())
     with new_hdf5(path, known | attributes) as file:
         make_datasets(file, axes, store, dtype="float64", tile=tile)

@@ -23,6 +23,12 @@ LARGEST_RANK = 16
 # Deflate packs at most 1032 bytes into one.
 DENSEST = 1100
 _PLENTY = 64 << 20
+_PER_CHUNK = 256
+# Of a dataset, by this program and by HDF5's dimension scales.
+_ATTRIBUTES = (
+    *("units", "long_name", "description", "flag_masks", "flag_meanings"),
+    *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS"),
+)
 _FILTERS = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
 _TYPES = {
     "float64": (h5t.IEEE_F64LE, h5t.IEEE_F64BE),
@@ -42,6 +48,7 @@ class Found(NamedTuple):
         dtype: of NumPy.
         size: bytes in memory.
         chunks: how many.
+        stored: bytes in the file.
     """
 
     data: h5d.DatasetID
@@ -49,6 +56,7 @@ class Found(NamedTuple):
     dtype: str
     size: int
     chunks: int
+    stored: int
 
     def values(self) -> np.ndarray:
         """All of it.
@@ -79,7 +87,7 @@ def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, Found]:
 
 
 def refuse_dense(found: Iterable[Found], size: int, *, densest: int = DENSEST) -> None:
-    """Refuse datasets that hold much more than their file can.
+    """Refuse datasets that hold much more than their file can, or much less than it has.
 
     Args:
         found: all that would be read.
@@ -89,25 +97,33 @@ def refuse_dense(found: Iterable[Found], size: int, *, densest: int = DENSEST) -
     Raises:
         DamagedError: they do.
     """
-    total, most = sum(one.size for one in found), _PLENTY + densest * size
+    every = list(found)
+    total, most = sum(one.size for one in every), _PLENTY + densest * size
     if total > most:
         raise DamagedError(
             f"it says it holds {total / 1e9:.3g} GB: must be at most {most / 1e9:.3g} GB in a file of its size"
         )
+    stored = sum(one.stored + _PER_CHUNK * one.chunks for one in every)
+    if size > _PLENTY + 1.2 * stored:
+        raise DamagedError(f"{(size - stored) / 1e9:.3g} GB of it are none of its quantities")
 
 
-def refuse_others(file: h5py.File, count: int) -> None:
-    """Refuse a file with other objects than those that were asked for.
+def refuse_others(file: h5py.File, objects: int, attributes: int) -> None:
+    """Refuse a file with other objects or attributes than those that were asked for.
 
     Args:
         file: open.
-        count: how many its root must hold.
+        objects: how many its root must hold.
+        attributes: how many its root must have.
 
     Raises:
         DamagedError: there are more, or fewer.
     """
-    if h5g.open(file.id, b"/").get_num_objs() != count:
-        raise DamagedError("it holds other datasets than its settings say")
+    there = h5g.open(file.id, b"/").get_num_objs(), h5a.get_num_attrs(file.id)
+    if there != (objects, attributes):
+        raise DamagedError(
+            f"it has {there[0]} objects and {there[1]} attributes: {objects} and {attributes} of them are cspr's"
+        )
 
 
 def text(item: h5py.HLObject, name: str, *, largest: int = LARGEST_TEXT) -> str | None:
@@ -177,6 +193,8 @@ def _dataset(file: h5py.File, name: str) -> Found:
     if h5o.get_info(file.id, key).type != h5o.TYPE_DATASET:
         raise DamagedError(f"{name} is not a dataset")
     data = h5d.open(file.id, key)
+    if h5a.get_num_attrs(data) > sum(h5a.exists(data, one.encode()) for one in _ATTRIBUTES):
+        raise DamagedError(f"{name} has attributes that are none of cspr")
     creation = data.get_create_plist()
     # Asked before the dataspace: HDF5 opens the other files of a virtual dataset to find its shape.
     if creation.get_layout() not in (h5d.COMPACT, h5d.CONTIGUOUS, h5d.CHUNKED) or creation.get_external_count():
@@ -194,7 +212,7 @@ def _dataset(file: h5py.File, name: str) -> Found:
         chunks = math.prod(-(-n // m) for n, m in zip(shape, chunk, strict=True))
         if math.prod(chunk) * item > LARGEST_CHUNK or chunks > LARGEST_CHUNKS:
             raise DamagedError(f"{name} has {chunks} chunks of {list(chunk)}: more or larger ones than cspr makes")
-    return Found(data, shape, dtype, math.prod(shape) * item, chunks)
+    return Found(data, shape, dtype, math.prod(shape) * item, chunks, int(data.get_storage_size()))
 
 
 def _dtype(kind: h5t.TypeID) -> str | None:

@@ -26,6 +26,8 @@ LARGEST_DATA, DENSEST = 8e9, 50
 # Seconds of the processor to find out what a file holds; those that reading it takes on slow machines.
 _LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
+# Names of parts of vectors, for other programs.
+_MARKS = (b"axis", b"cable", b"component")
 _LONG = ("settings", "environment_settings", "plan", "robot_settings")
 _TEXTS = (
     *("Conventions", "title", "map", "identity", "z_axis", "robot", "software", "environment", "environments"),
@@ -52,7 +54,9 @@ def _result(out: BinaryIO) -> None:
         attributes = _attributes(file)
         tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS)
         found = guard.datasets(file, [name for table in tables for name in table])
-        guard.refuse_dense(found.values(), os.fstat(0).st_size, densest=DENSEST)
+        marks = [name for name in _MARKS if "map" not in attributes and file.id.links.exists(name)]
+        guard.refuse_others(file, len(found) + len(marks), len(attributes))
+        guard.refuse_dense(found.values(), FILE.stat().st_size, densest=DENSEST)
         total = sum(one.size for one in found.values())
         if total > LARGEST_DATA:
             raise DamagedError(f"it holds {total / 1e9:.3g} GB of data: must be at most {LARGEST_DATA / 1e9:.3g} GB")
