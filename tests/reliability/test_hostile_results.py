@@ -13,6 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from test_outputs import settings_of
 
 import cspr_jax
 from cspr_jax.errors import StoreError
@@ -25,7 +26,6 @@ from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, make_datasets, reason, set_attributes
 from cspr_jax.store.seal import LENGTH, DamagedError, check_file, seal_file, sealed
 from reliability.test_hostile import cspr
-from test_outputs import settings_of
 
 AXES = {"x": [0.1, 0.2, 0.3, 0.4], "y": [0.1, 0.2, 0.3], "z": [1.0, 1.5], "z0": [1.7]}
 SHAPE = tuple(len(points) for points in AXES.values())
