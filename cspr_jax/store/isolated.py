@@ -19,7 +19,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from cspr_jax.errors import StoreError
+from cspr_jax.errors import StoreError, one_line
 from cspr_jax.store.seal import DamagedError, check_mark, check_open, open_regular
 
 # Hashing that many bytes takes a moment; of larger files it is asked before what they hold.
@@ -58,6 +58,7 @@ def fetch(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     with _asked(path, "result") as (found, pipe):
         arrays = {}
         for name, dtype, shape in found["arrays"]:
+            _header(pipe, patience=None)
             arrays[name] = np.empty(shape, dtype)
             if arrays[name].size:
                 _fill(pipe, arrays[name].reshape(-1).data.cast("B"))
@@ -89,7 +90,7 @@ def _asked(path: Path, what: str) -> Iterator[tuple[dict[str, Any], RawIOBase]]:
         large = os.fstat(file).st_size > _QUICK
         if not large:
             check_open(path, file)
-        with _reading(file, what) as pipe:
+        with _reading(path, file, what) as pipe:
             found = _header(pipe, patience=_PATIENCE)
             if large:
                 check_open(path, file)
@@ -99,7 +100,7 @@ def _asked(path: Path, what: str) -> Iterator[tuple[dict[str, Any], RawIOBase]]:
 
 
 @contextlib.contextmanager
-def _reading(file: int, what: str) -> Iterator[RawIOBase]:
+def _reading(path: Path, file: int, what: str) -> Iterator[RawIOBase]:
     specs = [spec for name in ("h5py", "numpy") if (spec := importlib.util.find_spec(name)) is not None]
     places = {str(Path(spec.origin).parent.parent) for spec in specs if spec.origin is not None}
     home = str(Path(__file__).parents[2])
@@ -116,21 +117,21 @@ def _reading(file: int, what: str) -> Iterator[RawIOBase]:
             env=environment,
         )
     except OSError as error:
-        raise StoreError(f"no process could be started to read a file: {error.strerror or error}") from error
+        raise StoreError(one_line(f"{path}: no process could be started to read it: {error.strerror}")) from error
     with child:
         try:
             yield cast(RawIOBase, child.stdout)
         except EOFError as error:
             code = child.wait()
             if code >= 0:
-                raise StoreError(f"the process that reads files ended with exit code {code}") from error
+                raise StoreError(one_line(f"{path}: the process that read it ended with exit code {code}")) from error
             raise DamagedError(_ENDS.get(signal.Signals(-code), "HDF5 fails on it")) from error
         finally:
             child.kill()
 
 
 def _header(pipe: RawIOBase, *, patience: float | None) -> dict[str, Any]:
-    if not select.select([pipe], [], [], patience)[0]:
+    if patience is not None and not select.select([pipe], [], [], patience)[0]:
         raise DamagedError("HDF5 waits for something")
     size = bytearray(8)
     _fill(pipe, memoryview(size))

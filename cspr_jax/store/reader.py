@@ -37,7 +37,7 @@ _INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass
 
 
 def serve() -> None:
-    """Answer with what the file on standard input holds: what was found as JSON, then the bytes of its arrays."""
+    """Answer with what the file on standard input holds: what was found as JSON, then each array behind an answer."""
     out = os.fdopen(os.dup(1), "wb")
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     _grant(_LOOK, 0)
@@ -64,8 +64,10 @@ def _result(out: BinaryIO) -> None:
         _answer(out, {"attributes": attributes, "arrays": arrays})
         _grant_for(found.values())
         for one in found.values():
+            values = one.values()
+            _answer(out, {})  # it could be read
             if one.size:
-                out.write(one.values().reshape(-1).data.cast("B"))
+                out.write(values.reshape(-1).data.cast("B"))
         out.flush()
 
 

@@ -269,9 +269,10 @@ def here(monkeypatch):
         except UNREADABLE as error:
             raise DamagedError(reason(error)) from error
         pipe.seek(0)
-        found = json.loads(pipe.read(int.from_bytes(pipe.read(8), "little")))
+        found = isolated._header(pipe, patience=None)
         arrays = {name: np.empty(shape, dtype) for name, dtype, shape in found["arrays"]}
         for array in arrays.values():
+            isolated._header(pipe, patience=None)
             if array.size:
                 pipe.readinto(array.reshape(-1).data.cast("B"))
         return found["attributes"], arrays
