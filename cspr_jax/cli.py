@@ -105,7 +105,6 @@ def _parser() -> argparse.ArgumentParser:
         sub.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan = add("plan", _plan, "plan a sequence of poses")
     plan.add_argument("plan", type=Path, help="plan file (TOML)")
-    plan.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the motion to FILE.csv or FILE.h5")
     plan.add_argument("--anyway", action="store_true", help="write the best candidate's motion if it is not feasible")
     plan.add_argument("--rate", type=float, metavar="HZ", help="rows a second (default: `samples` rows a segment)")
@@ -125,15 +124,15 @@ def _parser() -> argparse.ArgumentParser:
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
     table.add_argument("--list", action="store_true", help="list the tables")
-    table.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     table.add_argument("--definition", choices=("grid", "scan", "equal-volume", "all"), help="3.3, 3.4: accessible set")
     table.add_argument("--amplitude", choices=("quintic", "effective", "effective-c3", "all"), help="3.3, 3.4")
     table.add_argument("--fine", action="store_true", help="3.3, 3.4: step pi/64 instead of pi/32")
     bench = add("bench", _bench, "measure checks per second beside a NumPy version of the same check")
-    bench.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     bench.add_argument(
         "--kernels", type=Path, metavar="DIR", help="beside C++ kernels of this folder, such as benchmarks"
     )
+    for sub in (plan, table, bench):
+        sub.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     for sub in (run, plan, table, bench):
         sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
     robots = add("robots", _robots, "list the catalogue of robots")

@@ -1,5 +1,6 @@
 """Sealed result files that nobody wrote: each gives one line and an exit code, in little time and memory."""
 
+import faulthandler
 import io
 import json
 import os
@@ -291,6 +292,7 @@ def test_good_ones_are_drawn(tmp_path, monkeypatch):
 
 def test_hostile_files_are_refused(hostile, here):
     assert len(hostile) >= 60
+    faulthandler.dump_traceback_later(300.0, exit=True)  # HDF5 would wait for ever, and Python with it
     for name, path in hostile.items():
         with pytest.raises(StoreError) as raised:
             cspr_jax.open_result(path)
@@ -299,6 +301,7 @@ def test_hostile_files_are_refused(hostile, here):
         if "motion" not in name:
             with pytest.raises(DamagedError):
                 content_of(path)
+    faulthandler.cancel_dump_traceback_later()
 
 
 # Those that took gigabytes, or minutes, or for ever.
