@@ -99,40 +99,33 @@ def _parser() -> argparse.ArgumentParser:
         ("verify", _verify, "read again everything of a run, or a result or motion file, and check it"),
     ):
         sub = add(name, command, text)
-        sub.add_argument(
-            "path", type=Path, help="run directory" + (", result file or motion file" if name == "verify" else "")
-        )
+        sub.add_argument("path", type=Path, help="run directory" + (", result or motion" if name == "verify" else ""))
         sub.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan = add("plan", _plan, "plan a sequence of poses")
     plan.add_argument("plan", type=Path, help="plan file (TOML)")
+    plan.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the motion to FILE.csv or FILE.h5")
     plan.add_argument("--anyway", action="store_true", help="write the best candidate's motion if it is not feasible")
     plan.add_argument("--rate", type=float, metavar="HZ", help="rows a second (default: `samples` rows a segment)")
     plot = add("plot", _plot, "draw a result file, or several maps as lines")
-    plot.add_argument(
-        "result", type=Path, nargs="+", help="result or directory of `cspr run`, or motion of `cspr plan -o`"
-    )
+    plot.add_argument("result", type=Path, nargs="+", help="result or run directory, or motion of `cspr plan -o`")
     plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
     plot.add_argument("--quantity", help="quantity of a map (default arcs or oscillations); see `cspr quantities`")
     plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
-    plot.add_argument(
-        "--envelope", action="store_true", help='outlines of all orientations of a place, of map = "orientations"'
-    )
-    plot.add_argument(
-        "--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis at its nearest point"
-    )
+    plot.add_argument("--envelope", action="store_true", help='outlines of a place, of map = "orientations"')
+    plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis: nearest point")
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
     table.add_argument("--list", action="store_true", help="list the tables")
+    table.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     table.add_argument("--definition", choices=("grid", "scan", "equal-volume", "all"), help="3.3, 3.4: accessible set")
     table.add_argument("--amplitude", choices=("quintic", "effective", "effective-c3", "all"), help="3.3, 3.4")
     table.add_argument("--fine", action="store_true", help="3.3, 3.4: step pi/64 instead of pi/32")
     bench = add("bench", _bench, "measure checks per second beside a NumPy version of the same check")
+    bench.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     bench.add_argument(
         "--kernels", type=Path, metavar="DIR", help="beside C++ kernels of this folder, such as benchmarks"
     )
-    for sub in (plan, table, bench):
-        sub.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     for sub in (run, plan, table, bench):
         sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
     robots = add("robots", _robots, "list the catalogue of robots")
@@ -248,7 +241,7 @@ def _verify(options: argparse.Namespace) -> int:
     else:
         counts = ", ".join(f"{key} {found[key]}" for key in VERIFIED if key in found)
         sys.stdout.write(f"{found['path']}: {counts}\n")
-    again = "plan it" if "motion" in found else "run the sweep"
+    again = "run the sweep" if "shards" in found else "run or plan it"
     for fault in found["faults"]:
         sys.stderr.write(f"cspr: {fault}: {again} again to make it anew\n")
     return ExitCode.INPUT_OUTPUT if found["faults"] else ExitCode.DONE
