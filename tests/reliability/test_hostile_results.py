@@ -334,6 +334,8 @@ def test_the_worst_take_little_time_and_memory(hostile, tmp_path):
     assert [line for line in done.stdout.splitlines() if line.isdigit()] == ["4"] * 2 * len(paths)
     errors = done.stderr.splitlines()
     assert len(errors) == 2 * len(paths) and all(line.startswith("cspr: ") for line in errors)
+    # Not hashed, which takes long.
+    assert ["GB of it are none of its quantities" in line for line in errors if str(large) in line] == [True, True]
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 500_000 or sys.platform != "linux"
 
 
