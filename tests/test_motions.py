@@ -16,8 +16,8 @@ from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.store.netcdf import LAYOUT
 from cspr_jax.store.seal import sealed
 
-# The first segment needs five arcs, the second six.
-HARD = SHORT.replace("max_arcs = 30", "max_arcs = 5")
+# The second segment, which needs six arcs, ends above the spools.
+HARD = SHORT.replace("position = [0.0, -1.1, 1.7]", "position = [0.0, -1.1, -0.2]")
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_a_motion_says_what_it_is(motions):
     assert good.data["segment_arcs"].tolist() == good.data["segment_tried_arcs"].tolist() == [5, 6]
     assert not good.data["segment_verdict"].any() and (good.data["segment_margin"] > 0.0).all()
     assert hard.attributes["feasible"] == 0 and "not proved feasible" in hard.attributes["title"]
-    assert hard.data["segment_arcs"].tolist() == [5, 0] and hard.data["segment_tried_arcs"][1] in range(1, 6)
+    assert hard.data["segment_arcs"].tolist() == [5, 0] and hard.data["segment_tried_arcs"][1] > 0
     assert Verdict(int(hard.data["segment_verdict"][1])) & Verdict.NO_ARCS
     with h5py.File(motions / "hard.h5") as file:
         assert file["segment_end"].dims[0][0] == file["segment"]
