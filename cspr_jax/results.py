@@ -66,6 +66,7 @@ def open_result(path: Path) -> Result:
     """
     try:
         attributes, arrays = fetch(Path(path))
+        arrays = dict(sorted(arrays.items()))
         settings = _settings(attributes, path) if "map" in attributes else {}
         _check_robot(attributes, path)
         if settings:
