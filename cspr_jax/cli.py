@@ -4,7 +4,6 @@ import argparse
 import contextlib
 import io
 import json
-import math
 import os
 import sys
 import traceback
@@ -24,7 +23,7 @@ EPILOGUE = (
 )
 
 LARGEST_WORKERS = 256
-VERIFIED = ("tiles", "shards", "missing", "cells", "cells_near_zero", "mixed")
+VERIFIED = ("tiles", "shards", "missing", "cells", "cells_near_zero", "mixed", "rows", "segments", "feasible")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -108,23 +107,24 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--prune", action="store_true", help="remove the shards once the result is complete")
     for name, command, text in (
         ("status", _status, "say how far a run has come, without touching it"),
-        ("verify", _verify, "read again everything of a run, or a result file, and check it"),
+        ("verify", _verify, "read again everything of a run, or a result or motion file, and check it"),
     ):
         sub = add(name, command, text)
-        sub.add_argument("path", type=Path, help="run directory" + (" or result file" if name == "verify" else ""))
+        sub.add_argument("path", type=Path, help="run directory" + (", result or motion" if name == "verify" else ""))
         sub.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan = add("plan", _plan, "plan a sequence of poses")
     plan.add_argument("plan", type=Path, help="plan file (TOML)")
     plan.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the motion to FILE.csv or FILE.h5")
+    plan.add_argument("--anyway", action="store_true", help="write the best candidate's motion if it is not feasible")
     plan.add_argument("--rate", type=float, metavar="HZ", help="rows a second (default: `samples` rows a segment)")
     plot = add("plot", _plot, "draw a result file, or several maps as lines")
-    plot.add_argument("result", type=Path, nargs="+", help="result of `cspr run`, or motion of `cspr plan -o FILE.h5`")
+    plot.add_argument("result", type=Path, nargs="+", help="result or run directory, or motion of `cspr plan -o`")
     plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
     plot.add_argument("--quantity", help="quantity of a map (default arcs or oscillations); see `cspr quantities`")
     plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
     plot.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
-    plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis of a map")
+    plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis: nearest point")
     add_style(plot)
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
@@ -272,8 +272,9 @@ def _verify(options: argparse.Namespace) -> int:
     else:
         counts = ", ".join(f"{key} {found[key]}" for key in VERIFIED if key in found)
         sys.stdout.write(f"{found['path']}: {counts}\n")
+    again = "run the sweep" if "shards" in found else "run or plan it"
     for fault in found["faults"]:
-        sys.stderr.write(f"cspr: {fault}: run the sweep again to make it anew\n")
+        sys.stderr.write(f"cspr: {fault}: {again} again to make it anew\n")
     return ExitCode.INPUT_OUTPUT if found["faults"] else ExitCode.DONE
 
 
@@ -282,6 +283,8 @@ def _plan(options: argparse.Namespace) -> int:
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
     if options.rate is not None and not 0.0 < options.rate < float("inf"):
         raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
+    if options.anyway and options.output is None:
+        raise ConfigError("--anyway", "must be absent without -o")
     from cspr_jax.config.hints import plan_hints, robot_hints
 
     with waiting():
@@ -297,33 +300,28 @@ def _plan(options: argparse.Namespace) -> int:
         _print_json(reports.plan_object(plan))
     else:
         _print(reports.plan_table(plan))
-    if options.output is not None and feasible:
+    if options.output is not None and (feasible or options.anyway):
         with waiting():
             motions.write_rows(plan, options.output, rate=options.rate)
+        if not feasible:
+            _warn(f"{options.output}: is not proved feasible; it says so itself")
     elif options.output is not None:
-        sys.stderr.write(f"cspr: {options.output}: not written, since a segment is not proved feasible\n")
+        _warn(f"{options.output}: not written, since a segment is not proved feasible (--anyway writes it)")
     return ExitCode.DONE if feasible else ExitCode.NOT_FEASIBLE
 
 
 def _plot(options: argparse.Namespace) -> int:
-    at = {}
-    for text in options.at:
-        axis, _, value = text.partition("=")
-        try:
-            at[axis] = float(value)
-        except ValueError as error:
-            raise ConfigError("--at", f"{shown(text)}: must be AXIS=VALUE, such as z=1.7") from error
-        if not math.isfinite(at[axis]):
-            raise ConfigError("--at", f"{shown(text)}: must be a finite number")
-    from cspr_jax.plots.draw import plot
+    from cspr_jax.plots import draw, selection
     from cspr_jax.plots.style import style_of
 
-    output = options.output or options.result[0].with_suffix(".png")
+    at = selection.places(options.at)
+    results = [selection.result_at(path) for path in options.result]
+    output = options.output or results[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
     chosen = {"quantity": options.quantity, "at": at, "lines": options.lines, "envelope": options.envelope}
     with waiting():
-        plot(options.result, output, **chosen, style=style_of(options.size, options.dpi, options.font_size))
+        draw.plot(results, output, **chosen, style=style_of(options.size, options.dpi, options.font_size))
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE
 

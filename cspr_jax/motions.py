@@ -4,27 +4,33 @@ import csv
 import io
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import h5py
 import jax
 import numpy as np
 
-from cspr_jax import tensions, wrenches
+from cspr_jax import __version__, tensions, wrenches
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.identity import canonical_json
 from cspr_jax.planning import Plan
 from cspr_jax.problem import motion_kind
-from cspr_jax.quantities import TRAJECTORY
+from cspr_jax.quantities import SEGMENTS, TRAJECTORY, flag_attributes
+from cspr_jax.reports import is_feasible
 from cspr_jax.store.disk import Disk
-from cspr_jax.store.netcdf import new_hdf5, set_attributes
+from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.pose_segment import motion, quaternion_at
 
+SCHEMA = 2
 # Those that change sign when time runs backwards.
 _RATES = ("velocity", "omega", "rate")
 _VECTORS = ("position", "velocity", "acceleration", "omega", "omega_dot")
 LARGEST_ROWS = 20_000_000
+# A tick that lies so near to the end of a segment, in parts of a tick, is that end.
+SAME_TICK = 1e-6
 
 
 @jax.jit
@@ -64,7 +70,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
 
     Args:
         plan: the plan.
-        rate: rows a second over the whole plan, Hz; None: `samples` rows a segment, ends included.
+        rate: rows a second over the whole plan, Hz, and one at its end; None: `samples` rows a segment, ends included.
 
     Returns:
         "t" (n,) s and the other names of `quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
@@ -77,8 +83,10 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         if rate is None:
             tau = np.linspace(0.0, 1.0, plan.keys.samples)
         else:
-            ticks = np.arange(np.ceil(starts[i] * rate - 1e-9), np.ceil(starts[i + 1] * rate - 1e-9))
+            ticks = np.arange(*np.ceil(starts[i : i + 2] * rate - SAME_TICK))
             tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
+            if i == len(duration) - 1:
+                tau = np.append(tau, 1.0)
         segment = jax.tree.map(lambda x, i=i: x[i], plan.segments)
         back = bool(plan.backwards[i])
         states = _states(plan, segment, float(plan.answers.tried_arcs[i]), 1.0 - tau if back else tau)
@@ -102,7 +110,7 @@ def _states(plan: Plan, segment, arcs: float, tau: np.ndarray):
 
 
 def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
-    """Write the motion of a plan to a .csv or .h5 file.
+    """Write the motion of a plan to a .csv or .h5 file; that of one that is not feasible says so.
 
     Args:
         plan: the plan.
@@ -110,7 +118,7 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
         rate: rows a second, Hz, or None.
 
     Raises:
-        ConfigError: another ending, or too many rows.
+        ConfigError: too many rows, or a best candidate that is not finite.
         StoreError: the disk or the folder refuses.
     """
     if rate is not None and rate * plan.answers.duration.sum() > LARGEST_ROWS:
@@ -118,21 +126,32 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
     if rate is None and plan.keys.samples * len(plan.answers.duration) > LARGEST_ROWS:
         raise ConfigError("samples", f"{plan.keys.samples}: must give at most {LARGEST_ROWS} rows in all")
     found = rows(plan, rate=rate)
+    if not all(np.isfinite(values).all() for name, values in found.items() if name != "tension"):
+        raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
     if path.suffix == ".csv":
-        publish(Disk(), path, _csv(found).encode())
+        publish(Disk(), path, _csv(found, None if is_feasible(plan) else _feasible_rows(plan, found["t"])).encode())
     else:
         _write_hdf5(plan, path, found)
 
 
-def _csv(found: dict[str, np.ndarray]) -> str:
+def _feasible_rows(plan: Plan, t: np.ndarray) -> np.ndarray:
+    # Of each row, whether its segment is proved feasible; a row at a boundary belongs to both.
+    ends = np.cumsum(plan.answers.duration)
+    before, after = (np.searchsorted(ends, t, side).clip(max=len(ends) - 1) for side in ("left", "right"))
+    good = plan.answers.arcs > 0
+    return good[before] & good[after]
+
+
+def _csv(found: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
     heads = ["t"]
     for name in list(found)[1:]:
         heads += [f"{name}_{part}" for part in _parts(name, found[name].shape[1])]
     table = np.column_stack(list(found.values()))
+    last = [[]] * len(table) if feasible is None else [[int(flag)] for flag in feasible]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(heads)
-    writer.writerows([[repr(float(value)) for value in row] for row in table])
+    writer.writerow(heads if feasible is None else [*heads, "feasible"])
+    writer.writerows([[repr(float(value)) for value in row] + flag for row, flag in zip(table, last, strict=True)])
     return text.getvalue()
 
 
@@ -143,11 +162,10 @@ def _parts(name: str, count: int) -> list[str]:
 
 
 def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
-    spec = plan.spec
-    attributes = {"Conventions": "CF-1.11", "robot": spec.name, "mass": spec.mass, "z_axis": spec.z_axis, "z0": plan.z0}
+    segments = _segments(plan)
     cables = list(range(1, found["tension"].shape[1] + 1))
-    with new_hdf5(path, attributes) as file:
-        scales = {"t": found["t"], "axis": list("xyz"), "cable": cables}
+    with new_hdf5(path, _attributes(plan)) as file:
+        scales = {"t": found["t"], "axis": list("xyz"), "cable": cables, "segment": segments["segment"]}
         if "quaternion" in found:
             scales["component"] = list("wxyz")
         for name, labels in scales.items():
@@ -155,8 +173,50 @@ def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
             file[name].make_scale(name)
         for name, values in found.items():
             data: h5py.Dataset = file[name] if name == "t" else file.create_dataset(name, data=values)
-            set_attributes(data, {"units": TRAJECTORY[name].units, "long_name": TRAJECTORY[name].long_name})
+            describe(data, TRAJECTORY[name])
             if name != "t":
                 data.dims[0].attach_scale(file["t"])
                 across = "axis" if name in _VECTORS else "component" if name == "quaternion" else "cable"
                 data.dims[1].attach_scale(file[across])
+        for name, values in segments.items():
+            data = file[name] if name == "segment" else file.create_dataset(name, data=values)
+            describe(data, SEGMENTS[name])
+            if name != "segment":
+                data.dims[0].attach_scale(file["segment"])
+        set_attributes(file["segment_verdict"], flag_attributes())
+
+
+def _attributes(plan: Plan) -> dict[str, Any]:
+    spec = plan.spec
+    return {
+        "Conventions": "CF-1.11",
+        "title": f"Motion of robot {spec.name}" + ("" if is_feasible(plan) else ", not proved feasible"),
+        "schema": SCHEMA,
+        "software": f"cspr_jax {__version__}",
+        "feasible": int(is_feasible(plan)),
+        "family": plan.keys.family,
+        "plan": plan.text,
+        "robot": spec.name,
+        "robot_settings": canonical_json(spec.model_dump(mode="json", exclude_none=True)),
+        "base_points": np.asarray(spec.base_points),
+        "mass": spec.mass,
+        "z_axis": spec.z_axis,
+        "z0": float(plan.z0),
+    }
+
+
+def _segments(plan: Plan) -> dict[str, np.ndarray]:
+    answers, ends = plan.answers, np.cumsum(plan.answers.duration)
+    found = {
+        "segment": np.arange(1, len(ends) + 1),
+        "segment_start": np.concatenate([[0.0], ends[:-1]]),
+        "segment_end": ends,
+        "segment_arcs": answers.arcs,
+        "segment_tried_arcs": answers.tried_arcs,
+        "segment_verdict": answers.verdict,
+        "segment_margin": answers.margin,
+    }
+    return {
+        name: np.asarray(values, "float64" if (kind := SEGMENTS[name].kind) == "float" else kind)
+        for name, values in found.items()
+    }

@@ -10,6 +10,7 @@ from cspr_jax import problem
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.choices import best_amplitude, chosen_depth
 from cspr_jax.config.plan import PlanFile, read_plan
+from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError, InputError
@@ -48,6 +49,7 @@ class Plan:
         segments: of the n segments, each of the parity of its number of arcs; in the kernels' coordinates.
         backwards: (n,) whether a segment runs against its normalised time, from its target back to rest.
         warnings: what its user should know, one line each.
+        text: of the plan file; empty for a plan that has none.
     """
 
     spec: RobotFile
@@ -61,6 +63,7 @@ class Plan:
     segments: Segment | PoseSegment
     backwards: np.ndarray
     warnings: tuple[str, ...] = ()
+    text: str = ""
 
 
 def plan(path: Path) -> Plan:
@@ -75,7 +78,8 @@ def plan(path: Path) -> Plan:
     Raises:
         ConfigError: a mistake in the file.
     """
-    return plan_of(read_plan(path), path)
+    text = read_text(path)
+    return dataclasses.replace(plan_of(read_plan(text, path), path), text=text)
 
 
 def plan_of(keys: PlanFile, path: Path) -> Plan:

@@ -270,6 +270,31 @@ TRAJECTORY = {
         Quantity("tension", "N", "cable tension", "Tension of each cable, in cable order."),
     )
 }
+# What a motion file holds of each segment of its plan.
+SEGMENTS = {
+    q.name: q
+    for q in (
+        Quantity("segment", "1", "segment", "Number of a segment, in the order of the plan from 1 on.", "int16"),
+        Quantity("segment_start", "s", "start of the segment", "Time since the start of the plan."),
+        Quantity("segment_end", "s", "end of the segment", "Time since the start of the plan."),
+        Quantity(
+            "segment_arcs",
+            "1",
+            "smallest number of arcs",
+            "Smallest number of arcs proved feasible, or that the plan gives; 0: none.",
+            "int16",
+        ),
+        Quantity(
+            "segment_tried_arcs",
+            "1",
+            "number of arcs of the motion",
+            "Equal to `segment_arcs` where it is positive, else that of the best candidate.",
+            "int16",
+        ),
+        Quantity("segment_verdict", "1", "verdict", "Bit flags; 0 is feasible.", "uint16"),
+        Quantity("segment_margin", "1", "margin", "Smallest pseudotension over its value at rest in P0."),
+    )
+}
 # Those that only a rigid platform has.
 OF_PLATFORMS = ("quaternion", "omega", "omega_dot")
 STORABLE = tuple(QUANTITIES)

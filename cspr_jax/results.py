@@ -1,21 +1,26 @@
-"""Reading result files."""
+"""Reading result files: what another process found in one, checked with the schema of what wrote it."""
 
 import dataclasses
 import json
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
-from cspr_jax.errors import StoreError
-from cspr_jax.store.netcdf import UNREADABLE, plain, reason, refuse_foreign
-from cspr_jax.store.seal import DamagedError, check_file
+from cspr_jax.config.reading import checked
+from cspr_jax.config.robot import LARGEST_LENGTH, RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError, StoreError, one_line, shown
+from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.store.isolated import fetch
+from cspr_jax.store.seal import DamagedError
 
-# A result is read into memory as a whole: bytes of its data.
-LARGEST_DATA = 8e9
-# Shapes of what a motion holds for each cable, at one instant.
-CABLES = [(n,) for n in range(2, 7)]
+# No number of a result is larger, but those that are infinite.
+LARGEST_NUMBER, LARGEST_MASS = 1e30, 1e9
+# Settings have some ten tables and lists, and some fifty keys.
+_MOST_PARTS = 10_000
+_BLOCK = 1 << 20
+_EVERY = AXES | QUANTITIES | TRAJECTORY | SEGMENTS
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,7 +32,7 @@ class Result:
         data: quantities by name, each with the dimensions of `axes` (of a map), or as stored (of a motion).
         units: of axes and quantities.
         labels: long names of axes and quantities.
-        attributes: of the file.
+        attributes: of the file, those that this program writes.
         settings: of the sweep; empty for a motion.
     """
 
@@ -47,6 +52,9 @@ class Result:
 def open_result(path: Path) -> Result:
     """Read a result of `cspr run` or a motion of `cspr plan -o`.
 
+    The file may come from anybody: another process reads it, within limits of memory and time, and what it finds
+    is checked like a sweep file.
+
     Args:
         path: the file.
 
@@ -57,38 +65,126 @@ def open_result(path: Path) -> Result:
         StoreError: no such file, not HDF5, damaged, or not written by this program.
     """
     try:
-        check_file(path)
-        with h5py.File(path, "r") as file:
-            refuse_foreign(path, file, LARGEST_DATA)
-            everything = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset)}
-            scales = {name for name, item in everything.items() if item.is_scale}
-            found = {name: np.asarray(item) for name, item in everything.items()}
-            units = {name: str(plain(item.attrs.get("units", ""))) for name, item in everything.items()}
-            names = {name: str(plain(item.attrs.get("long_name", name))) for name, item in everything.items()}
-            attributes = {name: plain(value) for name, value in file.attrs.items()}
-            settings = json.loads(attributes.get("settings", "{}"))
-    except (DamagedError, *UNREADABLE, MemoryError) as error:
-        raise StoreError(f"{path}: cannot be read as a result: {reason(error)}") from error
-    data = {name: array for name, array in found.items() if name not in scales}
-    # HDF5's own record of dimensions is not asked: damaged, it keeps the library busy for ever.
-    order = settings.get("dimensions") if isinstance(settings, dict) and "map" in attributes else ["t"]
-    axes = {str(name): found[name] for name in order if name in scales} if isinstance(order, list) else {}
-    if not _is_ours(axes, data, attributes):
-        raise StoreError(f"{path}: is not a result of cspr: it has no quantities with named axes")
-    return Result(axes, data, units, names, attributes, settings)
+        attributes, arrays = fetch(Path(path))
+        arrays = dict(sorted(arrays.items()))
+        settings = _settings(attributes, path) if "map" in attributes else {}
+        _check_robot(attributes, path)
+        if settings:
+            axes, data = _map(settings, arrays)
+        else:
+            axes, data = _motion(attributes, arrays)
+    except DamagedError as error:
+        raise StoreError(one_line(f"{path}: cannot be read as a result: {error}")) from error
+    except ConfigError as error:
+        raise StoreError(str(error)) from error
+    names = [*axes, *data]
+    units, labels = ({n: getattr(_EVERY[n], key) for n in names} for key in ("units", "long_name"))
+    return Result(axes, data, units, labels, attributes, settings)
 
 
-def _is_ours(axes: dict[str, np.ndarray], data: dict[str, np.ndarray], attributes: dict[str, Any]) -> bool:
-    # A map over a grid, or a motion over time, with numbers of the right shapes.
-    if not data or not axes or not isinstance(attributes.get("robot"), str):
-        return False
-    if "map" in attributes:
-        shape = tuple(points.size for points in axes.values())
-        numbers = [*axes.values(), *data.values()]
-        return all(array.dtype.kind in "fiu" for array in numbers) and all(a.shape == shape for a in data.values())
-    if "t" not in axes or not isinstance(attributes.get("z0"), float):
-        return False
-    count, position, tension = axes["t"].size, data.get("position"), data.get("tension")
-    if position is None or tension is None or {position.dtype.kind, tension.dtype.kind} != {"f"}:
-        return False
-    return position.shape == (count, 3) and tension.shape[:1] == (count,) and tension.shape[1:] in CABLES
+def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
+    text = attributes.get(name)
+    if text is None:
+        raise DamagedError(f"it has no {name}")
+    # Before anything is built of it.
+    if max(text.count("[") + text.count("{"), text.count(":")) > _MOST_PARTS:
+        raise DamagedError(f"its {name} have more parts than cspr writes")
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise DamagedError(f"its {name} cannot be read: {error}") from error
+    if not isinstance(found, dict):
+        raise DamagedError(f"its {name} = {shown(found)}: must be a table")
+    return found
+
+
+def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:
+    # What a sweep file says, with its robot and the order of the axes.
+    settings = _json(attributes, "settings")
+    checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, path, at="settings")
+    robot = checked(RobotFile, settings["robot"], path, at="settings.robot")
+    order = settings.get("dimensions")
+    if not isinstance(order, list) or not order or not all(isinstance(name, str) and name in AXES for name in order):
+        raise DamagedError(f"settings.dimensions = {shown(order)}: must be a list of axes")
+    for name, wanted in (("map", settings["map"]), ("robot", robot.name), ("z_axis", robot.z_axis)):
+        if attributes.get(name) != wanted:
+            raise DamagedError(f"its {name} = {shown(attributes.get(name))} and its settings do not fit")
+    return settings
+
+
+def _check_robot(attributes: dict[str, Any], path: Path) -> None:
+    # What pictures say of it. Motions of earlier versions have no more than its name.
+    name, z_axis, points = attributes.get("robot"), attributes.get("z_axis", "down"), attributes.get("base_points")
+    if not isinstance(name, str) or not 0 < len(name) <= 200:
+        raise DamagedError(f"robot = {shown(name)}: must be a name of at most 200 characters")
+    if z_axis not in ("down", "up"):
+        raise DamagedError(f'z_axis = {shown(z_axis)}: must be "down" or "up"')
+    attributes["robot"] = one_line(name)
+    if points is not None:
+        attributes["base_points"] = np.asarray(points, float)
+        _check_numbers("base_points", attributes["base_points"], LARGEST_LENGTH)
+    if "robot_settings" in attributes:
+        checked(RobotFile, _json(attributes, "robot_settings"), path, at="robot_settings")
+
+
+def _map(
+    settings: dict[str, Any], arrays: dict[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    order = settings["dimensions"]
+    axes = {name: arrays[name] for name in order if name in arrays}
+    data = {name: array for name, array in arrays.items() if name in QUANTITIES}
+    if len(axes) < len(order) or not data:
+        raise DamagedError("it is not a result of cspr: it has no quantities with named axes")
+    for name, points in axes.items():
+        if points.dtype != np.float64 or points.ndim != 1 or not points.size:
+            raise DamagedError(f"axis {name} is not a list of numbers")
+        _check_numbers(name, points, LARGEST_LENGTH)
+    shape = tuple(points.size for points in axes.values())
+    for name, array in data.items():
+        kind = QUANTITIES[name].kind
+        if array.shape != shape or array.dtype.name not in (("float64", "float32") if kind == "float" else (kind,)):
+            raise DamagedError(f"{name} has not the shape of its axes, or another type")
+        _check_numbers(name, array, LARGEST_NUMBER, finite=False)
+    return axes, data
+
+
+def _motion(
+    attributes: dict[str, Any], arrays: dict[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    time, tension = arrays.get("t"), arrays.get("tension")
+    if time is None or tension is None or "position" not in arrays or time.ndim != 1 or tension.ndim != 2:
+        raise DamagedError("it is not a result of cspr: it has no quantities with named axes")
+    if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= 6:
+        raise DamagedError("it is not a motion of two to six cables")
+    for name, most in (("z0", LARGEST_LENGTH), ("mass", LARGEST_MASS)):
+        if not 1.0 / most <= attributes.get(name, 0.0) <= most:
+            raise DamagedError(f"{name} = {shown(attributes.get(name))}: must be a number > 0")
+    widths = {"quaternion": 4, "length": tension.shape[1], "rate": tension.shape[1], "tension": tension.shape[1]}
+    segments = {name: array for name, array in arrays.items() if name in SEGMENTS}
+    for name, array in arrays.items():
+        wanted: tuple[int, ...] = (len(time), widths.get(name, 3))
+        if name == "t":
+            wanted = (len(time),)
+        elif name in segments:
+            wanted = (segments["segment"].size if "segment" in segments else -1,)
+        kind = _EVERY[name].kind
+        if array.shape != wanted or array.dtype != (np.float64 if kind == "float" else kind):
+            raise DamagedError(f"{name} has another shape or type than in a motion")
+        # The best candidate of a motion that is not feasible may pass a singularity.
+        _check_numbers(name, array, LARGEST_NUMBER, finite=name != "tension")
+    if (np.diff(time) < 0.0).any():
+        raise DamagedError("its time runs backwards")
+    return {"t": time}, {name: array for name, array in arrays.items() if name != "t"}
+
+
+def _check_numbers(name: str, array: np.ndarray, most: float, *, finite: bool = True) -> None:
+    flat = array.reshape(-1)
+    for start in range(0, flat.size, _BLOCK):
+        block = flat[start : start + _BLOCK]
+        if block.dtype.kind == "f":
+            known = np.isfinite(block)
+            if finite and not known.all():
+                raise DamagedError(f"{name} holds numbers that are not finite")
+            block = np.abs(block[known])
+        if block.size and (block.max() > most or block.min() < 0):
+            raise DamagedError(f"{name} holds numbers that no result has")

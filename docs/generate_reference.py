@@ -10,7 +10,7 @@ from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, Swee
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.errors import ExitCode
 from cspr_jax.feasibility.verdicts import SENTENCES
-from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY
+from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 
 EXITS = {
     ExitCode.DONE: "done",
@@ -42,6 +42,18 @@ FILES = {
     "Robot files": [("", RobotFile)],
 }
 
+MOTION = """## Columns of a motion
+
+`cspr plan -o FILE.csv` writes `t`, then `_x _y _z`, `_w _x _y _z` or `_1 _2 _3` of each, `samples` rows a segment; with `--rate HZ`
+a row each 1/HZ s and one at the end itself. `FILE.h5` has the same as datasets, and says what it is: attributes `software`, `schema`,
+`plan` (the text of the plan file), `robot_settings` (the robot, as JSON), `base_points` (the spools), `mass`, `z_axis`, `z0`, `family`,
+and `feasible`, 1 or 0. It is sealed like a result: `cspr verify FILE.h5` and `cspr plot FILE.h5` notice every changed byte.
+
+A plan that is not feasible is written with `--anyway` alone: each segment as its best candidate moves. Its picture says NOT PROVED
+FEASIBLE and which segments; its HDF5 file has `feasible = 0` and the verdicts of its segments; its CSV file has a last column `feasible`,
+1 in rows of segments that are proved feasible and 0 in the others. CSV files of feasible plans do not have that column.
+"""
+
 
 def reference_text() -> str:
     """The page.
@@ -62,10 +74,8 @@ def reference_text() -> str:
             parts.append((f"`{place}`: " if place else "") + (model.__doc__ or "").split("\n")[0] + "\n")
             parts.append(_keys(model))
     parts.append("## Quantities of a result\n\n" + _quantities(QUANTITIES) + "\nAxes:\n\n" + _quantities(AXES))
-    parts.append(
-        "## Columns of a motion\n\n`cspr plan -o FILE.csv` writes `t`, then `_x _y _z` or `_1 _2 _3` of each.\n"
-    )
-    parts.append(_quantities(TRAJECTORY))
+    parts.append(MOTION)
+    parts.append(_quantities(TRAJECTORY) + "\nOf each segment, in HDF5 files:\n\n" + _quantities(SEGMENTS))
     rows = "".join(f"| {flag.value} | `{flag.text}` | {text} |\n" for flag, text in SENTENCES.items())
     parts.append(f"## Verdicts\n\nBit flags; 0 is feasible.\n\n| bit | name | meaning |\n|---|---|---|\n{rows}")
     rows = "".join(f"| {code.value} | {text} |\n" for code, text in EXITS.items())

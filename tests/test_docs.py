@@ -93,7 +93,7 @@ def test_the_first_robot_and_plan(checkout, capsys):
     assert capsys.readouterr().out.startswith("[3 1 3] [1.12")
     files[1].write_text(files[1].read_text("utf-8").replace("tension_min = 1.0", "max_tension = 40.0"), "utf-8")
     with pytest.raises(ConfigError) as caught:
-        read_plan(files[1])
+        read_plan(files[1].read_text(), files[1])
     assert line == f"cspr: {str(caught.value).replace(str(files[1]), 'hall_plan.toml')}\n"
 
 

@@ -135,7 +135,7 @@ def plan_line(tmp_path, text) -> str:
     path = tmp_path / "in.toml"
     path.write_text(text)
     with pytest.raises(ConfigError) as caught:
-        keys = read_plan(path)
+        keys = read_plan(path.read_text(), path)
         resolve_robot(keys.robot, path, tmp_path)
     return str(caught.value).removeprefix(f"{path}: ")
 
@@ -229,7 +229,7 @@ def test_all_errors(tmp_path):
     text = PLAN.replace("z0 = 1.7", "z0 = -1.0\nmax_arcs = 0\nquux = 1")
     (tmp_path / "in.toml").write_text(text)
     with pytest.raises(ConfigError) as caught:
-        read_plan(tmp_path / "in.toml")
+        read_plan((tmp_path / "in.toml").read_text(), tmp_path / "in.toml")
     error = caught.value
     assert str(error) == f"{error.lines[0]} (and 2 more: --all-errors shows them)"
     keys = [line.removeprefix(f"{tmp_path / 'in.toml'}: ").split(" = ")[0] for line in error.lines]
@@ -253,10 +253,10 @@ def test_limits_of_a_plan_have_a_table(tmp_path):
     path = tmp_path / "in.toml"
     table = "[limits]\ntension_max = 5.0\nfloor = 3.5\ncable_length_max = [3.0, 3.0, 4.0]\n[[pose]]\nrest"
     path.write_text(PLAN.replace("[[pose]]\nrest", table))
-    keys = read_plan(path)
+    keys = read_plan(path.read_text(), path)
     flat = PLAN.replace("z0 =", "tension_max = 5.0\nfloor = 3.5\ncable_length_max = [3.0, 3.0, 4.0]\nz0 =")
     path.write_text(flat)
-    assert keys.model_dump() == read_plan(path).model_dump()
+    assert keys.model_dump() == read_plan(path.read_text(), path).model_dump()
     assert (keys.tension_max, keys.floor, keys.tension_min) == (5.0, 3.5, None)
 
 

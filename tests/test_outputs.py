@@ -8,14 +8,17 @@ import jax
 import matplotlib.colors
 import numpy as np
 import pytest
+from reliability.support import go, sweep_of
 
 import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.feasibility.verdicts import SENTENCES
+from cspr_jax.plots.draw import _map_figure
 from cspr_jax.plots.sections import NONE_COLOUR
-from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY, flag_attributes
+from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.reports import plan_object
+from cspr_jax.results import Result
 from cspr_jax.store.netcdf import make_datasets, new_hdf5
 
 ROOT = Path(__file__).parent.parent
@@ -84,7 +87,7 @@ def test_robots(capsys):
 
 def test_quantities(capsys):
     found = {(row["group"], row["name"]): row for row in strict_json(cspr(capsys, "quantities", "--json"))}
-    tables = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY}
+    tables = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY, "segment": SEGMENTS}
     assert set(found) == {(group, name) for group, table in tables.items() for name in table}
     assert found["map", "duration"]["units"] == "s" and found["motion", "tension"]["units"] == "N"
     people = cspr(capsys, "quantities")
@@ -98,13 +101,27 @@ def test_verdicts_have_names_and_sentences():
     assert len(flags["flag_masks"]) == len(set(flags["flag_masks"])) == len(flags["flag_meanings"].split())
 
 
+def settings_of(axes: dict[str, list[float]]) -> dict[str, object]:
+    """Settings of a sweep over these axes."""
+    robot = {"name": "prototype", "mass": 0.2, "base_points": (np.eye(3) * 0.3).tolist(), "z_axis": "down"}
+    start = {"from": {"position": [0.7, 0.7, 3.0]}}
+    return {
+        "schema": 1,
+        "map": "minimum-arcs",
+        "robot": robot,
+        "axes": axes,
+        "trajectory": start,
+        "dimensions": list(axes),
+    }
+
+
 def made(path: Path, sizes: dict[str, int] = SHAPE, **attributes: object) -> Path:
     """A map with invented numbers: arcs 10 x + y + z from 0 on, margins from -2 up."""
     axes = {name: np.linspace(0.5, 1.5, size) if size > 1 else np.array([1.7]) for name, size in sizes.items()}
     index = np.indices(tuple(sizes.values()))
     arcs = sum(i * w for i, w in zip(index, (10, 1, 1, 0), strict=True))
     known = {"map": "minimum-arcs", "robot": "prototype", "z_axis": "down", "base_points": np.eye(3) * 0.3}
-    known["settings"] = json.dumps({"dimensions": list(sizes), "trajectory": {"from": {"position": [0.7, 0.7, 3.0]}}})
+    known["settings"] = json.dumps(settings_of({name: points.tolist() for name, points in axes.items()}))
     store, tile = ["arcs", "margin"], tuple(sizes.values())
     with new_hdf5(path, known | attributes) as file:
         make_datasets(file, axes, store, dtype="float64", tile=tile)
@@ -347,3 +364,67 @@ def test_robots_that_do_not_fit(tmp_path):
     (tmp_path / "up.toml").write_text(text)
     robot = cspr_jax.load_robot(tmp_path / "up.toml")
     assert (robot.base_points.tolist(), robot.z_axis) == ([[0, 0, 1], [1, 0, 1], [0, 2, 1]], "up")
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ("z=77", '"z=77": must be z in [0.5, 1.5]'),
+        ("z=0.4999", "must be z in [0.5, 1.5]"),
+        ("z=1.5001", "must be z in [0.5, 1.5]"),
+        ("z0=1.6", '"z0=1.6": must be z0 = 1.7'),
+        ("tilt=0", '"tilt": must be one of x, y, z, z0'),
+    ],
+)
+def test_a_value_out_of_its_axis_is_refused(capsys, tmp_path, asked, words):
+    assert words in cspr(capsys, "plot", made(tmp_path / "map.h5"), "--at", asked, code=2)
+    assert not (tmp_path / "map.png").exists()
+
+
+def test_the_nearest_value_is_named(capsys, tmp_path, figures):
+    """Between two values; not where the difference is rounding, at the ends too."""
+    path = made(tmp_path / "map.h5")
+    for asked, words, said in (
+        ("z=0.6", "z = 0.6429 m (nearest to 0.6 m)", True),
+        ("z=1.5000000001", "z = 1.5 m", False),
+        ("z=0.4999999999", "z = 0.5 m", False),
+        ("z0=1.7", "z0 = 1.7 m", False),
+    ):
+        cspr(capsys, "plot", path, "--at", asked)
+        title = figures[-1].get_suptitle()
+        assert words in title and ("nearest" in title) == said
+
+
+def test_all_quantities_of_a_file_are_cut_at_the_same_slices(tmp_path, figures):
+    """Where only some orientations are accessible, what is drawn of one is drawn of the others."""
+    axes = {"torsion": 9, "tilt_azimuth": 4, "tilt": 3}
+    points = {name: np.linspace(0.0, 1.0, count) for name, count in axes.items()}
+    verdict = np.full(tuple(axes.values()), cspr_jax.Verdict.NOT_ACCESSIBLE.value, np.uint16)
+    verdict[1:8] = cspr_jax.Verdict.SLACK_CABLE.value
+    arcs = np.zeros(verdict.shape, np.int16)
+    arcs[4, :, :2], verdict[4, :, :2] = 3, 0
+    data = {"verdict": verdict, "arcs": arcs, "margin": np.where(arcs > 0, 0.5, np.nan)}
+    units = dict.fromkeys([*axes, *data], "1")
+    result = Result(points, data, units, {name: name for name in units}, {"robot": "r", "map": "orientations"}, {})
+    shown = {}
+    for name in data:
+        figure = _map_figure(result, name, {}, None)
+        shown[name] = [panel.get_title() for panel in panels(figure)], panels(figure)[0].get_ylim()
+    assert shown["verdict"] == shown["arcs"] == shown["margin"] and len(shown["arcs"][0]) == 6
+    del data["verdict"]
+    assert [panel.get_title() for panel in panels(_map_figure(result, "arcs", {}, None))] == ["torsion = 0.5"]
+
+
+def test_a_run_directory_is_drawn(capsys, tmp_path, figures):
+    """Its result; one line where it has none."""
+    sweep = sweep_of(tmp_path / "s", tiles=4)
+    go(sweep, tmp_path / "run")
+    result = tmp_path / "run" / "small.h5"
+    assert cspr(capsys, "plot", tmp_path / "run") == f"{result.with_suffix('.png')}\n"
+    assert "prototype" in figures[0].get_suptitle()
+    result.unlink()
+    assert "holds no finished result" in cspr(capsys, "plot", tmp_path / "run", code=4)
+    result.symlink_to(made(tmp_path / "elsewhere.h5"))
+    assert "holds no finished result" in cspr(capsys, "plot", tmp_path / "run", code=4)
+    assert "is not a run directory" in cspr(capsys, "plot", tmp_path / "s", code=4)
+    assert len(figures) == 1

@@ -230,7 +230,9 @@ def test_rows_at_a_rate(tmp_path):
     assert cspr(tmp_path, SHORT, "--rate", "40", "-o", str(output))[::2] == (0, "")
     segments, motion = planned(tmp_path, SHORT)["segments"], columns(output)
     total = sum(s["duration"] for s in segments)
-    np.testing.assert_allclose(motion["t"], np.arange(np.ceil(total * 40)) / 40, rtol=0.0, atol=1e-12)
+    ticks = [*np.arange(np.ceil(total * 40)) / 40, total]
+    np.testing.assert_allclose(motion["t"], ticks, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(motion["position"][-1], POSES[7], atol=1e-12)
     start = 0.0
     for i, segment in enumerate(segments):
         inside = (motion["t"] >= start - 1e-9) & (motion["t"] < start + segment["duration"] - 1e-9)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.reading import Table, checked, read_toml
+from cspr_jax.config.reading import Table, checked, parse_toml
 from cspr_jax.config.robot import Coordinate, LimitKeys, LimitTable, Point, Positive
 from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import fault
@@ -79,11 +79,12 @@ class PlanFile(TrajectoryKeys, LimitKeys):
         return self.model_copy(update={"limits": None, **given})
 
 
-def read_plan(path: Path) -> PlanFile:
+def read_plan(text: str, path: Path) -> PlanFile:
     """A plan file.
 
     Args:
-        path: the file.
+        text: its content.
+        path: named in errors.
 
     Returns:
         its content, limits of [limits] beside the other keys.
@@ -91,6 +92,6 @@ def read_plan(path: Path) -> PlanFile:
     Raises:
         ConfigError: a mistake in it.
     """
-    data = read_toml(path)
+    data = parse_toml(text, path)
     refuse_other_kinds(data, "plan", path)
     return checked(PlanFile, data, path)

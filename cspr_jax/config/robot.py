@@ -60,7 +60,7 @@ LEVEL = 1e-9
 class RobotFile(LimitKeys):
     """A point mass on three cables, or on two in the plane y = 0; or a rigid platform on six."""
 
-    name: str = Field(description="name of the robot", min_length=1)
+    name: str = Field(description="name of the robot, at most 200 characters", min_length=1, max_length=200)
     base_points: list[Point] = Field(
         description="where the cables leave their spools: three points [x, y, z] in cable order, m; two if planar, "
         "six with a rigid platform"

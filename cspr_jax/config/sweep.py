@@ -29,7 +29,7 @@ class AxisRange(Table):
 
 Axis = Annotated[
     Annotated[AxisRange, Tag("~range")]
-    | Annotated[list[Coordinate], Field(min_length=1, max_length=LARGEST_COUNT), Tag("~values")],
+    | Annotated[list[Coordinate], Field(min_length=1, max_length=LARGEST_COUNT, fail_fast=True), Tag("~values")],
     Discriminator(lambda value: "~range" if isinstance(value, dict | AxisRange) else "~values"),
 ]
 _OF_TARGETS = "{} of the targets, m: {{ start, stop, count }} or a list"
@@ -126,10 +126,10 @@ class Run(Table):
     dtype: Literal["float64", "float32"] = Field(
         "float64", description="of stored numbers, and of the sieve; verdicts are float64's in both"
     )
-    tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1)] | None = Field(
-        None, description="shape of the block computed at a time, one number an axis"
+    tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1, fail_fast=True)] | None = (
+        Field(None, description="shape of the block computed at a time, one number an axis")
     )
-    store: Annotated[list[Literal[STORABLE]], Field(min_length=1)] | None = Field(  # type: ignore[valid-type]
+    store: Annotated[list[Literal[STORABLE]], Field(min_length=1, fail_fast=True)] | None = Field(  # type: ignore[valid-type]
         None, description="quantities to store; see `cspr quantities`"
     )
 

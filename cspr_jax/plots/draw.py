@@ -13,6 +13,7 @@ from cspr_jax.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.plots.motion import motion_figure
 from cspr_jax.plots.notes import notes
 from cspr_jax.plots.sections import AROUND, POLAR, Section, section_figure, tells
+from cspr_jax.plots.selection import nearest
 from cspr_jax.plots.style import Style, in_style, rendered
 from cspr_jax.results import Result, open_result
 from cspr_jax.stages import stage
@@ -61,7 +62,7 @@ def plot(
         paths: results of `cspr run`, or one motion of `cspr plan -o`.
         output: picture to write; its ending is the format.
         quantity: which one of a map; None: "arcs", or the first there is.
-        at: fixed values of axes, the nearest point is taken.
+        at: fixed values of axes, within their ranges; the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
         style: size, resolution and letters; None: the default.
@@ -209,10 +210,8 @@ def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
     data, fixed, place = result.data[name], [], {}
     for axis, wanted in at.items():
-        if axis not in result.axes:
-            raise InputError("--at", axis, "one of " + ", ".join(result.axes))
-        place[axis] = int(np.argmin(np.abs(result.axes[axis] - wanted)))
-        fixed.append(value(result, axis, result.axes[axis][place[axis]]))
+        place[axis], words = nearest(result, axis, wanted)
+        fixed.append(words)
     across = [axis for axis, points in result.axes.items() if len(points) > 1 and axis not in place]
     if not across:
         counts = {axis: 1 if axis in place else len(points) for axis, points in result.axes.items()}

@@ -9,6 +9,9 @@ from matplotlib.figure import Figure
 from cspr_jax.plots.labels import COLOURS, STYLES, robot_name
 from cspr_jax.results import Result
 
+# Of longer plans the lines would hide the rest.
+BOUNDARIES = 200
+
 
 def motion_figure(result: Result) -> Figure:
     """Path and tensions of a motion.
@@ -36,9 +39,25 @@ def motion_figure(result: Result) -> Figure:
     if result.attributes.get("z_axis", "down") == "down":
         drawn["xz"].invert_yaxis()
     _tensions(drawn["tension"], time, tension, result.attributes.get("mass"))
+    for name in {"orientation", "tension"} & drawn.keys():
+        _boundaries(drawn[name], result)
     z_axis, z0 = result.attributes.get("z_axis", "down"), float(result.attributes["z0"])
-    figure.suptitle(f"{robot_name(result)}: z0 = {z0:.4g} m, z axis {z_axis}")
+    figure.suptitle(f"{robot_name(result)}: z0 = {z0:.4g} m, z axis {z_axis}{_mark(result)}")
     return figure
+
+
+def _boundaries(panel: Axes, result: Result) -> None:
+    # Between segments; motions of earlier versions do not say where.
+    for time in result.data.get("segment_end", np.empty(0))[:-1][:BOUNDARIES]:
+        panel.axvline(time, color="black", linewidth=0.8, alpha=0.35)
+
+
+def _mark(result: Result) -> str:
+    if result.attributes.get("feasible", 1):
+        return ""
+    wrong = np.flatnonzero(result.data.get("segment_arcs", np.empty(0)) == 0) + 1
+    which = ", ".join(str(number) for number in wrong[:6]) + (", ..." if len(wrong) > 6 else "")
+    return f"\nNOT PROVED FEASIBLE: segment{'s' if len(wrong) > 1 else ''} {which}"
 
 
 def _path(panel: Axes, position: np.ndarray, j: int) -> None:

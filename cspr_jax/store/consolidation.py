@@ -4,7 +4,7 @@ import dataclasses
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,10 @@ import numpy as np
 
 from cspr_jax.errors import StoreError
 from cspr_jax.identity import identity
+from cspr_jax.quantities import AXES, QUANTITIES
+from cspr_jax.store import guard
 from cspr_jax.store.disk import Disk
+from cspr_jax.store.guard import Found
 from cspr_jax.store.netcdf import (
     UNREADABLE,
     file_size,
@@ -21,7 +24,6 @@ from cspr_jax.store.netcdf import (
     open_hdf5,
     plain,
     reason,
-    refuse_foreign,
     set_attributes,
 )
 from cspr_jax.store.publishing import new_file
@@ -29,7 +31,7 @@ from cspr_jax.store.seal import DamagedError, check_file
 from cspr_jax.store.shards import Layout, Shard, digest_of
 from cspr_jax.tiles import Grid
 
-LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES = 1 << 30, 1 << 28
+LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES, LARGEST_TILES = 1 << 24, 1 << 28, 100_000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -125,31 +127,69 @@ def read_content(path: Path) -> Content:
     if file_size(path) < 0:
         raise DamagedError("it is not a file")
     check_file(path)
+    return content_of(path)
+
+
+def content_of(path: Path, begun: Callable[[Iterable[Found]], None] = lambda _: None) -> Content:
+    """The same of a file whose seal was compared already.
+
+    Args:
+        path: the file.
+        begun: called with all datasets before they are read, which takes long.
+
+    Returns:
+        what it holds.
+
+    Raises:
+        DamagedError: it is not what was written, or was not written by this program.
+    """
     try:
         with h5py.File(path, "r") as file:
-            settings = json.loads(plain(file.attrs["settings"]))
-            if identity(settings) != plain(file.attrs["identity"]):
+            settings = json.loads(_text(file, "settings"))
+            if identity(settings) != _text(file, "identity"):
                 raise DamagedError("its settings and its identity do not fit")
-            tile, store = tuple(settings["run"]["tile"]), list(settings["run"]["store"])
-            if set(file) != {*settings["dimensions"], *store}:
-                raise DamagedError("it holds other datasets than its settings say")
-            refuse_foreign(path, file, np.iinfo(np.int64).max)
-            if any(file[name].nbytes > LARGEST_AXIS_BYTES for name in settings["dimensions"]):
-                raise DamagedError("its axes have no fitting size")
-            grid = Grid({name: np.asarray(file[name]).reshape(-1) for name in settings["dimensions"]}, tile)
-            _check_shapes(file, grid, store)
+            tile, store, axes = settings["run"]["tile"], settings["run"]["store"], settings["dimensions"]
+            found = _found(file, axes, store)
+            grid = Grid({name: found[name].values().reshape(-1) for name in axes}, tuple(tile))
+            _check_shapes(found, grid, store)
+            begun(found.values())
             digests = _digests(file, grid, store, lambda: None)
-            if _fold(grid.axes, digests) != plain(file.attrs["content_sha256"]):
+            if _fold(grid.axes, digests) != _text(file, "content_sha256"):
                 raise DamagedError("its content has changed")
-            near_zero, mixed = int(file.attrs["cells_near_zero"]), bool(file.attrs["mixed"])
+            near_zero, mixed = (int(guard.numbers(file, name, "int64") or 0) for name in ("cells_near_zero", "mixed"))
     except (StoreError, *UNREADABLE, MemoryError) as error:
         raise DamagedError(f"it cannot be read: {reason(error)}") from error
-    return Content(identity(settings), settings, grid.size, len(grid.tiling), near_zero, mixed)
+    return Content(identity(settings), settings, grid.size, len(grid.tiling), near_zero, bool(mixed))
 
 
-def _check_shapes(file: h5py.File, grid: Grid, store: list[str]) -> None:
-    if any(file[name].shape != grid.shape for name in store) or len(grid.tile) != len(grid.shape):
+def _text(file: h5py.File, name: str) -> str:
+    found = guard.text(file, name)
+    if found is None:
+        raise DamagedError(f"it has no {name}")
+    return found
+
+
+def _found(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, Found]:
+    # All datasets that the settings name, and no others; each looked at before anything is read.
+    names = [*axes, *store]
+    if len({*names}) < len(names) or not {*axes} <= AXES.keys() or not {*store} <= QUANTITIES.keys():
+        raise DamagedError("its settings name other quantities than cspr has")
+    if h5py.h5g.open(file.id, b"/").get_num_objs() != len(names):
+        raise DamagedError("it holds other datasets than its settings say")
+    found = guard.datasets(file, names)
+    if found.keys() != {*names}:
+        raise DamagedError("it holds other datasets than its settings say")
+    if any(found[name].size > LARGEST_AXIS_BYTES for name in axes):
+        raise DamagedError("its axes have no fitting size")
+    guard.refuse_dense(found.values(), os.stat(file.filename).st_size)
+    return found
+
+
+def _check_shapes(found: dict[str, Found], grid: Grid, store: list[str]) -> None:
+    if any(found[name].shape != grid.shape for name in store) or len(grid.tile) != len(grid.shape):
         raise DamagedError("its datasets do not fit its axes")
-    largest = max(file[name].dtype.itemsize for name in store) * float(np.prod([float(n) for n in grid.tile]))
+    largest = 8.0 * float(np.prod([float(n) for n in grid.tile]))
     if largest > LARGEST_TILE_BYTES or not all(isinstance(n, int) and n > 0 for n in grid.tile):
         raise DamagedError("its tiles have no fitting size")
+    if len(grid.tiling) > LARGEST_TILES:
+        raise DamagedError(f"it has {len(grid.tiling)} tiles: must be at most {LARGEST_TILES}")

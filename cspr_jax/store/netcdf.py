@@ -10,7 +10,6 @@ from typing import Any
 import h5py
 import numpy as np
 
-from cspr_jax.errors import StoreError
 from cspr_jax.quantities import AXES, QUANTITIES, Quantity, flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import new_file
@@ -182,28 +181,6 @@ def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:
     one = sum(np.dtype(dtype_of(name, dtype)).itemsize for name in store)
     # Twice the data, and a tenth for chunks that do not compress and for what describes them.
     return int(2.1 * np.prod([float(n) for n in shape]) * one) + (1 << 20)
-
-
-def refuse_foreign(path: Path, file: h5py.File, largest: float) -> None:
-    """Refuse a file whose data lie in other files, or would not fit into memory.
-
-    Args:
-        path: named in the error.
-        file: open.
-        largest: bytes that all data may take.
-
-    Raises:
-        StoreError: it is one.
-    """
-    total = 0
-    for name, item in file.items():
-        if not isinstance(item, h5py.Dataset):
-            continue
-        if item.is_virtual or item.external:
-            raise StoreError(f"{path}: {name}: its data lie in other files: must be in this one")
-        total += int(np.prod([float(n) for n in item.shape or ()])) * item.dtype.itemsize
-    if total > largest:
-        raise StoreError(f"{path}: holds {total / 1e9:.3g} GB of data: must be at most {largest / 1e9:.3g} GB")
 
 
 def reason(error: BaseException) -> str:

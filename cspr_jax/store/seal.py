@@ -7,6 +7,7 @@ give wrong values without an error, or keep the library busy for ever.
 import errno
 import hashlib
 import os
+import stat
 from pathlib import Path
 
 from cspr_jax.errors import StoreError, one_line
@@ -15,6 +16,7 @@ from cspr_jax.store.disk import Disk, write_all
 _MARK = b"\ncspr_jax, sha256 of all before this line: "
 LENGTH = len(_MARK) + 64 + 1
 _STEP = 1 << 20
+_NONE = "it is not whole, or not of cspr"
 
 
 # What a process or system lacks at the moment, or may not do: it says nothing about the file.
@@ -83,6 +85,34 @@ def seal_file(disk: Disk, file: int, size: int) -> None:
     write_all(disk, file, _line(_hash(file, size)), size)
 
 
+def open_regular(path: Path) -> int:
+    """Open a file for reading, and only a file: a pipe would keep its reader waiting.
+
+    Args:
+        path: the file, or a link to one.
+
+    Returns:
+        a descriptor.
+
+    Raises:
+        DamagedError: it is no regular file, or cannot be read.
+        StoreError: the system refuses to read anything at the moment.
+    """
+    try:
+        # Opening a device can do something to it, so it is looked at before, and again against a change between.
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            raise DamagedError("it is not a file")
+        file = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY)
+    except ValueError as error:  # a name with a null byte
+        raise DamagedError(f"it cannot be read: {error}") from error
+    except OSError as error:
+        raise unreadable(path, error) from error
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise DamagedError("it is not a file")
+    return file
+
+
 def check_file(path: Path) -> None:
     """Compare a file with its seal.
 
@@ -93,19 +123,49 @@ def check_file(path: Path) -> None:
         DamagedError: it is no regular file, cannot be read, has no seal, or one that does not fit.
         StoreError: the system refuses to read anything at the moment.
     """
+    file = open_regular(path)
     try:
-        file = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
-    except OSError as error:
-        raise unreadable(path, error) from error
-    try:
-        size = os.fstat(file).st_size - LENGTH
-        line = os.pread(file, LENGTH, max(size, 0))
-        # Files of others need not be read whole.
-        _check(line, _hash(file, size) if line.startswith(_MARK) else "")
-    except OSError as error:
-        raise unreadable(path, error) from error
+        check_mark(path, file)
+        check_open(path, file)
     finally:
         os.close(file)
+
+
+def check_mark(path: Path, file: int) -> None:
+    """Look whether an open file ends with a seal; files of others need not be read whole.
+
+    Args:
+        path: named in errors.
+        file: descriptor.
+
+    Raises:
+        DamagedError: it does not, or cannot be read.
+        StoreError: the system refuses to read anything at the moment.
+    """
+    try:
+        line = os.pread(file, LENGTH, max(os.fstat(file).st_size - LENGTH, 0))
+    except OSError as error:
+        raise unreadable(path, error) from error
+    if not line.startswith(_MARK):
+        raise DamagedError(_NONE)
+
+
+def check_open(path: Path, file: int) -> None:
+    """Compare an open file with its seal.
+
+    Args:
+        path: named in errors.
+        file: descriptor.
+
+    Raises:
+        DamagedError: it cannot be read, has no seal, or one that does not fit.
+        StoreError: the system refuses to read anything at the moment.
+    """
+    try:
+        size = os.fstat(file).st_size - LENGTH
+        _check(os.pread(file, LENGTH, max(size, 0)), _hash(file, size))
+    except OSError as error:
+        raise unreadable(path, error) from error
 
 
 def _line(digest: str) -> bytes:
@@ -114,7 +174,7 @@ def _line(digest: str) -> bytes:
 
 def _check(line: bytes, digest: str) -> None:
     if not line.startswith(_MARK):
-        raise DamagedError("it is not whole, or not of cspr")
+        raise DamagedError(_NONE)
     if line != _line(digest):
         raise DamagedError("its bytes have changed")
 

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from cspr_jax.identity import canonical_json
+from cspr_jax.store import guard
 from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, file_size, new_dataset, reason
 from cspr_jax.store.seal import DamagedError, sealed, unreadable, unsealed
 
@@ -121,11 +122,12 @@ def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -
         try:
             if set(file) != set(layout.store):
                 raise DamagedError("it holds other quantities")
-            if any(file[name].dtype.str != np.dtype(dtype_of(name, layout.dtype)).str for name in layout.store):
+            found = guard.datasets(file, layout.store)
+            if any(one.dtype != dtype_of(name, layout.dtype) for name, one in found.items()):
                 raise DamagedError("it holds other types")
-            if any(file[name].shape != shape for name in layout.store):
+            if any(one.shape != shape for one in found.values()):
                 raise DamagedError("it holds a tile of another shape")
-            values = {name: np.asarray(file[name]) for name in layout.store}
+            values = {name: one.values() for name, one in found.items()}
             written = file.attrs["content_sha256"]
         except UNREADABLE as error:
             raise DamagedError(f"HDF5 cannot read it: {reason(error)}") from error

@@ -4,10 +4,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cspr_jax.errors import StoreError, one_line
-from cspr_jax.store.consolidation import Content, read_content
+from cspr_jax.results import open_result
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.folder import RunFolder
+from cspr_jax.store.isolated import content
+from cspr_jax.store.netcdf import file_size
 from cspr_jax.store.record import Record, read_record
 from cspr_jax.store.seal import DamagedError
 from cspr_jax.store.shards import Layout, read_shard
@@ -46,10 +50,10 @@ def status(directory: Path) -> dict[str, Any]:
 
 
 def verify(path: Path) -> dict[str, Any]:
-    """Read again everything of a run, or one result file.
+    """Read again everything of a run, or one result or motion file.
 
     Args:
-        path: a run directory, or a result file.
+        path: a run directory, or a file.
 
     Returns:
         plain values: counts, and "faults", a list of lines.
@@ -59,7 +63,7 @@ def verify(path: Path) -> dict[str, Any]:
     """
     if path.is_file():
         # A link that a user names is followed.
-        return _verify_result(path.resolve(), None, {"schema": 1, "path": str(path), "faults": []})
+        return _verify_file(path, {"schema": 1, "path": str(path), "faults": []})
     record = _record(path)
     folder = _folder(path, record)
     found: dict[str, Any] = {"schema": 1, "path": str(path), "tiles": 0, "shards": 0, "missing": 0, "faults": []}
@@ -83,19 +87,67 @@ def verify(path: Path) -> dict[str, Any]:
     return found
 
 
-def _verify_result(path: Path, record: Record | None, found: dict[str, Any]) -> dict[str, Any]:
-    content: Content | None = None
+def result_in(directory: Path) -> Path:
+    """The result of a run directory.
+
+    Args:
+        directory: of the run.
+
+    Returns:
+        its path.
+
+    Raises:
+        StoreError: no run directory, or its run has not finished.
+    """
+    path = _folder(directory, _record(directory)).result
+    if file_size(path) < 0:
+        raise StoreError(one_line(f"{directory}: holds no finished result: run the sweep to its end"))
+    return path
+
+
+def _verify_file(path: Path, found: dict[str, Any]) -> dict[str, Any]:
     try:
-        content = read_content(path)
-        if record is not None and content.identity != record.identity:
+        inside = content(path)
+    except DamagedError as error:
+        return found | {"result": str(path), "faults": [one_line(f"{path}: {error}")]}
+    if inside is not None:
+        return found | {"result": str(path)} | _counts(inside)
+    try:
+        result = open_result(path)
+    except StoreError as error:
+        return found | {"motion": str(path), "faults": [str(error)]}
+    # Motions of earlier versions say nothing of their segments.
+    segments = result.data.get("segment", np.empty(0)).size or None
+    feasible = result.attributes.get("feasible")
+    counts = {
+        "rows": result.axes["t"].size,
+        "segments": segments,
+        "feasible": None if feasible is None else feasible > 0,
+    }
+    return found | {"motion": str(path)} | {key: value for key, value in counts.items() if value is not None}
+
+
+def _verify_result(path: Path, record: Record, found: dict[str, Any]) -> None:
+    found["result"] = str(path)
+    try:
+        if file_size(path) < 0:
+            raise DamagedError("it is not a file")
+        inside = content(path)
+        if inside is None or inside["identity"] != record.identity:
             raise DamagedError("it belongs to another sweep")
     except DamagedError as error:
         found["faults"].append(one_line(f"{path}: {error}"))
-    found["result"] = str(path)
-    if content is not None:
-        found |= {"cells": content.cells, "cells_near_zero": content.near_zero, "mixed": content.mixed}
-        found.setdefault("tiles", content.tiles)
-    return found
+    else:
+        found |= {key: value for key, value in _counts(inside).items() if key not in found}
+
+
+def _counts(inside: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "cells": inside["cells"],
+        "cells_near_zero": inside["near_zero"],
+        "mixed": inside["mixed"],
+        "tiles": inside["tiles"],
+    }
 
 
 def _record(directory: Path) -> Record:

@@ -146,6 +146,26 @@ def test_foreign_hdf5(finished, tmp_path):
         shutil.rmtree(directory)
 
 
+def test_pipes_devices_and_links_to_them(tmp_path):
+    """One line at once; a link to a file is followed."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("pipe")
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "nowhere").symlink_to("none")
+    for path in (tmp_path / "pipe", tmp_path / "link", tmp_path / "loop", tmp_path / "nowhere", Path("/dev/zero")):
+        refused("plot", path, "-o", tmp_path / "a.png")
+        refused("verify", path)
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "run.json").symlink_to("../pipe")
+    for command in ("plot", "verify", "status"):
+        refused(command, tmp_path / "run")
+
+
+def test_a_link_to_a_result_is_followed(finished, tmp_path):
+    (tmp_path / "link.h5").symlink_to(finished[1] / "small.h5")
+    assert cspr("plot", tmp_path / "link.h5")[0] == 0 == cspr("verify", tmp_path / "link.h5")[0]
+
+
 def test_files_that_are_no_hdf5(tmp_path):
     for name, data in {
         "empty": b"",

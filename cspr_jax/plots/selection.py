@@ -1,0 +1,85 @@
+"""What a user chose to see: files, directories, and values of axes."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.plots.labels import value
+from cspr_jax.results import Result
+
+# What is asked for and what there is are the same but for rounding.
+SAME = 1e-9
+
+
+def result_at(path: Path) -> Path:
+    """The file to draw.
+
+    Args:
+        path: it, or the directory of its run.
+
+    Returns:
+        the file.
+
+    Raises:
+        StoreError: a directory without a finished result.
+    """
+    if not path.is_dir():
+        return path
+    from cspr_jax.sweep.inspection import result_in  # only a directory needs it
+
+    return result_in(path)
+
+
+def places(words: list[str]) -> dict[str, float]:
+    """Values of axes as the command line gives them.
+
+    Args:
+        words: such as "z=1.7".
+
+    Returns:
+        the values by axis.
+
+    Raises:
+        ConfigError: a word of another form.
+    """
+    at = {}
+    for text in words:
+        axis, _, number = text.partition("=")
+        try:
+            at[axis] = float(number)
+        except ValueError as error:
+            raise ConfigError("--at", f"{shown(text)}: must be AXIS=VALUE, such as z=1.7") from error
+        if not math.isfinite(at[axis]):
+            raise ConfigError("--at", f"{shown(text)}: must be a finite number")
+    return at
+
+
+def nearest(result: Result, axis: str, wanted: float) -> tuple[int, str]:
+    """The point of an axis that is drawn where a value is asked for.
+
+    Args:
+        result: a map.
+        axis: its name.
+        wanted: the value.
+
+    Returns:
+        the index of the point, and how the picture says it: with the value where that is another one.
+
+    Raises:
+        InputError: no such axis, or a value out of its range.
+    """
+    if axis not in result.axes:
+        raise InputError("--at", axis, "one of " + ", ".join(result.axes))
+    points = result.axes[axis]
+    low, high = float(points.min()), float(points.max())
+    rounding = SAME * max(abs(low), abs(high))
+    if not low - rounding <= wanted <= high + rounding:
+        allowed = f"{axis} in [{low:.6g}, {high:.6g}]" if high > low else f"{axis} = {low:.6g}, its one point"
+        raise InputError("--at", f"{axis}={wanted:.6g}", allowed)
+    place = int(np.argmin(np.abs(points - wanted)))
+    words = value(result, axis, points[place])
+    if abs(points[place] - wanted) > rounding:
+        words += f" (nearest to {value(result, axis, wanted).partition(' = ')[2]})"
+    return place, words
