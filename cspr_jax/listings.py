@@ -5,7 +5,7 @@ from typing import Any
 
 from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
 from cspr_jax.problem import fault_at_rest
-from cspr_jax.quantities import AXES, QUANTITIES, TRAJECTORY
+from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 
 
 def robots() -> list[dict[str, Any]]:
@@ -48,7 +48,7 @@ def quantities() -> list[dict[str, Any]]:
     Returns:
         group, name, units and description of each.
     """
-    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY}
+    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY, "segment": SEGMENTS}
     return [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
 
 

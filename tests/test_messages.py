@@ -213,7 +213,7 @@ PIECES = {"sweep": SWEEP, "plan": PLAN, "robot": ROBOT}
 @pytest.mark.parametrize("wanted", PIECES)
 def test_a_file_of_another_kind(tmp_path, given, wanted):
     (tmp_path / "in.toml").write_text(PIECES[given])
-    read = {"sweep": read_sweep, "plan": read_plan, "robot": read_robot}[wanted]
+    read = {"sweep": read_sweep, "plan": lambda path: read_plan(path.read_text(), path), "robot": read_robot}[wanted]
     if given == wanted:
         read(tmp_path / "in.toml")
         return

@@ -23,8 +23,16 @@ def made(path: Path, axes: dict, data: dict | None = None, kind: str = "minimum-
     shape = tuple(len(points) for points in axes.values())
     data = data or {"arcs": 1 + np.arange(np.prod(shape)).reshape(shape) % 5}
     trajectory = given.pop("trajectory", {"from": {"rest": True}})
-    settings = {"schema": 1, "map": kind, "dimensions": list(axes), "trajectory": trajectory}
     known = {"map": kind, "robot": "robot", "z_axis": "down", "base_points": np.array(given.pop("base", TRIANGLE))}
+    robot = {"mass": 1.0, "base_points": TRIANGLE, "z_axis": given.get("z_axis", "down")}
+    settings = {
+        "schema": 1,
+        "map": kind,
+        "robot": robot | {"name": given.get("robot", "robot")},
+        "axes": {name: points.tolist() for name, points in axes.items()},
+        "trajectory": trajectory,
+        "dimensions": list(axes),
+    }
     with new_hdf5(path, known | {"settings": json.dumps(settings)} | given) as file:
         make_datasets(file, axes, list(data), dtype="float64", tile=shape)
         for name, values in data.items():
@@ -290,7 +298,7 @@ def test_names_are_drawn_letter_by_letter(capsys, tmp_path):
     cspr(capsys, "plot", path, "-o", tmp_path / "a.svg")
     text = (tmp_path / "a.svg").read_text("utf-8")
     assert re.search(r"<text[^>]*>\$x_1\^2 \\frac\{ _a \^ \\alpha \$ % # ~ &amp; \{\\n", text)
-    long = made(tmp_path / "long.h5", GRID | {"z": [1.5]}, robot="long" * 500)
+    long = made(tmp_path / "long.h5", GRID | {"z": [1.5]}, robot="long" * 50)
     cspr(capsys, "plot", long, "-o", tmp_path / "b.svg")
     assert max(map(len, re.findall(r">([^<>]*long[^<>]*)<", (tmp_path / "b.svg").read_text("utf-8")))) < 80
 

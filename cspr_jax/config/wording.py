@@ -97,7 +97,7 @@ def _question(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> 
     # What a string, or a number in place of a list, probably stands for.
     value, key = error["input"], str(parts[-1]) if parts else ""
     if not isinstance(value, str):
-        is_single = error["loc"][-1] == "~values" and isinstance(value, int | float) and not isinstance(value, bool)
+        is_single = error["loc"][-1:] == ("~values",) and isinstance(value, int | float) and not isinstance(value, bool)
         return f"did you mean [{shown(value)}]? " if is_single else ""
     if error["type"] == "literal_error":
         near = nearest(value, error.get("ctx", {})["expected"].split("'")[1::2])
@@ -138,6 +138,8 @@ def _allowed(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> s
         words = "at least" if kind == "too_short" else "at most"
         number = context.get("min_length", context.get("max_length"))
         allowed = f"a list of {words} {number} values, not {context['actual_length']}{explained}"
+    elif kind == "string_too_long":
+        allowed = f"a string of at most {context['max_length']} characters"
     elif kind == "literal_error":
         allowed = context["expected"].replace("'", '"') + explained
     else:

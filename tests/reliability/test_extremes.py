@@ -131,10 +131,10 @@ def ready(path):
     keys = checked(PlanFile, read_toml(path), path)
     spec = resolve_robot(keys.robot, path, path.parent)
     sequence = (Poses if spec.is_platform else sequence_of)(spec, keys, path)
-    robot = (problem.build_platform if spec.is_platform else problem.build_robot)(spec, keys, path)
+    robot = (problem.platform_of if spec.is_platform else problem.point_mass_of)(spec, keys, path)
     rest = problem.build_limits(spec, keys, keys.floor, path), problem.build_amplitude(keys, path, epsilon=0.2)
     if not spec.is_platform:
-        return sequence.points(robot, chosen_depth(Shared(robot, *rest), sequence))
+        return sequence.points(chosen_depth(Shared(robot, *rest), sequence))
     shared = PoseShared(aligned(robot)[0], *rest)
     sequence.check_poses(shared)
     try:
