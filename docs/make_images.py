@@ -24,7 +24,7 @@ class Image(NamedTuple):
         seconds: that its commands took, on 2 cores that had other work too.
         plot: arguments of `cspr plot` after the results.
         sources: sweeps or plans in `sweeps`, one result each; empty: the one of the picture's name.
-        command: "run" for sweeps, "plan" for plans.
+        command: "run" for sweeps, "plan" for plans, "draw" for a script of its own.
     """
 
     caption: str
@@ -57,6 +57,7 @@ IMAGES = {
         ("figure_1_9_a1", "figure_1_9_a2", "figure_1_9_a3", "figure_1_9_effective"),
     ),
     "table_2_1": Image("The motion of Table 2.1: path and tensions.", 12, command="plan"),
+    "concepts": Image("From start to target in five arcs, and the pseudotensions; see concepts.md.", 8, command="draw"),
 }
 
 
@@ -71,6 +72,8 @@ def commands_of(name: str) -> list[str]:
     """
     image = IMAGES[name]
     sources = image.sources or (name,)
+    if image.command == "draw":
+        return [f"python docs/draw_{name}.py"]
     if image.command == "plan":
         results = [f"{RESULTS}/{source}.h5" for source in sources]
         made = [f"cspr plan sweeps/{s}.toml -o {r}" for s, r in zip(sources, results, strict=True)]
@@ -109,8 +112,9 @@ def make(name: str) -> None:
     (ROOT / RESULTS).mkdir(parents=True, exist_ok=True)
     for line in commands_of(name):
         print(line, flush=True)
-        words = shlex.split(line)[1:]
-        subprocess.run([sys.executable, "-m", "cspr_jax", *words], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+        program, *words = shlex.split(line)
+        module = [] if program == "python" else ["-m", "cspr_jax"]
+        subprocess.run([sys.executable, *module, *words], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
 
 
 if __name__ == "__main__":
