@@ -11,9 +11,9 @@ import jax
 import numpy as np
 
 from cspr_jax import amplitudes, load_robot
-from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.limits import Limits
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
 from cspr_jax.maps.pose_ends import end_options

@@ -21,7 +21,7 @@ def main() -> None:
     from cspr_jax.amplitudes import named
     from cspr_jax.api import load_robot
     from cspr_jax.feasibility.certificate import Shared
-    from cspr_jax.feasibility.limits import Limits
+    from cspr_jax.limits import Limits
     from cspr_jax.maps.minimum_oscillations import minimum_oscillations, transitions_to
 
     rng, z0 = np.random.default_rng(0), np.full(options.count, 2.0)

@@ -10,9 +10,9 @@ from cspr_jax import problem
 from cspr_jax.amplitudes import named
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.limits import Limits
 from cspr_jax.maps import attainable
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.reference_pose import aligned

@@ -17,9 +17,9 @@ from cspr_jax.feasibility import oscillations as counts
 from cspr_jax.feasibility import zero_tension
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.envelopes import lower_envelope, proved_envelope
-from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.margins import margins
 from cspr_jax.feasibility.transition_margins import transition_margins
+from cspr_jax.limits import Limits
 from cspr_jax.maps.minimum_oscillations import transitions_to
 from cspr_jax.results import open_result
 

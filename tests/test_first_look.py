@@ -11,9 +11,9 @@ from test_platform import MSSM, Z0, made, ours
 
 from cspr_jax.amplitudes import named
 from cspr_jax.feasibility import first_look
-from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.limits import Limits
 from cspr_jax.maps.minimum_pose_arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.trajectories.pose_segment import Kind
 

@@ -14,8 +14,8 @@ from cspr_jax import robots
 from cspr_jax.amplitudes import from_pieces, named
 from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import Shared, prove
-from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.margins import margins
+from cspr_jax.limits import Limits
 from cspr_jax.numerics import vertex
 from cspr_jax.trajectories import hypocycloid
 

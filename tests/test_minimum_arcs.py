@@ -12,8 +12,8 @@ from cspr_jax import robots
 from cspr_jax.amplitudes import named
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.limits import Limits
 from cspr_jax.maps.minimum_arcs import minimum_arcs
 
 Z0 = 1.7

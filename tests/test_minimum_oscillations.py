@@ -12,7 +12,7 @@ from cspr_jax import tensions
 from cspr_jax.amplitudes import named
 from cspr_jax.cli import main
 from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.limits import Limits
+from cspr_jax.limits import Limits
 from cspr_jax.maps.minimum_oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.results import open_result
 from cspr_jax.robots import planar_robot, point_mass_robot

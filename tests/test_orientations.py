@@ -14,10 +14,10 @@ from scipy.spatial.transform import Rotation
 from test_platform import MSSM, ours
 
 from cspr_jax.amplitudes import named
-from cspr_jax.feasibility.limits import Limits
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.sights import Watch
+from cspr_jax.limits import Limits
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.maps.attainable import attainable, attained
 from cspr_jax.maps.pose_ends import end_options
