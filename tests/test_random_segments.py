@@ -134,5 +134,5 @@ def test_many_random_segments(kind, seed, record_property):
     names = LIMITS if seed < 3 else ("tension_max", "cable_acceleration_max")
     for _ in range(6):
         worst.append(compare(rng, kind, names, 12))
-    record_property("largest error of a margin", max(worst))
+    record_property("largest error of a margin", float(max(worst)))
     assert max(worst) < 1e-8
