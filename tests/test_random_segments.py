@@ -135,4 +135,4 @@ def test_many_random_segments(kind, seed, record_property):
     for _ in range(6):
         worst.append(compare(rng, kind, names, 12))
     record_property("largest error of a margin", float(max(worst)))
-    assert max(worst) < 1e-8
+    assert max(worst) < 1e-9
