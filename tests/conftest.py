@@ -60,3 +60,11 @@ def prototype():
 def tilted():
     """A general triangle: no symmetry, tilted plane, labels the other way round; as the kernels take it."""
     return robots.point_mass_robot(TILTED, mass=1.7, gravity=9.80665, name="tilted")
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """Every figure that is drawn, instead of its file."""
+    drawn = []
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, *args, **kwargs: drawn.append(self))
+    return drawn

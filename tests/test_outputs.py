@@ -129,14 +129,6 @@ def made(path: Path, sizes: dict[str, int] = SHAPE, **attributes: object) -> Pat
     return path
 
 
-@pytest.fixture
-def figures(monkeypatch):
-    """Every figure that is drawn, instead of its file."""
-    drawn = []
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, *args, **kwargs: drawn.append(self))
-    return drawn
-
-
 def panels(figure) -> list:
     return [panel for panel in figure.axes if panel.get_visible() and panel.get_label() != "<colorbar>"]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from test_outputs import cspr, figures, panels  # noqa: F401
+from test_outputs import cspr, panels
 
 from cspr_jax.plots.colours import NONE_COLOUR, scale_of
 from cspr_jax.store.netcdf import make_datasets, new_hdf5
@@ -67,7 +67,7 @@ def marked(panel) -> dict[str, tuple]:
     }
 
 
-def test_spools_p0_and_start_stand_where_they_are(capsys, tmp_path, figures):  # noqa: F811
+def test_spools_p0_and_start_stand_where_they_are(capsys, tmp_path, figures):
     """P0 is at 0.1 + 1.4 = 1.5 m, the start at 2.1 m: nearest to 2 m, within half a step."""
     start = {"from": {"position": [0.5, -0.5, 2.1]}}
     path = made(tmp_path / "map.h5", GRID, trajectory=start, base=MSSM)
@@ -95,7 +95,7 @@ def test_spools_p0_and_start_stand_where_they_are(capsys, tmp_path, figures):  #
     assert side.get_ylim() == (2.25, 0.75)
 
 
-def test_what_lies_elsewhere_is_not_marked(capsys, tmp_path, figures):  # noqa: F811
+def test_what_lies_elsewhere_is_not_marked(capsys, tmp_path, figures):
     """The start half a metre below the only section; beyond the lowest one; P0 upward of z = up."""
     for k, (z, height) in enumerate((([1.5], 2.0), ([1.0, 1.2, 1.4], 2.0), ([0.1, 1.2, 1.4], 1.6))):
         start = {"from": {"position": [0.5, -0.5, height]}}
@@ -117,7 +117,7 @@ def test_what_lies_elsewhere_is_not_marked(capsys, tmp_path, figures):  # noqa: 
         ([[np.cos(a), np.sin(a), 0.1] for a in np.array([0, 3, 1, 4, 2, 5]) * np.pi / 3.0], 0),  # their order crosses
     ],
 )
-def test_other_spools_have_their_own_shape(capsys, tmp_path, figures, base, sides):  # noqa: F811
+def test_other_spools_have_their_own_shape(capsys, tmp_path, figures, base, sides):
     cspr(capsys, "plot", made(tmp_path / "map.h5", GRID, base=base), "--at", "z=1")
     (panel,) = panels(figures[0])
     last = panel.lines[-1]
@@ -126,7 +126,7 @@ def test_other_spools_have_their_own_shape(capsys, tmp_path, figures, base, side
     assert (last.get_marker() == "s") == (sides < 3) and (last.get_linewidth() > 0.0) == (sides > 0)
 
 
-def test_sections_are_moved_to_what_is_marked(capsys, tmp_path, figures):  # noqa: F811
+def test_sections_are_moved_to_what_is_marked(capsys, tmp_path, figures):
     """Of 30 heights six are shown; P0 at 1.7 m and the start at 3.0 m are among them, for every quantity."""
     axes = {"x": [-1.0, 1.0], "y": [-1.0, 1.0], "z": np.linspace(0.3, 3.2, 30), "z0": [1.6]}
     arcs = np.ones((2, 2, 30, 1), int)
@@ -139,7 +139,7 @@ def test_sections_are_moved_to_what_is_marked(capsys, tmp_path, figures):  # noq
         assert titles == ["z = 0.3 m", "z = 0.9 m", "z = 1.7 m", "z = 2 m", "z = 2.6 m", "z = 3 m"]
 
 
-def test_a_vertical_half_plane_and_a_view_from_above(capsys, tmp_path, figures):  # noqa: F811
+def test_a_vertical_half_plane_and_a_view_from_above(capsys, tmp_path, figures):
     axes = {"radius": np.linspace(0.0, 1.0, 6), "azimuth": [0.0, 0.5 * np.pi], "z": np.linspace(0.0, 2.0, 9)}
     path = made(tmp_path / "map.h5", axes | {"z0": [1.4]})
     cspr(capsys, "plot", path, "--at", "azimuth=1.57")
@@ -153,7 +153,7 @@ def test_a_vertical_half_plane_and_a_view_from_above(capsys, tmp_path, figures):
     np.testing.assert_allclose(panel.lines[1].get_xydata()[2], [0.5 * np.pi, 0.4])
 
 
-def test_angles_are_degrees_and_axes_have_words(capsys, tmp_path, figures):  # noqa: F811
+def test_angles_are_degrees_and_axes_have_words(capsys, tmp_path, figures):
     turns = {"tilt_azimuth": [0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi], "tilt": [0.8], "torsion": [-0.4, 0.0, 0.4]}
     path = made(tmp_path / "map.h5", GRID | {"z": [1.5]} | turns, kind="poses")
     cspr(capsys, "plot", path, "--at", "torsion=0")
@@ -176,7 +176,7 @@ def test_angles_are_degrees_and_axes_have_words(capsys, tmp_path, figures):  # n
     assert shown[180] == "180" and shown[270] == "-90"
 
 
-def test_an_orientation_plane_has_no_label_on_its_head(capsys, tmp_path, figures):  # noqa: F811
+def test_an_orientation_plane_has_no_label_on_its_head(capsys, tmp_path, figures):
     azimuth = (np.arange(8) - 4) * np.pi / 4.0
     axes = {
         "x": [0.1],
@@ -219,13 +219,13 @@ def test_an_orientation_plane_has_no_label_on_its_head(capsys, tmp_path, figures
         ("minimum-arcs", "arcs", False),
     ],
 )
-def test_from_rest_is_said_of_motions_alone(capsys, tmp_path, figures, kind, quantity, rest):  # noqa: F811
+def test_from_rest_is_said_of_motions_alone(capsys, tmp_path, figures, kind, quantity, rest):
     path = made(tmp_path / "map.h5", GRID, {quantity: np.ones(1)}, kind=kind, trajectory={})
     cspr(capsys, "plot", path, "--quantity", quantity)
     assert ("from rest" in figures[0].get_suptitle()) == rest
 
 
-def test_none_only_where_there_is_some(capsys, tmp_path, figures):  # noqa: F811
+def test_none_only_where_there_is_some(capsys, tmp_path, figures):
     arcs = np.full((5, 5, 3, 1), 3)
     arcs[0, 0] = 7
     some = arcs.copy()
@@ -258,7 +258,7 @@ def test_a_few_large_cells_do_not_use_up_the_colours():
         assert scale_of(even).extend == "neither" and scale_of(even).norm.vmax >= even.max()
 
 
-def test_counts_have_whole_ticks_and_missing_values_a_word(capsys, tmp_path, figures):  # noqa: F811
+def test_counts_have_whole_ticks_and_missing_values_a_word(capsys, tmp_path, figures):
     found = np.linspace(0.0, 2.0, 25).reshape(5, 5, 1, 1)
     data = {"accessible": np.round(found), "mean_arcs": np.where(found > 1.5, np.nan, found)}
     path = made(tmp_path / "map.h5", GRID | {"z": [1.5]}, data, kind="attainability", trajectory={})
@@ -268,7 +268,7 @@ def test_counts_have_whole_ticks_and_missing_values_a_word(capsys, tmp_path, fig
     assert "no value" in words(figures[1]) and "no value" not in words(figures[0])
 
 
-def test_lines_are_named_by_what_tells_them_apart(capsys, tmp_path, figures):  # noqa: F811
+def test_lines_are_named_by_what_tells_them_apart(capsys, tmp_path, figures):
     """Thesis Fig. 1.9: the amplitude functions; of one and the same function, the files."""
     axes = {"tau": np.linspace(0.0, 1.0, 5), "x": [1.0], "y": [0.0], "z": [1.0]}
     functions = {"a": "A1", "b": "A2", "c": {"name": "effective", "epsilon": 0.06}}
@@ -353,7 +353,7 @@ def test_sizes_that_cannot_be(capsys, tmp_path, arguments, told):
     assert [file.name for file in tmp_path.iterdir()] == ["map.h5"]
 
 
-def test_titles_stand_clear_of_panels(capsys, tmp_path, figures):  # noqa: F811
+def test_titles_stand_clear_of_panels(capsys, tmp_path, figures):
     """Of sections, whose upper row has ticks below, and of polar ones, which have angles around."""
     tilts = {"tilt_azimuth": (np.arange(8) - 4) * np.pi / 4.0, "tilt": np.arange(1, 4) * 0.3}
     for k, axes in enumerate((GRID | {"z": [1.0, 1.2, 1.5, 2.0]}, {"z": [1.0, 1.2, 1.5, 2.0]} | tilts)):
@@ -367,7 +367,7 @@ def test_titles_stand_clear_of_panels(capsys, tmp_path, figures):  # noqa: F811
         assert len(titles) == 5 and not any(title.overlaps(box) for title in titles for box in inner)
 
 
-def test_long_titles_are_broken(capsys, tmp_path, figures):  # noqa: F811
+def test_long_titles_are_broken(capsys, tmp_path, figures):
     path = made(tmp_path / "map.h5", GRID | {"z": [1.5]})
     cspr(capsys, "plot", path, "--size", "8x12")
     title = figures[0].suptitle(figures[0].get_suptitle())
