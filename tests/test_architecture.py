@@ -102,12 +102,15 @@ def _name(path: Path) -> str:
 
 
 MODULES = {_name(path): ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
-INNER = [name for name in MODULES if name]
+PACKAGES = {_name(path.parent / "__init__.py") for path in PACKAGE.rglob("*.py")}
+INNER = [name for name, tree in MODULES.items() if name and not (name in PACKAGES and len(tree.body) == 1)]
 
 
 def _level(name: str) -> int | None:
-    """Layer of a module: its own, else that of its package."""
-    return LEVELS.get(name, LEVELS.get(name.split(".")[0]))
+    """Layer of a module: that of the longest name of a folder or module that it begins with."""
+    parts = name.split(".")
+    names = (".".join(parts[:length]) for length in range(len(parts), 0, -1))
+    return next((LEVELS[name] for name in names if name in LEVELS), None)
 
 
 def _imports(tree: ast.AST) -> Iterator[str]:
