@@ -13,12 +13,12 @@ import numpy as np
 from cspr_jax import amplitudes, load_robot
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.limits import Limits
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import aligned
 from cspr_jax.rotations import from_tilt_torsion
+from cspr_jax.schema.limits import Limits
 
 Z0, MAX_ARCS = 1.7, 20
 EPSILONS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)

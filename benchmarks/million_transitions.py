@@ -21,8 +21,8 @@ def main() -> None:
     from cspr_jax.amplitudes import named
     from cspr_jax.api import load_robot
     from cspr_jax.feasibility.certificate import Shared
-    from cspr_jax.limits import Limits
     from cspr_jax.maps.minimum_oscillations import minimum_oscillations, transitions_to
+    from cspr_jax.schema.limits import Limits
 
     rng, z0 = np.random.default_rng(0), np.full(options.count, 2.0)
     targets = rng.uniform(-3.5, 3.5, (options.count, 3))

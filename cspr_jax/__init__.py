@@ -11,17 +11,17 @@ if TYPE_CHECKING:
     from cspr_jax.api import load_robot as load_robot
     from cspr_jax.api import minimum_arcs as minimum_arcs
     from cspr_jax.api import plan as plan
-    from cspr_jax.feasibility.verdicts import Verdict as Verdict
-    from cspr_jax.limits import Limits as Limits
     from cspr_jax.results import open_result as open_result
     from cspr_jax.robots import point_mass_robot as point_mass_robot
+    from cspr_jax.schema.limits import Limits as Limits
+    from cspr_jax.schema.verdicts import Verdict as Verdict
     from cspr_jax.xla import keep_compiled_code as keep_compiled_code
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "Limits": ("cspr_jax.limits", "Limits"),
-    "Verdict": ("cspr_jax.feasibility.verdicts", "Verdict"),
+    "Limits": ("cspr_jax.schema.limits", "Limits"),
+    "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
     "amplitude": ("cspr_jax.amplitudes", "named"),
     "keep_compiled_code": ("cspr_jax.xla", "keep_compiled_code"),
     "load_robot": ("cspr_jax.api", "load_robot"),

@@ -13,13 +13,13 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.limits import Limits
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_arcs import minimum_arcs as _minimum_arcs
 from cspr_jax.numerics import double_precision
 from cspr_jax.planning import Plan
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point
+from cspr_jax.schema.limits import Limits
 
 
 def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:

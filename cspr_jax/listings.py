@@ -5,7 +5,7 @@ from typing import Any
 
 from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
 from cspr_jax.problem import fault_at_rest
-from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 
 
 def robots() -> list[dict[str, Any]]:
@@ -56,7 +56,7 @@ def quantities_table(found: list[dict[str, Any]]):
     """The quantities for a terminal.
 
     Args:
-        found: as `quantities` gives them.
+        found: as `schema.quantities` gives them.
 
     Returns:
         a rich table.

@@ -13,11 +13,11 @@ import numpy as np
 from cspr_jax import __version__, tensions, wrenches
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.identity import canonical_json
 from cspr_jax.planning import Plan
 from cspr_jax.problem import motion_kind
-from cspr_jax.quantities import SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.reports import is_feasible
+from cspr_jax.schema.identity import canonical_json
+from cspr_jax.schema.quantities import SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
@@ -73,8 +73,8 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         rate: rows a second over the whole plan, Hz, and one at its end; None: `samples` rows a segment, ends included.
 
     Returns:
-        "t" (n,) s and the other names of `quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
-        axes; those of `quantities.OF_PLATFORMS` only for a platform.
+        "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
+        axes; those of `schema.quantities.OF_PLATFORMS` only for a platform.
     """
     duration = plan.answers.duration
     starts = np.concatenate([[0.0], np.cumsum(duration)])

@@ -8,9 +8,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.limits import NO_LIMITS, Limits
 from cspr_jax.numerics import leaf
 from cspr_jax.robots import LARGEST_LENGTH, SMALLEST_AREA_RATIO, STANDARD_GRAVITY, Axis, check_axis, check_numbers
+from cspr_jax.schema.limits import NO_LIMITS, Limits
 
 CABLES = 6
 # Points nearer to each other than this part of the largest distance are one point.

@@ -11,12 +11,12 @@ from cspr_jax.config.robot import LimitKeys, RobotFile
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.frames import Frame, frame_of
-from cspr_jax.limits import NO_LIMITS, Limits
 from cspr_jax.numerics import leaf
 from cspr_jax.platforms import PlatformRobot, platform_robot
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.robots import STANDARD_GRAVITY, PointMassRobot
 from cspr_jax.rotations import UNIT_TOLERANCE, from_tilt_torsion
+from cspr_jax.schema.limits import NO_LIMITS, Limits
 from cspr_jax.trajectories.pose_segment import Kind
 
 RobotKind = TypeVar("RobotKind", PointMassRobot, PlatformRobot)

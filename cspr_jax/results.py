@@ -11,7 +11,7 @@ from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import LARGEST_LENGTH, RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, StoreError, one_line, shown
-from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 from cspr_jax.store.isolated import fetch
 from cspr_jax.store.seal import DamagedError
 

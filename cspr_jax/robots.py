@@ -13,8 +13,8 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.limits import NO_LIMITS, Limits
 from cspr_jax.numerics import leaf
+from cspr_jax.schema.limits import NO_LIMITS, Limits
 
 STANDARD_GRAVITY = 9.81
 # Below these ratios three spools count as lying on a line, and their plane as vertical.

@@ -9,8 +9,8 @@ from cspr_jax.config.robot import LimitTable, RobotFile
 from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepTrajectory
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.errors import ExitCode
-from cspr_jax.feasibility.verdicts import SENTENCES
-from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.verdicts import SENTENCES
 
 EXITS = {
     ExitCode.DONE: "done",

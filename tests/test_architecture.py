@@ -14,13 +14,16 @@ PACKAGE = ROOT / "cspr_jax"
 
 # From the bottom up, as docs/architecture.md draws them; a package stands for its modules, a longer name goes first.
 LAYERS = (
-    ("errors", "frames", "limits", "numerics", "bounds", "grids", "lanes", "stages"),
+    ("errors", "frames", "schema.limits", "numerics", "bounds", "grids", "lanes", "stages"),
     ("amplitudes", "robots", "platforms", "rotations", "orientations", "symmetries"),
     ("tensions", "wrenches", "wrench_lanes", "reference_pose"),
     ("trajectories",),
-    ("feasibility",),
+    (
+        "feasibility",
+        "schema.verdicts",
+    ),
     ("maps", "maps.minimum_arcs", "maps.sieve"),
-    ("config", "identity", "quantities", "tiles"),
+    ("config", "schema.identity", "schema.quantities", "schema.tiles"),
     ("problem", "store", "results"),
     (
         "maps.cells",
@@ -66,11 +69,11 @@ WITHOUT_JAX = (
     "config.sweep",
     "config.trajectory",
     "config.wording",
-    "feasibility.verdicts",
+    "schema.verdicts",
     "frames",
-    "identity",
-    "quantities",
-    "tiles",
+    "schema.identity",
+    "schema.quantities",
+    "schema.tiles",
     "store.consolidation",
     "store.disk",
     "store.folder",

@@ -16,7 +16,7 @@ from cspr_jax.amplitudes import named
 from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared, prove, tolerance
 from cspr_jax.feasibility.slacks import instant, row_bounds, stretch, taut_bounds
-from cspr_jax.limits import Limits
+from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories import hypocycloid
 
 COUNT, SOAK_COUNT = 2_000, 20_000

@@ -19,9 +19,9 @@ from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.envelopes import lower_envelope, proved_envelope
 from cspr_jax.feasibility.margins import margins
 from cspr_jax.feasibility.transition_margins import transition_margins
-from cspr_jax.limits import Limits
 from cspr_jax.maps.minimum_oscillations import transitions_to
 from cspr_jax.results import open_result
+from cspr_jax.schema.limits import Limits
 
 CURVES = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}
 SWEEP = """schema = 1

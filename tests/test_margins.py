@@ -15,8 +15,8 @@ from cspr_jax.amplitudes import from_pieces, named
 from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import Shared, prove
 from cspr_jax.feasibility.margins import margins
-from cspr_jax.limits import Limits
 from cspr_jax.numerics import vertex
+from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories import hypocycloid
 
 N, Z0 = 40, 1.7

@@ -12,9 +12,9 @@ from cspr_jax import robots
 from cspr_jax.amplitudes import named
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.limits import Limits
 from cspr_jax.maps.minimum_arcs import minimum_arcs
+from cspr_jax.schema.limits import Limits
+from cspr_jax.schema.verdicts import Verdict
 
 Z0 = 1.7
 BASE = equilateral(0.26)

@@ -12,7 +12,7 @@ from test_plan import SHORT, cspr
 import cspr_jax
 from cspr_jax import __version__
 from cspr_jax.cli import main
-from cspr_jax.feasibility.verdicts import Verdict
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.netcdf import LAYOUT
 from cspr_jax.store.seal import sealed
 

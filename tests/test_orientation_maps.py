@@ -14,12 +14,12 @@ from cspr_jax import orientation_tables
 from cspr_jax.amplitudes import named
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.limits import Limits
 from cspr_jax.maps.accessible import accessible
 from cspr_jax.maps.attainable import attainable
 from cspr_jax.plots.reasons import reasons
 from cspr_jax.results import open_result
+from cspr_jax.schema.limits import Limits
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.pose_segment import Kind
 
 

@@ -15,9 +15,9 @@ from cspr_jax.amplitudes import named
 from cspr_jax.feasibility import contact_lanes, interference
 from cspr_jax.feasibility.pose_lanes import moving_slacks, order, still_slacks
 from cspr_jax.feasibility.pose_slacks import PoseShared, pose_slacks
-from cspr_jax.limits import Limits
 from cspr_jax.planning import plan
 from cspr_jax.results import open_result
+from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories.pose_lanes import instant, instant_of_arc, state
 from cspr_jax.trajectories.pose_segment import USUAL, Kind
 from cspr_jax.wrench_lanes import cables

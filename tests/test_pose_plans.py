@@ -23,10 +23,10 @@ from cspr_jax.cli import main
 from cspr_jax.feasibility.interference import cables_cross, contacts, gaps, platform_hit, views
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared, pose_slacks
-from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.limits import Limits
 from cspr_jax.maps.bends import LARGEST, cheapest_path, options
 from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
+from cspr_jax.schema.limits import Limits
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.pose_segment import motion
 
 ROOT = Path(__file__).parent.parent

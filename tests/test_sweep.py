@@ -17,8 +17,8 @@ import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import SelfCheckError
 from cspr_jax.maps.cells import CellMap
-from cspr_jax.quantities import OF_MAP
-from cspr_jax.quantities import QUANTITIES as EVERY
+from cspr_jax.schema.quantities import OF_MAP
+from cspr_jax.schema.quantities import QUANTITIES as EVERY
 from cspr_jax.sweep.definition import read_sweep
 
 ROOT = Path(__file__).parent.parent

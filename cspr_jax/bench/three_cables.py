@@ -14,10 +14,10 @@ from cspr_jax import amplitudes
 from cspr_jax.bench.timing import best
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.grids import in_threads
-from cspr_jax.limits import Limits
 from cspr_jax.maps import sieve
 from cspr_jax.maps.minimum_arcs import segments_between
 from cspr_jax.robots import point_mass_robot
+from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories.hypocycloid import Segment
 
 MAX_ARCS = 30

@@ -7,8 +7,8 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Coordinate, LimitTable, Point
 from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
-from cspr_jax.quantities import STORABLE
-from cspr_jax.tiles import LARGEST_TILE
+from cspr_jax.schema.quantities import STORABLE
+from cspr_jax.schema.tiles import LARGEST_TILE
 
 LARGEST_COUNT = 10_000_000
 

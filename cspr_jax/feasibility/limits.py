@@ -19,10 +19,10 @@ from jax import Array
 
 from cspr_jax.bounds import Bounds
 from cspr_jax.feasibility.slacks import Instant, Stretch, row_bounds
-from cspr_jax.feasibility.verdicts import Verdict
-from cspr_jax.limits import Limits
 from cspr_jax.numerics import sincospi
 from cspr_jax.robots import PointMassRobot, plane_normal
+from cspr_jax.schema.limits import Limits
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.hypocycloid import Segment, duration, oscillation
 
 FLAGS = {

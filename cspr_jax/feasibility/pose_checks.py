@@ -21,8 +21,8 @@ from cspr_jax.feasibility.pose_lanes import order
 from cspr_jax.feasibility.pose_samples import Motions, Narrowing, Places, Seen, along, low_points
 from cspr_jax.feasibility.pose_slacks import PoseShared, flags
 from cspr_jax.feasibility.pose_sweeps import swept
-from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.grids import in_batches, room
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.pose_segment import USUAL, Kind, PoseSegment, duration
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.

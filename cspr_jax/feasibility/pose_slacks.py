@@ -18,9 +18,9 @@ from jax import Array
 from cspr_jax import wrenches
 from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility.limits import FLAGS, Limits, given
-from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import plane_normal
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.wrenches import Pose
 
 

@@ -8,7 +8,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import OF_TARGETS, PointMassMap
 from cspr_jax.maps.minimum_arcs import minimum_arcs
 from cspr_jax.robots import rest_point
-from cspr_jax.tiles import Grid
+from cspr_jax.schema.tiles import Grid
 
 _OF_STARTS = ("from_x", "from_y", "from_z", "z0")
 

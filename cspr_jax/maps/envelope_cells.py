@@ -14,7 +14,7 @@ from cspr_jax.grids import in_batches
 from cspr_jax.maps.answers import BATCH
 from cspr_jax.maps.minimum_oscillations import transitions_to
 from cspr_jax.maps.oscillation_cells import OscillationMap
-from cspr_jax.tiles import Grid
+from cspr_jax.schema.tiles import Grid
 from cspr_jax.trajectories.transition import inclination, weights
 
 # How far an envelope may lie below zero at the number of oscillations that keeps it above.

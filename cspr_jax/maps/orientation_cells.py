@@ -7,14 +7,14 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Orientations, SweepFile
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
-from cspr_jax.feasibility.verdicts import NO_REASON, SENTENCES, Verdict
 from cspr_jax.maps.accessible import Accessible, accessible
 from cspr_jax.maps.attainable import VALUES, attainable
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.maps.pose_answers import PoseAnswers
-from cspr_jax.quantities import REFUSALS
+from cspr_jax.schema.quantities import REFUSALS
+from cspr_jax.schema.tiles import Grid
+from cspr_jax.schema.verdicts import NO_REASON, SENTENCES, Verdict
 from cspr_jax.symmetries import NONE, folded, symmetries
-from cspr_jax.tiles import Grid
 
 # Digits of a place, m, up to which two cells are at the same one.
 DIGITS = 12

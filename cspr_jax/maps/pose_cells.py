@@ -18,7 +18,7 @@ from cspr_jax.maps.pose_answers import PoseAnswers, contradictions, reached
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.robots import rest_point
-from cspr_jax.tiles import Grid
+from cspr_jax.schema.tiles import Grid
 
 # Time functions of the rotation with a beta-hat of its own at each end.
 _OWN = (None, "beta_ff")

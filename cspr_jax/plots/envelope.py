@@ -6,9 +6,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.verdicts import Verdict
 from cspr_jax.plots.labels import COLOURS, chosen, robot_name
 from cspr_jax.results import Result
+from cspr_jax.schema.verdicts import Verdict
 
 AXES = ("torsion", "tilt_azimuth", "tilt")
 SECTIONS = 17

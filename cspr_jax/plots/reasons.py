@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from cspr_jax.feasibility.verdicts import NO_REASON, Verdict
 from cspr_jax.plots.colours import Scale
+from cspr_jax.schema.verdicts import NO_REASON, Verdict
 
 # Quantities that are flags of a verdict, and what it is called where none is set.
 VERDICTS = {"verdict": "feasible", "main_reason": "all attained"}

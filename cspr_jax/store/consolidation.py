@@ -12,8 +12,9 @@ import h5py
 import numpy as np
 
 from cspr_jax.errors import StoreError
-from cspr_jax.identity import identity
-from cspr_jax.quantities import AXES, QUANTITIES
+from cspr_jax.schema.identity import identity
+from cspr_jax.schema.quantities import AXES, QUANTITIES
+from cspr_jax.schema.tiles import Grid
 from cspr_jax.store import guard
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.guard import Found
@@ -29,7 +30,6 @@ from cspr_jax.store.netcdf import (
 from cspr_jax.store.publishing import new_file
 from cspr_jax.store.seal import DamagedError, check_file
 from cspr_jax.store.shards import Layout, Shard, digest_of
-from cspr_jax.tiles import Grid
 
 LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES, LARGEST_TILES = 1 << 24, 1 << 28, 100_000
 

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import h5py
 
 from cspr_jax.errors import StoreError
-from cspr_jax.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 from cspr_jax.store import guard
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.netcdf import UNREADABLE, reason

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.identity import digest
+from cspr_jax.schema.identity import digest
 from cspr_jax.store.disk import READ_ONLY, Disk
 from cspr_jax.store.netcdf import file_size
 from cspr_jax.store.publishing import publish

@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from cspr_jax.identity import canonical_json
+from cspr_jax.schema.identity import canonical_json
 from cspr_jax.store import guard
 from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, file_size, new_dataset, reason
 from cspr_jax.store.seal import DamagedError, sealed, unreadable, unsealed

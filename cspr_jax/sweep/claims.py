@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.errors import RefusedError, one_line
-from cspr_jax.identity import differences, digest
+from cspr_jax.schema.identity import differences, digest
 from cspr_jax.store.consolidation import read_content
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.record import Record, read_record, write_record

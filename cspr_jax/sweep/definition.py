@@ -16,12 +16,12 @@ from cspr_jax.config.reading import checked, parse_toml, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.identity import FORMAT_VERSION, canonical_json, identity
-from cspr_jax.quantities import DEFAULT_STORE, OF_MAP, TITLES
+from cspr_jax.schema.identity import FORMAT_VERSION, canonical_json, identity
+from cspr_jax.schema.quantities import DEFAULT_STORE, OF_MAP, TITLES
+from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 from cspr_jax.store.netcdf import bytes_needed
 from cspr_jax.store.shards import Layout
 from cspr_jax.sweep.checks import check_map, check_points
-from cspr_jax.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 
 # Each tile is a file.
 LARGEST_TILES = 100_000

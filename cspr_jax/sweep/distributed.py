@@ -9,7 +9,7 @@ from concurrent.futures import CancelledError
 from typing import Any
 
 from cspr_jax.errors import ConfigError, RefusedError, ResourceError, StoppedError
-from cspr_jax.identity import differences
+from cspr_jax.schema.identity import differences
 from cspr_jax.store.netcdf import reason
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment

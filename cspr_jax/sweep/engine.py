@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
 from cspr_jax.errors import RefusedError, StoppedError, StoreError, one_line
-from cspr_jax.identity import canonical_json, digest
+from cspr_jax.schema.identity import canonical_json, digest
 from cspr_jax.store.consolidation import consolidate, read_content
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.folder import RunFolder

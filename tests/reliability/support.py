@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cspr_jax.identity import digest
+from cspr_jax.schema.identity import digest
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.record import read_record
 from cspr_jax.store.shards import Shard

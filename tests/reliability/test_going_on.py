@@ -14,7 +14,7 @@ import xarray
 
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError, ExitCode, RefusedError, StoreError
-from cspr_jax.identity import digest
+from cspr_jax.schema.identity import digest
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.inspection import verify
 from reliability.support import ENVIRONMENT, Paper, check_same, content, go, sweep_of

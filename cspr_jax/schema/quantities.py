@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from cspr_jax.feasibility.verdicts import SENTENCES, Verdict
+from cspr_jax.schema.verdicts import SENTENCES, Verdict
 
 
 @dataclasses.dataclass(frozen=True)
