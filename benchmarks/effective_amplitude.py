@@ -11,13 +11,13 @@ import jax
 import numpy as np
 
 from cspr_jax import amplitudes, load_robot
+from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.reference_pose import aligned
-from cspr_jax.rotations import from_tilt_torsion
 from cspr_jax.schema.limits import Limits
 
 Z0, MAX_ARCS = 1.7, 20

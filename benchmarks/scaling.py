@@ -49,9 +49,9 @@ def six_cables(count: int) -> tuple[float, int]:
     """The bench's kernel over all trajectories, whatever their numbers."""
     import jax
 
+    from cspr_jax.arithmetic.batches import in_threads
     from cspr_jax.bench import six_cables as bench
     from cspr_jax.bench.timing import best
-    from cspr_jax.grids import in_threads
 
     given = bench.work(count)
 

@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic.elementary import leaf, polynomial
 from cspr_jax.errors import InputError
-from cspr_jax.numerics import leaf, polynomial
 
 HIGHEST_DERIVATIVE = 5
 NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3", "ideal")

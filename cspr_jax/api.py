@@ -9,13 +9,13 @@ import numpy as np
 
 from cspr_jax import planning, problem
 from cspr_jax.amplitudes import Amplitude, named
+from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_arcs import minimum_arcs as _minimum_arcs
-from cspr_jax.numerics import double_precision
 from cspr_jax.planning import Plan
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point

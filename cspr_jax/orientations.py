@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cspr_jax.rotations import from_tilt_torsion
+from cspr_jax.arithmetic.rotations import from_tilt_torsion
 
 # Orientations are neighbours up to this many steps apart on the grid of equal volumes.
 NEAR = 1.5

@@ -8,6 +8,7 @@ import numpy as np
 
 from cspr_jax import problem
 from cspr_jax.amplitudes import Amplitude, derivatives
+from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.choices import best_amplitude, chosen_depth
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
@@ -18,7 +19,6 @@ from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.extremes import Extremes, extremes
 from cspr_jax.feasibility.pose_extremes import pose_extremes
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.frames import Frame
 from cspr_jax.maps.answers import Answers
 from cspr_jax.pose_sequences import Poses
 from cspr_jax.reference_pose import aligned, reference_pose

@@ -7,8 +7,8 @@ import jax
 import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
-from cspr_jax.numerics import leaf
 from cspr_jax.robots import LARGEST_LENGTH, SMALLEST_AREA_RATIO, STANDARD_GRAVITY, Axis, check_axis, check_numbers
 from cspr_jax.schema.limits import NO_LIMITS, Limits
 

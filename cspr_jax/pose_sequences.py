@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax import problem, rotations
+from cspr_jax import problem
+from cspr_jax.arithmetic import rotations
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile

@@ -7,15 +7,15 @@ import numpy as np
 
 from cspr_jax import amplitudes, robots
 from cspr_jax.amplitudes import Amplitude, boundary_errors
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import Frame, frame_of
+from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, from_tilt_torsion
 from cspr_jax.config.robot import LimitKeys, RobotFile
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.frames import Frame, frame_of
-from cspr_jax.numerics import leaf
 from cspr_jax.platforms import PlatformRobot, platform_robot
 from cspr_jax.reference_pose import reference_pose
 from cspr_jax.robots import STANDARD_GRAVITY, PointMassRobot
-from cspr_jax.rotations import UNIT_TOLERANCE, from_tilt_torsion
 from cspr_jax.schema.limits import NO_LIMITS, Limits
 from cspr_jax.trajectories.pose_segment import Kind
 

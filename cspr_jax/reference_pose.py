@@ -17,8 +17,8 @@ import numpy as np
 from jax import Array
 
 from cspr_jax import wrenches
+from cspr_jax.arithmetic.elementary import double_precision, leaf
 from cspr_jax.errors import InputError
-from cspr_jax.numerics import double_precision, leaf
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import rest_point
 

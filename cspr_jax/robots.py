@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
-from cspr_jax.numerics import leaf
 from cspr_jax.schema.limits import NO_LIMITS, Limits
 
 STANDARD_GRAVITY = 9.81

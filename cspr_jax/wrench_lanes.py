@@ -11,7 +11,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.lanes import Matrix, Vector, combined, cross, dot, turned, turned_back
+from cspr_jax.arithmetic.lanes import Matrix, Vector, combined, cross, dot, turned, turned_back
 from cspr_jax.platforms import CABLES, PlatformRobot
 
 

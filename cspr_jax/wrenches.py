@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.numerics import solved
+from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.platforms import CABLES, PlatformRobot
 
 

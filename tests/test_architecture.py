@@ -14,8 +14,17 @@ PACKAGE = ROOT / "cspr_jax"
 
 # From the bottom up, as docs/architecture.md draws them; a package stands for its modules, a longer name goes first.
 LAYERS = (
-    ("errors", "frames", "schema.limits", "numerics", "bounds", "grids", "lanes", "stages"),
-    ("amplitudes", "robots", "platforms", "rotations", "orientations", "symmetries"),
+    (
+        "errors",
+        "arithmetic.frames",
+        "schema.limits",
+        "arithmetic.elementary",
+        "arithmetic.bounds",
+        "arithmetic.batches",
+        "arithmetic.lanes",
+        "stages",
+    ),
+    ("amplitudes", "robots", "platforms", "arithmetic.rotations", "orientations", "symmetries"),
     ("tensions", "wrenches", "wrench_lanes", "reference_pose"),
     ("trajectories",),
     (
@@ -70,7 +79,7 @@ WITHOUT_JAX = (
     "config.trajectory",
     "config.wording",
     "schema.verdicts",
-    "frames",
+    "arithmetic.frames",
     "schema.identity",
     "schema.quantities",
     "schema.tiles",
@@ -168,7 +177,7 @@ def test_kernels_know_no_files_and_pictures(name):
 
 
 def test_no_compiled_function_calls_lapack():
-    """Batches of such calls of jaxlib 0.10 can wait for ever for their own threads; see `numerics.solved`."""
+    """Batches of such calls of jaxlib 0.10 can wait for ever for their own threads; see `arithmetic.elementary.solved`."""
     calls = re.compile(r"jnp\.linalg\.(?!norm\b)|jax\.scipy\.linalg|lax\.linalg")
     assert [path.name for path in PACKAGE.rglob("*.py") if calls.search(path.read_text("utf-8"))] == []
 

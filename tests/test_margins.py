@@ -12,10 +12,10 @@ from oracles import point_mass as oracle
 
 from cspr_jax import robots
 from cspr_jax.amplitudes import from_pieces, named
+from cspr_jax.arithmetic.elementary import vertex
 from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import Shared, prove
 from cspr_jax.feasibility.margins import margins
-from cspr_jax.numerics import vertex
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories import hypocycloid
 

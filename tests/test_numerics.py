@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from cspr_jax.bounds import Bounds
-from cspr_jax.numerics import polynomial, sincospi
+from cspr_jax.arithmetic.bounds import Bounds
+from cspr_jax.arithmetic.elementary import polynomial, sincospi
 
 SINCOSPI = jax.jit(sincospi)
 PI = np.longdouble("3.14159265358979323846264338327950288")

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from test_platform import MSSM, ours
 
 from cspr_jax.amplitudes import named
+from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.feasibility.sights import Watch
@@ -21,7 +22,6 @@ from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.maps.attainable import attainable, attained
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.orientations import equal_volume_grid, tilt_torsion_grid
-from cspr_jax.rotations import from_tilt_torsion
 from cspr_jax.schema.limits import Limits
 from cspr_jax.symmetries import NONE, alike, folded, symmetries
 from cspr_jax.trajectories.pose_segment import Kind

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import platform as oracle
 
-from cspr_jax import problem, rotations, wrenches
+from cspr_jax import problem, wrenches
 from cspr_jax.amplitudes import named
+from cspr_jax.arithmetic import rotations
 from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from cspr_jax import compiled, xla
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError
-from cspr_jax.grids import in_batches
 
 ROOT = Path(__file__).parent.parent
 

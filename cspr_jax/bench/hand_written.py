@@ -15,10 +15,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.arithmetic.lanes import Vector
 from cspr_jax.bench import six_cables, three_cables
 from cspr_jax.bench.timing import best
 from cspr_jax.errors import ConfigError
-from cspr_jax.lanes import Vector
 from cspr_jax.maps import sieve
 from cspr_jax.trajectories.rest_lanes import rest_table, swings
 

@@ -15,9 +15,9 @@ from jax import Array
 
 from cspr_jax import amplitudes
 from cspr_jax.api import load_robot
+from cspr_jax.arithmetic.batches import in_batches, in_threads, padded
 from cspr_jax.bench.timing import best, operations
 from cspr_jax.feasibility.first_look import smallest_tensions
-from cspr_jax.grids import in_batches, in_threads, padded
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.reference_pose import aligned
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, pose_segment

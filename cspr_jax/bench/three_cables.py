@@ -11,9 +11,9 @@ import jax
 import numpy as np
 
 from cspr_jax import amplitudes
+from cspr_jax.arithmetic.batches import in_threads
 from cspr_jax.bench.timing import best
 from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.grids import in_threads
 from cspr_jax.maps import sieve
 from cspr_jax.maps.minimum_arcs import segments_between
 from cspr_jax.robots import point_mass_robot

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.arithmetic.lanes import Matrix, Vector, combined, cross, dot, turned_back
 from cspr_jax.feasibility.interference import PARALLEL
-from cspr_jax.lanes import Matrix, Vector, combined, cross, dot, turned_back
 from cspr_jax.wrench_lanes import Cables
 
 

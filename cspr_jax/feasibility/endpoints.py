@@ -9,8 +9,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax import rotations
-from cspr_jax.numerics import length, solved
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.elementary import length, solved
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.wrenches import jacobian, rays
 

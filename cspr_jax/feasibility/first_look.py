@@ -15,10 +15,10 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.amplitudes import Amplitude
+from cspr_jax.arithmetic.batches import in_batches, room
+from cspr_jax.arithmetic.lanes import cross, dot
 from cspr_jax.feasibility.pose_lanes import certain_tension, lowest_tension
 from cspr_jax.feasibility.pose_samples import rows
-from cspr_jax.grids import in_batches, room
-from cspr_jax.lanes import cross, dot
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.trajectories.pose_lanes import instant
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment

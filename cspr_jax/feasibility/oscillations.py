@@ -19,7 +19,7 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.amplitudes import SMALLEST_EPSILON, Amplitude, derivatives, named
-from cspr_jax.numerics import vertex
+from cspr_jax.arithmetic.elementary import vertex
 
 # Samples of each piece of the amplitude function; between them the maximum is refined.
 SAMPLES = 64

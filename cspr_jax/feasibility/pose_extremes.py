@@ -9,11 +9,11 @@ import numpy as np
 from jax import Array
 
 from cspr_jax import wrenches
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.extremes import SIGNS, Extremes
 from cspr_jax.feasibility.narrowing import narrowed
 from cspr_jax.feasibility.pose_samples import SAMPLES
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.grids import in_batches
 from cspr_jax.robots import plane_normal
 from cspr_jax.stages import stage
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, motion

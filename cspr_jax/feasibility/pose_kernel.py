@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 from jax import Array, lax
 
+from cspr_jax.arithmetic.lanes import dot, smallest, stored
 from cspr_jax.feasibility import contact_lanes
 from cspr_jax.feasibility.pose_lanes import moving_slacks, still_slacks
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.lanes import dot, smallest, stored
 from cspr_jax.trajectories.pose_lanes import Instant, instant, instant_of_arc, state
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 from cspr_jax.wrench_lanes import cables

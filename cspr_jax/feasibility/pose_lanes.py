@@ -3,9 +3,9 @@
 import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.arithmetic.lanes import dot, smallest
 from cspr_jax.feasibility.limits import Limits, given
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.lanes import dot, smallest
 from cspr_jax.platforms import CABLES, PlatformRobot
 from cspr_jax.robots import plane_normal
 from cspr_jax.trajectories.pose_lanes import Instant, State, squared_duration, state

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.pose_kernel import SECTIONS, narrowed
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.grids import in_batches
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 
 SAMPLES = 64  # an arc

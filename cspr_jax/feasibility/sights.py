@@ -9,10 +9,10 @@ import numpy as np
 from jax import Array
 
 from cspr_jax import wrench_lanes
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.lanes import rotation, stored
 from cspr_jax.feasibility import contact_lanes
 from cspr_jax.feasibility.interference import Contacts, cables_cross, contacts, platform_hit
-from cspr_jax.grids import in_batches
-from cspr_jax.lanes import rotation, stored
 from cspr_jax.platforms import CABLES, PlatformRobot
 from cspr_jax.robots import plane_normal, rest_point
 from cspr_jax.wrench_lanes import cables

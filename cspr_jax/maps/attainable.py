@@ -2,15 +2,15 @@
 
 import numpy as np
 
+from cspr_jax.arithmetic.batches import in_parts
+from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.endpoints import AT_REST
 from cspr_jax.feasibility.pose_checks import PoseChecker
-from cspr_jax.grids import in_parts
 from cspr_jax.maps.answers import joined
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, reached, trials
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.robots import rest_point
-from cspr_jax.rotations import from_tilt_torsion
 from cspr_jax.symmetries import NONE, Symmetries, alike
 
 # Values of beta-hat tried at the target.

@@ -7,13 +7,13 @@ import numpy as np
 
 from cspr_jax import problem
 from cspr_jax.amplitudes import Amplitude
+from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.frames import frame_of
 from cspr_jax.reference_pose import aligned
 from cspr_jax.robots import plane_normal
 from cspr_jax.schema.limits import Limits

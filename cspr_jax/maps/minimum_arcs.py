@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.amplitudes import boundary_errors
+from cspr_jax.arithmetic.batches import in_batches, in_parts, room
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
-from cspr_jax.grids import in_batches, in_parts, room
 from cspr_jax.maps import sieve
 from cspr_jax.maps.answers import Answers, decided, end_slacks, joined, only
 from cspr_jax.robots import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius

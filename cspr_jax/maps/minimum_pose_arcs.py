@@ -8,9 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.pose_checks import PoseChecker, PoseChecks
 from cspr_jax.feasibility.pose_samples import rows
-from cspr_jax.grids import in_batches
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.stages import stage

@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax import rotations
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.endpoints import endpoint
-from cspr_jax.grids import in_batches
 from cspr_jax.maps.bends import options
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import plane_normal, rest_point

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
+from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ResourceError, SelfCheckError
@@ -17,7 +18,6 @@ from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.maps.orientation_cells import AccessibleMap, AttainableMap
 from cspr_jax.maps.oscillation_cells import OscillationMap
 from cspr_jax.maps.pose_cells import PoseMap
-from cspr_jax.numerics import double_precision
 from cspr_jax.schema.identity import digest
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep

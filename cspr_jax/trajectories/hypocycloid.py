@@ -25,7 +25,7 @@ from jax import Array
 
 from cspr_jax import robots
 from cspr_jax.amplitudes import Amplitude, derivatives
-from cspr_jax.numerics import sincospi
+from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.robots import PointMassRobot
 from cspr_jax.trajectories.couplings import couplings
 from cspr_jax.trajectories.swing_plane import swing_plane

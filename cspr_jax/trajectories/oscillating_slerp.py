@@ -13,8 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax import rotations
-from cspr_jax.numerics import length, polynomial, sincospi
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.elementary import length, polynomial, sincospi
 
 # Below these, series stand for quotients that would cancel: of 1 - s for arccos(s) / sqrt(1 - s^2), of the square of
 # an angle for sin(r) / r.

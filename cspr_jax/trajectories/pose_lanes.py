@@ -12,8 +12,8 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.amplitudes import Amplitude, derivatives
-from cspr_jax.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation, stored
-from cspr_jax.numerics import polynomial, sincospi
+from cspr_jax.arithmetic.elementary import polynomial, sincospi
+from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation, stored
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 
 # Terms of a Chebyshev fit on s in [0, 1] of W = arccos(s) / sqrt(1 - s^2): accurate to 1e-14, its derivatives to 1e-10.
@@ -121,7 +121,7 @@ def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind, one: Arra
         now: of these arcs.
         kind: of the motions.
         one: () the number 1 as an argument of what is compiled, where all of the state is to be stored; see
-            `lanes.stored`.
+            `arithmetic.lanes.stored`.
 
     Returns:
         the state.

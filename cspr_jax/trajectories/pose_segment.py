@@ -18,9 +18,9 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax import rotations
 from cspr_jax.amplitudes import Amplitude, derivatives
-from cspr_jax.numerics import sincospi
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.platforms import PlatformRobot
 from cspr_jax.robots import rest_point, spool_radius
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn

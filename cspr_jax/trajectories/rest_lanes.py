@@ -12,8 +12,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.amplitudes import Amplitude, derivatives
-from cspr_jax.lanes import Matrix, Vector, about_axis
-from cspr_jax.numerics import sincospi
+from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
 
 

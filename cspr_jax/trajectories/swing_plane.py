@@ -5,7 +5,7 @@ import math
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.numerics import length
+from cspr_jax.arithmetic.elementary import length
 from cspr_jax.robots import AT_P0
 
 # Sine of an angle below which a plane counts as upright.

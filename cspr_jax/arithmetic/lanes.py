@@ -76,7 +76,7 @@ def turned_back(matrix: Matrix, vector: Vector) -> Vector:
 
 
 def rotation(quaternion: Sequence[Array]) -> Matrix:
-    """The rotation matrix of a unit quaternion; see `rotations.matrix`.
+    """The rotation matrix of a unit quaternion; see `arithmetic.rotations.matrix`.
 
     Args:
         quaternion: four arrays, scalar first.

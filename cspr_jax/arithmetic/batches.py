@@ -12,7 +12,7 @@ from typing import TypeVar
 import jax
 import numpy as np
 
-from cspr_jax.numerics import double_precision
+from cspr_jax.arithmetic.elementary import double_precision
 
 # How many times as large a batch is elsewhere than on a CPU, whose caches it has to fit.
 LARGER = {"gpu": 16, "tpu": 16}

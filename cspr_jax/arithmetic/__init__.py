@@ -1,0 +1,1 @@
+"""Elementary functions, bounds, rotations, frames, and batches of one shape."""
