@@ -34,7 +34,7 @@ def main() -> None:
 
 def one(work: str, count: int, cores: int) -> None:
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
-    from cspr_jax import xla
+    from cspr_jax.runtime import xla
 
     xla.prepare()
     import jax

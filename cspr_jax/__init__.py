@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from cspr_jax.api import plan as plan
     from cspr_jax.results import open_result as open_result
     from cspr_jax.robots import point_mass_robot as point_mass_robot
+    from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
     from cspr_jax.schema.limits import Limits as Limits
     from cspr_jax.schema.verdicts import Verdict as Verdict
-    from cspr_jax.xla import keep_compiled_code as keep_compiled_code
 
 __version__ = "0.1.0"
 
@@ -23,7 +23,7 @@ _PUBLIC = {
     "Limits": ("cspr_jax.schema.limits", "Limits"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
     "amplitude": ("cspr_jax.amplitudes", "named"),
-    "keep_compiled_code": ("cspr_jax.xla", "keep_compiled_code"),
+    "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
     "load_robot": ("cspr_jax.api", "load_robot"),
     "minimum_arcs": ("cspr_jax.api", "minimum_arcs"),
     "open_result": ("cspr_jax.results", "open_result"),

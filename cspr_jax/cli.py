@@ -11,10 +11,11 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from cspr_jax import __version__, compiled
+from cspr_jax import __version__
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
 from cspr_jax.plots.options import add_style
-from cspr_jax.progress import progress, waiting
+from cspr_jax.runtime import compile_cache
+from cspr_jax.runtime.progress import progress, waiting
 from cspr_jax.sweep.signals import Prompt, prompt_end, stop_signals
 
 EPILOGUE = (
@@ -46,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write("cspr: Linux and macOS are supported, Windows is not; its subsystem for Linux will do\n")
         return int(ExitCode.BAD_INPUT)
     options = _parser().parse_args(arguments)
-    with prompt_end(compiled.hand_over if arguments is None else None) as prompt:
+    with prompt_end(compile_cache.hand_over if arguments is None else None) as prompt:
         return _exit_code(options, prompt)
 
 
@@ -159,7 +160,7 @@ def _add_listings(add: Callable[..., argparse.ArgumentParser]) -> None:
 
 
 def _start_jax(options: argparse.Namespace) -> None:
-    from cspr_jax import xla
+    from cspr_jax.runtime import xla
 
     xla.prepare(options.device, _warn)
     import jax
@@ -219,7 +220,7 @@ def _hint(lines: list[str]) -> None:
 
 @contextlib.contextmanager
 def _executor(options: argparse.Namespace, sweep: Any, stop: Any) -> Iterator[Any]:
-    from cspr_jax import xla
+    from cspr_jax.runtime import xla
 
     if options.scheduler is None:  # the workers of a scheduler have settings of their own
         xla.prepare(options.device, _warn)

@@ -8,7 +8,7 @@ from typing import Any
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.planning import plan_of
-from cspr_jax.stages import within
+from cspr_jax.runtime.stages import within
 from cspr_jax.transition_tables import Key
 
 SEQUENCE = Path(__file__).parent / "published" / "table_3_2.toml"

@@ -9,7 +9,7 @@ from cspr_jax import orientation_tables, pose_tables, transition_tables
 from cspr_jax.errors import ConfigError
 from cspr_jax.orientation_tables import Choice
 from cspr_jax.planning import plan
-from cspr_jax.stages import within
+from cspr_jax.runtime.stages import within
 from cspr_jax.table_layout import Cell, grid
 from cspr_jax.transition_tables import Key
 

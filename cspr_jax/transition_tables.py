@@ -18,7 +18,7 @@ from cspr_jax.feasibility.oscillations import (
     many_oscillations,
 )
 from cspr_jax.problem import point_mass_of
-from cspr_jax.stages import stage
+from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories.transition import transition, weights
 
 Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one

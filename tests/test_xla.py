@@ -14,10 +14,10 @@ import jax
 import numpy as np
 import pytest
 
-from cspr_jax import compiled, xla
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError
+from cspr_jax.runtime import compile_cache, xla
 
 ROOT = Path(__file__).parent.parent
 
@@ -191,20 +191,20 @@ jax.jit(slow)(jnp.ones(()))
 
 def test_what_killed_runs_left_is_swept(tmp_path, monkeypatch):
     gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True)
-    left = tmp_path / f"run-{compiled.socket.gethostname()}-{gone.stdout.strip()}"
-    alive = tmp_path / f"run-{compiled.socket.gethostname()}-{os.getppid()}"
+    left = tmp_path / f"run-{compile_cache.socket.gethostname()}-{gone.stdout.strip()}"
+    alive = tmp_path / f"run-{compile_cache.socket.gethostname()}-{os.getppid()}"
     for place in (left, alive):
         place.mkdir()
         (place / "entry").write_text("half")
     (tmp_path / "whole").mkdir()
     (tmp_path / "whole" / f"known~{zlib.crc32(b'whole'):08x}").write_text("whole")
-    monkeypatch.setattr(compiled, "_quiet", lambda *_: None)
+    monkeypatch.setattr(compile_cache, "_quiet", lambda *_: None)
     lines = []
-    own = compiled.opened(tmp_path, lines.append)
+    own = compile_cache.opened(tmp_path, lines.append)
     assert not left.exists() and alive.exists() and [entry.name for entry in own.iterdir()] == ["known"] and not lines
     (own / "new").write_bytes(zlib.compress(b"new"))
     (own / "half").write_bytes(zlib.compress(b"new")[:-3])
-    compiled.hand_over()
+    compile_cache.hand_over()
     names = {entry.name.partition("~")[0] for entry in (tmp_path / "whole").iterdir()}
     assert names == {"known", "new"} and not own.exists()
 

@@ -9,7 +9,7 @@ from cspr_jax import tensions
 from cspr_jax.feasibility.blocks import INTERVALS, blocks
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.margins import Functions, smallest_values
-from cspr_jax.stages import stage
+from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 

@@ -15,7 +15,7 @@ from cspr_jax.feasibility.narrowing import narrowed
 from cspr_jax.feasibility.pose_samples import SAMPLES
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.robots import plane_normal
-from cspr_jax.stages import stage
+from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, motion
 
 BATCH = 512

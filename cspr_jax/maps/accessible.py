@@ -18,7 +18,7 @@ from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.sights import Watch
 from cspr_jax.orientations import OrientationGrid, equal_volume_grid, tilt_torsion_grid
 from cspr_jax.platforms import PlatformRobot
-from cspr_jax.stages import stage
+from cspr_jax.runtime.stages import stage
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
 WHOLE = 8.0 * math.pi**2  # of SO(3), in the measure sin(theta) d phi d theta d sigma

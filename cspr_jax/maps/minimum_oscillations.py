@@ -22,7 +22,7 @@ from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.transition_margins import transition_margins
 from cspr_jax.maps.answers import BATCH, Answers, Known, decided, end_slacks, only
 from cspr_jax.maps.minimum_arcs import check_numbers
-from cspr_jax.stages import stage
+from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories import transition
 from cspr_jax.trajectories.hypocycloid import Segment
 

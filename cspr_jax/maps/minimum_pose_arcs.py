@@ -12,8 +12,8 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.pose_checks import PoseChecker, PoseChecks
 from cspr_jax.feasibility.pose_samples import rows
 from cspr_jax.platforms import PlatformRobot
+from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.stages import stage
 from cspr_jax.trajectories.pose_segment import PoseSegment, pose_segment
 
 BATCH = 2048

@@ -16,7 +16,7 @@ from cspr_jax.plots.sections import AROUND, POLAR, Section, section_figure, tell
 from cspr_jax.plots.selection import nearest
 from cspr_jax.plots.style import Style, in_style, rendered
 from cspr_jax.results import Result, open_result
-from cspr_jax.stages import stage
+from cspr_jax.runtime.stages import stage
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
 

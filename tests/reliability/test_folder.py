@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cspr_jax import xla
+from cspr_jax.runtime import xla
 from cspr_jax.sweep import executors
 
 OTHERS = ("cspr_jax", "jax", "jaxlib", "numpy", "h5py", "scipy", "pydantic", "rich", "sitecustomize", "usercustomize")

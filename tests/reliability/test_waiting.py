@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from cspr_jax import stages
 from cspr_jax.cli import main
 from cspr_jax.errors import StoreError
 from cspr_jax.plots.draw import plot
-from cspr_jax.progress import Pace, progress, waiting
+from cspr_jax.runtime import stages
+from cspr_jax.runtime.progress import Pace, progress, waiting
 from reliability.support import go, sweep_of
 
 # In a call that no signal ends, as compiling is: the main thread waits for a lock that it holds itself.

@@ -19,8 +19,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax import compiled, stages
 from cspr_jax.errors import ConfigError
+from cspr_jax.runtime import compile_cache, stages
 
 # Twice as fast where the processor has it; XLA's own choice is half of it.
 WIDE, NEEDS = "--xla_cpu_prefer_vector_width=512", "avx512f"
@@ -100,7 +100,7 @@ def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
 
 def _keep(folder: Path, warn: Callable[[str], None]) -> Path | None:
     try:
-        own = compiled.opened(folder, warn)
+        own = compile_cache.opened(folder, warn)
     except OSError as error:
         warn(f"{folder}: compiled code cannot be kept: {error.strerror or error}")
         return None

@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
-from cspr_jax import stages
+from cspr_jax.runtime import stages
 
 
 class Pace:
