@@ -177,7 +177,7 @@ def test_kernels_know_no_files_and_pictures(name):
 
 
 def test_no_compiled_function_calls_lapack():
-    """Batches of such calls of jaxlib 0.10 can wait for ever for their own threads; see `arithmetic.elementary.solved`."""
+    """Batches of them can wait for ever for their own threads in jaxlib 0.10; see `arithmetic.elementary.solved`."""
     calls = re.compile(r"jnp\.linalg\.(?!norm\b)|jax\.scipy\.linalg|lax\.linalg")
     assert [path.name for path in PACKAGE.rglob("*.py") if calls.search(path.read_text("utf-8"))] == []
 
