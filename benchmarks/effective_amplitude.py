@@ -17,7 +17,7 @@ from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
 from cspr_jax.maps.pose_ends import end_options
-from cspr_jax.reference_pose import aligned
+from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.schema.limits import Limits
 
 Z0, MAX_ARCS = 1.7, 20

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from cspr_jax.api import minimum_arcs as minimum_arcs
     from cspr_jax.api import plan as plan
     from cspr_jax.results import open_result as open_result
-    from cspr_jax.robots import point_mass_robot as point_mass_robot
+    from cspr_jax.robots.point_mass import point_mass_robot as point_mass_robot
     from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
     from cspr_jax.schema.limits import Limits as Limits
     from cspr_jax.schema.verdicts import Verdict as Verdict
@@ -28,7 +28,7 @@ _PUBLIC = {
     "minimum_arcs": ("cspr_jax.api", "minimum_arcs"),
     "open_result": ("cspr_jax.results", "open_result"),
     "plan": ("cspr_jax.api", "plan"),
-    "point_mass_robot": ("cspr_jax.robots", "point_mass_robot"),
+    "point_mass_robot": ("cspr_jax.robots.point_mass", "point_mass_robot"),
 }
 __all__ = [
     "Limits",

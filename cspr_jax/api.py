@@ -17,8 +17,8 @@ from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_arcs import minimum_arcs as _minimum_arcs
 from cspr_jax.planning import Plan
-from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point
 from cspr_jax.schema.limits import Limits
 
 

@@ -22,7 +22,7 @@ def robots_table(found: list[dict[str, Any]]):
     """The robots for a terminal.
 
     Args:
-        found: as `robots` gives them.
+        found: as `robots.point_mass` gives them.
 
     Returns:
         a rich table.

@@ -10,12 +10,13 @@ import h5py
 import jax
 import numpy as np
 
-from cspr_jax import __version__, tensions, wrenches
+from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.planning import Plan
 from cspr_jax.problem import motion_kind
 from cspr_jax.reports import is_feasible
+from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.store.disk import Disk
@@ -37,8 +38,8 @@ SAME_TICK = 1e-6
 def _point_states(shared, segment, arcs, tau):
     def one(t):
         position, velocity, acceleration = hypocycloid.motion(segment, shared.amplitude, arcs, t)
-        length, rate, _ = tensions.cable_motion(shared.robot, position, velocity, acceleration)
-        force = tensions.tensions(shared.robot, position, acceleration)
+        length, rate, _ = force_balance.cable_motion(shared.robot, position, velocity, acceleration)
+        force = force_balance.tensions(shared.robot, position, acceleration)
         states = (position, velocity, acceleration, length, rate, force)
         return dict(zip(("position", "velocity", "acceleration", "length", "rate", "tension"), states, strict=True))
 
@@ -49,7 +50,7 @@ def _point_states(shared, segment, arcs, tau):
 def _pose_states(shared, segment, arcs, tau, *, kind):
     def one(t):
         pose = motion(segment, shared.amplitude, arcs, t, kind=kind)
-        length, rate, _ = wrenches.cable_motion(shared.robot, pose)
+        length, rate, _ = wrench_balance.cable_motion(shared.robot, pose)
         return {
             "position": pose.position,
             "velocity": pose.velocity,
@@ -59,7 +60,7 @@ def _pose_states(shared, segment, arcs, tau, *, kind):
             "omega_dot": pose.angular_acceleration,
             "length": length,
             "rate": rate,
-            "tension": wrenches.tensions(shared.robot, pose),
+            "tension": wrench_balance.tensions(shared.robot, pose),
         }
 
     return jax.vmap(one)(tau)

@@ -14,10 +14,10 @@ from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps import attainable
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
-from cspr_jax.reference_pose import aligned
+from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.robots.symmetries import folded, symmetries
 from cspr_jax.runtime.stages import within
 from cspr_jax.schema.limits import Limits
-from cspr_jax.symmetries import folded, symmetries
 from cspr_jax.trajectories.pose_segment import Kind
 from cspr_jax.transition_tables import Key
 

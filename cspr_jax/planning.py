@@ -21,7 +21,7 @@ from cspr_jax.feasibility.pose_extremes import pose_extremes
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.answers import Answers
 from cspr_jax.pose_sequences import Poses
-from cspr_jax.reference_pose import aligned, reference_pose
+from cspr_jax.robots.reference_pose import aligned, reference_pose
 from cspr_jax.sequences import Sequence, sequence_of
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.pose_segment import PoseSegment

@@ -16,17 +16,17 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.endpoints import AT_REST, endpoint
-from cspr_jax.feasibility.interference import contacts, gaps
 from cspr_jax.feasibility.pose_checks import FEW, MANY, TOUCH, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.bends import BEYOND, cheapest_path, options
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, segments_with, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, settled
-from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import plane_normal, rest_point
+from cspr_jax.robots.interference import contacts, gaps
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal, rest_point
+from cspr_jax.robots.wrench_balance import conditioning
 from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories.pose_segment import PoseSegment
-from cspr_jax.wrenches import conditioning
 
 # Relative determinant below which a pose counts as singular.
 SINGULAR = 1e-9

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cspr_jax import amplitudes, robots
+from cspr_jax import amplitudes
 from cspr_jax.amplitudes import Amplitude, boundary_errors
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
@@ -13,9 +13,10 @@ from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, from_tilt_torsion
 from cspr_jax.config.robot import LimitKeys, RobotFile
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.platforms import PlatformRobot, platform_robot
-from cspr_jax.reference_pose import reference_pose
-from cspr_jax.robots import STANDARD_GRAVITY, PointMassRobot
+from cspr_jax.robots import point_mass
+from cspr_jax.robots.platform import PlatformRobot, platform_robot
+from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
+from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.schema.limits import NO_LIMITS, Limits
 from cspr_jax.trajectories.pose_segment import Kind
 
@@ -70,7 +71,7 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
     given |= {"z_axis": spec.z_axis, "limits": build_limits(spec, LimitKeys(), None, file)}
     try:
         if not spec.is_platform:
-            make = robots.planar_robot if spec.planar else robots.point_mass_robot
+            make = point_mass.planar_robot if spec.planar else point_mass.point_mass_robot
             return make(spec.base_points, **given)
         given |= {"inertia": spec.inertia, "centre_of_mass": spec.centre_of_mass or [0.0, 0.0, 0.0]}
         return platform_robot(spec.base_points, spec.platform_points, **given)

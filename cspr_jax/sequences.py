@@ -15,7 +15,7 @@ from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps.answers import Answers, pick
 from cspr_jax.maps.minimum_arcs import minimum_arcs, segments_between
 from cspr_jax.maps.minimum_oscillations import minimum_oscillations, transitions_to
-from cspr_jax.robots import rest_point
+from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.transition import steady
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from cspr_jax import robots
+from cspr_jax.robots import point_mass
 
 # What one process has compiled, those beside it and those that tests start need not; it goes with the run.
 COMPILED = Path(os.environ.setdefault("CSPR_TESTS_COMPILED", f"{tempfile.gettempdir()}/cspr-tests-{os.getpid()}"))
@@ -53,13 +53,13 @@ TILTED = TILTED - TILTED.mean(0)
 @pytest.fixture(scope="session")
 def prototype():
     """The robot of chapter 2."""
-    return robots.point_mass_robot(equilateral(0.26), mass=0.198, name="prototype")
+    return point_mass.point_mass_robot(equilateral(0.26), mass=0.198, name="prototype")
 
 
 @pytest.fixture(scope="session")
 def tilted():
     """A general triangle: no symmetry, tilted plane, labels the other way round; as the kernels take it."""
-    return robots.point_mass_robot(TILTED, mass=1.7, gravity=9.80665, name="tilted")
+    return point_mass.point_mass_robot(TILTED, mass=1.7, gravity=9.80665, name="tilted")
 
 
 @pytest.fixture

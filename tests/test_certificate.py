@@ -11,11 +11,11 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax import robots
 from cspr_jax.amplitudes import named
 from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared, prove, tolerance
 from cspr_jax.feasibility.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories import hypocycloid
 
@@ -24,7 +24,7 @@ SAMPLES = 20_001
 Z0 = 1.7
 BASES = {"prototype": equilateral(0.26), "tilted": TILTED}
 MASS = {"prototype": 0.198, "tilted": 1.7}
-ROBOTS = {name: robots.point_mass_robot(base, mass=MASS[name]) for name, base in BASES.items()}
+ROBOTS = {name: point_mass.point_mass_robot(base, mass=MASS[name]) for name, base in BASES.items()}
 QUINTIC, EFFECTIVE, SMOOTH = named("quintic"), named("effective", 0.2), named("effective-c3", 0.2)
 PRINTED = {"quintic": (QUINTIC, oracle.quintic), "effective": (EFFECTIVE, partial(oracle.effective, epsilon=0.2))}
 SEGMENTS = jax.jit(jax.vmap(lambda *given: hypocycloid.segment(*given[:4], odd=given[4]), in_axes=(None, 0, 0, 0, 0)))

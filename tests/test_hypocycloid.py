@@ -8,9 +8,9 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax import robots
 from cspr_jax.amplitudes import derivatives, from_polynomial, named
 from cspr_jax.feasibility.slacks import instant, normalised_pseudotensions
+from cspr_jax.robots import point_mass
 from cspr_jax.trajectories import hypocycloid
 
 N = 120
@@ -47,7 +47,7 @@ class Batch:
         whole = [np.broadcast_to(np.asarray(v), (self.n, *shape))[np.arange(N) % self.n] for v, shape in shapes]
         self.bases, self.starts, self.ends, self.z0, self.arcs, self.gravity = whole
         self.hub = self.bases.mean(1) + self.z0[:, None] * DOWN
-        robot = robots.PointMassRobot(self.bases, np.ones(N), self.gravity.astype(float))
+        robot = point_mass.PointMassRobot(self.bases, np.ones(N), self.gravity.astype(float))
         self.segments = SEGMENTS(robot, self.starts, self.ends, self.z0.astype(float), self.arcs % 2 == 1)
         self.p = self.arcs.astype(float)
 

@@ -10,18 +10,18 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax import robots
 from cspr_jax.amplitudes import from_pieces, named
 from cspr_jax.arithmetic.elementary import vertex
 from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import Shared, prove
 from cspr_jax.feasibility.margins import margins
+from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories import hypocycloid
 
 N, Z0 = 40, 1.7
 BASES = {"prototype": equilateral(0.26), "tilted": TILTED}
-ROBOTS = {name: robots.point_mass_robot(base, mass=0.8) for name, base in BASES.items()}
+ROBOTS = {name: point_mass.point_mass_robot(base, mass=0.8) for name, base in BASES.items()}
 QUINTIC, EFFECTIVE = named("quintic"), named("effective", 0.2)
 PRINTED = {"quintic": (QUINTIC, oracle.quintic), "effective": (EFFECTIVE, partial(oracle.effective, epsilon=0.2))}
 SEGMENTS = jax.jit(jax.vmap(lambda *given: hypocycloid.segment(*given[:4], odd=given[4]), in_axes=(None, 0, 0, 0, 0)))

@@ -8,11 +8,11 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax import robots
 from cspr_jax.amplitudes import named
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps.minimum_arcs import minimum_arcs
+from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 
@@ -26,7 +26,7 @@ NO_LIMITS = Limits()
 
 def answer(starts, ends, limits=NO_LIMITS, base=BASE, z0=Z0, mass=0.198, **options):
     starts, ends = np.atleast_2d(np.asarray(starts, float)), np.atleast_2d(np.asarray(ends, float))
-    shared = Shared(robots.point_mass_robot(base, mass=mass), limits, QUINTIC)
+    shared = Shared(point_mass.point_mass_robot(base, mass=mass), limits, QUINTIC)
     return minimum_arcs(shared, starts, ends, np.full(len(starts), z0), **options)
 
 

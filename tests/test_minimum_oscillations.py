@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from conftest import equilateral
 
-from cspr_jax import tensions
 from cspr_jax.amplitudes import named
 from cspr_jax.cli import main
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps.minimum_oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.results import open_result
-from cspr_jax.robots import planar_robot, point_mass_robot
+from cspr_jax.robots import force_balance
+from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
 from cspr_jax.schema.limits import Limits
 
 A1 = np.polynomial.Polynomial((0, 0, 0, 4, -3))
@@ -71,9 +71,9 @@ def test_planar_tensions():
         wanted = balance(base, p, a)
         for i in range(50):
             length = np.linalg.norm(np.asarray(base) - p[i], axis=1)
-            force = tensions.tensions(robot, jnp.asarray(p[i]), jnp.asarray(a[i]))
+            force = force_balance.tensions(robot, jnp.asarray(p[i]), jnp.asarray(a[i]))
             np.testing.assert_allclose(force, 0.4 * wanted[i] * length, rtol=1e-9, atol=1e-9)
-            kappa = tensions.pseudotensions(robot, jnp.asarray(p[i]), jnp.asarray(a[i]))
+            kappa = force_balance.pseudotensions(robot, jnp.asarray(p[i]), jnp.asarray(a[i]))
             assert (np.sign(kappa) == np.sign(wanted[i])).all()
 
 

@@ -22,8 +22,8 @@ from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.maps.attainable import attainable, attained
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.orientations import equal_volume_grid, tilt_torsion_grid
+from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
 from cspr_jax.schema.limits import Limits
-from cspr_jax.symmetries import NONE, alike, folded, symmetries
 from cspr_jax.trajectories.pose_segment import Kind
 
 B = 0.86

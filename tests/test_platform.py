@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import platform as oracle
 
-from cspr_jax import problem, wrenches
+from cspr_jax import problem
 from cspr_jax.amplitudes import named
 from cspr_jax.arithmetic import rotations
 from cspr_jax.config.robot import CATALOGUE, read_robot
@@ -20,8 +20,9 @@ from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.endpoints import endpoint
 from cspr_jax.feasibility.first_look import smallest_tensions
-from cspr_jax.platforms import pairs_apart, platform_robot
-from cspr_jax.reference_pose import reference_pose
+from cspr_jax.robots import wrench_balance
+from cspr_jax.robots.platform import pairs_apart, platform_robot
+from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.trajectories import pose_segment as segments
 from cspr_jax.trajectories.pose_segment import USUAL, Kind
 
@@ -83,7 +84,7 @@ def _lowest(chosen, robot, amplitude, poses, p):
     poses = [(jnp.where(jnp.isnan(x), jnp.stack([z0 * 0.0, z0 * 0.0, z0]), x), q) for x, q in poses]
     one = _made(robot, *poses, z0, tuple(bends), p % 2.0 == 1.0)
     at = jax.vmap(lambda t: segments.motion(one, amplitude, p, t))(jnp.linspace(0.0, 1.0, 201))
-    return jnp.min(jax.vmap(lambda *leaves: wrenches.tensions(robot, wrenches.Pose(*leaves)))(*at))
+    return jnp.min(jax.vmap(lambda *leaves: wrench_balance.tensions(robot, wrench_balance.Pose(*leaves)))(*at))
 
 
 lowest, slopes = jax.jit(_lowest), jax.jit(jax.grad(_lowest))
@@ -179,8 +180,8 @@ def test_wrench_balance(robot):
     for _ in range(50):
         position, quaternion = random_pose(rng)
         rotation, (velocity, omega, pull, spin) = oracle.matrix(quaternion), rng.normal(size=(4, 3))
-        pose = wrenches.Pose(*(jnp.asarray(x) for x in (position, rotation, velocity, omega, pull, spin)))
-        tension = np.asarray(wrenches.tensions(found, pose))
+        pose = wrench_balance.Pose(*(jnp.asarray(x) for x in (position, rotation, velocity, omega, pull, spin)))
+        tension = np.asarray(wrench_balance.tensions(found, pose))
         arms = robot.platform @ rotation.T
         cables = position + arms - robot.base
         units = -cables / np.linalg.norm(cables, axis=1)[:, None]
@@ -194,7 +195,7 @@ def test_wrench_balance(robot):
         wanted = oracle.tensions(robot, position, rotation, ratios).reshape(6)
         np.testing.assert_allclose(tension, wanted, rtol=1e-8, atol=1e-8 * scale)
         wanted = np.sign(np.linalg.det(oracle.jacobian(robot, position, rotation)))
-        assert np.sign(wrenches.conditioning(found, pose.position, pose.rotation)) == wanted
+        assert np.sign(wrench_balance.conditioning(found, pose.position, pose.rotation)) == wanted
 
 
 def test_work_of_the_cables_is_the_change_of_energy():
@@ -211,8 +212,8 @@ def test_work_of_the_cables_is_the_change_of_energy():
         at = states(
             package, segment, amplitude, float(p), np.concatenate([[a], 0.5 * (a + b) + 0.5 * (b - a) * nodes, [b]])
         )
-        tension = np.asarray(jax.vmap(lambda *x: wrenches.tensions(package, wrenches.Pose(*x)))(*at))
-        _, rate, _ = jax.vmap(lambda *x: wrenches.cable_motion(package, wrenches.Pose(*x)))(*at)
+        tension = np.asarray(jax.vmap(lambda *x: wrench_balance.tensions(package, wrench_balance.Pose(*x)))(*at))
+        _, rate, _ = jax.vmap(lambda *x: wrench_balance.cable_motion(package, wrench_balance.Pose(*x)))(*at)
         power = -(tension * np.asarray(rate)).sum(1)
         work += 0.5 * (b - a) * time * float(parts @ power[1:-1])
 
@@ -246,7 +247,7 @@ def test_ends(robot):
         segment = made(package, random_pose(rng), (position, quaternion), Z0, (-1.0, bend), 5)
         at = jax.tree.map(lambda x: x[0], states(package, segment, named("quintic"), 5.0, np.ones(1)))
         np.testing.assert_allclose(
-            wrenches.tensions_per_length(package, at), found.offset + bend * found.slope, rtol=1e-7, atol=1e-8
+            wrench_balance.tensions_per_length(package, at), found.offset + bend * found.slope, rtol=1e-7, atol=1e-8
         )
     rest = endpoint(package, jnp.array([0.0, 0.0, Z0]), jnp.array([1.0, 0.0, 0.0, 0.0]), jnp.asarray(Z0))
     assert float(rest.preferred) == -1.0
@@ -339,9 +340,9 @@ def readable(package, poses):
     """Tensions per mass and length, and determinants, of many poses."""
 
     def one(*x):
-        pose = wrenches.Pose(*x)
-        found = wrenches.tensions_per_length(package, pose)
-        return found, wrenches.conditioning(package, pose.position, pose.rotation)
+        pose = wrench_balance.Pose(*x)
+        found = wrench_balance.tensions_per_length(package, pose)
+        return found, wrench_balance.conditioning(package, pose.position, pose.rotation)
 
     return jax.vmap(one)(*poses)
 
@@ -369,7 +370,7 @@ def test_the_fast_kernel(robot, name, kind):
     """The smallest tension of many segments as the readable functions give it; -inf past a singularity."""
     package, rng, amplitude = ours(robot), np.random.default_rng(9), AMPLITUDES[name][0]
     rest = (jnp.array([0.0, 0.0, Z0]), jnp.eye(3))
-    reference = float(wrenches.conditioning(package, *rest))
+    reference = float(wrench_balance.conditioning(package, *rest))
     for p in (1, 4, 7):
         tau = np.linspace(0.0, 1.0, 32)
         some = [

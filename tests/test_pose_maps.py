@@ -10,17 +10,16 @@ import pytest
 from test_platform import MSSM, Z0, general, made, ours, random_pose, states
 from test_pose_plans import HEAD, SHORT, cspr, planned
 
-from cspr_jax import wrenches
 from cspr_jax.amplitudes import named
-from cspr_jax.feasibility import contact_lanes, interference
 from cspr_jax.feasibility.pose_lanes import moving_slacks, order, still_slacks
 from cspr_jax.feasibility.pose_slacks import PoseShared, pose_slacks
 from cspr_jax.planning import plan
 from cspr_jax.results import open_result
+from cspr_jax.robots import contact_lanes, interference, wrench_balance
+from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories.pose_lanes import instant, instant_of_arc, state
 from cspr_jax.trajectories.pose_segment import USUAL, Kind
-from cspr_jax.wrench_lanes import cables
 
 REST = "{ rest = true }"
 POSE = "{ position = [0.6, -0.4, 1.5], tilt_torsion = [0.3, 0.4, -0.2], beta_hat = -2.0 }"
@@ -118,7 +117,7 @@ def test_lanes_are_the_readable_slacks(robot):
         views = np.stack([np.stack(v, -1) for v in contact_lanes.views(wires, here.turn)], 1)
         for i, segment in enumerate(some):
             at = jax.tree.map(lambda x: x[0], states(package, segment, amplitude, float(p), np.array([t])))
-            pose = wrenches.Pose(*at)
+            pose = wrench_balance.Pose(*at)
             wanted = np.asarray(pose_slacks(shared, pose, jnp.asarray(Z0), segment.regular))
             if abs(wanted[1]) > 1e-3:
                 np.testing.assert_allclose(found[:, i], wanted, rtol=1e-7, atol=1e-8)

@@ -9,12 +9,12 @@ import pytest
 from conftest import equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax import robots, tensions
+from cspr_jax.robots import force_balance, point_mass
 
 N = 200
-TENSIONS, PSEUDO = jax.jit(jax.vmap(tensions.tensions)), jax.jit(jax.vmap(tensions.pseudotensions))
-CABLES = jax.jit(jax.vmap(tensions.cable_motion))
-CABLES_ALONG = jax.jit(jax.vmap(tensions.cable_motion, in_axes=(None, 0, 0, 0)))
+TENSIONS, PSEUDO = jax.jit(jax.vmap(force_balance.tensions)), jax.jit(jax.vmap(force_balance.pseudotensions))
+CABLES = jax.jit(jax.vmap(force_balance.cable_motion))
+CABLES_ALONG = jax.jit(jax.vmap(force_balance.cable_motion, in_axes=(None, 0, 0, 0)))
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def states():
     normal = np.stack([oracle.plane_normal(base) for base in bases])
     level = bases.mean(1) + np.c_[across, -(across * normal[:, :2]).sum(1)]  # in the spools' plane
     position = level + depth[:, None] * np.array([0.0, 0.0, 1.0])
-    robot = robots.PointMassRobot(bases, rng.uniform(0.1, 30.0, N), rng.uniform(1.6, 12.0, N))
+    robot = point_mass.PointMassRobot(bases, rng.uniform(0.1, 30.0, N), rng.uniform(1.6, 12.0, N))
     return robot, position, rng.normal(size=(N, 3)), 4.0 * rng.normal(size=(N, 3))
 
 
@@ -59,12 +59,14 @@ def test_forces_balance(states):
 
 def test_hanging_still():
     """A mass below the centroid of level spools pulls on three cables alike: f = m g rho / (3 z)."""
-    robot = robots.point_mass_robot(equilateral(0.26), mass=0.198)
+    robot = point_mass.point_mass_robot(equilateral(0.26), mass=0.198)
     below, still = np.array([0.0, 0.0, 1.7]), np.zeros(3)
     wanted = 0.198 * 9.81 * np.hypot(0.26, 1.7) / (3 * 1.7)
-    np.testing.assert_allclose(tensions.tensions(robot, jnp.asarray(below), jnp.asarray(still)), wanted, rtol=1e-13)
+    np.testing.assert_allclose(
+        force_balance.tensions(robot, jnp.asarray(below), jnp.asarray(still)), wanted, rtol=1e-13
+    )
     wanted = np.sqrt(3.0) / 2.0 * 9.81 * 0.26**2  # the constant of (2.51)
-    np.testing.assert_allclose(tensions.pseudotensions(robot, jnp.asarray(below), jnp.asarray(still)), wanted)
+    np.testing.assert_allclose(force_balance.pseudotensions(robot, jnp.asarray(below), jnp.asarray(still)), wanted)
 
 
 def test_pseudotensions_have_the_sign_of_tensions(states):
@@ -83,7 +85,7 @@ def test_labels_do_not_matter(states):
     """Spools numbered the other way round are the same robot: values follow their cables, with their sign."""
     robot, position, velocity, acceleration = states
     for order in itertools.permutations(range(3)):
-        other = robots.PointMassRobot(robot.base_points[:, order], robot.mass, robot.gravity)
+        other = point_mass.PointMassRobot(robot.base_points[:, order], robot.mass, robot.gravity)
         for function in (TENSIONS, PSEUDO):
             wanted = np.asarray(function(robot, position, acceleration))[:, order]
             found = np.asarray(function(other, position, acceleration))
@@ -95,12 +97,12 @@ def test_labels_do_not_matter(states):
 
 def test_above_the_spools_a_hanging_mass_must_push():
     """Tensions change sign across the spool plane, pseudotensions do not: that is why eta is a criterion."""
-    robot = robots.point_mass_robot(equilateral(1.0), mass=2.0)
+    robot = point_mass.point_mass_robot(equilateral(1.0), mass=2.0)
     for z, sign in ((0.4, 1.0), (-0.4, -1.0)):
         at = jnp.array([0.1, -0.05, z])
-        assert (np.sign(tensions.tensions(robot, at, jnp.zeros(3))) == sign).all()
-        assert (np.sign(tensions.pseudotensions(robot, at, jnp.zeros(3))) == 1.0).all()
-    assert not np.isfinite(tensions.tensions(robot, jnp.array([0.1, -0.05, 0.0]), jnp.zeros(3))).any()
+        assert (np.sign(force_balance.tensions(robot, at, jnp.zeros(3))) == sign).all()
+        assert (np.sign(force_balance.pseudotensions(robot, at, jnp.zeros(3))) == 1.0).all()
+    assert not np.isfinite(force_balance.tensions(robot, jnp.array([0.1, -0.05, 0.0]), jnp.zeros(3))).any()
 
 
 def test_cable_lengths_and_rates_against_the_reference(states):

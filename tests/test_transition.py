@@ -11,12 +11,12 @@ from conftest import equilateral
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cspr_jax import tensions
 from cspr_jax.amplitudes import derivatives, from_polynomial, named
 from cspr_jax.cli import main
 from cspr_jax.feasibility import oscillations as counts
 from cspr_jax.feasibility import zero_tension
-from cspr_jax.robots import planar_robot, point_mass_robot
+from cspr_jax.robots import force_balance
+from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories import transition as transitions
 
@@ -72,11 +72,11 @@ def test_weights_make_the_pseudotensions(tilted, name):
     amplitude, z0, n = FUNCTIONS[name], 1.4, 5.0
     target = np.array([1.1, -0.7, 1.9])
     one = transitions.transition(tilted, amplitude, jnp.asarray(target), jnp.asarray(z0))
-    at_rest = tensions.pseudotensions(tilted, one.hub, jnp.zeros(3))
+    at_rest = force_balance.pseudotensions(tilted, one.hub, jnp.zeros(3))
     end = float(derivatives(amplitude, jnp.asarray(1.0), order=2)[2])
     for tau in np.linspace(0.0, 1.0, 41):
         position, _, acceleration = hypocycloid.motion(one, amplitude, jnp.asarray(2.0 * n), jnp.asarray(tau))
-        kappa = np.asarray(tensions.pseudotensions(tilted, position, acceleration) / at_rest)
+        kappa = np.asarray(force_balance.pseudotensions(tilted, position, acceleration) / at_rest)
         a, a1, a2 = (float(x) for x in derivatives(amplitude, jnp.asarray(tau), order=2))
         v, w = float(transitions.inclination(one)), np.asarray(transitions.weights(one))
         omega = (2.0 * np.pi * n) ** 2 - end  # (1.29)

@@ -16,7 +16,7 @@ from cspr_jax.bench.timing import best
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps import sieve
 from cspr_jax.maps.minimum_arcs import segments_between
-from cspr_jax.robots import point_mass_robot
+from cspr_jax.robots.point_mass import point_mass_robot
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories.hypocycloid import Segment
 

@@ -13,7 +13,7 @@ from cspr_jax.errors import ConfigError, InputError, shown
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
-# Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots`, which imports jax.
+# Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.point_mass`, with jax.
 LARGEST_LENGTH = 1e6
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
@@ -53,7 +53,7 @@ class LimitTable(LimitKeys):
 # What is supported, by the number of spools.
 NUMBERS = {2: "2 (planar = true)", 3: "3 (a point mass)", 6: "6 (a rigid platform, with platform_points and inertia)"}
 SUPPORTED = "supported are " + ", ".join(NUMBERS.values())
-# Two spools count as level if their heights differ by less than this part of their distance; as in `robots`.
+# Two spools count as level if their heights differ by less than this part of their distance; as in `robots.point_mass`.
 LEVEL = 1e-9
 
 

@@ -28,7 +28,7 @@ from cspr_jax.feasibility.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.feasibility.criteria import curvatures, slacks
 from cspr_jax.feasibility.limits import Limits, given
 from cspr_jax.feasibility.slacks import largest_term
-from cspr_jax.robots import PointMassRobot
+from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.trajectories.hypocycloid import Segment
 
 SMALLEST_MARGIN = 1e-9

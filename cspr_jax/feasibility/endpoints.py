@@ -11,8 +11,8 @@ from jax import Array
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import length, solved
-from cspr_jax.platforms import PlatformRobot
-from cspr_jax.wrenches import jacobian, rays
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.wrench_balance import jacobian, rays
 
 # At rest the reference orientation makes beta-hat free; this value swings like a pendulum.
 AT_REST = -1.0

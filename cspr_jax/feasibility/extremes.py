@@ -5,10 +5,10 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax import tensions
 from cspr_jax.feasibility.blocks import INTERVALS, blocks
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.margins import Functions, smallest_values
+from cspr_jax.robots import force_balance
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
@@ -52,8 +52,8 @@ def _demands(robot, limits, amplitude, segment, arcs, tau):
     # Smooth functions of one instant, in the order of `Extremes`.
     del limits
     position, velocity, acceleration = hypocycloid.motion(segment, amplitude, arcs, tau)
-    force = tensions.tensions(robot, position, acceleration)
-    length, rate, rate_slope = tensions.cable_motion(robot, position, velocity, acceleration)
+    force = force_balance.tensions(robot, position, acceleration)
+    length, rate, rate_slope = force_balance.cable_motion(robot, position, velocity, acceleration)
     depth = 1.0 + segment.tilt @ (segment.plane.T @ (position - segment.hub))
     heights = jnp.stack([depth, -position[2]])
     every = (force, -force, force / length / robot.mass, heights, -length, rate, -rate, rate_slope, -rate_slope)

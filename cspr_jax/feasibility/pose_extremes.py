@@ -8,13 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax import wrenches
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.extremes import SIGNS, Extremes
 from cspr_jax.feasibility.narrowing import narrowed
 from cspr_jax.feasibility.pose_samples import SAMPLES
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.robots import plane_normal
+from cspr_jax.robots import wrench_balance
+from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, motion
 
@@ -25,8 +25,8 @@ BATCH = 512
 def _demands(shared: PoseShared, arguments, *, kind: Kind) -> Array:
     def one(segment, arcs, tau):
         robot, pose = shared.robot, motion(segment, shared.amplitude, arcs, tau, kind=kind)
-        per_length = wrenches.tensions_per_length(robot, pose)
-        lengths, rates, bends = wrenches.cable_motion(robot, pose)
+        per_length = wrench_balance.tensions_per_length(robot, pose)
+        lengths, rates, bends = wrench_balance.cable_motion(robot, pose)
         force = robot.mass * per_length * lengths
         depth = plane_normal(robot) @ pose.position * segment.rate / robot.gravity
         return jnp.stack(

@@ -3,7 +3,7 @@
 With f the tensions, rho the cable lengths, m the mass:
 
     taut           6 z0 mu / g, the tension over its value at rest in P0 if all were equal
-    regular        determinant (`wrenches.conditioning`) over its value at rest in P0
+    regular        determinant (`robots.wrench_balance.conditioning`) over its value at rest in P0
     below          depth of the mass centre below the spool plane, over z0
     tension        (f - f_min) 6 / (m g),  (f_max - f) 6 / (m g)
     floor          (floor - z) / z0
@@ -15,13 +15,13 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax import wrenches
 from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility.limits import FLAGS, Limits, given
-from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import plane_normal
+from cspr_jax.robots import wrench_balance
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.wrench_balance import Pose
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.wrenches import Pose
 
 
 class PoseShared(NamedTuple):
@@ -63,16 +63,16 @@ def pose_slacks(shared: PoseShared, pose: Pose, z0: Array, regular: Array) -> Ar
         (n_criteria,) in the order of `flags`.
     """
     robot, limits = shared.robot, shared.limits
-    per_length = wrenches.tensions_per_length(robot, pose)
+    per_length = wrench_balance.tensions_per_length(robot, pose)
     found = [
         6.0 * z0 / robot.gravity * jnp.min(per_length),
-        wrenches.conditioning(robot, pose.position, pose.rotation) / regular,
+        wrench_balance.conditioning(robot, pose.position, pose.rotation) / regular,
         plane_normal(robot) @ pose.position / z0,
     ]
     names = given(limits)
     if not names:
         return jnp.stack(found)
-    lengths, rates, bends = wrenches.cable_motion(robot, pose)
+    lengths, rates, bends = wrench_balance.cable_motion(robot, pose)
     force, weight = robot.mass * per_length * lengths, robot.mass * robot.gravity / 6.0
     slacks = {
         "tension_min": lambda limit: jnp.min(force - limit) / weight,

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cspr_jax.feasibility.interference import cables_cross, platform_hit
 from cspr_jax.feasibility.pose_kernel import LEAST_COSINE
+from cspr_jax.robots.interference import cables_cross, platform_hit
 
 HALVINGS = 12
 

@@ -8,15 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax import wrench_lanes
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.lanes import rotation, stored
-from cspr_jax.feasibility import contact_lanes
-from cspr_jax.feasibility.interference import Contacts, cables_cross, contacts, platform_hit
-from cspr_jax.platforms import CABLES, PlatformRobot
-from cspr_jax.robots import plane_normal, rest_point
-from cspr_jax.wrench_lanes import cables
-from cspr_jax.wrenches import conditioning
+from cspr_jax.robots import contact_lanes, wrench_lanes
+from cspr_jax.robots.interference import Contacts, cables_cross, contacts, platform_hit
+from cspr_jax.robots.platform import CABLES, PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal, rest_point
+from cspr_jax.robots.wrench_balance import conditioning
+from cspr_jax.robots.wrench_lanes import cables
 
 BATCH = 4096
 # Determinants below this part of that of the reference orientation count as singular, of whichever sign rounding makes
@@ -63,7 +62,7 @@ def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
         place: (3,) m.
 
     Returns:
-        of `wrenches.conditioning`; NaN if it has not, or the place is not below the spools.
+        of `robots.wrench_balance.conditioning`; NaN if it has not, or the place is not below the spools.
     """
     upright, depth = jnp.eye(3), plane_normal(robot) @ jnp.asarray(place)
     here = float(conditioning(robot, jnp.asarray(place), upright))

@@ -10,8 +10,8 @@ from cspr_jax.maps.answers import joined
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, reached, trials
 from cspr_jax.maps.pose_ends import end_options
-from cspr_jax.robots import rest_point
-from cspr_jax.symmetries import NONE, Symmetries, alike
+from cspr_jax.robots.point_mass import rest_point
+from cspr_jax.robots.symmetries import NONE, Symmetries, alike
 
 # Values of beta-hat tried at the target.
 VALUES = 20

@@ -14,8 +14,8 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.reference_pose import aligned
-from cspr_jax.robots import plane_normal
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict

@@ -15,7 +15,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
 from cspr_jax.maps import sieve
 from cspr_jax.maps.answers import Answers, decided, end_slacks, joined, only
-from cspr_jax.robots import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
+from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment

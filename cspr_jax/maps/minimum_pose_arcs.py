@@ -11,7 +11,7 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.pose_checks import PoseChecker, PoseChecks
 from cspr_jax.feasibility.pose_samples import rows
-from cspr_jax.platforms import PlatformRobot
+from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.pose_segment import PoseSegment, pose_segment

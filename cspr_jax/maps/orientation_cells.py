@@ -11,10 +11,10 @@ from cspr_jax.maps.accessible import Accessible, accessible
 from cspr_jax.maps.attainable import VALUES, attainable
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.maps.pose_answers import PoseAnswers
+from cspr_jax.robots.symmetries import NONE, folded, symmetries
 from cspr_jax.schema.quantities import REFUSALS
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import NO_REASON, SENTENCES, Verdict
-from cspr_jax.symmetries import NONE, folded, symmetries
 
 # Digits of a place, m, up to which two cells are at the same one.
 DIGITS = 12

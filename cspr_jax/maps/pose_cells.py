@@ -16,8 +16,8 @@ from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
 from cspr_jax.maps.pose_answers import PoseAnswers, contradictions, reached
 from cspr_jax.maps.pose_ends import end_options
-from cspr_jax.reference_pose import reference_pose
-from cspr_jax.robots import rest_point
+from cspr_jax.robots.point_mass import rest_point
+from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.schema.tiles import Grid
 
 # Time functions of the rotation with a beta-hat of its own at each end.

@@ -10,9 +10,9 @@ from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.endpoints import endpoint
 from cspr_jax.maps.bends import options
-from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import plane_normal, rest_point
-from cspr_jax.wrenches import conditioning
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal, rest_point
+from cspr_jax.robots.wrench_balance import conditioning
 
 BATCH = 1024
 

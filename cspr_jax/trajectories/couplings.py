@@ -3,8 +3,8 @@
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax import robots
-from cspr_jax.robots import PointMassRobot
+from cspr_jax.robots import point_mass
+from cspr_jax.robots.point_mass import PointMassRobot
 
 
 def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Array, Array]:
@@ -21,7 +21,7 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
     Returns:
         tilt (n,), 1/m; pull (n_cables, n), 1/m, one row a cable; twist (n_cables,), 1/m^2, zero for a line.
     """
-    if robots.is_planar(robot):
+    if point_mass.is_planar(robot):
         half = robot.base_points[:, 0]
         tilt = axes[2] / hub[2]
         return tilt, axes[0] / half[:, None] - tilt, jnp.zeros_like(half)  # (1.15), (1.16)
@@ -29,7 +29,7 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
     area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
     scale = 3.0 / (area[2] * hub[2])
     opposite = jnp.roll(a, -1, axis=0) - jnp.roll(a, -2, axis=0)  # a2 - a3, a3 - a1, a1 - a2
-    tilt = robots.plane_normal(robot) @ axes / hub[2]
+    tilt = point_mass.plane_normal(robot) @ axes / hub[2]
     pull = -scale * (jnp.cross(hub, opposite) + area / 3.0) @ axes
     twist = scale * (opposite @ jnp.cross(axes[:, 0], axes[:, -1]))
     return tilt, pull, twist

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cspr_jax.robots import HasSpools, plane_normal
+from cspr_jax.robots.point_mass import HasSpools, plane_normal
 
 
 def _depths(robot: HasSpools, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

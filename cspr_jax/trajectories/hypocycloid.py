@@ -23,10 +23,10 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax import robots
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.arithmetic.elementary import sincospi
-from cspr_jax.robots import PointMassRobot
+from cspr_jax.robots import point_mass
+from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.trajectories.couplings import couplings
 from cspr_jax.trajectories.swing_plane import swing_plane
 
@@ -79,8 +79,8 @@ def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: 
     Returns:
         the segment for arcs of that parity.
     """
-    hub, size = robots.rest_point(z0), robots.spool_radius(robot)
-    plane, r1, r2, precession = swing_plane(start - hub, end - hub, size, robots.plane_normal(robot), odd)
+    hub, size = point_mass.rest_point(z0), point_mass.spool_radius(robot)
+    plane, r1, r2, precession = swing_plane(start - hub, end - hub, size, point_mass.plane_normal(robot), odd)
     tilt, pull, twist = couplings(robot, hub, plane)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
     return Segment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, jnp.zeros_like(r1), tilt, pull, twist)

@@ -21,11 +21,11 @@ from jax import Array
 from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import sincospi
-from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import rest_point, spool_radius
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import rest_point, spool_radius
+from cspr_jax.robots.wrench_balance import Pose, conditioning
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn
 from cspr_jax.trajectories.swing_plane import swing_plane
-from cspr_jax.wrenches import Pose, conditioning
 
 
 class Kind(NamedTuple):
@@ -59,7 +59,7 @@ class PoseSegment:
         sense: () +1 (p odd) or -1 (p even).
         rate: () lambda of (3.50), 1/s^2.
         turn: of the orientation.
-        regular: () determinant (`wrenches.conditioning`) at rest in P0, whose sign must not change.
+        regular: () determinant (`robots.wrench_balance.conditioning`) at rest in P0, whose sign must not change.
     """
 
     plane: Array

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import length
-from cspr_jax.robots import AT_P0
+from cspr_jax.robots.point_mass import AT_P0
 
 # Sine of an angle below which a plane counts as upright.
 UPRIGHT = 1e-12

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cspr_jax
-from cspr_jax import robots
 from cspr_jax.amplitudes import named
+from cspr_jax.robots import point_mass
 
 N, EXAMPLES = 300, 10
 QUINTIC = named("quintic")
@@ -36,7 +36,7 @@ class Problem:
         base, starts, ends = (
             own if v is None else v for v, own in ((base, self.base), (starts, self.starts), (ends, self.ends))
         )
-        robot = robots.point_mass_robot(base, **{"mass": self.mass, "gravity": self.gravity} | other)
+        robot = point_mass.point_mass_robot(base, **{"mass": self.mass, "gravity": self.gravity} | other)
         return cspr_jax.minimum_arcs(robot, ends, start=starts, z0=self.z0 if z0 is None else z0, max_arcs=8)
 
     def of(self, change):

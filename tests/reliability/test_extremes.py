@@ -18,7 +18,7 @@ from cspr_jax.errors import ConfigError, CsprError, InputError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.pose_sequences import Poses
-from cspr_jax.reference_pose import aligned, reference_pose
+from cspr_jax.robots.reference_pose import aligned, reference_pose
 from cspr_jax.sequences import sequence_of
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.tile import TileMap

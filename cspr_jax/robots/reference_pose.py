@@ -16,11 +16,11 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax import wrenches
 from cspr_jax.arithmetic.elementary import double_precision, leaf
 from cspr_jax.errors import InputError
-from cspr_jax.platforms import PlatformRobot
-from cspr_jax.robots import rest_point
+from cspr_jax.robots import wrench_balance
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import rest_point
 
 # Axes that differ less from the reference ones are taken to be these.
 ALIGNED = 1e-6
@@ -43,7 +43,7 @@ class Reference(NamedTuple):
     Fields:
         robot: the robot, its platform axes parallel to the fixed ones in the reference orientation.
         rotation: (3, 3) from the axes of the robot file to these.
-        conditioning: of `wrenches.conditioning` at P0; its sign is the one that must not change.
+        conditioning: of `robots.wrench_balance.conditioning` at P0; its sign is the one that must not change.
         tensions: (6,) at rest in P0 over their mean.
     """
 
@@ -117,7 +117,9 @@ def _free(robot: PlatformRobot, hub: np.ndarray) -> str:
 
 @jax.jit
 def _standing(robot: PlatformRobot, hub: Array) -> tuple[Array, Array]:
-    return wrenches.conditioning(robot, hub, jnp.eye(3)), wrenches.tensions(robot, wrenches.at_rest(hub, jnp.eye(3)))
+    return wrench_balance.conditioning(robot, hub, jnp.eye(3)), wrench_balance.tensions(
+        robot, wrench_balance.at_rest(hub, jnp.eye(3))
+    )
 
 
 def _level_and_straight(robot: PlatformRobot) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The wrench balance of many platforms, one lane a case: the fast form of `wrenches`, without a division but the last.
+"""The wrench balance of many platforms, one lane a case: the fast form of `wrench_balance`, one division at the end.
 
 (3.11) is solved by adjugates, the cables in two groups of three; the determinant falls out of the same products.
 """
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import Matrix, Vector, combined, cross, dot, turned, turned_back
-from cspr_jax.platforms import CABLES, PlatformRobot
+from cspr_jax.robots.platform import CABLES, PlatformRobot
 
 
 class Cables(NamedTuple):
@@ -142,7 +142,7 @@ def determinant(wires: Cables) -> Array:
 
 
 def conditioning(robot: PlatformRobot, wires: Cables) -> Array:
-    """Determinant of J with unit cables and the platform's size as unit; see `wrenches.conditioning`.
+    """Determinant of J with unit cables and the platform's size as unit; see `robots.wrench_balance.conditioning`.
 
     Args:
         robot: the robot.

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.robots import PointMassRobot, is_planar
+from cspr_jax.robots.point_mass import PointMassRobot, is_planar
 
 
 def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:

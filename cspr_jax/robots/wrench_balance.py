@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import solved
-from cspr_jax.platforms import CABLES, PlatformRobot
+from cspr_jax.robots.platform import CABLES, PlatformRobot
 
 
 class Pose(NamedTuple):

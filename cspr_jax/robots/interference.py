@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.platforms import PlatformRobot, pairs_apart
-from cspr_jax.wrenches import rays
+from cspr_jax.robots.platform import PlatformRobot, pairs_apart
+from cspr_jax.robots.wrench_balance import rays
 
 # Points nearer than this part of the platform's size are one corner.
 SAME = 1e-9

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cspr_jax.platforms import PlatformRobot
+from cspr_jax.robots.platform import PlatformRobot
 
 LARGEST_FOLD = 6
 # Of the robot's size: points nearer than this are the same.

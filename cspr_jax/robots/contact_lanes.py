@@ -6,8 +6,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import Matrix, Vector, combined, cross, dot, turned_back
-from cspr_jax.feasibility.interference import PARALLEL
-from cspr_jax.wrench_lanes import Cables
+from cspr_jax.robots.interference import PARALLEL
+from cspr_jax.robots.wrench_lanes import Cables
 
 
 def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: Cables) -> list[Vector]:

@@ -1,4 +1,4 @@
-"""The six-cable robot: geometry, mass, inertia, limits; its axes are as of `robots`."""
+"""The six-cable robot: geometry, mass, inertia, limits; its axes are as of `robots.point_mass`."""
 
 import dataclasses
 import itertools
@@ -9,7 +9,14 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
-from cspr_jax.robots import LARGEST_LENGTH, SMALLEST_AREA_RATIO, STANDARD_GRAVITY, Axis, check_axis, check_numbers
+from cspr_jax.robots.point_mass import (
+    LARGEST_LENGTH,
+    SMALLEST_AREA_RATIO,
+    STANDARD_GRAVITY,
+    Axis,
+    check_axis,
+    check_numbers,
+)
 from cspr_jax.schema.limits import NO_LIMITS, Limits
 
 CABLES = 6

@@ -1,0 +1,1 @@
+"""Robots: geometry, mass, the balance of forces and wrenches, rest, symmetries, contacts of cables."""
