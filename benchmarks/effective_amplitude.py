@@ -10,7 +10,7 @@ import time
 import jax
 import numpy as np
 
-from cspr_jax import amplitudes, load_robot
+from cspr_jax import load_robot
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
@@ -19,6 +19,7 @@ from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
 from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.schema.limits import Limits
+from cspr_jax.trajectories import amplitudes
 
 Z0, MAX_ARCS = 1.7, 20
 EPSILONS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)

@@ -7,7 +7,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cspr_jax.amplitudes import named as amplitude
     from cspr_jax.api import load_robot as load_robot
     from cspr_jax.api import minimum_arcs as minimum_arcs
     from cspr_jax.api import plan as plan
@@ -16,13 +15,14 @@ if TYPE_CHECKING:
     from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
     from cspr_jax.schema.limits import Limits as Limits
     from cspr_jax.schema.verdicts import Verdict as Verdict
+    from cspr_jax.trajectories.amplitudes import named as amplitude
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
     "Limits": ("cspr_jax.schema.limits", "Limits"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
-    "amplitude": ("cspr_jax.amplitudes", "named"),
+    "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
     "load_robot": ("cspr_jax.api", "load_robot"),
     "minimum_arcs": ("cspr_jax.api", "minimum_arcs"),

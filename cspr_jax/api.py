@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax import planning, problem
-from cspr_jax.amplitudes import Amplitude, named
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
@@ -20,6 +19,7 @@ from cspr_jax.planning import Plan
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point
 from cspr_jax.schema.limits import Limits
+from cspr_jax.trajectories.amplitudes import Amplitude, named
 
 
 def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:

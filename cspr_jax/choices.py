@@ -6,7 +6,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import problem
-from cspr_jax.amplitudes import Amplitude
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
@@ -16,6 +15,7 @@ from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, HasSpools, rest_po
 from cspr_jax.runtime.stages import within
 from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories import depths
+from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.transition import depth_for, transition, weights
 
 # A conservative z0 must lie above its bound: by this part of it.

@@ -23,7 +23,7 @@ from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
 from cspr_jax.trajectories import hypocycloid
-from cspr_jax.trajectories.pose_segment import motion, quaternion_at
+from cspr_jax.trajectories.platform_segment import motion, quaternion_at
 
 SCHEMA = 2
 # Those that change sign when time runs backwards.

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax import problem
-from cspr_jax.amplitudes import named
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
@@ -18,7 +17,8 @@ from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.robots.symmetries import folded, symmetries
 from cspr_jax.runtime.stages import within
 from cspr_jax.schema.limits import Limits
-from cspr_jax.trajectories.pose_segment import Kind
+from cspr_jax.trajectories.amplitudes import named
+from cspr_jax.trajectories.platform_segment import Kind
 from cspr_jax.transition_tables import Key
 
 RADIUS = 0.86  # b of (3.95), m

@@ -7,7 +7,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import problem
-from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.choices import best_amplitude, chosen_depth
 from cspr_jax.config.plan import PlanFile, read_plan
@@ -23,8 +22,9 @@ from cspr_jax.maps.answers import Answers
 from cspr_jax.pose_sequences import Poses
 from cspr_jax.robots.reference_pose import aligned, reference_pose
 from cspr_jax.sequences import Sequence, sequence_of
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment
-from cspr_jax.trajectories.pose_segment import PoseSegment
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # A third derivative that changes more than this, relative to its largest value, just beside a knot makes tensions jump.
 JUMP, NEAR_KNOT = 1e-6, 1e-12

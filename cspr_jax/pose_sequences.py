@@ -26,7 +26,7 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal, rest_point
 from cspr_jax.robots.wrench_balance import conditioning
 from cspr_jax.sequences import Sequence
-from cspr_jax.trajectories.pose_segment import PoseSegment
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Relative determinant below which a pose counts as singular.
 SINGULAR = 1e-9

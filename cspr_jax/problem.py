@@ -5,8 +5,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cspr_jax import amplitudes
-from cspr_jax.amplitudes import Amplitude, boundary_errors
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, from_tilt_torsion
@@ -18,7 +16,9 @@ from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.schema.limits import NO_LIMITS, Limits
-from cspr_jax.trajectories.pose_segment import Kind
+from cspr_jax.trajectories import amplitudes
+from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors
+from cspr_jax.trajectories.platform_segment import Kind
 
 RobotKind = TypeVar("RobotKind", PointMassRobot, PlatformRobot)
 

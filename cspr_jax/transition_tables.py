@@ -6,7 +6,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.amplitudes import Amplitude, named
 from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility import zero_tension
@@ -19,6 +18,7 @@ from cspr_jax.feasibility.oscillations import (
 )
 from cspr_jax.problem import point_mass_of
 from cspr_jax.runtime.stages import stage
+from cspr_jax.trajectories.amplitudes import Amplitude, named
 from cspr_jax.trajectories.transition import transition, weights
 
 Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import point_mass as oracle
 
-from cspr_jax import amplitudes
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps.minimum_arcs import minimum_arcs
 from cspr_jax.schema.limits import Limits
+from cspr_jax.trajectories import amplitudes
 
 DERIVATIVES = jax.jit(partial(amplitudes.derivatives, order=5))
 LOCAL_BOUNDS = jax.jit(amplitudes.local_bounds)

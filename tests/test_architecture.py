@@ -24,9 +24,21 @@ LAYERS = (
         "arithmetic.lanes",
         "runtime.stages",
     ),
-    ("amplitudes", "robots.point_mass", "robots.platform", "arithmetic.rotations", "orientations", "robots.symmetries"),
+    (
+        "trajectories.amplitudes",
+        "robots.point_mass",
+        "robots.platform",
+        "arithmetic.rotations",
+        "orientations",
+        "robots.symmetries",
+    ),
     ("robots.force_balance", "robots.wrench_balance", "robots.wrench_lanes", "robots.reference_pose"),
-    ("trajectories",),
+    (
+        "trajectories",
+        "trajectories.from_rest_lanes",
+        "trajectories.platform_segment",
+        "trajectories.platform_lanes",
+    ),
     (
         "feasibility",
         "robots.contact_lanes",

@@ -11,13 +11,13 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax.amplitudes import named
 from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared, prove, tolerance
 from cspr_jax.feasibility.slacks import instant, row_bounds, stretch, taut_bounds
 from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories import hypocycloid
+from cspr_jax.trajectories.amplitudes import named
 
 COUNT, SOAK_COUNT = 2_000, 20_000
 SAMPLES = 20_001

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cspr_jax.amplitudes import derivatives, named
 from cspr_jax.cli import main
 from cspr_jax.feasibility import oscillations as counts
 from cspr_jax.feasibility import zero_tension
@@ -22,6 +21,7 @@ from cspr_jax.feasibility.transition_margins import transition_margins
 from cspr_jax.maps.minimum_oscillations import transitions_to
 from cspr_jax.results import open_result
 from cspr_jax.schema.limits import Limits
+from cspr_jax.trajectories.amplitudes import derivatives, named
 
 CURVES = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}
 SWEEP = """schema = 1

@@ -9,13 +9,13 @@ import pytest
 from oracles import platform as oracle
 from test_platform import MSSM, Z0, made, ours
 
-from cspr_jax.amplitudes import named
 from cspr_jax.feasibility import first_look
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.minimum_pose_arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.schema.limits import Limits
-from cspr_jax.trajectories.pose_segment import Kind
+from cspr_jax.trajectories.amplitudes import named
+from cspr_jax.trajectories.platform_segment import Kind
 
 BENDS, ARCS = 5, 8
 

@@ -10,7 +10,6 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax.amplitudes import from_pieces, named
 from cspr_jax.arithmetic.elementary import vertex
 from cspr_jax.feasibility import criteria
 from cspr_jax.feasibility.certificate import Shared, prove
@@ -18,6 +17,7 @@ from cspr_jax.feasibility.margins import margins
 from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories import hypocycloid
+from cspr_jax.trajectories.amplitudes import from_pieces, named
 
 N, Z0 = 40, 1.7
 BASES = {"prototype": equilateral(0.26), "tilted": TILTED}

@@ -8,13 +8,13 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax.amplitudes import named
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps.minimum_arcs import minimum_arcs
 from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.trajectories.amplitudes import named
 
 Z0 = 1.7
 BASE = equilateral(0.26)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from conftest import equilateral
 
-from cspr_jax.amplitudes import named
 from cspr_jax.cli import main
 from cspr_jax.feasibility.certificate import Shared
 from cspr_jax.maps.minimum_oscillations import best_inclinations, minimum_oscillations, transitions_to
@@ -16,6 +15,7 @@ from cspr_jax.results import open_result
 from cspr_jax.robots import force_balance
 from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
 from cspr_jax.schema.limits import Limits
+from cspr_jax.trajectories.amplitudes import named
 
 A1 = np.polynomial.Polynomial((0, 0, 0, 4, -3))
 SPATIAL = point_mass_robot(equilateral(0.693), mass=0.129)

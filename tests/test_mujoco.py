@@ -11,10 +11,10 @@ from test_pose_plans import SHORT
 
 import cspr_jax
 from cspr_jax import motions
-from cspr_jax.amplitudes import named
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.trajectories.pose_segment import duration
+from cspr_jax.trajectories.amplitudes import named
+from cspr_jax.trajectories.platform_segment import duration
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -11,7 +11,6 @@ from test_platform import MSSM, ours
 from test_pose_plans import cspr
 
 from cspr_jax import orientation_tables
-from cspr_jax.amplitudes import named
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.maps.accessible import accessible
@@ -20,7 +19,8 @@ from cspr_jax.plots.reasons import reasons
 from cspr_jax.results import open_result
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.trajectories.pose_segment import Kind
+from cspr_jax.trajectories.amplitudes import named
+from cspr_jax.trajectories.platform_segment import Kind
 
 
 @pytest.fixture(autouse=True)

@@ -13,7 +13,6 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from test_platform import MSSM, ours
 
-from cspr_jax.amplitudes import named
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared
@@ -24,7 +23,8 @@ from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.orientations import equal_volume_grid, tilt_torsion_grid
 from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
 from cspr_jax.schema.limits import Limits
-from cspr_jax.trajectories.pose_segment import Kind
+from cspr_jax.trajectories.amplitudes import named
+from cspr_jax.trajectories.platform_segment import Kind
 
 B = 0.86
 

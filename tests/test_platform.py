@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from oracles import platform as oracle
 
 from cspr_jax import problem
-from cspr_jax.amplitudes import named
 from cspr_jax.arithmetic import rotations
 from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
@@ -23,8 +22,9 @@ from cspr_jax.feasibility.first_look import smallest_tensions
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import pairs_apart, platform_robot
 from cspr_jax.robots.reference_pose import reference_pose
-from cspr_jax.trajectories import pose_segment as segments
-from cspr_jax.trajectories.pose_segment import USUAL, Kind
+from cspr_jax.trajectories import platform_segment as segments
+from cspr_jax.trajectories.amplitudes import named
+from cspr_jax.trajectories.platform_segment import USUAL, Kind
 
 MSSM = oracle.mssm()
 PLATFORMS = ("laval-mssm", "nist-robocrane", "fast", "greenline")

@@ -10,7 +10,6 @@ import pytest
 from test_platform import MSSM, Z0, general, made, ours, random_pose, states
 from test_pose_plans import HEAD, SHORT, cspr, planned
 
-from cspr_jax.amplitudes import named
 from cspr_jax.feasibility.pose_lanes import moving_slacks, order, still_slacks
 from cspr_jax.feasibility.pose_slacks import PoseShared, pose_slacks
 from cspr_jax.planning import plan
@@ -18,8 +17,9 @@ from cspr_jax.results import open_result
 from cspr_jax.robots import contact_lanes, interference, wrench_balance
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.schema.limits import Limits
-from cspr_jax.trajectories.pose_lanes import instant, instant_of_arc, state
-from cspr_jax.trajectories.pose_segment import USUAL, Kind
+from cspr_jax.trajectories.amplitudes import named
+from cspr_jax.trajectories.platform_lanes import instant, instant_of_arc, state
+from cspr_jax.trajectories.platform_segment import USUAL, Kind
 
 REST = "{ rest = true }"
 POSE = "{ position = [0.6, -0.4, 1.5], tilt_torsion = [0.3, 0.4, -0.2], beta_hat = -2.0 }"

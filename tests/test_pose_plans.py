@@ -18,7 +18,6 @@ from oracles import platform as oracle
 from test_platform import MSSM, Z0, made, ours, random_pose
 
 from cspr_jax import pose_tables
-from cspr_jax.amplitudes import named
 from cspr_jax.cli import main
 from cspr_jax.feasibility.pose_checks import PoseChecker
 from cspr_jax.feasibility.pose_slacks import PoseShared, pose_slacks
@@ -27,7 +26,8 @@ from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
 from cspr_jax.robots.interference import cables_cross, contacts, gaps, platform_hit, views
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.trajectories.pose_segment import motion
+from cspr_jax.trajectories.amplitudes import named
+from cspr_jax.trajectories.platform_segment import motion
 
 ROOT = Path(__file__).parent.parent
 SEQUENCE = (ROOT / "sweeps" / "table_3_2.toml").read_text("utf-8")

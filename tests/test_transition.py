@@ -11,7 +11,6 @@ from conftest import equilateral
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cspr_jax.amplitudes import derivatives, from_polynomial, named
 from cspr_jax.cli import main
 from cspr_jax.feasibility import oscillations as counts
 from cspr_jax.feasibility import zero_tension
@@ -19,6 +18,7 @@ from cspr_jax.robots import force_balance
 from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories import transition as transitions
+from cspr_jax.trajectories.amplitudes import derivatives, from_polynomial, named
 
 FUNCTIONS = {
     "A1": named("A1"),

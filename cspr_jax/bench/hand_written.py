@@ -20,7 +20,7 @@ from cspr_jax.bench import six_cables, three_cables
 from cspr_jax.bench.timing import best
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps import sieve
-from cspr_jax.trajectories.rest_lanes import rest_table, swings
+from cspr_jax.trajectories.from_rest_lanes import rest_table, swings
 
 FLAGS = (
     "-O3",

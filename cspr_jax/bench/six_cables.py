@@ -13,14 +13,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax import amplitudes
 from cspr_jax.api import load_robot
 from cspr_jax.arithmetic.batches import in_batches, in_threads, padded
 from cspr_jax.bench.timing import best, operations
 from cspr_jax.feasibility.first_look import smallest_tensions
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, pose_segment
+from cspr_jax.trajectories import amplitudes
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment, pose_segment
 
 TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
 NUMPY_TRAJECTORIES = 128

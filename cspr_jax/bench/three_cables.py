@@ -10,7 +10,6 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax import amplitudes
 from cspr_jax.arithmetic.batches import in_threads
 from cspr_jax.bench.timing import best
 from cspr_jax.feasibility.certificate import Shared
@@ -18,6 +17,7 @@ from cspr_jax.maps import sieve
 from cspr_jax.maps.minimum_arcs import segments_between
 from cspr_jax.robots.point_mass import point_mass_robot
 from cspr_jax.schema.limits import Limits
+from cspr_jax.trajectories import amplitudes
 from cspr_jax.trajectories.hypocycloid import Segment
 
 MAX_ARCS = 30

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.amplitudes import Amplitude
+from cspr_jax.trajectories.amplitudes import Amplitude
 
 # Intervals between the samples of one block.
 INTERVALS = 16

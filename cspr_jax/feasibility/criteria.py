@@ -6,11 +6,11 @@ import itertools
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility.limits import FLAGS, Limits, count, given, limit_curvatures, limit_slacks
 from cspr_jax.feasibility.slacks import instant, row_bounds, stretch, taut_bounds
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.hypocycloid import Segment
 
 

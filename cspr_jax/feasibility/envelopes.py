@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.amplitudes import Amplitude, derivatives, local_bounds
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives, local_bounds
 
 # Intervals of each piece of the amplitude function.
 INTERVALS = 64

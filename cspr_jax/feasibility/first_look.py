@@ -14,16 +14,16 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.amplitudes import Amplitude
 from cspr_jax.arithmetic.batches import in_batches, room
 from cspr_jax.arithmetic.lanes import cross, dot
 from cspr_jax.feasibility.pose_lanes import certain_tension, lowest_tension
 from cspr_jax.feasibility.pose_samples import rows
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import balance, cables
-from cspr_jax.trajectories.pose_lanes import instant
-from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
-from cspr_jax.trajectories.rest_lanes import rest_table, swing, swings
+from cspr_jax.trajectories.amplitudes import Amplitude
+from cspr_jax.trajectories.from_rest_lanes import rest_table, swing, swings
+from cspr_jax.trajectories.platform_lanes import instant
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 # Instants of one call; how many more motions are looked at than checked at a time, and what part of them is few.
 CHUNK, FIRST, FEWER = 8, 2, 8

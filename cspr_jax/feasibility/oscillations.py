@@ -18,8 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.amplitudes import SMALLEST_EPSILON, Amplitude, derivatives, named
 from cspr_jax.arithmetic.elementary import vertex
+from cspr_jax.trajectories.amplitudes import SMALLEST_EPSILON, Amplitude, derivatives, named
 
 # Samples of each piece of the amplitude function; between them the maximum is refined.
 SAMPLES = 64

@@ -23,7 +23,7 @@ from cspr_jax.feasibility.pose_slacks import PoseShared, flags
 from cspr_jax.feasibility.pose_sweeps import swept
 from cspr_jax.robots.interference import contacts
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.trajectories.pose_segment import USUAL, Kind, PoseSegment, duration
+from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment, duration
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
 FEW, MANY = 256, 2048

@@ -16,7 +16,7 @@ from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.runtime.stages import stage
-from cspr_jax.trajectories.pose_segment import Kind, PoseSegment, motion
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment, motion
 
 BATCH = 512
 

@@ -12,8 +12,8 @@ from cspr_jax.feasibility.pose_lanes import moving_slacks, still_slacks
 from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.robots import contact_lanes
 from cspr_jax.robots.wrench_lanes import cables
-from cspr_jax.trajectories.pose_lanes import Instant, instant, instant_of_arc, state
-from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_lanes import Instant, instant, instant_of_arc, state
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 # Steps between which a gap or a cable turns by more than this angle are to be halved.
 LEAST_COSINE = 0.8

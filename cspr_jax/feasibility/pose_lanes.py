@@ -9,8 +9,8 @@ from cspr_jax.feasibility.pose_slacks import PoseShared
 from cspr_jax.robots.platform import CABLES, PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import Balance, Cables, balance, cable_rates, cables, conditioning, inertial_wrench
-from cspr_jax.trajectories.pose_lanes import Instant, State, squared_duration, state
-from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_lanes import Instant, State, squared_duration, state
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 # Limits on what depends on the motion, beside the tensions, and on the pose alone, beside regularity and depth.
 MOVING = ("tension_min", "tension_max", "cable_speed_max", "cable_acceleration_max")

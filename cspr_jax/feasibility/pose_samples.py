@@ -10,7 +10,7 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.pose_kernel import SECTIONS, narrowed
 from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 SAMPLES = 64  # an arc
 # Values that spread less along a motion are not narrowed.

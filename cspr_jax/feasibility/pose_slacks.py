@@ -15,13 +15,13 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.amplitudes import Amplitude
 from cspr_jax.feasibility.limits import FLAGS, Limits, given
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_balance import Pose
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.trajectories.amplitudes import Amplitude
 
 
 class PoseShared(NamedTuple):

@@ -17,9 +17,9 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.amplitudes import Amplitude, derivatives, local_bounds
 from cspr_jax.arithmetic.bounds import Bounds
 from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives, local_bounds
 from cspr_jax.trajectories.hypocycloid import Segment, oscillation, swing
 
 

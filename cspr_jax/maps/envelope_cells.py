@@ -6,7 +6,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.amplitudes import Amplitude
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility import oscillations as counts
@@ -15,6 +14,7 @@ from cspr_jax.maps.answers import BATCH
 from cspr_jax.maps.minimum_oscillations import transitions_to
 from cspr_jax.maps.oscillation_cells import OscillationMap
 from cspr_jax.schema.tiles import Grid
+from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.transition import inclination, weights
 
 # How far an envelope may lie below zero at the number of oscillations that keeps it above.

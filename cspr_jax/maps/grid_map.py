@@ -6,7 +6,6 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from cspr_jax import problem
-from cspr_jax.amplitudes import Amplitude
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
@@ -19,6 +18,7 @@ from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.trajectories.amplitudes import Amplitude
 
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8

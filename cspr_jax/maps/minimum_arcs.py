@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.amplitudes import boundary_errors
 from cspr_jax.arithmetic.batches import in_batches, in_parts, room
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
@@ -18,6 +17,7 @@ from cspr_jax.maps.answers import Answers, decided, end_slacks, joined, only
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories import hypocycloid
+from cspr_jax.trajectories.amplitudes import boundary_errors
 from cspr_jax.trajectories.hypocycloid import Segment
 
 # So many segments are held at a time by each thread.

@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
-from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility import oscillations as counts
 from cspr_jax.feasibility import zero_tension
@@ -24,6 +23,7 @@ from cspr_jax.maps.answers import BATCH, Answers, Known, decided, end_slacks, on
 from cspr_jax.maps.minimum_arcs import check_numbers
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories import transition
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment
 
 # Instants of the sieve; odd, so that they do not fall on the zeros of an oscillation.

@@ -14,7 +14,7 @@ from cspr_jax.feasibility.pose_samples import rows
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.trajectories.pose_segment import PoseSegment, pose_segment
+from cspr_jax.trajectories.platform_segment import PoseSegment, pose_segment
 
 BATCH = 2048
 # So many candidates are held at a time.

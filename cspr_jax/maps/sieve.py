@@ -17,9 +17,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.arithmetic.elementary import lesser, sincospi
 from cspr_jax.feasibility.slacks import largest_term
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment, oscillation
 
 SAMPLES = 32

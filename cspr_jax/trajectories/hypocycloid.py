@@ -23,10 +23,10 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.couplings import couplings
 from cspr_jax.trajectories.swing_plane import swing_plane
 

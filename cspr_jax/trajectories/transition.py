@@ -14,9 +14,9 @@ import dataclasses
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, rest_point
 from cspr_jax.trajectories import hypocycloid
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment
 
 

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis
-from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 
 class Swings(NamedTuple):

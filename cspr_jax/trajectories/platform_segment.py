@@ -18,12 +18,12 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point, spool_radius
 from cspr_jax.robots.wrench_balance import Pose, conditioning
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn
 from cspr_jax.trajectories.swing_plane import swing_plane
 

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.amplitudes import Amplitude, derivatives
 from cspr_jax.arithmetic.elementary import polynomial, sincospi
 from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation, stored
-from cspr_jax.trajectories.pose_segment import Kind, PoseSegment
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 # Terms of a Chebyshev fit on s in [0, 1] of W = arccos(s) / sqrt(1 - s^2): accurate to 1e-14, its derivatives to 1e-10.
 _TERMS = 24
