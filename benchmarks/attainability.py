@@ -16,7 +16,7 @@ def main() -> None:
 
     jax.config.update("jax_enable_x64", True)
     from cspr_jax import orientation_tables as tables
-    from cspr_jax.feasibility.pose_samples import SAMPLES
+    from cspr_jax.feasibility.platform.samples import SAMPLES
     from cspr_jax.maps.accessible import accessible
     from cspr_jax.maps.attainable import VALUES
 

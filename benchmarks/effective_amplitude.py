@@ -12,8 +12,8 @@ import numpy as np
 
 from cspr_jax import load_robot
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
 from cspr_jax.maps.pose_ends import end_options

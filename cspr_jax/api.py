@@ -12,7 +12,7 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_arcs import minimum_arcs as _minimum_arcs
 from cspr_jax.planning import Plan

@@ -12,7 +12,7 @@ import numpy as np
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.planning import Plan
 from cspr_jax.problem import motion_kind
 from cspr_jax.reports import is_feasible

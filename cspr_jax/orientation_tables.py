@@ -9,8 +9,8 @@ import numpy as np
 from cspr_jax import problem
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.maps import attainable
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.robots.reference_pose import aligned

@@ -14,10 +14,10 @@ from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.extremes import Extremes, extremes
-from cspr_jax.feasibility.pose_extremes import pose_extremes
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.demands import Extremes, extremes
+from cspr_jax.feasibility.platform.demands import pose_extremes
+from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.maps.answers import Answers
 from cspr_jax.pose_sequences import Poses
 from cspr_jax.robots.reference_pose import aligned, reference_pose

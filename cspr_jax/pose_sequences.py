@@ -15,9 +15,9 @@ from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.endpoints import AT_REST, endpoint
-from cspr_jax.feasibility.pose_checks import FEW, MANY, TOUCH, PoseChecker
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.checker import FEW, MANY, TOUCH, PoseChecker
+from cspr_jax.feasibility.platform.end_acceleration import AT_REST, endpoint
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.maps.bends import BEYOND, cheapest_path, options
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, segments_with, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, settled

@@ -11,7 +11,7 @@ from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.maps.answers import Answers, pick
 from cspr_jax.maps.minimum_arcs import minimum_arcs, segments_between
 from cspr_jax.maps.minimum_oscillations import minimum_oscillations, transitions_to

@@ -8,8 +8,8 @@ from jax import Array
 
 from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.feasibility import zero_tension
-from cspr_jax.feasibility.oscillations import (
+from cspr_jax.feasibility.transition import zero_tension
+from cspr_jax.feasibility.transition.oscillations import (
     best_epsilon,
     best_inclination,
     horizontal_oscillations,

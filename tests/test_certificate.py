@@ -11,9 +11,9 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax.feasibility import criteria
-from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared, prove, tolerance
-from cspr_jax.feasibility.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.feasibility.point_mass import criteria
+from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, Shared, prove, tolerance
+from cspr_jax.feasibility.point_mass.slacks import instant, row_bounds, stretch, taut_bounds
 from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories import hypocycloid

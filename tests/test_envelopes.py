@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cspr_jax.cli import main
-from cspr_jax.feasibility import oscillations as counts
-from cspr_jax.feasibility import zero_tension
-from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.envelopes import lower_envelope, proved_envelope
-from cspr_jax.feasibility.margins import margins
-from cspr_jax.feasibility.transition_margins import transition_margins
+from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.point_mass.margins import margins
+from cspr_jax.feasibility.transition import oscillations as counts
+from cspr_jax.feasibility.transition import zero_tension
+from cspr_jax.feasibility.transition.envelopes import lower_envelope, proved_envelope
+from cspr_jax.feasibility.transition.margins import transition_margins
 from cspr_jax.maps.minimum_oscillations import transitions_to
 from cspr_jax.results import open_result
 from cspr_jax.schema.limits import Limits

@@ -9,9 +9,9 @@ import pytest
 from oracles import platform as oracle
 from test_platform import MSSM, Z0, made, ours
 
-from cspr_jax.feasibility import first_look
-from cspr_jax.feasibility.pose_checks import PoseChecker
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform import prefilter
+from cspr_jax.feasibility.platform.checker import PoseChecker
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.maps.minimum_pose_arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories.amplitudes import named
@@ -71,14 +71,14 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     np.testing.assert_array_equal(checker.look.refuted(segments, 6, tau), wanted)
     few = jax.tree.map(lambda x: x[:16], segments)
     np.testing.assert_array_equal(checker.look.refuted(few, 6, tau), wanted[:16])
-    exact = first_look.smallest_tensions
+    exact = prefilter.smallest_tensions
     for wrong in (lambda x: x - 0.3, lambda x: np.inf * x, lambda x: np.nan * x):
 
         def spoiled(*given, rough, wrong=wrong, **options):
             value, when = exact(*given, rough=rough, **options)
             return (wrong(value), when) if rough else (value, when)
 
-        monkeypatch.setattr(first_look, "smallest_tensions", spoiled)
+        monkeypatch.setattr(prefilter, "smallest_tensions", spoiled)
         refuted = checker.look.refuted(segments, 6, tau)
         assert not (refuted & ~wanted).any()
 
@@ -115,7 +115,7 @@ def test_the_size_of_the_robot_changes_nothing(scale):
         given = given._replace(start=start, end=end, z0=given.z0 * unit)
         segments = _Segments(checker.shared.robot, given)(5, np.arange(300))
         sizes.append(checker.look.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
-        rough, _ = first_look.smallest_tensions(
+        rough, _ = prefilter.smallest_tensions(
             checker.shared.robot,
             named("quintic"),
             5.0,

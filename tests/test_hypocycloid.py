@@ -8,7 +8,7 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax.feasibility.slacks import instant, normalised_pseudotensions
+from cspr_jax.feasibility.point_mass.slacks import instant, normalised_pseudotensions
 from cspr_jax.robots import point_mass
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.amplitudes import derivatives, from_polynomial, named

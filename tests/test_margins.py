@@ -11,9 +11,9 @@ from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax.arithmetic.elementary import vertex
-from cspr_jax.feasibility import criteria
-from cspr_jax.feasibility.certificate import Shared, prove
-from cspr_jax.feasibility.margins import margins
+from cspr_jax.feasibility.point_mass import criteria
+from cspr_jax.feasibility.point_mass.certificate import Shared, prove
+from cspr_jax.feasibility.point_mass.margins import margins
 from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits
 from cspr_jax.trajectories import hypocycloid

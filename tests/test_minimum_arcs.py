@@ -9,7 +9,7 @@ from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.maps.minimum_arcs import minimum_arcs
 from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits

@@ -9,7 +9,7 @@ import pytest
 from conftest import equilateral
 
 from cspr_jax.cli import main
-from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.maps.minimum_oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.results import open_result
 from cspr_jax.robots import force_balance

@@ -11,8 +11,8 @@ from test_platform import MSSM, ours
 from test_pose_plans import cspr
 
 from cspr_jax import orientation_tables
-from cspr_jax.feasibility.pose_checks import PoseChecker
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.checker import PoseChecker
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.maps.accessible import accessible
 from cspr_jax.maps.attainable import attainable
 from cspr_jax.plots.reasons import reasons

@@ -14,9 +14,9 @@ from scipy.spatial.transform import Rotation
 from test_platform import MSSM, ours
 
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.feasibility.pose_checks import PoseChecker
-from cspr_jax.feasibility.pose_slacks import PoseShared
-from cspr_jax.feasibility.sights import Watch
+from cspr_jax.feasibility.platform.checker import PoseChecker
+from cspr_jax.feasibility.platform.orientation_steps import Watch
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.maps.attainable import attainable, attained
 from cspr_jax.maps.pose_ends import end_options

@@ -17,8 +17,8 @@ from cspr_jax.arithmetic import rotations
 from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.endpoints import endpoint
-from cspr_jax.feasibility.first_look import smallest_tensions
+from cspr_jax.feasibility.platform.end_acceleration import endpoint
+from cspr_jax.feasibility.platform.prefilter import smallest_tensions
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import pairs_apart, platform_robot
 from cspr_jax.robots.reference_pose import reference_pose

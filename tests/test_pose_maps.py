@@ -10,8 +10,8 @@ import pytest
 from test_platform import MSSM, Z0, general, made, ours, random_pose, states
 from test_pose_plans import HEAD, SHORT, cspr, planned
 
-from cspr_jax.feasibility.pose_lanes import moving_slacks, order, still_slacks
-from cspr_jax.feasibility.pose_slacks import PoseShared, pose_slacks
+from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, still_slacks
+from cspr_jax.feasibility.platform.slacks import PoseShared, pose_slacks
 from cspr_jax.planning import plan
 from cspr_jax.results import open_result
 from cspr_jax.robots import contact_lanes, interference, wrench_balance

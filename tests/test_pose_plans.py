@@ -19,8 +19,8 @@ from test_platform import MSSM, Z0, made, ours, random_pose
 
 from cspr_jax import pose_tables
 from cspr_jax.cli import main
-from cspr_jax.feasibility.pose_checks import PoseChecker
-from cspr_jax.feasibility.pose_slacks import PoseShared, pose_slacks
+from cspr_jax.feasibility.platform.checker import PoseChecker
+from cspr_jax.feasibility.platform.slacks import PoseShared, pose_slacks
 from cspr_jax.maps.bends import LARGEST, cheapest_path, options
 from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
 from cspr_jax.robots.interference import cables_cross, contacts, gaps, platform_hit, views
@@ -95,7 +95,7 @@ def test_verdicts_do_not_change_with_more_samples(checker, monkeypatch):
         (near_pose(rng), near_pose(rng), tuple(rng.uniform(-5.0, 0.0, 2)), int(rng.integers(3, 9))) for _ in range(40)
     ]
     first = [checked(checker, *case) for case in cases]
-    monkeypatch.setattr("cspr_jax.feasibility.pose_samples.SAMPLES", 201)
+    monkeypatch.setattr("cspr_jax.feasibility.platform.samples.SAMPLES", 201)
     for case, before in zip(cases, first, strict=True):
         after = checked(checker, *case)
         assert after.verdict[0] == before.verdict[0]
@@ -150,7 +150,7 @@ def test_steps_are_halved_where_cables_turn(checker, monkeypatch):
     ]
     flags = Verdict.CABLE_CABLE.value | Verdict.CABLE_PLATFORM.value
     first = [int(checked(checker, *case).verdict[0]) & flags for case in cases]
-    monkeypatch.setattr("cspr_jax.feasibility.pose_samples.SAMPLES", 4)
+    monkeypatch.setattr("cspr_jax.feasibility.platform.samples.SAMPLES", 4)
     for case, before in zip(cases, first, strict=True):
         assert int(checked(checker, *case).verdict[0]) & flags == before
         seen += before > 0

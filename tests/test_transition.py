@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cspr_jax.cli import main
-from cspr_jax.feasibility import oscillations as counts
-from cspr_jax.feasibility import zero_tension
+from cspr_jax.feasibility.transition import oscillations as counts
+from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.robots import force_balance
 from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
 from cspr_jax.trajectories import hypocycloid

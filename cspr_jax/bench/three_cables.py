@@ -12,7 +12,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_threads
 from cspr_jax.bench.timing import best
-from cspr_jax.feasibility.certificate import Shared
+from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.maps import sieve
 from cspr_jax.maps.minimum_arcs import segments_between
 from cspr_jax.robots.point_mass import point_mass_robot

@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.feasibility.sights import Watch
+from cspr_jax.feasibility.platform.orientation_steps import Watch
 from cspr_jax.orientations import OrientationGrid, equal_volume_grid, tilt_torsion_grid
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage

@@ -14,9 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility import criteria
-from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared, prove
-from cspr_jax.feasibility.margins import margins
+from cspr_jax.feasibility.point_mass import criteria
+from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, Shared, prove
+from cspr_jax.feasibility.point_mass.margins import margins
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment

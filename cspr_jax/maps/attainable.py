@@ -4,8 +4,8 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_parts
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.feasibility.endpoints import AT_REST
-from cspr_jax.feasibility.pose_checks import PoseChecker
+from cspr_jax.feasibility.platform.checker import PoseChecker
+from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.maps.answers import joined
 from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates, smallest_arcs
 from cspr_jax.maps.pose_answers import PoseAnswers, reached, trials

@@ -8,8 +8,8 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility import oscillations as counts
-from cspr_jax.feasibility.envelopes import lower_envelope
+from cspr_jax.feasibility.transition import oscillations as counts
+from cspr_jax.feasibility.transition.envelopes import lower_envelope
 from cspr_jax.maps.answers import BATCH
 from cspr_jax.maps.minimum_oscillations import transitions_to
 from cspr_jax.maps.oscillation_cells import OscillationMap

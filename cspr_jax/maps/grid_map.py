@@ -11,8 +11,8 @@ from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.schema.limits import Limits

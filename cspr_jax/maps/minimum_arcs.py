@@ -11,7 +11,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts, room
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared
+from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, Shared
 from cspr_jax.maps import sieve
 from cspr_jax.maps.answers import Answers, decided, end_slacks, joined, only
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius

@@ -13,12 +13,12 @@ import numpy as np
 from jax import lax
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility import oscillations as counts
-from cspr_jax.feasibility import zero_tension
-from cspr_jax.feasibility.certificate import SMALLEST_MARGIN, Shared, tolerance
-from cspr_jax.feasibility.envelopes import proved_envelope
-from cspr_jax.feasibility.limits import given
-from cspr_jax.feasibility.transition_margins import transition_margins
+from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, Shared, tolerance
+from cspr_jax.feasibility.point_mass.proof_slacks import given
+from cspr_jax.feasibility.transition import oscillations as counts
+from cspr_jax.feasibility.transition import zero_tension
+from cspr_jax.feasibility.transition.envelopes import proved_envelope
+from cspr_jax.feasibility.transition.margins import transition_margins
 from cspr_jax.maps.answers import BATCH, Answers, Known, decided, end_slacks, only
 from cspr_jax.maps.minimum_arcs import check_numbers
 from cspr_jax.runtime.stages import stage

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.pose_checks import PoseChecker, PoseChecks
-from cspr_jax.feasibility.pose_samples import rows
+from cspr_jax.feasibility.platform.checker import PoseChecker, PoseChecks
+from cspr_jax.feasibility.platform.samples import rows
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict

@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 
-from cspr_jax.feasibility.endpoints import AT_REST
-from cspr_jax.feasibility.pose_checks import PoseChecker
-from cspr_jax.feasibility.pose_samples import rows
+from cspr_jax.feasibility.platform.checker import PoseChecker
+from cspr_jax.feasibility.platform.end_acceleration import AT_REST
+from cspr_jax.feasibility.platform.samples import rows
 from cspr_jax.maps.answers import Answers
 from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
 from cspr_jax.schema.verdicts import Verdict

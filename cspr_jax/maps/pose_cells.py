@@ -8,8 +8,8 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.feasibility.endpoints import AT_REST
-from cspr_jax.feasibility.pose_checks import MANY, PoseChecker
+from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
+from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.maps.answers import joined
 from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap

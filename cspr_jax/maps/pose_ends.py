@@ -8,7 +8,7 @@ import numpy as np
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.endpoints import endpoint
+from cspr_jax.feasibility.platform.end_acceleration import endpoint
 from cspr_jax.maps.bends import options
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal, rest_point

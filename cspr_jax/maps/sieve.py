@@ -6,7 +6,7 @@ one parity. What is left of a check is some fifty multiplications and additions 
 A fusion runs over the segments of a batch and takes several samples at a time, so that a segment's
 own numbers stay in registers and no array of segments by samples is made but the precession.
 
-The sieve rejects candidates; it accepts none. `feasibility.certificate` decides about the rest.
+The sieve rejects candidates; it accepts none. `feasibility.point_mass.certificate` decides about the rest.
 """
 
 import math
@@ -18,7 +18,7 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.arithmetic.elementary import lesser, sincospi
-from cspr_jax.feasibility.slacks import largest_term
+from cspr_jax.feasibility.point_mass.slacks import largest_term
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment, oscillation
 

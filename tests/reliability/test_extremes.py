@@ -15,8 +15,8 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import CATALOGUE, resolve_robot
 from cspr_jax.errors import ConfigError, CsprError, InputError
-from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.pose_sequences import Poses
 from cspr_jax.robots.reference_pose import aligned, reference_pose
 from cspr_jax.sequences import sequence_of

@@ -8,8 +8,8 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.pose_kernel import SECTIONS, narrowed
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.kernels import SECTIONS, narrowed
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 SAMPLES = 64  # an arc

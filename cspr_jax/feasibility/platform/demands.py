@@ -9,10 +9,10 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.extremes import SIGNS, Extremes
+from cspr_jax.feasibility.demands import SIGNS, Extremes
 from cspr_jax.feasibility.narrowing import narrowed
-from cspr_jax.feasibility.pose_samples import SAMPLES
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.samples import SAMPLES
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.runtime.stages import stage

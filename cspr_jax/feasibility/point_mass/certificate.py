@@ -23,10 +23,10 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.blocks import INTERVALS, blocks, over_blocks
-from cspr_jax.feasibility.criteria import curvatures, slacks
-from cspr_jax.feasibility.limits import Limits, given
-from cspr_jax.feasibility.slacks import largest_term
+from cspr_jax.feasibility.point_mass.blocks import INTERVALS, blocks, over_blocks
+from cspr_jax.feasibility.point_mass.criteria import curvatures, slacks
+from cspr_jax.feasibility.point_mass.proof_slacks import Limits, given
+from cspr_jax.feasibility.point_mass.slacks import largest_term
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.hypocycloid import Segment

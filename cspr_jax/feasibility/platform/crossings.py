@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cspr_jax.feasibility.pose_kernel import LEAST_COSINE
+from cspr_jax.feasibility.platform.kernels import LEAST_COSINE
 from cspr_jax.robots.interference import cables_cross, platform_hit
 
 HALVINGS = 12

@@ -15,9 +15,9 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import vertex
-from cspr_jax.feasibility.blocks import INTERVALS, blocks, over_blocks
-from cspr_jax.feasibility.certificate import BATCH, Shared
-from cspr_jax.feasibility.criteria import counts, smooth_slacks
+from cspr_jax.feasibility.point_mass.blocks import INTERVALS, blocks, over_blocks
+from cspr_jax.feasibility.point_mass.certificate import BATCH, Shared
+from cspr_jax.feasibility.point_mass.criteria import counts, smooth_slacks
 from cspr_jax.trajectories.hypocycloid import Segment
 
 CANDIDATES = 3

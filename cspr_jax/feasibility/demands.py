@@ -5,9 +5,9 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.feasibility.blocks import INTERVALS, blocks
-from cspr_jax.feasibility.certificate import Shared
-from cspr_jax.feasibility.margins import Functions, smallest_values
+from cspr_jax.feasibility.point_mass.blocks import INTERVALS, blocks
+from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.point_mass.margins import Functions, smallest_values
 from cspr_jax.robots import force_balance
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories import hypocycloid

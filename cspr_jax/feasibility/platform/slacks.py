@@ -15,7 +15,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.feasibility.limits import FLAGS, Limits, given
+from cspr_jax.feasibility.point_mass.proof_slacks import FLAGS, Limits, given
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal

@@ -15,12 +15,12 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, room
-from cspr_jax.feasibility.first_look import FIRST, FirstLook
-from cspr_jax.feasibility.pose_kernel import glances, look_along, moving_along
-from cspr_jax.feasibility.pose_lanes import order
-from cspr_jax.feasibility.pose_samples import Motions, Narrowing, Places, Seen, along, low_points
-from cspr_jax.feasibility.pose_slacks import PoseShared, flags
-from cspr_jax.feasibility.pose_sweeps import swept
+from cspr_jax.feasibility.platform.crossings import swept
+from cspr_jax.feasibility.platform.kernels import glances, look_along, moving_along
+from cspr_jax.feasibility.platform.prefilter import FIRST, FirstLook
+from cspr_jax.feasibility.platform.samples import Motions, Narrowing, Places, Seen, along, low_points
+from cspr_jax.feasibility.platform.slack_lanes import order
+from cspr_jax.feasibility.platform.slacks import PoseShared, flags
 from cspr_jax.robots.interference import contacts
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment, duration

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from cspr_jax.arithmetic.lanes import dot, smallest, stored
-from cspr_jax.feasibility.pose_lanes import moving_slacks, still_slacks
-from cspr_jax.feasibility.pose_slacks import PoseShared
+from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, still_slacks
+from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.robots import contact_lanes
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.trajectories.platform_lanes import Instant, instant, instant_of_arc, state

@@ -1,0 +1,1 @@
+"""Feasibility of motions of a platform: slacks, samples, checks, cables that cross."""

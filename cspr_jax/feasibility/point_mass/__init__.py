@@ -1,0 +1,1 @@
+"""Feasibility of motions of a point mass: slacks, bounds, certificate, margins."""

@@ -1,0 +1,1 @@
+"""Feasibility of transitions: oscillations, envelopes, margins."""
