@@ -17,8 +17,8 @@ def main() -> None:
     jax.config.update("jax_enable_x64", True)
     from cspr_jax import orientation_tables as tables
     from cspr_jax.feasibility.platform.samples import SAMPLES
-    from cspr_jax.maps.accessible import accessible
-    from cspr_jax.maps.attainable import VALUES
+    from cspr_jax.search.accessible import accessible
+    from cspr_jax.search.attainable import VALUES
 
     checker = tables.checker_of(options.amplitude)
     places = [np.array([x * tables.RADIUS, y * tables.RADIUS, tables.DEPTH]) for x, y in tables.PLACES.values()]

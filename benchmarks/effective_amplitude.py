@@ -14,11 +14,11 @@ from cspr_jax import load_robot
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
 from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.maps.bends import OPTIONS
-from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
-from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.schema.limits import Limits
+from cspr_jax.search.beta_hat import OPTIONS
+from cspr_jax.search.platform_arcs import Candidates, smallest_arcs
+from cspr_jax.search.pose_ends import end_options
 from cspr_jax.trajectories import amplitudes
 
 Z0, MAX_ARCS = 1.7, 20

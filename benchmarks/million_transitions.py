@@ -20,8 +20,8 @@ def main() -> None:
     jax.config.update("jax_enable_x64", True)
     from cspr_jax.api import load_robot
     from cspr_jax.feasibility.point_mass.certificate import Shared
-    from cspr_jax.maps.minimum_oscillations import minimum_oscillations, transitions_to
     from cspr_jax.schema.limits import Limits
+    from cspr_jax.search.oscillations import minimum_oscillations, transitions_to
     from cspr_jax.trajectories.amplitudes import named
 
     rng, z0 = np.random.default_rng(0), np.full(options.count, 2.0)

@@ -13,12 +13,12 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.maps.answers import Answers
-from cspr_jax.maps.minimum_arcs import minimum_arcs as _minimum_arcs
 from cspr_jax.planning import Plan
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point
 from cspr_jax.schema.limits import Limits
+from cspr_jax.search.answers import Answers
+from cspr_jax.search.point_mass_arcs import minimum_arcs as _minimum_arcs
 from cspr_jax.trajectories.amplitudes import Amplitude, named
 
 

@@ -11,12 +11,12 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
 from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.maps import attainable
-from cspr_jax.maps.accessible import DEFINITIONS, accessible
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.robots.symmetries import folded, symmetries
 from cspr_jax.runtime.stages import within
 from cspr_jax.schema.limits import Limits
+from cspr_jax.search import attainable
+from cspr_jax.search.accessible import DEFINITIONS, accessible
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import Kind
 from cspr_jax.transition_tables import Key
@@ -40,7 +40,7 @@ class Choice:
     """What a table of orientations is computed with.
 
     Fields:
-        definitions: of the accessible set, of `maps.accessible.DEFINITIONS`.
+        definitions: of the accessible set, of `search.accessible.DEFINITIONS`.
         amplitudes: of `AMPLITUDES`.
         finer: how many times as fine the step is as pi / 32.
     """

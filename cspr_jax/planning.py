@@ -18,9 +18,9 @@ from cspr_jax.feasibility.demands import Extremes, extremes
 from cspr_jax.feasibility.platform.demands import pose_extremes
 from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.maps.answers import Answers
 from cspr_jax.pose_sequences import Poses
 from cspr_jax.robots.reference_pose import aligned, reference_pose
+from cspr_jax.search.answers import Answers
 from cspr_jax.sequences import Sequence, sequence_of
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment

@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
-from cspr_jax.maps.minimum_oscillations import OscillationAnswers
-from cspr_jax.maps.pose_answers import PoseAnswers
 from cspr_jax.planning import Plan
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.oscillations import OscillationAnswers
+from cspr_jax.search.platform_answers import PoseAnswers
 
 SCHEMA = 1
 

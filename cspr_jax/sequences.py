@@ -12,10 +12,10 @@ from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.maps.answers import Answers, pick
-from cspr_jax.maps.minimum_arcs import minimum_arcs, segments_between
-from cspr_jax.maps.minimum_oscillations import minimum_oscillations, transitions_to
 from cspr_jax.robots.point_mass import rest_point
+from cspr_jax.search.answers import Answers, pick
+from cspr_jax.search.oscillations import minimum_oscillations, transitions_to
+from cspr_jax.search.point_mass_arcs import minimum_arcs, segments_between
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.transition import steady
 

@@ -13,8 +13,8 @@ from oracles import point_mass as oracle
 
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.maps.minimum_arcs import minimum_arcs
 from cspr_jax.schema.limits import Limits
+from cspr_jax.search.point_mass_arcs import minimum_arcs
 from cspr_jax.trajectories import amplitudes
 
 DERIVATIVES = jax.jit(partial(amplitudes.derivatives, order=5))

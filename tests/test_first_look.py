@@ -12,8 +12,8 @@ from test_platform import MSSM, Z0, made, ours
 from cspr_jax.feasibility.platform import prefilter
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.maps.minimum_pose_arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.schema.limits import Limits
+from cspr_jax.search.platform_arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import Kind
 

@@ -10,10 +10,10 @@ from oracles import point_mass as oracle
 
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.maps.minimum_arcs import minimum_arcs
 from cspr_jax.robots import point_mass
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.point_mass_arcs import minimum_arcs
 from cspr_jax.trajectories.amplitudes import named
 
 Z0 = 1.7
@@ -209,7 +209,7 @@ def test_parts_are_put_together_in_order(monkeypatch):
         answer(starts[k : k + 500], ends[k : k + 500], z0=z0[k : k + 500], arcs=arcs[k : k + 500])
         for k in range(0, 2500, 500)
     ]
-    monkeypatch.setattr("cspr_jax.maps.minimum_arcs.PART", 400)
+    monkeypatch.setattr("cspr_jax.search.point_mass_arcs.PART", 400)
     whole = answer(starts, ends, z0=z0, arcs=arcs)
     for name, values in vars(whole).items():
         np.testing.assert_array_equal(values, np.concatenate([getattr(piece, name) for piece in pieces]), err_msg=name)

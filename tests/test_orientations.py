@@ -17,12 +17,12 @@ from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.orientation_steps import Watch
 from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.maps.accessible import DEFINITIONS, accessible
-from cspr_jax.maps.attainable import attainable, attained
-from cspr_jax.maps.pose_ends import end_options
-from cspr_jax.orientations import equal_volume_grid, tilt_torsion_grid
 from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
 from cspr_jax.schema.limits import Limits
+from cspr_jax.search.accessible import DEFINITIONS, accessible
+from cspr_jax.search.attainable import attainable, attained
+from cspr_jax.search.orientation_grids import equal_volume_grid, tilt_torsion_grid
+from cspr_jax.search.pose_ends import end_options
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import Kind
 

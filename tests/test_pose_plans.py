@@ -21,11 +21,11 @@ from cspr_jax import pose_tables
 from cspr_jax.cli import main
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.slacks import PoseShared, pose_slacks
-from cspr_jax.maps.bends import LARGEST, cheapest_path, options
-from cspr_jax.maps.minimum_pose_arcs import Candidates, smallest_arcs
 from cspr_jax.robots.interference import cables_cross, contacts, gaps, platform_hit, views
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.beta_hat import LARGEST, cheapest_path, options
+from cspr_jax.search.platform_arcs import Candidates, smallest_arcs
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import motion
 

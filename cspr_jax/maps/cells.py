@@ -6,9 +6,9 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import OF_TARGETS, PointMassMap
-from cspr_jax.maps.minimum_arcs import minimum_arcs
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.tiles import Grid
+from cspr_jax.search.point_mass_arcs import minimum_arcs
 
 _OF_STARTS = ("from_x", "from_y", "from_z", "z0")
 

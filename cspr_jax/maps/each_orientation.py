@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from cspr_jax.maps.accessible import accessible
 from cspr_jax.maps.orientation_cells import DIGITS, AttainableMap
-from cspr_jax.maps.pose_answers import contradictions
 from cspr_jax.maps.pose_cells import TILT_TORSION
 from cspr_jax.schema.quantities import OF_MAP, QUANTITIES
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.accessible import accessible
+from cspr_jax.search.platform_answers import contradictions
 
 # What has no value where nothing is accessible.
 FLOATS = tuple(name for name in OF_MAP["orientations"] if QUANTITIES[name].kind == "float")

@@ -7,14 +7,14 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Orientations, SweepFile
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
 from cspr_jax.feasibility.point_mass.proof_slacks import given
-from cspr_jax.maps.accessible import Accessible, accessible
-from cspr_jax.maps.attainable import VALUES, attainable
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
-from cspr_jax.maps.pose_answers import PoseAnswers
 from cspr_jax.robots.symmetries import NONE, folded, symmetries
 from cspr_jax.schema.quantities import REFUSALS
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import NO_REASON, SENTENCES, Verdict
+from cspr_jax.search.accessible import Accessible, accessible
+from cspr_jax.search.attainable import VALUES, attainable
+from cspr_jax.search.platform_answers import PoseAnswers
 
 # Digits of a place, m, up to which two cells are at the same one.
 DIGITS = 12

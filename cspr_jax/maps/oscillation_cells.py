@@ -10,9 +10,9 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import OF_TARGETS, PointMassMap
-from cspr_jax.maps.minimum_oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.robots.point_mass import is_planar
 from cspr_jax.schema.tiles import Grid
+from cspr_jax.search.oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.trajectories.transition import depth_for
 
 # Where a target above the spools has no p0 below it: its verdict does not depend on it.

@@ -10,15 +10,15 @@ from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
-from cspr_jax.maps.answers import joined
-from cspr_jax.maps.bends import OPTIONS
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
-from cspr_jax.maps.minimum_pose_arcs import CANDIDATES, Candidates
-from cspr_jax.maps.pose_answers import PoseAnswers, contradictions, reached
-from cspr_jax.maps.pose_ends import end_options
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.schema.tiles import Grid
+from cspr_jax.search.answers import joined
+from cspr_jax.search.beta_hat import OPTIONS
+from cspr_jax.search.platform_answers import PoseAnswers, contradictions, reached
+from cspr_jax.search.platform_arcs import CANDIDATES, Candidates
+from cspr_jax.search.pose_ends import end_options
 
 # Time functions of the rotation with a beta-hat of its own at each end.
 _OWN = (None, "beta_ff")

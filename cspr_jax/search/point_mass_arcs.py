@@ -12,16 +12,16 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_batches, in_parts, room
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, Shared
-from cspr_jax.maps import sieve
-from cspr_jax.maps.answers import Answers, decided, end_slacks, joined, only
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.runtime.stages import stage
+from cspr_jax.search import arc_sieve
+from cspr_jax.search.answers import Answers, decided, end_slacks, joined, only
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.amplitudes import boundary_errors
 from cspr_jax.trajectories.hypocycloid import Segment
 
 # So many segments are held at a time by each thread.
-PART = 16 * sieve.BATCH
+PART = 16 * arc_sieve.BATCH
 
 
 @jax.jit
@@ -48,7 +48,7 @@ def segments_between(
         the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...), and the
         left-hand side of (2.55), (n,).
     """
-    even, odd, infinity = in_batches(partial(_segments, shared), (starts, ends, z0), size=sieve.BATCH)
+    even, odd, infinity = in_batches(partial(_segments, shared), (starts, ends, z0), size=arc_sieve.BATCH)
     return {0: even, 1: odd}, infinity
 
 
@@ -95,7 +95,7 @@ def minimum_arcs(
         return decided(shared, parities, only(upper, None if arcs is None else np.asarray(arcs)[which]), infinity)
 
     # Not two batches where one has room for all.
-    return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(sieve.BATCH) else part(slice(None))
+    return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(arc_sieve.BATCH) else part(slice(None))
 
 
 def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
@@ -125,7 +125,7 @@ def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
 def _sieved(shared: Shared, even: Segment, odd: Segment, max_arcs: int, dtype: str) -> np.ndarray:
     # Upper bounds (n, max_arcs): of the sieve, and of the two ends, where every slack is known.
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
-    kernel = partial(sieve.upper_bounds, max_arcs=max_arcs)
-    upper = in_batches(lambda pair: kernel(shared.amplitude, *pair), cast, size=sieve.BATCH).astype(float)
-    at_ends = in_batches(partial(end_slacks, shared, 3.0), odd, size=sieve.BATCH)
+    kernel = partial(arc_sieve.upper_bounds, max_arcs=max_arcs)
+    upper = in_batches(lambda pair: kernel(shared.amplitude, *pair), cast, size=arc_sieve.BATCH).astype(float)
+    at_ends = in_batches(partial(end_slacks, shared, 3.0), odd, size=arc_sieve.BATCH)
     return np.where(np.isnan(upper), -np.inf, np.minimum(upper, at_ends[:, None] + SMALLEST_MARGIN))

@@ -16,9 +16,9 @@ from scipy.sparse.csgraph import connected_components
 
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.platform.orientation_steps import Watch
-from cspr_jax.orientations import OrientationGrid, equal_volume_grid, tilt_torsion_grid
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
+from cspr_jax.search.orientation_grids import OrientationGrid, equal_volume_grid, tilt_torsion_grid
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
 WHOLE = 8.0 * math.pi**2  # of SO(3), in the measure sin(theta) d phi d theta d sigma

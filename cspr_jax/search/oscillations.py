@@ -19,9 +19,9 @@ from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.feasibility.transition.envelopes import proved_envelope
 from cspr_jax.feasibility.transition.margins import transition_margins
-from cspr_jax.maps.answers import BATCH, Answers, Known, decided, end_slacks, only
-from cspr_jax.maps.minimum_arcs import check_numbers
 from cspr_jax.runtime.stages import stage
+from cspr_jax.search.answers import BATCH, Answers, Known, decided, end_slacks, only
+from cspr_jax.search.point_mass_arcs import check_numbers
 from cspr_jax.trajectories import transition
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment

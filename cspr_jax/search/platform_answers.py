@@ -8,9 +8,9 @@ import numpy as np
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.feasibility.platform.samples import rows
-from cspr_jax.maps.answers import Answers
-from cspr_jax.maps.minimum_pose_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.answers import Answers
+from cspr_jax.search.platform_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
 
 NEVER = np.iinfo(int).max
 

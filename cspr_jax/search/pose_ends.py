@@ -9,10 +9,10 @@ import numpy as np
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.platform.end_acceleration import endpoint
-from cspr_jax.maps.bends import options
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal, rest_point
 from cspr_jax.robots.wrench_balance import conditioning
+from cspr_jax.search.beta_hat import options
 
 BATCH = 1024
 

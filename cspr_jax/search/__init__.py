@@ -1,0 +1,1 @@
+"""Searches: numbers of arcs, oscillations, beta-hat and orientations that make a motion feasible."""
