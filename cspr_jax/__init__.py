@@ -10,11 +10,11 @@ if TYPE_CHECKING:
     from cspr_jax.api import load_robot as load_robot
     from cspr_jax.api import minimum_arcs as minimum_arcs
     from cspr_jax.api import plan as plan
-    from cspr_jax.results import open_result as open_result
     from cspr_jax.robots.point_mass import point_mass_robot as point_mass_robot
     from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
     from cspr_jax.schema.limits import Limits as Limits
     from cspr_jax.schema.verdicts import Verdict as Verdict
+    from cspr_jax.store.result import open_result as open_result
     from cspr_jax.trajectories.amplitudes import named as amplitude
 
 __version__ = "0.1.0"
@@ -26,7 +26,7 @@ _PUBLIC = {
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
     "load_robot": ("cspr_jax.api", "load_robot"),
     "minimum_arcs": ("cspr_jax.api", "minimum_arcs"),
-    "open_result": ("cspr_jax.results", "open_result"),
+    "open_result": ("cspr_jax.store.result", "open_result"),
     "plan": ("cspr_jax.api", "plan"),
     "point_mass_robot": ("cspr_jax.robots.point_mass", "point_mass_robot"),
 }

@@ -18,9 +18,9 @@ from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.feasibility.transition.envelopes import lower_envelope, proved_envelope
 from cspr_jax.feasibility.transition.margins import transition_margins
-from cspr_jax.results import open_result
 from cspr_jax.schema.limits import Limits
 from cspr_jax.search.oscillations import transitions_to
+from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.amplitudes import derivatives, named
 
 CURVES = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}

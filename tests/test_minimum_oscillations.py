@@ -10,11 +10,11 @@ from conftest import equilateral
 
 from cspr_jax.cli import main
 from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.results import open_result
 from cspr_jax.robots import force_balance
 from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
 from cspr_jax.schema.limits import Limits
 from cspr_jax.search.oscillations import best_inclinations, minimum_oscillations, transitions_to
+from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.amplitudes import named
 
 A1 = np.polynomial.Polynomial((0, 0, 0, 4, -3))

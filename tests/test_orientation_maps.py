@@ -14,11 +14,11 @@ from cspr_jax import orientation_tables
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.plots.reasons import reasons
-from cspr_jax.results import open_result
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.accessible import accessible
 from cspr_jax.search.attainable import attainable
+from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import Kind
 

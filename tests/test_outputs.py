@@ -16,10 +16,10 @@ from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.plots.draw import _map_figure
 from cspr_jax.plots.sections import NONE_COLOUR
 from cspr_jax.reports import plan_object
-from cspr_jax.results import Result
 from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.schema.verdicts import SENTENCES
 from cspr_jax.store.netcdf import make_datasets, new_hdf5
+from cspr_jax.store.result import Result
 
 ROOT = Path(__file__).parent.parent
 SHAPE = {"x": 5, "y": 4, "z": 8, "z0": 1}

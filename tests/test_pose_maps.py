@@ -13,10 +13,10 @@ from test_pose_plans import HEAD, SHORT, cspr, planned
 from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.feasibility.platform.slacks import PoseShared, pose_slacks
 from cspr_jax.planning import plan
-from cspr_jax.results import open_result
 from cspr_jax.robots import contact_lanes, interference, wrench_balance
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.schema.limits import Limits
+from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_lanes import instant, instant_of_arc, state
 from cspr_jax.trajectories.platform_segment import USUAL, Kind

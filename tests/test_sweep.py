@@ -16,7 +16,7 @@ from oracles import point_mass
 import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import SelfCheckError
-from cspr_jax.maps.cells import CellMap
+from cspr_jax.maps.arcs import CellMap
 from cspr_jax.schema.quantities import OF_MAP
 from cspr_jax.schema.quantities import QUANTITIES as EVERY
 from cspr_jax.sweep.definition import read_sweep

@@ -15,10 +15,10 @@ from cspr_jax.plots.notes import notes
 from cspr_jax.plots.sections import AROUND, POLAR, Section, section_figure, tells
 from cspr_jax.plots.selection import nearest
 from cspr_jax.plots.style import Style, in_style, rendered
-from cspr_jax.results import Result, open_result
 from cspr_jax.runtime.stages import stage
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
+from cspr_jax.store.result import Result, open_result
 
 # What a map is asked for first.
 FIRST = ("arcs", "oscillations", "lower_envelope", "attainable_fraction", "accessible_volume")

@@ -7,8 +7,8 @@ from matplotlib.ticker import MaxNLocator
 
 from cspr_jax.errors import InputError
 from cspr_jax.plots.labels import COLOURS, chosen, robot_name
-from cspr_jax.results import Result
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.store.result import Result
 
 AXES = ("torsion", "tilt_azimuth", "tilt")
 SECTIONS = 17

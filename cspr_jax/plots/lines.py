@@ -12,7 +12,7 @@ from cspr_jax.plots.labels import COLOURS, STYLES, as_drawn, axis_label, chosen,
 from cspr_jax.plots.layout import in_degrees, in_whole_numbers, panels
 from cspr_jax.plots.notes import table
 from cspr_jax.plots.reasons import VERDICTS, reasons
-from cspr_jax.results import Result
+from cspr_jax.store.result import Result
 
 LINES = len(COLOURS)
 

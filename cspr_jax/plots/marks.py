@@ -12,7 +12,7 @@ from matplotlib.transforms import Bbox
 
 from cspr_jax.plots.labels import as_drawn
 from cspr_jax.plots.notes import start, starts_at_rest, table
-from cspr_jax.results import Result
+from cspr_jax.store.result import Result
 
 # Axes of one and the same space: of the targets, or of the start points.
 OF_TARGETS, OF_STARTS = ("x", "y", "z", "radius", "azimuth"), ("from_x", "from_y", "from_z")

@@ -2,7 +2,7 @@
 
 from cspr_jax.plots.fitting import shortened
 from cspr_jax.plots.labels import value
-from cspr_jax.results import Result
+from cspr_jax.store.result import Result
 
 # Maps whose segments all start at rest, and those of their quantities that are not of a motion.
 OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")

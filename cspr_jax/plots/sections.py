@@ -14,8 +14,8 @@ from cspr_jax.plots.labels import PANELS, as_drawn, axis_label, chosen, heading,
 from cspr_jax.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
 from cspr_jax.plots.marks import mark, marked
 from cspr_jax.plots.reasons import VERDICTS, reason_scale
-from cspr_jax.results import Result
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.store.result import Result
 
 # Quantities of which either sign is as good as the other.
 SIGNED = ("used_inclination",)

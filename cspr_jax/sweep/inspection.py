@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.errors import StoreError, one_line
-from cspr_jax.results import open_result
 from cspr_jax.schema.tiles import Tiling
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.store.isolated import content
 from cspr_jax.store.netcdf import file_size
 from cspr_jax.store.record import Record, read_record
+from cspr_jax.store.result import open_result
 from cspr_jax.store.seal import DamagedError
 from cspr_jax.store.shards import Layout, read_shard
 

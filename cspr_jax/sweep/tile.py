@@ -11,13 +11,13 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ResourceError, SelfCheckError
-from cspr_jax.maps.cells import CellMap
-from cspr_jax.maps.each_orientation import EachOrientationMap
-from cspr_jax.maps.envelope_cells import EnvelopeMap
+from cspr_jax.maps.arcs import CellMap
+from cspr_jax.maps.envelopes import EnvelopeMap
 from cspr_jax.maps.grid_map import GridMap
-from cspr_jax.maps.orientation_cells import AccessibleMap, AttainableMap
-from cspr_jax.maps.oscillation_cells import OscillationMap
-from cspr_jax.maps.pose_cells import PoseMap
+from cspr_jax.maps.orientations import AccessibleMap, AttainableMap
+from cspr_jax.maps.oscillations import OscillationMap
+from cspr_jax.maps.places import EachOrientationMap
+from cspr_jax.maps.poses import PoseMap
 from cspr_jax.schema.identity import digest
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep

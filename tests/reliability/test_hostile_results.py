@@ -277,7 +277,7 @@ def here(monkeypatch):
                 pipe.readinto(array.reshape(-1).data.cast("B"))
         return found["attributes"], arrays
 
-    monkeypatch.setattr("cspr_jax.results.fetch", fetched)
+    monkeypatch.setattr("cspr_jax.store.result.fetch", fetched)
 
 
 def test_good_ones_are_drawn(tmp_path, monkeypatch):

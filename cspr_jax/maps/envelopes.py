@@ -10,7 +10,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition.envelopes import lower_envelope
-from cspr_jax.maps.oscillation_cells import OscillationMap
+from cspr_jax.maps.oscillations import OscillationMap
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.answers import BATCH
 from cspr_jax.search.oscillations import transitions_to

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from cspr_jax.maps.orientation_cells import DIGITS, AttainableMap
-from cspr_jax.maps.pose_cells import TILT_TORSION
+from cspr_jax.maps.orientations import DIGITS, AttainableMap
+from cspr_jax.maps.poses import TILT_TORSION
 from cspr_jax.schema.quantities import OF_MAP, QUANTITIES
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.accessible import accessible
