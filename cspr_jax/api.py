@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cspr_jax import planning, problem
+from cspr_jax import problem
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.planning import Plan
+from cspr_jax.plans import planning
+from cspr_jax.plans.planning import Plan
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point
 from cspr_jax.schema.limits import Limits

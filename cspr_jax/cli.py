@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
-from cspr_jax.plots.options import add_style
+from cspr_jax.outputs.plots.options import add_style
 from cspr_jax.runtime import compile_cache
 from cspr_jax.runtime.progress import progress, waiting
 from cspr_jax.sweep.signals import Prompt, prompt_end, stop_signals
@@ -290,20 +290,21 @@ def _plan(options: argparse.Namespace) -> int:
 
     with waiting():
         _start_jax(options)
-        from cspr_jax import motions, planning, reports
+        from cspr_jax.outputs import motion_files, plan_report
+        from cspr_jax.plans import planning
 
         plan = planning.plan(options.plan)
-    feasible = reports.is_feasible(plan)
+    feasible = plan_report.is_feasible(plan)
     for line in plan.warnings:
         _warn(line)
     _hint(robot_hints(plan.spec) + ([] if feasible else plan_hints(plan.keys, plan.spec)))
     if options.json:
-        _print_json(reports.plan_object(plan))
+        _print_json(plan_report.plan_object(plan))
     else:
-        _print(reports.plan_table(plan))
+        _print(plan_report.plan_table(plan))
     if options.output is not None and (feasible or options.anyway):
         with waiting():
-            motions.write_rows(plan, options.output, rate=options.rate)
+            motion_files.write_rows(plan, options.output, rate=options.rate)
         if not feasible:
             _warn(f"{options.output}: is not proved feasible; it says so itself")
     elif options.output is not None:
@@ -312,8 +313,8 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from cspr_jax.plots import draw, selection
-    from cspr_jax.plots.style import style_of
+    from cspr_jax.outputs.plots import draw, selection
+    from cspr_jax.outputs.plots.style import style_of
 
     at = selection.places(options.at)
     results = [selection.result_at(path) for path in options.result]
@@ -330,7 +331,7 @@ def _plot(options: argparse.Namespace) -> int:
 def _table(options: argparse.Namespace) -> int:
     with waiting():
         _start_jax(options)
-        from cspr_jax import tables
+        from cspr_jax.published import tables
 
     if options.list:
         sys.stdout.write("".join(f"{name}  {source.title}\n" for name, source in tables.TABLES.items()))
@@ -349,13 +350,13 @@ def _table(options: argparse.Namespace) -> int:
 
 
 def _robots(options: argparse.Namespace) -> int:
-    from cspr_jax import listings
+    from cspr_jax.outputs import listings
 
     return _listed(options, listings.robots(), listings.robots_table)
 
 
 def _quantities(options: argparse.Namespace) -> int:
-    from cspr_jax import listings
+    from cspr_jax.outputs import listings
 
     return _listed(options, listings.quantities(), listings.quantities_table)
 
@@ -366,7 +367,7 @@ def _listed(options: argparse.Namespace, found: Any, table: Callable[[Any], Any]
 
 
 def _examples(options: argparse.Namespace) -> int:
-    from cspr_jax import example_files
+    from cspr_jax.outputs import example_files
 
     known = example_files.examples()
     names = list(known) if options.all else options.name

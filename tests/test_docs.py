@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from cspr_jax import cli, tables
+from cspr_jax import cli
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import ConfigError
+from cspr_jax.published import tables
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.sweep.definition import read_sweep
 

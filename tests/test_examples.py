@@ -5,10 +5,11 @@ import sys
 
 import pytest
 
-from cspr_jax import __version__, example_files
+from cspr_jax import __version__
 from cspr_jax.cli import main
 from cspr_jax.config.reading import read_toml
 from cspr_jax.config.robot import catalogue_names
+from cspr_jax.outputs import example_files
 
 
 def test_they_are_listed_with_what_they_are_for(capsys):

@@ -10,7 +10,7 @@ from test_platform import Z0, general, made, ours, states
 from test_pose_plans import SHORT
 
 import cspr_jax
-from cspr_jax import motions
+from cspr_jax.outputs import motion_files
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.trajectories.amplitudes import named
@@ -24,7 +24,7 @@ SAMPLES = 2 * STEPS + 1
 
 
 class Motion(NamedTuple):
-    """A robot, and the columns of its motion: (n_segments, SAMPLES, ...) with the names of `motions.rows`."""
+    """A robot, and the columns of its motion: (n_segments, SAMPLES, ...) named as by `motion_files.rows`."""
 
     robot: PlatformRobot
     columns: dict[str, np.ndarray]
@@ -34,7 +34,7 @@ def planned(folder):
     """Rest, a pose, rest: rows of a plan. The platform turns about one fixed axis."""
     (folder / "plan.toml").write_text(SHORT.replace("[[pose]]", f"samples = {SAMPLES}\n[[pose]]", 1))
     plan = cspr_jax.plan(folder / "plan.toml")
-    rows = motions.rows(plan)
+    rows = motion_files.rows(plan)
     assert (plan.answers.verdict == 0).all()
     return Motion(plan.shared.robot, {name: x.reshape(2, SAMPLES, *x.shape[1:]) for name, x in rows.items()})
 

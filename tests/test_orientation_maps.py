@@ -10,10 +10,10 @@ from test_orientations import place
 from test_platform import MSSM, ours
 from test_pose_plans import cspr
 
-from cspr_jax import orientation_tables
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.plots.reasons import reasons
+from cspr_jax.outputs.plots.reasons import reasons
+from cspr_jax.published import chapter_3
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.accessible import accessible
@@ -31,7 +31,7 @@ def _64_bits():
 
 def test_tables_of_orientations(tmp_path, monkeypatch):
     """Their cells, with a coarse step; options that do not belong are refused."""
-    monkeypatch.setattr(orientation_tables, "DIVISIONS", 8)
+    monkeypatch.setattr(chapter_3, "DIVISIONS", 8)
     code, out, err = cspr("table", "3.3", "--json", "--definition", "grid")
     assert code == 0, err
     cells = json.loads(out)["cells"]

@@ -13,9 +13,9 @@ from reliability.support import go, sweep_of
 import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError, InputError, StoreError
-from cspr_jax.plots.draw import _map_figure
-from cspr_jax.plots.sections import NONE_COLOUR
-from cspr_jax.reports import plan_object
+from cspr_jax.outputs.plan_report import plan_object
+from cspr_jax.outputs.plots.draw import _map_figure
+from cspr_jax.outputs.plots.sections import NONE_COLOUR
 from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.schema.verdicts import SENTENCES
 from cspr_jax.store.netcdf import make_datasets, new_hdf5

@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from test_outputs import cspr, panels
 
-from cspr_jax.plots.colours import NONE_COLOUR, scale_of
+from cspr_jax.outputs.plots.colours import NONE_COLOUR, scale_of
 from cspr_jax.store.netcdf import make_datasets, new_hdf5
 
 TRIANGLE = [[0.3, -0.2, 0.1], [-0.3, -0.2, 0.1], [0.0, 0.4, 0.1]]

@@ -13,8 +13,8 @@ import pytest
 import xarray
 from oracles import point_mass
 
-from cspr_jax import choices
 from cspr_jax.cli import main
+from cspr_jax.plans import choices
 
 ROOT = Path(__file__).parent.parent
 SEQUENCE = (ROOT / "sweeps" / "table_2_1.toml").read_text("utf-8")

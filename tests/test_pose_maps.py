@@ -12,7 +12,7 @@ from test_pose_plans import HEAD, SHORT, cspr, planned
 
 from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.feasibility.platform.slacks import PoseShared, pose_slacks
-from cspr_jax.planning import plan
+from cspr_jax.plans.planning import plan
 from cspr_jax.robots import contact_lanes, interference, wrench_balance
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.schema.limits import Limits

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from oracles import platform as oracle
 from test_platform import MSSM, Z0, made, ours, random_pose
 
-from cspr_jax import pose_tables
 from cspr_jax.cli import main
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.slacks import PoseShared, pose_slacks
+from cspr_jax.published import table_3_2
 from cspr_jax.robots.interference import cables_cross, contacts, gaps, platform_hit, views
 from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
@@ -292,7 +292,7 @@ def cells_of_table_3_2():
 
 def test_table_3_2(monkeypatch):
     """Every printed row, with the function that has no jumps; pose 2 as printed has none."""
-    monkeypatch.setattr(pose_tables, "_AMPLITUDES", {"effective-c3 0.1": {"name": "effective-c3", "epsilon": 0.1}})
+    monkeypatch.setattr(table_3_2, "_AMPLITUDES", {"effective-c3 0.1": {"name": "effective-c3", "epsilon": 0.1}})
     check_table_3_2(cells_of_table_3_2())
 
 

@@ -12,7 +12,7 @@ import cspr_jax
 from cspr_jax import cli
 from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
 from cspr_jax.errors import InputError
-from cspr_jax.reports import plan_object
+from cspr_jax.outputs.plan_report import plan_object
 
 OF_THREE = [name for name in catalogue_names() if len(read_robot(CATALOGUE / f"{name}.toml").base_points) == 3]
 FILES = {

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from cspr_jax.table_layout import LEGEND, Cell, grid
+from cspr_jax.outputs.table_layout import LEGEND, Cell, grid
 
 
 def lines_of(cells, **options) -> list[list[str]]:

@@ -10,16 +10,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cspr_jax import problem
-from cspr_jax.choices import chosen_depth
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import CATALOGUE, resolve_robot
 from cspr_jax.errors import ConfigError, CsprError, InputError
 from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.pose_sequences import Poses
+from cspr_jax.plans.choices import chosen_depth
+from cspr_jax.plans.platform_sequence import Poses
+from cspr_jax.plans.sequence import sequence_of
 from cspr_jax.robots.reference_pose import aligned, reference_pose
-from cspr_jax.sequences import sequence_of
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.tile import TileMap
 

@@ -17,8 +17,8 @@ from test_outputs import settings_of
 
 import cspr_jax
 from cspr_jax.errors import StoreError
-from cspr_jax.plots.draw import _map_figure
-from cspr_jax.plots.motion import motion_figure
+from cspr_jax.outputs.plots.draw import _map_figure
+from cspr_jax.outputs.plots.motion import motion_figure
 from cspr_jax.schema.identity import identity
 from cspr_jax.store import isolated, reader
 from cspr_jax.store.consolidation import content_of

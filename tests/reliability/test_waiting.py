@@ -12,7 +12,7 @@ import pytest
 
 from cspr_jax.cli import main
 from cspr_jax.errors import StoreError
-from cspr_jax.plots.draw import plot
+from cspr_jax.outputs.plots.draw import plot
 from cspr_jax.runtime import stages
 from cspr_jax.runtime.progress import Pace, progress, waiting
 from reliability.support import go, sweep_of

@@ -6,7 +6,7 @@ depth below the spools over z0, both along the vertical:
     taut               kappa_k        thesis (2.12) to (2.14)
     below the spools   eta
 
-`schema.limits` adds those of the limits that are given. Beside each slack stands a bound of its second
+`proof_slacks` adds those of the limits that are given. Beside each slack stands a bound of its second
 derivative over an interval, from the closed form: it is what makes a verdict hold between samples.
 """
 

@@ -6,7 +6,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from cspr_jax.errors import InputError
-from cspr_jax.plots.labels import COLOURS, chosen, robot_name
+from cspr_jax.outputs.plots.labels import COLOURS, chosen, robot_name
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
 

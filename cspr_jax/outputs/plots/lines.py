@@ -7,11 +7,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cspr_jax.errors import InputError
-from cspr_jax.plots.fitting import shortened
-from cspr_jax.plots.labels import COLOURS, STYLES, as_drawn, axis_label, chosen, is_angle, label, robot_name, values
-from cspr_jax.plots.layout import in_degrees, in_whole_numbers, panels
-from cspr_jax.plots.notes import table
-from cspr_jax.plots.reasons import VERDICTS, reasons
+from cspr_jax.outputs.plots.fitting import shortened
+from cspr_jax.outputs.plots.labels import (
+    COLOURS,
+    STYLES,
+    as_drawn,
+    axis_label,
+    chosen,
+    is_angle,
+    label,
+    robot_name,
+    values,
+)
+from cspr_jax.outputs.plots.layout import in_degrees, in_whole_numbers, panels
+from cspr_jax.outputs.plots.notes import table
+from cspr_jax.outputs.plots.reasons import VERDICTS, reasons
 from cspr_jax.store.result import Result
 
 LINES = len(COLOURS)

@@ -8,7 +8,6 @@ import numpy as np
 
 from cspr_jax import problem
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.choices import best_amplitude, chosen_depth
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
@@ -18,10 +17,11 @@ from cspr_jax.feasibility.demands import Extremes, extremes
 from cspr_jax.feasibility.platform.demands import pose_extremes
 from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.pose_sequences import Poses
+from cspr_jax.plans.choices import best_amplitude, chosen_depth
+from cspr_jax.plans.platform_sequence import Poses
+from cspr_jax.plans.sequence import Sequence, sequence_of
 from cspr_jax.robots.reference_pose import aligned, reference_pose
 from cspr_jax.search.answers import Answers
-from cspr_jax.sequences import Sequence, sequence_of
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.platform_segment import PoseSegment

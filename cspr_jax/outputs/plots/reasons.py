@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from cspr_jax.plots.colours import Scale
+from cspr_jax.outputs.plots.colours import Scale
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 
 # Quantities that are flags of a verdict, and what it is called where none is set.

@@ -7,7 +7,7 @@ from cspr_jax.errors import ConfigError, RefusedError, StoreError, one_line, sho
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import make_folders
 
-_PACKAGE = Path(__file__).resolve().parent
+_PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def folder() -> Path:

@@ -18,6 +18,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.platform.checker import FEW, MANY, TOUCH, PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST, endpoint
 from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.plans.sequence import Sequence
 from cspr_jax.robots.interference import contacts, gaps
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal, rest_point
@@ -25,7 +26,6 @@ from cspr_jax.robots.wrench_balance import conditioning
 from cspr_jax.search.beta_hat import BEYOND, cheapest_path, options
 from cspr_jax.search.platform_answers import PoseAnswers, settled
 from cspr_jax.search.platform_arcs import Candidates, Found, segments_with, smallest_arcs
-from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Relative determinant below which a pose counts as singular.

@@ -7,14 +7,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.plots.envelope import AXES, envelope_figure
-from cspr_jax.plots.labels import PANELS, chosen, heading, robot_name, value, values
-from cspr_jax.plots.lines import Line, line_figure, lines_of, names_of, overlaid
-from cspr_jax.plots.motion import motion_figure
-from cspr_jax.plots.notes import notes
-from cspr_jax.plots.sections import AROUND, POLAR, Section, section_figure, tells
-from cspr_jax.plots.selection import nearest
-from cspr_jax.plots.style import Style, in_style, rendered
+from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
+from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, value, values
+from cspr_jax.outputs.plots.lines import Line, line_figure, lines_of, names_of, overlaid
+from cspr_jax.outputs.plots.motion import motion_figure
+from cspr_jax.outputs.plots.notes import notes
+from cspr_jax.outputs.plots.sections import AROUND, POLAR, Section, section_figure, tells
+from cspr_jax.outputs.plots.selection import nearest
+from cspr_jax.outputs.plots.style import Style, in_style, rendered
 from cspr_jax.runtime.stages import stage
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish

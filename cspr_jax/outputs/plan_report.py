@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from cspr_jax.planning import Plan
+from cspr_jax.plans.planning import Plan
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.oscillations import OscillationAnswers
 from cspr_jax.search.platform_answers import PoseAnswers

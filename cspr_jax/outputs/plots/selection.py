@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.plots.labels import value
+from cspr_jax.outputs.plots.labels import value
 from cspr_jax.store.result import Result
 
 # What is asked for and what there is are the same but for rounding.

@@ -11,6 +11,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
 from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.robots.symmetries import folded, symmetries
 from cspr_jax.runtime.stages import within
@@ -19,7 +20,6 @@ from cspr_jax.search import attainable
 from cspr_jax.search.accessible import DEFINITIONS, accessible
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import Kind
-from cspr_jax.transition_tables import Key
 
 RADIUS = 0.86  # b of (3.95), m
 MAX_ARCS = 20

@@ -13,9 +13,9 @@ import numpy as np
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.planning import Plan
+from cspr_jax.outputs.plan_report import is_feasible
+from cspr_jax.plans.planning import Plan
 from cspr_jax.problem import motion_kind
-from cspr_jax.reports import is_feasible
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import SEGMENTS, TRAJECTORY, flag_attributes

@@ -7,11 +7,11 @@ from typing import Any
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
-from cspr_jax.planning import plan_of
+from cspr_jax.plans.planning import plan_of
+from cspr_jax.published.chapter_1 import Key
 from cspr_jax.runtime.stages import within
-from cspr_jax.transition_tables import Key
 
-SEQUENCE = Path(__file__).parent / "published" / "table_3_2.toml"
+SEQUENCE = Path(__file__).with_name("table_3_2.toml")
 # The text names the quintic; its numbers fit the others. Which epsilon was used is not printed.
 _AMPLITUDES: dict[str, Any] = {
     "quintic": "quintic",

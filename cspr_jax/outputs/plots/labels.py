@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cspr_jax.plots.fitting import shortened
+from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.store.result import Result
 
 # Axes whose names in files are no words.

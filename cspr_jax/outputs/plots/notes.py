@@ -1,7 +1,7 @@
 """What a picture of a map keeps constant: where the motions start, and the axes that it does not show."""
 
-from cspr_jax.plots.fitting import shortened
-from cspr_jax.plots.labels import value
+from cspr_jax.outputs.plots.fitting import shortened
+from cspr_jax.outputs.plots.labels import value
 from cspr_jax.store.result import Result
 
 # Maps whose segments all start at rest, and those of their quantities that are not of a motion.

@@ -11,9 +11,9 @@ from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.feasibility.transition.oscillations import best_inclination
+from cspr_jax.plans.sequence import Sequence
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, HasSpools, rest_point, spool_radius
 from cspr_jax.runtime.stages import within
-from cspr_jax.sequences import Sequence
 from cspr_jax.trajectories import depths
 from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.transition import depth_for, transition, weights

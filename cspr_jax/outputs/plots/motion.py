@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cspr_jax.plots.labels import COLOURS, STYLES, robot_name
+from cspr_jax.outputs.plots.labels import COLOURS, STYLES, robot_name
 from cspr_jax.store.result import Result
 
 # Of longer plans the lines would hide the rest.

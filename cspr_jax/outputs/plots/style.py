@@ -12,7 +12,7 @@ import matplotlib.style
 from matplotlib.figure import Figure
 
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.plots.fitting import fit
+from cspr_jax.outputs.plots.fitting import fit
 
 # Over matplotlib's own defaults, so that a user's matplotlibrc changes nothing. Letters stay letters: TrueType in PDF,
 # text in SVG, and a dollar sign in a name is no mathematics. Sizes of letters are relative to font.size.

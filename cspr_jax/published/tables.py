@@ -5,13 +5,13 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax import orientation_tables, pose_tables, transition_tables
 from cspr_jax.errors import ConfigError
-from cspr_jax.orientation_tables import Choice
-from cspr_jax.planning import plan
+from cspr_jax.outputs.table_layout import Cell, grid
+from cspr_jax.plans.planning import plan
+from cspr_jax.published import chapter_1, chapter_3, table_3_2
+from cspr_jax.published.chapter_1 import Key
+from cspr_jax.published.chapter_3 import Choice
 from cspr_jax.runtime.stages import within
-from cspr_jax.table_layout import Cell, grid
-from cspr_jax.transition_tables import Key
 
 SCHEMA = 1
 
@@ -36,7 +36,7 @@ class Source:
 
 
 def _table_2_1() -> dict[Key, float | None]:
-    answers = plan(Path(__file__).parent / "published" / "table_2_1.toml").answers
+    answers = plan(Path(__file__).with_name("table_2_1.toml")).answers
     columns = {"feasible_at_infinity": answers.feasible_at_infinity, "p": answers.arcs, "T": answers.duration}
     found: dict[Key, float | None] = {}
     for i, arcs in enumerate(answers.arcs):
@@ -57,18 +57,18 @@ _PUBLISHED_2_1 = {
 TABLES = {
     "1.1": Source(
         "Dion-Gauvin thesis, Table 1.1: oscillations needed at a distance of four radii, horizontal, A1",
-        transition_tables.PUBLISHED["1.1"],
-        transition_tables.table_1_1,
+        chapter_1.PUBLISHED["1.1"],
+        chapter_1.table_1_1,
     ),
     "1.2": Source(
         "Dion-Gauvin thesis, Table 1.2: oscillations needed at various inclinations, sigma R = 1, xi = 1",
-        transition_tables.PUBLISHED["1.2"],
-        transition_tables.table_1_2,
+        chapter_1.PUBLISHED["1.2"],
+        chapter_1.table_1_2,
     ),
     "1.3": Source(
         "Dion-Gauvin thesis, Table 1.3: oscillations needed with various amplitude functions, horizontal",
-        transition_tables.PUBLISHED["1.3"],
-        transition_tables.table_1_3,
+        chapter_1.PUBLISHED["1.3"],
+        chapter_1.table_1_3,
     ),
     "2.1": Source(
         "Dion-Gauvin thesis, Table 2.1: feasibility at infinity, smallest number of arcs, duration (s)",
@@ -81,20 +81,20 @@ TABLES = {
     ),
     "3.2": Source(
         "Dion-Gauvin thesis, Table 3.2: smallest number of arcs and duration (s) with the printed beta-hat",
-        pose_tables.PUBLISHED,
-        pose_tables.table_3_2,
+        table_3_2.PUBLISHED,
+        table_3_2.table_3_2,
     ),
     "3.3": Source(
         "Dion-Gauvin thesis, Table 3.3: accessible and attainable orientations at four places, z0 = z = 1.7 m",
-        orientation_tables.PUBLISHED["3.3"],
-        orientation_tables.table_3_3,
+        chapter_3.PUBLISHED["3.3"],
+        chapter_3.table_3_3,
         with_choice=True,
         transposed=True,
     ),
     "3.4": Source(
         "Dion-Gauvin thesis, Table 3.4: smallest proportion (%) of attainable orientations from 1.5b to 3b, z0 = z",
-        orientation_tables.PUBLISHED["3.4"],
-        orientation_tables.table_3_4,
+        chapter_3.PUBLISHED["3.4"],
+        chapter_3.table_3_4,
         with_choice=True,
     ),
 }
@@ -182,7 +182,7 @@ def chosen(name: str, given: dict[str, Any]) -> Choice | None:
         return otherwise if value is None else tuple(names) if value == "all" else (value,)
 
     return Choice(
-        every("--definition", orientation_tables.DEFINITIONS, usual.definitions),
-        every("--amplitude", orientation_tables.AMPLITUDES, usual.amplitudes),
+        every("--definition", chapter_3.DEFINITIONS, usual.definitions),
+        every("--amplitude", chapter_3.AMPLITUDES, usual.amplitudes),
         2 if given["--fine"] else 1,
     )

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.projections.polar import PolarAxes
 
-from cspr_jax.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar, scale_of
-from cspr_jax.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
-from cspr_jax.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
-from cspr_jax.plots.marks import mark, marked
-from cspr_jax.plots.reasons import VERDICTS, reason_scale
+from cspr_jax.outputs.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar, scale_of
+from cspr_jax.outputs.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
+from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
+from cspr_jax.outputs.plots.marks import mark, marked
+from cspr_jax.outputs.plots.reasons import VERDICTS, reason_scale
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
 

@@ -1,0 +1,1 @@
+"""Plans: the motions that join consecutive poses."""

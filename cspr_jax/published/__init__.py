@@ -1,0 +1,1 @@
+"""Tables of the source texts, computed and beside what is printed."""
