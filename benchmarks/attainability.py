@@ -22,7 +22,7 @@ def main() -> None:
 
     checker = tables.checker_of(options.amplitude)
     places = [np.array([x * tables.RADIUS, y * tables.RADIUS, tables.DEPTH]) for x, y in tables.PLACES.values()]
-    robot = checker.shared.robot
+    robot = checker.problem.robot
     sets = [(place, accessible(robot, place, options.definition, tables.DIVISIONS).angles) for place in places]
     print(f"accessible: {time.perf_counter() - began:.1f} s since the start")
     found = tables.attained(checker, sets)

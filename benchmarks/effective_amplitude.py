@@ -13,9 +13,9 @@ import numpy as np
 from cspr_jax import load_robot
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
-from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.schema.limits import Limits
 from cspr_jax.search.beta_hat import OPTIONS
 from cspr_jax.search.platform_arcs import Candidates, smallest_arcs
 from cspr_jax.search.pose_ends import end_options
@@ -76,7 +76,7 @@ def main() -> None:
     for name, epsilon in [*names, *(("effective-c3", e) for e in EPSILONS)]:
         begun = time.perf_counter()
         amplitude = amplitudes.named(name, epsilon)
-        found = smallest_arcs(PoseChecker(PoseShared(robot, Limits(), amplitude), batch=MANY), some, max_arcs=MAX_ARCS)
+        found = smallest_arcs(PoseChecker(Problem(robot, Limits(), amplitude), batch=MANY), some, max_arcs=MAX_ARCS)
         least = np.zeros(options.segments, int)
         best = np.flatnonzero(found.arcs > 0)
         least[some.motion[best]] = found.arcs[best]

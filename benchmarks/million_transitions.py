@@ -19,16 +19,16 @@ def main() -> None:
 
     jax.config.update("jax_enable_x64", True)
     from cspr_jax.api import load_robot
-    from cspr_jax.feasibility.point_mass.certificate import Shared
-    from cspr_jax.schema.limits import Limits
+    from cspr_jax.feasibility.problem import Problem
+    from cspr_jax.robots.limits import Limits
     from cspr_jax.search.oscillations import minimum_oscillations, transitions_to
     from cspr_jax.trajectories.amplitudes import named
 
     rng, z0 = np.random.default_rng(0), np.full(options.count, 2.0)
     targets = rng.uniform(-3.5, 3.5, (options.count, 3))
     targets[:, 2] = 2.0 * (1.0 + options.inclination)
-    shared = Shared(load_robot("transition-prototype"), Limits(), named("quintic"))
-    answers = minimum_oscillations(shared, transitions_to(shared, targets, z0), z0, max_arcs=MAX_ARCS)
+    problem = Problem(load_robot("transition-prototype"), Limits(), named("quintic"))
+    answers = minimum_oscillations(problem, transitions_to(problem, targets, z0), z0, max_arcs=MAX_ARCS)
     seconds = time.perf_counter() - began
     feasible = int((answers.oscillations > 0).sum())
     fewer = int(((answers.oscillations > 0) & (answers.oscillations < answers.envelope_oscillations)).sum())

@@ -74,7 +74,7 @@ def three_cables(count: int) -> tuple[float, int]:
     ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (count, 3))
     starts = np.broadcast_to(bench.START, ends.shape).copy()
     z0 = np.full(count, bench.Z0)
-    return best(lambda: minimum_arcs(given.shared, starts, ends, z0), repeats=2), bench.checks(count)
+    return best(lambda: minimum_arcs(given.problem, starts, ends, z0), repeats=2), bench.checks(count)
 
 
 if __name__ == "__main__":

@@ -10,9 +10,9 @@ if TYPE_CHECKING:
     from cspr_jax.api import load_robot as load_robot
     from cspr_jax.api import minimum_arcs as minimum_arcs
     from cspr_jax.api import plan as plan
+    from cspr_jax.robots.limits import Limits as Limits
     from cspr_jax.robots.point_mass import point_mass_robot as point_mass_robot
     from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
-    from cspr_jax.schema.limits import Limits as Limits
     from cspr_jax.schema.verdicts import Verdict as Verdict
     from cspr_jax.store.result import open_result as open_result
     from cspr_jax.trajectories.amplitudes import named as amplitude
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "Limits": ("cspr_jax.schema.limits", "Limits"),
+    "Limits": ("cspr_jax.robots.limits", "Limits"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
     "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),

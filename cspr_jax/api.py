@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans import planning
 from cspr_jax.plans.planning import Plan
+from cspr_jax.problem import build_robot, centred, limits_over
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point
-from cspr_jax.schema.limits import Limits
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.point_mass_arcs import minimum_arcs as _minimum_arcs
 from cspr_jax.trajectories.amplitudes import Amplitude, named
@@ -36,7 +36,7 @@ def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
         ConfigError: no such robot, or a mistake in its file.
     """
     spec = resolve_robot(str(reference), reference, Path.cwd())
-    return problem.build_robot(spec, TrajectoryKeys(), reference)
+    return build_robot(spec, TrajectoryKeys(), reference)
 
 
 def plan(path: str | Path) -> Plan:
@@ -94,11 +94,11 @@ def minimum_arcs(
     if given is not None and given.shape not in ((3,), ends.shape):
         raise InputError("start", f"shape {given.shape}", f"finite numbers of shape (3,) or {ends.shape}")
     with double_precision():
-        centred, frame = problem.centred(robot)
+        own, frame = centred(robot)
         starts = rest_point(depth) if given is None else frame.inward(_points("start", np.atleast_2d(given)))
-        shared = Shared(centred, problem.limits_over(robot, limits), amplitude or named("quintic"))
+        problem = Problem(own, limits_over(robot, limits), amplitude or named("quintic"))
         starts = np.broadcast_to(starts, ends.shape).copy()
-        return _minimum_arcs(shared, starts, frame.inward(ends), depth, max_arcs=max_arcs)
+        return _minimum_arcs(problem, starts, frame.inward(ends), depth, max_arcs=max_arcs)
 
 
 def _points(key: str, given) -> np.ndarray:

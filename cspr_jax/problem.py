@@ -12,10 +12,10 @@ from cspr_jax.config.robot import LimitKeys, RobotFile
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.robots import point_mass
+from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
 from cspr_jax.robots.reference_pose import reference_pose
-from cspr_jax.schema.limits import NO_LIMITS, Limits
 from cspr_jax.trajectories import amplitudes
 from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors
 from cspr_jax.trajectories.platform_segment import Kind

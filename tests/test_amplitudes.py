@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from oracles import point_mass as oracle
 
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.point_mass.certificate import Shared
-from cspr_jax.schema.limits import Limits
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.limits import Limits
 from cspr_jax.search.point_mass_arcs import minimum_arcs
 from cspr_jax.trajectories import amplitudes
 
@@ -105,7 +105,7 @@ def test_broken_boundary_conditions_are_named_and_refused(prototype):
     ]:
         assert error in amplitudes.boundary_errors(curve)
         with pytest.raises(InputError) as raised:
-            minimum_arcs(Shared(prototype, Limits(), curve), points, points, z0)
+            minimum_arcs(Problem(prototype, Limits(), curve), points, points, z0)
         assert error in str(raised.value)
     assert len(amplitudes.boundary_errors(CURVES["A1"])) == 1
     slope = amplitudes.from_polynomial([0.0, 1.0])

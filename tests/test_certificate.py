@@ -12,10 +12,11 @@ from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax.feasibility.point_mass import criteria
-from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, Shared, prove, tolerance
+from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, prove, tolerance
 from cspr_jax.feasibility.point_mass.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import point_mass
-from cspr_jax.schema.limits import Limits
+from cspr_jax.robots.limits import Limits
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.amplitudes import named
 
@@ -169,7 +170,7 @@ def check_random_segments(count, seed):
     for name, amplitude in itertools.product(BASES, PRINTED):
         starts, ends, arcs = random_points(rng, name, share)
         mine, theirs = PRINTED[amplitude]
-        proof = prove(Shared(ROBOTS[name], Limits(), mine), segments_of(name, starts, ends, arcs), arcs)
+        proof = prove(Problem(ROBOTS[name], Limits(), mine), segments_of(name, starts, ends, arcs), arcs)
         dense = np.array([dense_margin(name, *segment, theirs) for segment in zip(starts, ends, arcs, strict=True)])
         assert np.array_equal(proof.feasible, dense > 0)
         assert np.array_equal(proof.infeasible, dense < 0)
@@ -220,7 +221,7 @@ def test_verdicts_with_limits_agree_with_dense_samples():
     generous = {key: (0.3 if key == "tension_min" else 1.3) * value for key, value in chosen.items()}
     passed = taut & np.array([all(within(key, f[ATTAINED[key]], generous[key]) for key in ATTAINED) for f in found])
     for values, wanted in [({key: chosen[key]}, met[key]) for key in met] + [(generous, passed)]:
-        proof = prove(Shared(ROBOTS[name], limits_of(values), QUINTIC), segments, arcs)
+        proof = prove(Problem(ROBOTS[name], limits_of(values), QUINTIC), segments, arcs)
         assert np.array_equal(proof.feasible, wanted), values
         assert np.array_equal(proof.infeasible, ~wanted), values
         assert 10 < wanted.sum() < taut.sum()
@@ -229,13 +230,13 @@ def test_verdicts_with_limits_agree_with_dense_samples():
 def test_undecided_only_within_the_tolerance():
     """Closing in on a margin of zero: infeasible, undecided, feasible in this order, the band as narrow as stated."""
     name, end, arcs, n = "prototype", np.array([-1.1, -0.9, 1.5]), 2, 1001
-    shared = Shared(ROBOTS[name], Limits(), QUINTIC)
+    problem = Problem(ROBOTS[name], Limits(), QUINTIC)
     low, high = 0.2, 0.6  # z of the start; it is 0.5 in Table 2.1
     for _ in range(4):
         z = np.linspace(low, high, n)
         starts = np.c_[np.full((n, 2), -1.1), z]
         segments, many = segments_of(name, starts, np.tile(end, (n, 1)), np.full(n, arcs)), np.full(n, arcs)
-        proof = prove(shared, segments, many)
+        proof = prove(problem, segments, many)
         verdict = proof.feasible.astype(int) - proof.infeasible.astype(int)
         assert verdict[0] == -1
         assert verdict[-1] == 1

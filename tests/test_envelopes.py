@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cspr_jax.cli import main
-from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.feasibility.point_mass.margins import margins
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.feasibility.transition.envelopes import lower_envelope, proved_envelope
 from cspr_jax.feasibility.transition.margins import transition_margins
-from cspr_jax.schema.limits import Limits
+from cspr_jax.robots.limits import Limits
 from cspr_jax.search.oscillations import transitions_to
 from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.amplitudes import derivatives, named
@@ -198,11 +198,11 @@ def test_what_envelopes_prove(name):
 @pytest.mark.parametrize("name", ["A1", "quintic", "effective"])
 def test_margins_of_transitions_from_two_functions(name, tilted):
     """The same as from the slack of each cable and the depth, where feasible and where not."""
-    shared = Shared(tilted, Limits(), named(name, 0.1 if name == "effective" else None))
+    problem = Problem(tilted, Limits(), named(name, 0.1 if name == "effective" else None))
     rng = np.random.default_rng(7)
     targets = rng.uniform([-4.0, -4.0, 0.2], [4.0, 4.0, 3.4], (300, 3))
-    segments, arcs = transitions_to(shared, targets, np.full(300, 1.6)), 2 * rng.integers(1, 9, 300)
-    found, wanted = transition_margins(shared, segments, arcs), margins(shared, segments, arcs)
+    segments, arcs = transitions_to(problem, targets, np.full(300, 1.6)), 2 * rng.integers(1, 9, 300)
+    found, wanted = transition_margins(problem, segments, arcs), margins(problem, segments, arcs)
     assert 50 < (wanted.min(1) > 0.0).sum() < 250
     np.testing.assert_allclose(found.min(1), wanted.min(1), atol=1e-9, rtol=1e-9)
     negative = wanted.min(1) <= 0.0

@@ -11,8 +11,8 @@ from test_platform import MSSM, Z0, made, ours
 
 from cspr_jax.feasibility.platform import prefilter
 from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.schema.limits import Limits
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.limits import Limits
 from cspr_jax.search.platform_arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import Kind
@@ -21,7 +21,7 @@ BENDS, ARCS = 5, 8
 
 
 def checker_of(robot, *, batch=512):
-    return PoseChecker(PoseShared(ours(robot), Limits(), named("quintic")), Kind(from_rest=True), batch=batch)
+    return PoseChecker(Problem(ours(robot), Limits(), named("quintic")), Kind(from_rest=True), batch=batch)
 
 
 def candidates(robot, rng, count):
@@ -41,7 +41,7 @@ def test_the_search_is_the_full_search():
     robot, motions, rng = MSSM, 500, np.random.default_rng(3)
     checker, full = checker_of(robot), checker_of(robot)
     given = candidates(robot, rng, motions)
-    segments, every = _Segments(full.shared.robot, given), np.arange(motions * BENDS)
+    segments, every = _Segments(full.problem.robot, given), np.arange(motions * BENDS)
     passes = np.zeros((ARCS + 1, len(every)), bool)
     for arcs in range(1, ARCS + 1):
         passes[arcs] = full.check(segments(arcs, every), np.full(len(every), arcs)).verdict == 0
@@ -62,8 +62,8 @@ def test_the_search_is_the_full_search():
 def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     """Instants of every kind; with a float32 that is wrong on purpose, less is refuted but never more."""
     checker, rng = checker_of(MSSM), np.random.default_rng(4)
-    checker = PoseChecker(checker.shared, kind, batch=64)
-    segments = _Segments(checker.shared.robot, candidates(MSSM, rng, 60))(6, np.arange(300))
+    checker = PoseChecker(checker.problem, kind, batch=64)
+    segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 60))(6, np.arange(300))
     tau = np.linspace(1.0, 0.0, 37)
     lowest = checker.look.lowest(segments, 6, tau)
     wanted = lowest <= -1e-7
@@ -99,7 +99,7 @@ def test_segments_of_candidates():
 
 def test_more_instants_refute_more():
     checker, rng = checker_of(MSSM, batch=64), np.random.default_rng(5)
-    segments = _Segments(checker.shared.robot, candidates(MSSM, rng, 40))(5, np.arange(200))
+    segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 40))(5, np.arange(200))
     found = [checker.look.refuted(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
     assert all(not (a & ~b).any() for a, b in pairwise(found))
 
@@ -113,10 +113,10 @@ def test_the_size_of_the_robot_changes_nothing(scale):
         checker, given = checker_of(robot, batch=64), candidates(MSSM, np.random.default_rng(6), 60)
         start, end = ((place * unit, turn) for place, turn in (given.start, given.end))
         given = given._replace(start=start, end=end, z0=given.z0 * unit)
-        segments = _Segments(checker.shared.robot, given)(5, np.arange(300))
+        segments = _Segments(checker.problem.robot, given)(5, np.arange(300))
         sizes.append(checker.look.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
         rough, _ = prefilter.smallest_tensions(
-            checker.shared.robot,
+            checker.problem.robot,
             named("quintic"),
             5.0,
             np.linspace(0.1, 1.0, 8),

@@ -12,10 +12,11 @@ from oracles import point_mass as oracle
 
 from cspr_jax.arithmetic.elementary import vertex
 from cspr_jax.feasibility.point_mass import criteria
-from cspr_jax.feasibility.point_mass.certificate import Shared, prove
+from cspr_jax.feasibility.point_mass.certificate import prove
 from cspr_jax.feasibility.point_mass.margins import margins
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import point_mass
-from cspr_jax.schema.limits import Limits
+from cspr_jax.robots.limits import Limits
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.amplitudes import from_pieces, named
 
@@ -66,9 +67,9 @@ def measured():
     for seed, (name, amplitude) in enumerate(CASES):
         starts, ends, arcs, segments = random_segments(name, seed)
         mine, theirs = PRINTED[amplitude]
-        shared = Shared(ROBOTS[name], Limits(), mine)
+        problem = Problem(ROBOTS[name], Limits(), mine)
         wanted = [reference(BASES[name], *s, theirs) for s in zip(starts, ends, arcs, strict=True)]
-        table[name, amplitude] = margins(shared, segments, arcs), prove(shared, segments, arcs), np.array(wanted)
+        table[name, amplitude] = margins(problem, segments, arcs), prove(problem, segments, arcs), np.array(wanted)
     return table
 
 
@@ -93,7 +94,7 @@ def test_margins_do_not_depend_on_where_the_samples_lie():
     quintic = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
     in_pieces = from_pieces("quintic in pieces", (0.237, 0.611), (0.0, 0.0, 0.0), (quintic, quintic, quintic))
     _, _, arcs, segments = random_segments("prototype", 9, 200)
-    one, other = (margins(Shared(ROBOTS["prototype"], Limits(), a), segments, arcs) for a in (QUINTIC, in_pieces))
+    one, other = (margins(Problem(ROBOTS["prototype"], Limits(), a), segments, arcs) for a in (QUINTIC, in_pieces))
     np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-5)
 
 
@@ -102,11 +103,13 @@ def test_margins_of_limits():
     name, limit = "prototype", {"tension_min": 0.5, "tension_max": 9.0, "cable_length_max": 2.4}
     limit |= {"cable_speed_max": 4.0, "cable_acceleration_max": 12.0}
     limits = Limits(**{key: np.full(3, value) for key, value in limit.items()}, floor=np.asarray(3.1))
-    shared = Shared(ROBOTS[name], limits, QUINTIC)
+    problem = Problem(ROBOTS[name], limits, QUINTIC)
     starts, ends, arcs, segments = random_segments(name, 7)
-    found = margins(shared, segments, arcs)
+    found = margins(problem, segments, arcs)
     assert found.shape == (N, len(criteria.flags(limits))) == (N, 8)
-    at = jax.vmap(jax.vmap(lambda s, p, t: jnp.stack(criteria.slacks(*shared, s, p, t)), (None, None, 0)), (0, 0, None))
+    at = jax.vmap(
+        jax.vmap(lambda s, p, t: jnp.stack(criteria.slacks(*problem, s, p, t)), (None, None, 0)), (0, 0, None)
+    )
     dense = np.asarray(jax.jit(at)(segments, arcs.astype(float), np.linspace(0.0, 1.0, 4001))).min(1)
     assert (found <= dense + 1e-3 * (1.0 + np.abs(dense))).all()
     assert (found >= dense - 1e-3 * (1.0 + np.abs(dense))).all()
@@ -118,12 +121,12 @@ def test_margins_of_limits():
 
 def test_order_of_the_segments_does_not_matter():
     """Segments are sorted by arcs inside: answers must come back in the caller's order."""
-    shared = Shared(ROBOTS["prototype"], Limits(), QUINTIC)
+    problem = Problem(ROBOTS["prototype"], Limits(), QUINTIC)
     _, _, arcs, segments = random_segments("prototype", 5)
     mixed = np.random.default_rng(6).permutation(N)
     shuffled = jax.tree.map(lambda leaf: leaf[mixed], segments)
-    assert np.array_equal(margins(shared, shuffled, arcs[mixed]), margins(shared, segments, arcs)[mixed])
-    one, other = prove(shared, segments, arcs), prove(shared, shuffled, arcs[mixed])
+    assert np.array_equal(margins(problem, shuffled, arcs[mixed]), margins(problem, segments, arcs)[mixed])
+    one, other = prove(problem, segments, arcs), prove(problem, shuffled, arcs[mixed])
     for field in ("feasible", "infeasible", "sampled", "bound"):
         assert np.array_equal(getattr(one, field)[mixed], getattr(other, field))
 

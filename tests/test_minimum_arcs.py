@@ -9,9 +9,9 @@ from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import point_mass
-from cspr_jax.schema.limits import Limits
+from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.point_mass_arcs import minimum_arcs
 from cspr_jax.trajectories.amplitudes import named
@@ -26,8 +26,8 @@ NO_LIMITS = Limits()
 
 def answer(starts, ends, limits=NO_LIMITS, base=BASE, z0=Z0, mass=0.198, **options):
     starts, ends = np.atleast_2d(np.asarray(starts, float)), np.atleast_2d(np.asarray(ends, float))
-    shared = Shared(point_mass.point_mass_robot(base, mass=mass), limits, QUINTIC)
-    return minimum_arcs(shared, starts, ends, np.full(len(starts), z0), **options)
+    problem = Problem(point_mass.point_mass_robot(base, mass=mass), limits, QUINTIC)
+    return minimum_arcs(problem, starts, ends, np.full(len(starts), z0), **options)
 
 
 def random_points(seed, n, far=1.1, deep=3.2, high=0.2):

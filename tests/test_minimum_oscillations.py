@@ -9,10 +9,10 @@ import pytest
 from conftest import equilateral
 
 from cspr_jax.cli import main
-from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import force_balance
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
-from cspr_jax.schema.limits import Limits
 from cspr_jax.search.oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.amplitudes import named
@@ -51,8 +51,8 @@ def test_whole_oscillations_against_the_force_balance(robot):
     targets = np.stack([rng.uniform(-2.5, 2.5, count), rng.uniform(-2.5, 2.5, count), rng.uniform(0.3, 3.0, count)], 1)
     if robot is PLANAR:
         targets[:, 1] = 0.0
-    shared, depth = Shared(robot, Limits(), named("A1")), np.full(count, z0)
-    found = minimum_oscillations(shared, transitions_to(shared, targets, depth), depth)
+    problem, depth = Problem(robot, Limits(), named("A1")), np.full(count, z0)
+    found = minimum_oscillations(problem, transitions_to(problem, targets, depth), depth)
     assert (found.oscillations > 0).all() and (found.oscillations <= found.envelope_oscillations).all()
     assert (found.oscillations < found.envelope_oscillations).any()
     for target, n in zip(targets, found.oscillations, strict=True):
@@ -78,9 +78,9 @@ def test_planar_tensions():
 
 
 def real(robot, targets, z0, name="quintic"):
-    shared = Shared(robot, Limits(), named(name))
+    problem = Problem(robot, Limits(), named(name))
     depth = np.broadcast_to(np.asarray(z0, float), len(targets)).copy()
-    return minimum_oscillations(shared, transitions_to(shared, targets, depth), depth, max_arcs=2)
+    return minimum_oscillations(problem, transitions_to(problem, targets, depth), depth, max_arcs=2)
 
 
 @pytest.mark.soak
@@ -102,7 +102,7 @@ def test_symmetries():
             bearing = mirror * angle + turn * np.pi / 3.0 + np.pi / 2.0
             points = np.stack([radius * np.cos(bearing), radius * np.sin(bearing), np.full(12, 2.0)], 1)
             level = real(SPATIAL, points, 2.0).least_oscillations
-            v = np.abs(best_inclinations(Shared(SPATIAL, Limits(), named("quintic")), points))
+            v = np.abs(best_inclinations(Problem(SPATIAL, Limits(), named("quintic")), points))
             first, second = (level, v) if first is None else (first, second)
             np.testing.assert_allclose(level, first, rtol=1e-9)
             np.testing.assert_allclose(v, second, atol=1e-6)

@@ -36,7 +36,7 @@ def planned(folder):
     plan = cspr_jax.plan(folder / "plan.toml")
     rows = motion_files.rows(plan)
     assert (plan.answers.verdict == 0).all()
-    return Motion(plan.shared.robot, {name: x.reshape(2, SAMPLES, *x.shape[1:]) for name, x in rows.items()})
+    return Motion(plan.problem.robot, {name: x.reshape(2, SAMPLES, *x.shape[1:]) for name, x in rows.items()})
 
 
 def asymmetrical(_):

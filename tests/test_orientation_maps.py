@@ -11,10 +11,10 @@ from test_platform import MSSM, ours
 from test_pose_plans import cspr
 
 from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.outputs.plots.reasons import reasons
 from cspr_jax.published import chapter_3
-from cspr_jax.schema.limits import Limits
+from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.accessible import accessible
 from cspr_jax.search.attainable import attainable
@@ -72,7 +72,7 @@ def test_maps_of_places(tmp_path):
     code, out, err = swept(tmp_path)
     assert code == 0, err
     data = {name: values[0, 0] for name, values in open_result(Path(out.split()[-1])).data.items()}
-    checker = PoseChecker(PoseShared(ours(MSSM), Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    checker = PoseChecker(Problem(ours(MSSM), Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
     for i, azimuth in enumerate((0.2, 0.8471975511965976, 1.5)):
         there = place(1.5, azimuth)
         inside = accessible(ours(MSSM), there, "scan", 6)
@@ -144,7 +144,7 @@ def test_a_map_of_every_orientation(tmp_path):
     seen = (verdict & Verdict.NOT_ACCESSIBLE.value) == 0
     assert seen[:, :, 1:].sum() + seen[:, 0, 0].sum() == len(inside.angles)
     sigma, phi, theta = (result.axes[name] for name in ("torsion", "tilt_azimuth", "tilt"))
-    checker = PoseChecker(PoseShared(ours(MSSM), Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    checker = PoseChecker(Problem(ours(MSSM), Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
     some = np.argwhere(seen)[::7]
     angles = np.array([[phi[j], theta[k], sigma[i]] for i, j, k in some])
     many, z0 = np.tile(there, (len(some), 1)), np.full(len(some), 1.7)

@@ -16,9 +16,9 @@ from test_platform import MSSM, ours
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.orientation_steps import Watch
-from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
-from cspr_jax.schema.limits import Limits
 from cspr_jax.search.accessible import DEFINITIONS, accessible
 from cspr_jax.search.attainable import attainable, attained
 from cspr_jax.search.orientation_grids import equal_volume_grid, tilt_torsion_grid
@@ -182,7 +182,7 @@ def test_nothing_is_accessible_above_the_spools():
 def test_attained_orientations():
     """More arcs allowed attain no fewer, and the same numbers where found; margins are positive where attained."""
     robot = ours(MSSM)
-    checker = PoseChecker(PoseShared(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    checker = PoseChecker(Problem(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
     there = place(1.5, 0.0)
     inside = accessible(robot, there, "scan", 8)
     many, z0 = np.tile(there, (len(inside.angles), 1)), np.full(len(inside.angles), 1.7)
@@ -214,7 +214,7 @@ def test_orientations_that_a_mirror_joins():
     mirrored = np.abs(mirror @ turns[stands] @ mirror - turns).max((1, 2)) < 1e-8
     assert (same | mirrored).all()
     assert (alike(symmetries(robot), where + np.array([0.1, 0.0]), angles) == np.arange(len(angles))).all()
-    checker = PoseChecker(PoseShared(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    checker = PoseChecker(Problem(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
     many, z0 = np.tile(there, (len(angles), 1)), np.full(len(angles), 1.7)
     once, twice = (
         attainable(checker, many, angles, z0, max_arcs=8, values=4, found=found) for found in (symmetries(robot), NONE)
@@ -228,7 +228,7 @@ def test_orientations_that_a_mirror_joins():
 def test_a_dip_beside_a_singularity():
     """A tension that is negative for a thousandth of the motion, near a nearly singular end: four arcs are too few."""
     robot, there, angles = ours(MSSM), place(1.5, math.pi / 2.0), np.array([[0.67737013, 0.40312747, -1.6689711]])
-    checker = PoseChecker(PoseShared(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    checker = PoseChecker(Problem(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
     found = attainable(checker, there[None], angles, np.array([1.7]), max_arcs=8, values=4)
     turned = from_tilt_torsion(angles[0] + np.array([math.pi / 2.0, 0.0, 0.0]))
     way = (np.array([0.0, 0.0, 1.7]), there, 1.7, np.eye(4)[0], turned)
@@ -242,7 +242,7 @@ def test_a_dip_beside_a_singularity():
 def test_verdicts_are_the_oracle_s():
     """2,000 random orientations: the smallest number of arcs, over all values of beta-hat, is the oracle's."""
     robot, rng, close, attained = ours(MSSM), np.random.default_rng(21), 0, 0
-    checker = PoseChecker(PoseShared(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True), batch=1024)
+    checker = PoseChecker(Problem(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True), batch=1024)
     for radius, azimuth in ((1.5, 0.0), (3.0, 0.0), (1.5, math.pi / 2.0), (2.2, 0.4)):
         there = place(radius, azimuth)
         angles = accessible(robot, there, "scan", 32).angles

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import platform as oracle
 
-from cspr_jax import problem
 from cspr_jax.arithmetic import rotations
 from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.platform.end_acceleration import endpoint
 from cspr_jax.feasibility.platform.prefilter import smallest_tensions
+from cspr_jax.problem import platform_of
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import pairs_apart, platform_robot
 from cspr_jax.robots.reference_pose import reference_pose
@@ -269,7 +269,7 @@ def test_the_catalogue_hangs_still(name):
     """Every six-cable robot of the catalogue is in equilibrium in its reference orientation, with equal tensions."""
     path = CATALOGUE / f"{name}.toml"
     spec = read_robot(path)
-    robot = problem.platform_of(spec, TrajectoryKeys(), path)
+    robot = platform_of(spec, TrajectoryKeys(), path)
     span = np.linalg.norm(robot.base_points, axis=1).max()
     for depth in (1.0, 3.0):
         found = reference_pose(robot, depth * span)

@@ -11,11 +11,12 @@ from test_platform import MSSM, Z0, general, made, ours, random_pose, states
 from test_pose_plans import HEAD, SHORT, cspr, planned
 
 from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, still_slacks
-from cspr_jax.feasibility.platform.slacks import PoseShared, pose_slacks
+from cspr_jax.feasibility.platform.slacks import pose_slacks
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.planning import plan
 from cspr_jax.robots import contact_lanes, interference, wrench_balance
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.wrench_lanes import cables
-from cspr_jax.schema.limits import Limits
 from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_lanes import instant, instant_of_arc, state
@@ -100,7 +101,7 @@ def test_lanes_are_the_readable_slacks(robot):
     """Every criterion with every limit, and what meets, at random instants of random motions."""
     package, rng, amplitude = ours(robot), np.random.default_rng(3), named("quintic")
     limits = Limits(floor=np.asarray(2.0), **{name: np.full(6, x) for name, x in ALL_LIMITS.items()})
-    shared, near = PoseShared(package, limits, amplitude), interference.contacts(package)
+    problem, near = Problem(package, limits, amplitude), interference.contacts(package)
     p, tau = 5, np.linspace(0.03, 0.97, 9)
     some = [made(package, random_pose(rng), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p) for _ in range(12)]
     batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
@@ -109,8 +110,8 @@ def test_lanes_are_the_readable_slacks(robot):
         now = instant(amplitude, batch.sense, np.full(12, float(p)), np.full(12, t))
         here = state(batch, np.full(12, float(p)), now, USUAL)
         wires = cables(package, here.position, here.turn)
-        found = moving_slacks(shared, batch, jnp.full(12, float(p)), now, USUAL) + still_slacks(
-            shared, batch, here, wires
+        found = moving_slacks(problem, batch, jnp.full(12, float(p)), now, USUAL) + still_slacks(
+            problem, batch, here, wires
         )
         found = np.stack(found)[order(limits)]
         gaps = np.stack([np.stack(v, -1) for v in contact_lanes.gaps(package.base_points, near.pairs, wires)], 1)
@@ -118,7 +119,7 @@ def test_lanes_are_the_readable_slacks(robot):
         for i, segment in enumerate(some):
             at = jax.tree.map(lambda x: x[0], states(package, segment, amplitude, float(p), np.array([t])))
             pose = wrench_balance.Pose(*at)
-            wanted = np.asarray(pose_slacks(shared, pose, jnp.asarray(Z0), segment.regular))
+            wanted = np.asarray(pose_slacks(problem, pose, jnp.asarray(Z0), segment.regular))
             if abs(wanted[1]) > 1e-3:
                 np.testing.assert_allclose(found[:, i], wanted, rtol=1e-7, atol=1e-8)
                 seen += 1

@@ -19,10 +19,11 @@ from test_platform import MSSM, Z0, made, ours, random_pose
 
 from cspr_jax.cli import main
 from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.platform.slacks import PoseShared, pose_slacks
+from cspr_jax.feasibility.platform.slacks import pose_slacks
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.published import table_3_2
 from cspr_jax.robots.interference import cables_cross, contacts, gaps, platform_hit, views
-from cspr_jax.schema.limits import Limits
+from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.beta_hat import LARGEST, cheapest_path, options
 from cspr_jax.search.platform_arcs import Candidates, smallest_arcs
@@ -54,11 +55,11 @@ def checker():
 
 
 def checker_with(amplitude, limits=None):
-    return PoseChecker(PoseShared(ours(MSSM), limits or Limits(), amplitude))
+    return PoseChecker(Problem(ours(MSSM), limits or Limits(), amplitude))
 
 
 def checked(checker, start, end, bends, p):
-    segment = made(checker.shared.robot, start, end, Z0, bends, p)
+    segment = made(checker.problem.robot, start, end, Z0, bends, p)
     return checker.check(jax.tree.map(lambda x: np.asarray(x)[None], segment), np.array([p]))
 
 
@@ -105,14 +106,14 @@ def test_verdicts_do_not_change_with_more_samples(checker, monkeypatch):
 
 
 @jax.jit
-def everything(shared, pairs, segment, arcs, tau):
+def everything(problem, pairs, segment, arcs, tau):
     """All criteria, the vectors between cables, and the views of cables, by the readable functions."""
 
     def one(t):
-        pose = motion(segment, shared.amplitude, arcs, t)
-        where = (shared.robot, pose.position, pose.rotation)
-        slack = pose_slacks(shared, pose, shared.robot.gravity / segment.rate, segment.regular)
-        return slack, gaps(shared.robot, pairs, *where[1:]), views(*where)
+        pose = motion(segment, problem.amplitude, arcs, t)
+        where = (problem.robot, pose.position, pose.rotation)
+        slack = pose_slacks(problem, pose, problem.robot.gravity / segment.rate, segment.regular)
+        return slack, gaps(problem.robot, pairs, *where[1:]), views(*where)
 
     return jax.vmap(one)(tau)
 
@@ -125,7 +126,7 @@ def test_verdicts_against_dense_samples(checker):
         p = int(rng.integers(2, 13))
         start = random_pose(rng, rest=True) if i % 2 else near_pose(rng)
         cases.append((start, near_pose(rng), (-1.0 if i % 2 else rng.uniform(-8.0, 2.0), rng.uniform(-8.0, 2.0)), p))
-    robot, near = checker.shared.robot, contacts(checker.shared.robot)
+    robot, near = checker.problem.robot, contacts(checker.problem.robot)
     some = [made(robot, start, end, Z0, bends, p) for start, end, bends, p in cases]
     batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
     verdicts = checker.check(batch, np.array([p for *_, p in cases])).verdict
@@ -133,7 +134,7 @@ def test_verdicts_against_dense_samples(checker):
     for i, (segment, (*_, p), verdict) in enumerate(zip(some, cases, verdicts, strict=True)):
         if verdict & Verdict.UNDECIDED:
             continue
-        found = everything(checker.shared, jnp.asarray(near.pairs), segment, float(p), tau)
+        found = everything(checker.problem, jnp.asarray(near.pairs), segment, float(p), tau)
         slack, gap, view = (np.asarray(x) for x in found)
         dense = (slack > 0.0).all() and not cables_cross(gap[:-1], gap[1:]).any()
         dense = dense and not platform_hit(near.sides, near.normal, view[:-1], view[1:]).any()

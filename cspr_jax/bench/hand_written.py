@@ -122,7 +122,7 @@ def _three_cables(kernel: Callable, work: three_cables.Work) -> float:
         s = jax.tree.map(np.asarray, segments)
         fields = [s.start_radius, s.end_radius - s.start_radius, s.precession, s.sense, *s.tilt.T]
         fields += [*s.pull.reshape(-1, 6).T, *s.twist.T]
-        table = arc_sieve.sample_table(work.shared.amplitude, arcs, tau, np.float32)
+        table = arc_sieve.sample_table(work.problem.amplitude, arcs, tau, np.float32)
         given = [_lined(x) for x in (np.stack(fields), table, arcs, tau)]
         found = _lined(np.zeros((len(arcs), len(s.rate))))
         sizes = ctypes.c_size_t(len(s.rate)), ctypes.c_int(len(arcs)), ctypes.c_int(len(tau))
@@ -130,7 +130,7 @@ def _three_cables(kernel: Callable, work: three_cables.Work) -> float:
         kept.append((given, found))
         few = jax.tree.map(lambda x: x[: arc_sieve.BATCH], s)
         _compare(
-            "three_cables.cpp", found, calls[-1], arc_sieve.smallest_sampled(work.shared.amplitude, few, arcs, tau)
+            "three_cables.cpp", found, calls[-1], arc_sieve.smallest_sampled(work.problem.amplitude, few, arcs, tau)
         )
     return three_cables.checks(len(work.ends)) / best(lambda: [call() for call in calls])
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_threads
 from cspr_jax.bench.timing import best
-from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import point_mass_robot
-from cspr_jax.schema.limits import Limits
 from cspr_jax.search import arc_sieve
 from cspr_jax.search.point_mass_arcs import segments_between
 from cspr_jax.trajectories import amplitudes
@@ -32,12 +32,12 @@ class Work(NamedTuple):
     """What is measured.
 
     Fields:
-        shared: robot and amplitude function.
+        problem: robot and amplitude function.
         ends: (n, 3) m.
         segments: for even numbers of arcs and for odd ones, leaves (n, ...).
     """
 
-    shared: Shared
+    problem: Problem
     ends: np.ndarray
     segments: tuple[Segment, Segment]
 
@@ -50,11 +50,11 @@ def work() -> Work:
     """
     half = math.sqrt(3.0) / 2.0
     base = RADIUS * np.array([[half, -0.5, 0.0], [-half, -0.5, 0.0], [0.0, 1.0, 0.0]])
-    shared = Shared(point_mass_robot(base, mass=0.198), Limits(), amplitudes.named("quintic"))
+    problem = Problem(point_mass_robot(base, mass=0.198), Limits(), amplitudes.named("quintic"))
     ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * arc_sieve.BATCH, 3))
     starts = np.broadcast_to(START, ends.shape).copy()
-    found, _ = segments_between(shared, starts, ends, np.full(len(ends), Z0))
-    return Work(shared, ends, (found[0], found[1]))
+    found, _ = segments_between(problem, starts, ends, np.full(len(ends), Z0))
+    return Work(problem, ends, (found[0], found[1]))
 
 
 def rate(given: Work, dtype: str) -> float:
@@ -71,7 +71,7 @@ def rate(given: Work, dtype: str) -> float:
     batches = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::BATCHES], pair)) for i in range(BATCHES)]
 
     def one(batch):
-        return jax.block_until_ready(arc_sieve.upper_bounds(given.shared.amplitude, *batch, max_arcs=MAX_ARCS))
+        return jax.block_until_ready(arc_sieve.upper_bounds(given.problem.amplitude, *batch, max_arcs=MAX_ARCS))
 
     return checks(len(given.ends)) / best(partial(in_threads, one, batches))
 
@@ -98,7 +98,7 @@ def numpy_rate(given: Work) -> float:
         the rate.
     """
     ends = given.ends[:NUMPY_SEGMENTS]
-    return checks(len(ends)) / best(partial(_numpy_checks, np.asarray(given.shared.robot.base_points), ends))
+    return checks(len(ends)) / best(partial(_numpy_checks, np.asarray(given.problem.robot.base_points), ends))
 
 
 def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ def nearest(given: str, allowed: Iterable[str]) -> str | None:
         words = [word.replace("height", "floor") for word in words]
     if words:
         # Among equals the one with the same letters.
-        ranked = [(_shared(words, _words(name)), _letters(given, name), name) for name in names]
+        ranked = [(_problem(words, _words(name)), _letters(given, name), name) for name in names]
         best = max(ranked, default=(0.0, 0.0, ""))
         if best[0] > ENOUGH:
             return best[2]
@@ -85,7 +85,7 @@ def _letters(first: str, second: str) -> float:
     return difflib.SequenceMatcher(None, first, second).ratio()
 
 
-def _shared(first: list[str], second: list[str]) -> float:
+def _problem(first: list[str], second: list[str]) -> float:
     # Words that both have, over all words of both.
     left, count = list(second), 0
     for word in first:

@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.feasibility.point_mass.blocks import INTERVALS, blocks
-from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.feasibility.point_mass.margins import Functions, smallest_values
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import force_balance
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories import hypocycloid
@@ -64,11 +64,11 @@ def _groups(n_cables: int) -> tuple[int, ...]:
     return (n_cables, n_cables, n_cables, 1, 1, n_cables, 2 * n_cables, 2 * n_cables)
 
 
-def extremes(shared: Shared, segments: Segment, arcs: np.ndarray, least_samples: int) -> Extremes:
+def extremes(problem: Problem, segments: Segment, arcs: np.ndarray, least_samples: int) -> Extremes:
     """What segments ask of the robot: at least 64 samples an arc, refined where a value is extreme.
 
     Args:
-        shared: robot, limits and amplitude.
+        problem: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,).
         least_samples: smallest number of samples of a segment.
@@ -77,9 +77,9 @@ def extremes(shared: Shared, segments: Segment, arcs: np.ndarray, least_samples:
         the extremes.
     """
     stage("extremes along the motion")
-    table = blocks(shared.amplitude, int(arcs.max()), density=4, least=-(-least_samples // INTERVALS))
-    functions = Functions(_demands, _groups(len(shared.robot.base_points)))
-    found = smallest_values(functions, shared, segments, arcs, table, batch=BATCH)
+    table = blocks(problem.amplitude, int(arcs.max()), density=4, least=-(-least_samples // INTERVALS))
+    functions = Functions(_demands, _groups(len(problem.robot.base_points)))
+    found = smallest_values(functions, problem, segments, arcs, table, batch=BATCH)
     columns = (found * SIGNS + 0.0).T  # no -0
     names = [field.name for field in dataclasses.fields(Extremes)][:-1]
     return Extremes(**dict(zip(names, columns, strict=True)), samples=table[1][arcs] * INTERVALS + 1)

@@ -26,7 +26,12 @@ class CellMap(PointMassMap):
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         starts, ends = self._starts(cells), self._targets(cells)
         answers = minimum_arcs(
-            self._shared, starts, ends, cells["z0"], max_arcs=self._keys.trajectory.max_arcs, dtype=self._keys.run.dtype
+            self._problem,
+            starts,
+            ends,
+            cells["z0"],
+            max_arcs=self._keys.trajectory.max_arcs,
+            dtype=self._keys.run.dtype,
         )
         return vars(answers)
 
@@ -47,10 +52,10 @@ class CellMap(PointMassMap):
 
     def _refuse_long(self, grid: Grid) -> None:
         # The nearest point of a product grid to a spool is nearest in each coordinate.
-        longest = self._shared.limits.cable_length_max
+        longest = self._problem.limits.cable_length_max
         if longest is None or "radius" in grid.axes:
             return
-        base = self._frame.outward(self._shared.robot.base_points)
+        base = self._frame.outward(self._problem.robot.base_points)
         for cable in range(len(base)):
             gaps = [np.abs(grid.axes[name] - base[cable, i]).min() for i, name in enumerate("xyz")]
             if np.linalg.norm(gaps) > np.asarray(longest)[cable]:

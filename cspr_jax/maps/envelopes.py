@@ -48,10 +48,10 @@ class EnvelopeMap(OscillationMap):
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         targets = self._targets(cells)
         z0 = self._depths(cells, targets)
-        segments = transitions_to(self._shared, targets, z0)
+        segments = transitions_to(self._problem, targets, z0)
         v, w = np.asarray(inclination(segments)), np.asarray(weights(segments))
         cable = np.asarray(cells.get("cable", np.zeros(len(v)))).astype(int)
-        kernel = partial(_instants, self._shared.amplitude)
+        kernel = partial(_instants, self._problem.amplitude)
         n, squared, envelope = in_batches(kernel, (w, v, cells["tau"], cable), size=BATCH)
         return {
             "least_oscillations": n,
@@ -63,7 +63,7 @@ class EnvelopeMap(OscillationMap):
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse cables that the robot has not; see `GridMap.refuse_hopeless`."""
-        n_cables = self._shared.robot.base_points.shape[0]
+        n_cables = self._problem.robot.base_points.shape[0]
         if "cable" in grid.axes and not np.isin(grid.axes["cable"], np.arange(1, n_cables + 1)).all():
             raise ConfigError(self._file, f"axes.cable: must be numbers of cables, from 1 to {n_cables}")
         super().refuse_hopeless(grid)

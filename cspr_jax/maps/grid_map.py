@@ -5,24 +5,23 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.problem import build_amplitude, build_limits, platform_of, point_mass_of
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.amplitudes import Amplitude
 
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
-SharedKind = TypeVar("SharedKind", Shared, PoseShared)
+SharedKind = TypeVar("SharedKind", Problem, Problem)
 OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
 
@@ -43,9 +42,9 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         """Build what all tiles share."""
         self._keys, self._file = keys, file
         self._frame = frame_of(spec.base_points, spec.z_axis)
-        amplitude = problem.build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=for_bounds)
-        limits = problem.build_limits(spec, keys.limits, keys.limits.floor, file)
-        self._shared: SharedKind = self._built(spec, limits, amplitude)
+        amplitude = build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=for_bounds)
+        limits = build_limits(spec, keys.limits, keys.limits.floor, file)
+        self._problem: SharedKind = self._built(spec, limits, amplitude)
 
     @abc.abstractmethod
     def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> SharedKind:
@@ -105,7 +104,7 @@ class GridMap(abc.ABC, Generic[SharedKind]):
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         # Cells among which depths and heights have their extremes. Of azimuths the one down the slope of the spool
         # plane stands for all: no other target is deeper below it.
-        slope = self._frame.turned(plane_normal(self._shared.robot))
+        slope = self._frame.turned(plane_normal(self._problem.robot))
         axes = {
             name: np.array([points.min(), points.max()]) if name != "azimuth" else np.arctan2(slope[1:2], slope[:1])
             for name, points in grid.axes.items()
@@ -115,8 +114,8 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         return Grid(axes, shape).cells(tuple(slice(0, n) for n in shape))
 
     def _refuse_out_of_reach(self, points: np.ndarray, key: str) -> None:
-        depth = points @ np.asarray(plane_normal(self._shared.robot))
-        floor = self._shared.limits.floor
+        depth = points @ np.asarray(plane_normal(self._problem.robot))
+        floor = self._problem.limits.floor
         if not (depth > 0.0).any():
             question = axis_question("down" if self._frame.signs[2] > 0.0 else "up")
             raise ConfigError(
@@ -126,7 +125,7 @@ class GridMap(abc.ABC, Generic[SharedKind]):
             raise ConfigError(self._file, f"{key}: every point is below the floor: must be some above it")
 
 
-class PlatformMap(GridMap[PoseShared]):
+class PlatformMap(GridMap[Problem]):
     """The map of a sweep of a platform; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
@@ -137,13 +136,13 @@ class PlatformMap(GridMap[PoseShared]):
             )
         super().__init__(spec, keys, file)
 
-    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> PoseShared:
-        robot = problem.platform_of(spec, self._keys.trajectory, self._file)
-        return PoseShared(aligned(robot)[0], limits, amplitude)
+    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
+        robot = platform_of(spec, self._keys.trajectory, self._file)
+        return Problem(aligned(robot)[0], limits, amplitude)
 
 
-class PointMassMap(GridMap[Shared]):
+class PointMassMap(GridMap[Problem]):
     """The map of a sweep of a point mass; see `GridMap`."""
 
-    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Shared:
-        return Shared(problem.point_mass_of(spec, self._keys.trajectory, self._file), limits, amplitude)
+    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
+        return Problem(point_mass_of(spec, self._keys.trajectory, self._file), limits, amplitude)

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Orientations, SweepFile
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
 from cspr_jax.feasibility.point_mass.proof_slacks import given
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
+from cspr_jax.problem import motion_kind
 from cspr_jax.robots.symmetries import NONE, folded, symmetries
 from cspr_jax.schema.quantities import REFUSALS
 from cspr_jax.schema.tiles import Grid
@@ -28,7 +28,7 @@ class AccessibleMap(PlatformMap):
         super().__init__(spec, keys, file)
         self._orientations = keys.orientations or Orientations()
         # Limits may differ from cable to cable.
-        self._alike = NONE if given(self._shared.limits) else symmetries(self._shared.robot)
+        self._alike = NONE if given(self._problem.limits) else symmetries(self._problem.robot)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`. Places that symmetries join are computed once."""
@@ -50,7 +50,7 @@ class AccessibleMap(PlatformMap):
 
     def _sets(self, places: np.ndarray, coarser: int) -> list[Accessible]:
         definition, divisions = self._orientations.definition or "scan", self._orientations.divisions
-        return [accessible(self._shared.robot, place, definition, divisions // coarser) for place in places]
+        return [accessible(self._problem.robot, place, definition, divisions // coarser) for place in places]
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse places that are all out of reach; see `GridMap.refuse_hopeless`."""
@@ -71,8 +71,8 @@ class AttainableMap(AccessibleMap):
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Build the checker of motions from rest."""
         super().__init__(spec, keys, file)
-        kind = problem.motion_kind(keys.trajectory, from_rest=True)
-        self._checker = PoseChecker(self._shared, kind, batch=MANY)
+        kind = motion_kind(keys.trajectory, from_rest=True)
+        self._checker = PoseChecker(self._problem, kind, batch=MANY)
 
     def _attainable(self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray) -> PoseAnswers:
         # Of (n, 3) angles at (n, 3) places, both in the kernels' axes.

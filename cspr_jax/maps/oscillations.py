@@ -30,8 +30,8 @@ class OscillationMap(PointMassMap):
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         targets = self._targets(cells)
         z0 = self._depths(cells, targets)
-        segments = transitions_to(self._shared, targets, z0)
-        return vars(minimum_oscillations(self._shared, segments, z0, max_arcs=self._keys.trajectory.max_arcs))
+        segments = transitions_to(self._problem, targets, z0)
+        return vars(minimum_oscillations(self._problem, segments, z0, max_arcs=self._keys.trajectory.max_arcs))
 
     def _depths(self, cells: dict[str, np.ndarray], targets: np.ndarray) -> np.ndarray:
         if "z0" in cells:
@@ -42,13 +42,13 @@ class OscillationMap(PointMassMap):
         elif isinstance(given, float):
             inclination = np.full(len(targets), given)
         else:
-            inclination = best_inclinations(self._shared, targets)
+            inclination = best_inclinations(self._problem, targets)
         points = (jnp.asarray(targets), jnp.asarray(inclination))
-        z0 = np.asarray(jax.vmap(partial(depth_for, self._shared.robot))(*points))
+        z0 = np.asarray(jax.vmap(partial(depth_for, self._problem.robot))(*points))
         return np.where(z0 > 0.0, z0, _ANY_DEPTH)
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach, or out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
-        if is_planar(self._shared.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
+        if is_planar(self._problem.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
             raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
         self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")

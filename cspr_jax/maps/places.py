@@ -42,7 +42,7 @@ class EachOrientationMap(AttainableMap):
         index, inside = _index(angles, divisions), np.zeros(len(places), bool)
         for k, place in enumerate(every):
             free = np.zeros((2 * divisions, divisions, 2 * divisions), bool)
-            free[_index(accessible(self._shared.robot, place, "grid", divisions).angles, divisions)] = True
+            free[_index(accessible(self._problem.robot, place, "grid", divisions).angles, divisions)] = True
             free[:, 0] = free[0, 0]  # without a tilt its azimuth says nothing
             which = own.ravel() == k
             inside[which] = free[tuple(i[which] for i in index)]

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.arithmetic.batches import in_parts
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
@@ -11,6 +10,7 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
+from cspr_jax.problem import given_quaternion, motion_kind, orientations
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.schema.tiles import Grid
@@ -32,11 +32,11 @@ class PoseMap(PlatformMap):
         """Refuse a start that is no pose."""
         super().__init__(spec, keys, file)
         start = keys.trajectory.start
-        self._quaternion = problem.given_quaternion(
+        self._quaternion = given_quaternion(
             None if start is None else start.quaternion, "trajectory.from.quaternion", file
         )
         from_rest = start is None or start.rest
-        self._checker = PoseChecker(self._shared, problem.motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
+        self._checker = PoseChecker(self._problem, motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -51,9 +51,9 @@ class PoseMap(PlatformMap):
     def _answers(self, cells: dict[str, np.ndarray]) -> PoseAnswers:
         z0, targets = np.asarray(cells["z0"], float), self._targets(cells)
         angles = np.stack([cells.get(name, np.zeros(len(z0))) for name in TILT_TORSION], axis=1)
-        poses = (targets, problem.orientations(self._frame, targets, angles))
+        poses = (targets, orientations(self._frame, targets, angles))
         given, beat = self._keys.trajectory.beta_hat, self._keys.trajectory.beat
-        values, can_end = end_options(self._shared.robot, *poses, z0, 1 if given == "preferred" else OPTIONS)
+        values, can_end = end_options(self._problem.robot, *poses, z0, 1 if given == "preferred" else OPTIONS)
         if beat in WITHOUT_BETA_HAT:
             values = np.zeros((len(z0), 1))
         elif isinstance(given, float):
@@ -73,8 +73,8 @@ class PoseMap(PlatformMap):
             turned = np.tile(self._frame.turned_quaternions(self._quaternion), (len(depths), 1))
             if start.tilt_torsion is not None:
                 angles = np.tile(start.tilt_torsion, (len(depths), 1))
-                turned = problem.orientations(self._frame, place, angles)
-            values = end_options(self._shared.robot, place, turned, depths, 1)[0][:, 0]
+                turned = orientations(self._frame, place, angles)
+            values = end_options(self._problem.robot, place, turned, depths, 1)[0][:, 0]
             chosen = np.where(np.isnan(values), AT_REST, values)
             bend = chosen[own] if start.beta_hat is None else np.full(count, start.beta_hat)
             first = (place[own], turned[own])
@@ -86,7 +86,7 @@ class PoseMap(PlatformMap):
         errors = []
         for z0 in grid.axes["z0"]:
             try:
-                reference_pose(self._shared.robot, float(z0))
+                reference_pose(self._problem.robot, float(z0))
             except InputError as error:
                 errors.append(error)
         if len(errors) == len(grid.axes["z0"]):

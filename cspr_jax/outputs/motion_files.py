@@ -12,7 +12,7 @@ import numpy as np
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.outputs.plan_report import is_feasible
 from cspr_jax.plans.planning import Plan
 from cspr_jax.problem import motion_kind
@@ -35,11 +35,11 @@ SAME_TICK = 1e-6
 
 
 @jax.jit
-def _point_states(shared, segment, arcs, tau):
+def _point_states(problem, segment, arcs, tau):
     def one(t):
-        position, velocity, acceleration = hypocycloid.motion(segment, shared.amplitude, arcs, t)
-        length, rate, _ = force_balance.cable_motion(shared.robot, position, velocity, acceleration)
-        force = force_balance.tensions(shared.robot, position, acceleration)
+        position, velocity, acceleration = hypocycloid.motion(segment, problem.amplitude, arcs, t)
+        length, rate, _ = force_balance.cable_motion(problem.robot, position, velocity, acceleration)
+        force = force_balance.tensions(problem.robot, position, acceleration)
         states = (position, velocity, acceleration, length, rate, force)
         return dict(zip(("position", "velocity", "acceleration", "length", "rate", "tension"), states, strict=True))
 
@@ -47,20 +47,20 @@ def _point_states(shared, segment, arcs, tau):
 
 
 @partial(jax.jit, static_argnames="kind")
-def _pose_states(shared, segment, arcs, tau, *, kind):
+def _pose_states(problem, segment, arcs, tau, *, kind):
     def one(t):
-        pose = motion(segment, shared.amplitude, arcs, t, kind=kind)
-        length, rate, _ = wrench_balance.cable_motion(shared.robot, pose)
+        pose = motion(segment, problem.amplitude, arcs, t, kind=kind)
+        length, rate, _ = wrench_balance.cable_motion(problem.robot, pose)
         return {
             "position": pose.position,
             "velocity": pose.velocity,
             "acceleration": pose.acceleration,
-            "quaternion": quaternion_at(segment, shared.amplitude, arcs, t, kind=kind),
+            "quaternion": quaternion_at(segment, problem.amplitude, arcs, t, kind=kind),
             "omega": pose.angular_velocity,
             "omega_dot": pose.angular_acceleration,
             "length": length,
             "rate": rate,
-            "tension": wrench_balance.tensions(shared.robot, pose),
+            "tension": wrench_balance.tensions(problem.robot, pose),
         }
 
     return jax.vmap(one)(tau)
@@ -105,9 +105,9 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
 
 
 def _states(plan: Plan, segment, arcs: float, tau: np.ndarray):
-    if isinstance(plan.shared, PoseShared):
-        return _pose_states(plan.shared, segment, arcs, tau, kind=motion_kind(plan.keys))
-    return _point_states(plan.shared, segment, arcs, tau)
+    if isinstance(plan.problem, Problem):
+        return _pose_states(plan.problem, segment, arcs, tau, kind=motion_kind(plan.keys))
+    return _point_states(plan.problem, segment, arcs, tau)
 
 
 def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:

@@ -25,10 +25,10 @@ def plan_object(plan: Plan) -> dict[str, Any]:
         "schema": SCHEMA,
         "robot": plan.spec.name,
         "family": plan.keys.family,
-        "amplitude": plan.shared.amplitude.name,
+        "amplitude": plan.problem.amplitude.name,
         "z0": plan.z0,
         "z_axis": plan.spec.z_axis,
-        "gravity": float(plan.shared.robot.gravity),
+        "gravity": float(plan.problem.robot.gravity),
         "segments": segments,
         "total_duration": float(plan.answers.duration.sum()),
         "feasible": is_feasible(plan),
@@ -119,7 +119,7 @@ def plan_table(plan: Plan):
     """
     from rich.table import Table  # only a terminal needs it
 
-    title = f"{plan.spec.name}: {plan.keys.family}, {plan.shared.amplitude.name}, z0 = {plan.z0:.6g} m"
+    title = f"{plan.spec.name}: {plan.keys.family}, {plan.problem.amplitude.name}, z0 = {plan.z0:.6g} m"
     table = Table(title=title, caption=_caption(plan), title_justify="left", caption_justify="left")
     swings = isinstance(plan.answers, OscillationAnswers)
     count = ("oscillations", "v") if swings else ("arcs",)

@@ -5,13 +5,13 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.transition.oscillations import best_inclination
 from cspr_jax.plans.sequence import Sequence
+from cspr_jax.problem import build_amplitude
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, HasSpools, rest_point, spool_radius
 from cspr_jax.runtime.stages import within
 from cspr_jax.trajectories import depths
@@ -24,11 +24,11 @@ EPSILONS = np.linspace(0.02, 0.5, 49)
 DEPTHS = 200
 
 
-def chosen_depth(shared: Any, sequence: Sequence) -> float:
+def chosen_depth(problem: Any, sequence: Sequence) -> float:
     """The plan's z0, given or chosen.
 
     Args:
-        shared: robot, limits and amplitude, `Shared` or `PoseShared`.
+        problem: robot, limits and amplitude, `Problem` or `Problem`.
         sequence: the plan's poses.
 
     Returns:
@@ -42,7 +42,7 @@ def chosen_depth(shared: Any, sequence: Sequence) -> float:
     if isinstance(keys.z0, float):
         if keys.z0 > LARGEST_LENGTH:
             raise ConfigError(path, f"z0 = {shown(keys.z0)}: must be at most 1e6 m")
-        _check_rest(shared.robot, sequence, keys.z0)
+        _check_rest(problem.robot, sequence, keys.z0)
         return keys.z0
     for i, pose in enumerate(keys.pose):
         if pose.rest and pose.position is not None:
@@ -50,14 +50,14 @@ def chosen_depth(shared: Any, sequence: Sequence) -> float:
     if not len(targets):
         raise ConfigError(path, "z0 = { choose = ... }: must be a number where every pose is at rest")
     if not isinstance(keys.z0, Choice):
-        return _depth_of_inclination(shared, sequence)
+        return _depth_of_inclination(problem, sequence)
     if keys.z0.choose == "mean":
-        z0 = depths.mean_depth(shared.robot, targets)
+        z0 = depths.mean_depth(problem.robot, targets)
     elif keys.z0.choose == "conservative":
-        z0 = depths.conservative_depth(shared.robot, targets) * (1.0 + ABOVE_BOUND)
+        z0 = depths.conservative_depth(problem.robot, targets) * (1.0 + ABOVE_BOUND)
     else:
         with within("fastest z0"):
-            z0 = _fastest_depth(shared, sequence)
+            z0 = _fastest_depth(problem, sequence)
     if not 0.0 < z0 <= LARGEST_LENGTH:
         hint = "".join(f" ({line})" for line in plan_hints(keys, sequence.spec))
         why = f"since no z0 in ]0, 1e6] m follows from the poses{hint}"
@@ -88,18 +88,18 @@ def _check_rest(robot: HasSpools, sequence: Sequence, z0: float) -> None:
             )
 
 
-def _depth_of_inclination(shared: Shared, sequence: Sequence) -> float:
+def _depth_of_inclination(problem: Problem, sequence: Sequence) -> float:
     targets, path, inclination = sequence.targets, sequence.path, sequence.keys.inclination
     if inclination == "best":
         if (targets != targets[0]).any():
             raise ConfigError(path, 'inclination = "best": must be a number in a plan with more than one target')
         # The weights do not depend on the depth of P0.
-        one = transition(shared.robot, shared.amplitude, jnp.asarray(targets[0]), jnp.asarray(1.0))
-        v = float(best_inclination(shared.amplitude, weights(one))[0])
+        one = transition(problem.robot, problem.amplitude, jnp.asarray(targets[0]), jnp.asarray(1.0))
+        v = float(best_inclination(problem.amplitude, weights(one))[0])
     else:
         v = float(inclination or 0.0)
-    found = [float(depth_for(shared.robot, jnp.asarray(target), jnp.asarray(v))) for target in targets]
-    if max(found) - min(found) > AT_P0 * float(spool_radius(shared.robot)):
+    found = [float(depth_for(problem.robot, jnp.asarray(target), jnp.asarray(v))) for target in targets]
+    if max(found) - min(found) > AT_P0 * float(spool_radius(problem.robot)):
         raise ConfigError(
             path, f"inclination = {v:g}: must be replaced by z0, since the targets lie at different depths"
         )
@@ -110,14 +110,14 @@ def _depth_of_inclination(shared: Shared, sequence: Sequence) -> float:
     return found[0]
 
 
-def _fastest_depth(shared: Shared, sequence: Sequence) -> float:
+def _fastest_depth(problem: Problem, sequence: Sequence) -> float:
     # The duration grows with the root of z0 between changes of the arcs: a coarse look, then a fine one at the best.
-    least = max(depths.least_depth(shared.robot, sequence.targets), 1e-3)
-    safe = depths.conservative_depth(shared.robot, sequence.targets)
+    least = max(depths.least_depth(problem.robot, sequence.targets), 1e-3)
+    safe = depths.conservative_depth(problem.robot, sequence.targets)
     trial = np.linspace(0.5 * least, max(1.5 * least, safe if np.isfinite(safe) else 0.0), DEPTHS)
     for _ in range(2):
         points = np.stack([sequence.points(z0) for z0 in trial])
-        answers = sequence.answers(shared, points, np.repeat(trial, len(sequence)))
+        answers = sequence.answers(problem, points, np.repeat(trial, len(sequence)))
         cost = np.where(answers.arcs > 0, answers.duration, np.inf).reshape(DEPTHS, -1).sum(1)
         best = int(np.argmin(cost))
         if not np.isfinite(cost[best]):
@@ -128,11 +128,11 @@ def _fastest_depth(shared: Shared, sequence: Sequence) -> float:
     return chosen
 
 
-def best_amplitude(shared: Any, sequence: Sequence, z0: float) -> tuple[Amplitude, float]:
+def best_amplitude(problem: Any, sequence: Sequence, z0: float) -> tuple[Amplitude, float]:
     """The amplitude function whose epsilon gives the shortest plan; among equals, the largest margin.
 
     Args:
-        shared: robot and limits, `Shared` or `PoseShared`.
+        problem: robot and limits, `Problem` or `Problem`.
         sequence: the plan's poses.
         z0: m.
 
@@ -141,8 +141,8 @@ def best_amplitude(shared: Any, sequence: Sequence, z0: float) -> tuple[Amplitud
     """
     ranked: list[tuple[float, float, int, Amplitude, float]] = []
     for epsilon in EPSILONS:
-        amplitude = problem.build_amplitude(sequence.keys, sequence.path, epsilon=float(epsilon))
-        trial = shared._replace(amplitude=amplitude)
+        amplitude = build_amplitude(sequence.keys, sequence.path, epsilon=float(epsilon))
+        trial = problem._replace(amplitude=amplitude)
         depth = chosen_depth(trial, sequence) if sequence.keys.inclination == "best" else z0
         points = sequence.points(depth)
         with within(f"epsilon {epsilon:.2f} of {EPSILONS[-1]:.2f}"):

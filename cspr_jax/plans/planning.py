@@ -6,7 +6,6 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
@@ -15,11 +14,11 @@ from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.demands import Extremes, extremes
 from cspr_jax.feasibility.platform.demands import pose_extremes
-from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.choices import best_amplitude, chosen_depth
 from cspr_jax.plans.platform_sequence import Poses
 from cspr_jax.plans.sequence import Sequence, sequence_of
+from cspr_jax.problem import build_amplitude, build_limits, motion_kind, platform_of, point_mass_of
 from cspr_jax.robots.reference_pose import aligned, reference_pose
 from cspr_jax.search.answers import Answers
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
@@ -40,7 +39,7 @@ class Plan:
     Fields:
         spec: the robot as its file has it.
         keys: the plan file.
-        shared: robot, limits, amplitude function; of a platform its reference too.
+        problem: robot, limits, amplitude function; of a platform its reference too.
         z0: m.
         frame: of the robot file.
         points: (n + 1, 3) in the axes of the robot file, m.
@@ -54,7 +53,7 @@ class Plan:
 
     spec: RobotFile
     keys: PlanFile
-    shared: Shared | PoseShared
+    problem: Problem | Problem
     z0: float
     frame: Frame
     points: np.ndarray
@@ -99,28 +98,28 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     if spec.is_platform:
         return _plan_of_poses(spec, keys, path)
     sequence = sequence_of(spec, keys, path)
-    robot = problem.point_mass_of(spec, keys, path)
-    limits = problem.build_limits(spec, keys, keys.floor, path)
-    amplitude = problem.build_amplitude(keys, path, epsilon=FIRST_EPSILON)
-    shared = Shared(robot, limits, amplitude)
-    z0 = chosen_depth(shared, sequence)
+    robot = point_mass_of(spec, keys, path)
+    limits = build_limits(spec, keys, keys.floor, path)
+    amplitude = build_amplitude(keys, path, epsilon=FIRST_EPSILON)
+    problem = Problem(robot, limits, amplitude)
+    z0 = chosen_depth(problem, sequence)
     if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
-        amplitude, z0 = best_amplitude(shared, sequence, z0)
-        shared = shared._replace(amplitude=amplitude)
+        amplitude, z0 = best_amplitude(problem, sequence, z0)
+        problem = problem._replace(amplitude=amplitude)
     points = sequence.points(z0)
     depth = np.full(len(sequence), z0)
-    answers = sequence.answers(shared, points, depth)
-    segments = sequence.segments(shared, points, depth, answers)
-    asked = extremes(shared, segments, answers.tried_arcs, keys.samples)
-    return _plan(sequence, shared, z0, points, (answers, asked, segments))
+    answers = sequence.answers(problem, points, depth)
+    segments = sequence.segments(problem, points, depth, answers)
+    asked = extremes(problem, segments, answers.tried_arcs, keys.samples)
+    return _plan(sequence, problem, z0, points, (answers, asked, segments))
 
 
-def _plan(sequence: Sequence, shared, z0: float, points: np.ndarray, found: tuple, warnings: tuple = ()) -> Plan:
+def _plan(sequence: Sequence, problem, z0: float, points: np.ndarray, found: tuple, warnings: tuple = ()) -> Plan:
     # What leaves the kernels is in the axes of the robot file.
     frame, (answers, asked, segments) = sequence.frame, found
     asked = dataclasses.replace(asked, lowest=frame.height(asked.lowest))
     places, backwards = frame.outward(points), sequence.backwards
-    return Plan(sequence.spec, sequence.keys, shared, z0, frame, places, answers, asked, segments, backwards, warnings)
+    return Plan(sequence.spec, sequence.keys, problem, z0, frame, places, answers, asked, segments, backwards, warnings)
 
 
 def _jumps(amplitude: Amplitude) -> bool:
@@ -132,23 +131,23 @@ def _jumps(amplitude: Amplitude) -> bool:
 def _plan_of_poses(spec: RobotFile, keys: PlanFile, path: Path) -> Plan:
     # Of a rigid platform, thesis chapter 3.
     sequence = Poses(spec, keys, path)
-    robot = problem.platform_of(spec, keys, path)
-    limits = problem.build_limits(spec, keys, keys.floor, path)
-    amplitude = problem.build_amplitude(keys, path, epsilon=FIRST_EPSILON)
-    shared = PoseShared(aligned(robot)[0], limits, amplitude)
-    sequence.check_poses(shared)
-    z0 = chosen_depth(shared, sequence)
+    robot = platform_of(spec, keys, path)
+    limits = build_limits(spec, keys, keys.floor, path)
+    amplitude = build_amplitude(keys, path, epsilon=FIRST_EPSILON)
+    problem = Problem(aligned(robot)[0], limits, amplitude)
+    sequence.check_poses(problem)
+    z0 = chosen_depth(problem, sequence)
     try:
         reference_pose(robot, z0)
     except InputError as error:
         raise ConfigError(path, spec.typed(error)) from error
     if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
-        amplitude, z0 = best_amplitude(shared, sequence, z0)
-        shared = shared._replace(amplitude=amplitude)
+        amplitude, z0 = best_amplitude(problem, sequence, z0)
+        problem = problem._replace(amplitude=amplitude)
     points, depth = sequence.points(z0), np.full(len(sequence), z0)
-    answers = sequence.answers(shared, points, depth)
-    segments = sequence.segments(shared, points, depth, answers)
-    kind = problem.motion_kind(keys)
-    asked = pose_extremes(shared, segments, answers.tried_arcs, keys.samples, kind=kind)
+    answers = sequence.answers(problem, points, depth)
+    segments = sequence.segments(problem, points, depth, answers)
+    kind = motion_kind(keys)
+    asked = pose_extremes(problem, segments, answers.tried_arcs, keys.samples, kind=kind)
     warnings = (_JUMPS.format(amplitude.name),) if kind.variable and _jumps(amplitude) else ()
-    return _plan(sequence, shared, z0, points, (answers, asked, segments), warnings)
+    return _plan(sequence, problem, z0, points, (answers, asked, segments), warnings)

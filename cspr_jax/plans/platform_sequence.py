@@ -8,7 +8,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax import problem
 from cspr_jax.arithmetic import rotations
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import PlanFile, Pose
@@ -17,8 +16,9 @@ from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.platform.checker import FEW, MANY, TOUCH, PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST, endpoint
-from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.sequence import Sequence
+from cspr_jax.problem import given_quaternion, motion_kind, orientations
 from cspr_jax.robots.interference import contacts, gaps
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal, rest_point
@@ -34,7 +34,7 @@ SINGULAR = 1e-9
 SOME = 1000
 
 
-class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
+class Poses(Sequence[Problem, PoseAnswers, PoseSegment]):
     """Poses of a platform, joined by the motions of chapter 3; see `Sequence`."""
 
     def __init__(self, spec: RobotFile, keys: PlanFile, path: Path) -> None:
@@ -63,15 +63,15 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         """
         points = self.points(z0)
         angles = np.array([[0.0] * 3 if p.rest else p.tilt_torsion or [0.0] * 3 for p in self.keys.pose])
-        turned = problem.orientations(self.frame, points, angles)
+        turned = orientations(self.frame, points, angles)
         is_given = np.array([pose.rest or pose.tilt_torsion is None for pose in self.keys.pose])
         return np.where(is_given[:, None], self.frame.turned_quaternions(self._given), turned)
 
-    def check_poses(self, shared: PoseShared) -> None:
+    def check_poses(self, problem: Problem) -> None:
         """Refuse poses at which no motion can begin or end.
 
         Args:
-            shared: gives the robot.
+            problem: gives the robot.
 
         Raises:
             ConfigError: which pose, and why.
@@ -80,15 +80,17 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         hint = "".join(f" ({line})" for line in plan_hints(self.keys, self.spec))
         for i, (position, quaternion) in enumerate(poses):
             if not self.keys.pose[i].rest:
-                _check_pose(shared.robot, i, position, quaternion, self.path, hint)
+                _check_pose(problem.robot, i, position, quaternion, self.path, hint)
 
-    def answers(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray) -> PoseAnswers:
+    def answers(self, problem: Problem, points: np.ndarray, z0: np.ndarray) -> PoseAnswers:
         """Smallest numbers of arcs, with the values of beta-hat that give the fewest in sum; see `Sequence.answers`."""
         count, depths = len(self), z0.reshape(-1, len(self))[:, 0]
         points = points.reshape(len(depths), -1, 3)
         quaternions = self.quaternions(float(depths[0]))
-        checker = PoseChecker(shared, problem.motion_kind(self.keys), batch=FEW if len(z0) <= SOME else MANY)
-        bends = [self._bends(shared, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)]
+        checker = PoseChecker(problem, motion_kind(self.keys), batch=FEW if len(z0) <= SOME else MANY)
+        bends = [
+            self._bends(problem, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)
+        ]
         if len(depths) == 1:
             self._refuse_slack(bends[0])
         # Every pair of values at the ends of every segment, for every depth.
@@ -117,13 +119,13 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
         start, end = ((points[depth, i + k], quaternions[i + k]) for k in (0, 1))
         return Candidates(start, end, z0, motion, bends)
 
-    def segments(self, shared: PoseShared, points: np.ndarray, z0: np.ndarray, answers: PoseAnswers) -> PoseSegment:
+    def segments(self, problem: Problem, points: np.ndarray, z0: np.ndarray, answers: PoseAnswers) -> PoseSegment:
         """The segments; see `Sequence.segments`."""
         quaternions = self.quaternions(float(z0[0]))
         found = self._candidates(points[None], quaternions, z0, np.arange(len(self)), tuple(answers.beta_hat.T))
-        return segments_with(shared.robot, found, answers.tried_arcs)
+        return segments_with(problem.robot, found, answers.tried_arcs)
 
-    def _bends(self, shared: PoseShared, points: np.ndarray, quaternions: np.ndarray, z0: float) -> list[np.ndarray]:
+    def _bends(self, problem: Problem, points: np.ndarray, quaternions: np.ndarray, z0: float) -> list[np.ndarray]:
         # Values of beta-hat to try at each pose; NaN where none keeps every cable taut.
         found = []
         for pose, position, quaternion in zip(self.keys.pose, points, quaternions, strict=True):
@@ -133,7 +135,7 @@ class Poses(Sequence[PoseShared, PoseAnswers, PoseSegment]):
             if pose.beta_hat is not None or pose.rest:
                 found.append(np.array([AT_REST if pose.beta_hat is None else pose.beta_hat]))
                 continue
-            preferred, lowest, highest = (np.atleast_1d(x) for x in _end(shared.robot, position, quaternion, z0)[2:])
+            preferred, lowest, highest = (np.atleast_1d(x) for x in _end(problem.robot, position, quaternion, z0)[2:])
             values = options(preferred, lowest, highest)[0]
             found.append(values[~np.isnan(values)] if not np.isnan(values[0]) else values[:1])
         return found
@@ -172,7 +174,7 @@ def _orientation(i: int, pose: Pose, path: Path) -> np.ndarray:
         if turned or (pose.tilt_torsion is not None and (pose.tilt_torsion[1] != 0.0 or pose.tilt_torsion[2] != 0.0)):
             raise ConfigError(path, f"pose[{i}]: must have the reference orientation at rest")
         return reference
-    return problem.given_quaternion(pose.quaternion, f"pose[{i}].quaternion", path)
+    return given_quaternion(pose.quaternion, f"pose[{i}].quaternion", path)
 
 
 # One function for XLA instead of some hundred small ones.

@@ -11,7 +11,7 @@ from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.search.answers import Answers, pick
 from cspr_jax.search.oscillations import minimum_oscillations, transitions_to
@@ -74,11 +74,11 @@ class Sequence(abc.ABC, Generic[SharedKind, AnswersKind, SegmentKind]):
         return np.array([at_rest if pose.rest else self.frame.inward(pose.position) for pose in self.keys.pose])
 
     @abc.abstractmethod
-    def answers(self, shared: SharedKind, points: np.ndarray, z0: np.ndarray) -> AnswersKind:
+    def answers(self, problem: SharedKind, points: np.ndarray, z0: np.ndarray) -> AnswersKind:
         """Answers of all segments, for one z0; those of point masses also for several at once.
 
         Args:
-            shared: robot, limits and amplitude.
+            problem: robot, limits and amplitude.
             points: (n_poses, 3), or (n_depths, n_poses, 3), m.
             z0: (n_segments,), or (n_depths * n_segments,), m.
 
@@ -87,11 +87,11 @@ class Sequence(abc.ABC, Generic[SharedKind, AnswersKind, SegmentKind]):
         """
 
     @abc.abstractmethod
-    def segments(self, shared: SharedKind, points: np.ndarray, z0: np.ndarray, answers: AnswersKind) -> SegmentKind:
+    def segments(self, problem: SharedKind, points: np.ndarray, z0: np.ndarray, answers: AnswersKind) -> SegmentKind:
         """The segments, each of the parity of its number of arcs.
 
         Args:
-            shared: robot, limits and amplitude.
+            problem: robot, limits and amplitude.
             points: (n_poses, 3) m.
             z0: (n_segments,) m.
             answers: as `answers` gave them.
@@ -101,7 +101,7 @@ class Sequence(abc.ABC, Generic[SharedKind, AnswersKind, SegmentKind]):
         """
 
 
-class Hypocycloids(Sequence[Shared, Answers, Segment]):
+class Hypocycloids(Sequence[Problem, Answers, Segment]):
     """Any poses, joined by the standard hypocycloids of chapter 2; see `Sequence`."""
 
     def __init__(self, spec: RobotFile, keys: PlanFile, path: Path) -> None:
@@ -114,19 +114,19 @@ class Hypocycloids(Sequence[Shared, Answers, Segment]):
             raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
         super().__init__(spec, keys, path)
 
-    def answers(self, shared: Shared, points: np.ndarray, z0: np.ndarray) -> Answers:
+    def answers(self, problem: Problem, points: np.ndarray, z0: np.ndarray) -> Answers:
         """Smallest numbers of arcs; see `Sequence.answers`."""
         starts, ends = points[..., :-1, :].reshape(-1, 3), points[..., 1:, :].reshape(-1, 3)
         fixed = np.tile(self._arcs, len(z0) // len(self))
-        return minimum_arcs(shared, starts, ends, z0, max_arcs=self._largest, arcs=fixed)
+        return minimum_arcs(problem, starts, ends, z0, max_arcs=self._largest, arcs=fixed)
 
-    def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
+    def segments(self, problem: Problem, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
         """The segments; see `Sequence.segments`."""
-        parities, _ = segments_between(shared, points[:-1], points[1:], z0)
+        parities, _ = segments_between(problem, points[:-1], points[1:], z0)
         return pick(parities, np.arange(len(self)), answers.tried_arcs)
 
 
-class Transitions(Sequence[Shared, Answers, Segment]):
+class Transitions(Sequence[Problem, Answers, Segment]):
     """Rest to a target, swings at it, back to rest: chapter 1; see `Sequence`."""
 
     def __init__(self, spec: RobotFile, keys: PlanFile, path: Path) -> None:
@@ -148,12 +148,12 @@ class Transitions(Sequence[Shared, Answers, Segment]):
         """(n_segments,) whether a segment runs against its normalised time: back to rest, (1.56) to (1.58)."""
         return self._backwards
 
-    def answers(self, shared: Shared, points: np.ndarray, z0: np.ndarray) -> Answers:
+    def answers(self, problem: Problem, points: np.ndarray, z0: np.ndarray) -> Answers:
         """Smallest numbers of oscillations; see `Sequence.answers`."""
         repeats = len(z0) // len(self)
-        segments = self._between(shared, points, z0)
+        segments = self._between(problem, points, z0)
         return minimum_oscillations(
-            shared,
+            problem,
             segments,
             z0,
             max_arcs=self._largest,
@@ -161,12 +161,12 @@ class Transitions(Sequence[Shared, Answers, Segment]):
             steady=np.tile(self._steady, repeats),
         )
 
-    def segments(self, shared: Shared, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
+    def segments(self, problem: Problem, points: np.ndarray, z0: np.ndarray, answers: Answers) -> Segment:
         """The segments; see `Sequence.segments`."""
-        return self._between(shared, points, z0)
+        return self._between(problem, points, z0)
 
-    def _between(self, shared: Shared, points: np.ndarray, z0: np.ndarray) -> Segment:
-        segments = transitions_to(shared, points[..., self._target, :].reshape(-1, 3), z0)
+    def _between(self, problem: Problem, points: np.ndarray, z0: np.ndarray) -> Segment:
+        segments = transitions_to(problem, points[..., self._target, :].reshape(-1, 3), z0)
         same = np.tile(self._steady, len(z0) // len(self))
 
         def choose(swing, transition):

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from cspr_jax import problem
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
-from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.problem import platform_of
 from cspr_jax.published.chapter_1 import Key
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.robots.symmetries import folded, symmetries
 from cspr_jax.runtime.stages import within
-from cspr_jax.schema.limits import Limits
 from cspr_jax.search import attainable
 from cspr_jax.search.accessible import DEFINITIONS, accessible
 from cspr_jax.trajectories.amplitudes import named
@@ -74,9 +74,9 @@ def checker_of(amplitude: str) -> PoseChecker:
         the checker, of motions of the MSSM from rest.
     """
     here = Path(__file__)
-    robot = problem.platform_of(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
-    shared = PoseShared(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
-    return PoseChecker(shared, Kind(from_rest=True), batch=MANY)
+    robot = platform_of(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
+    problem = Problem(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
+    return PoseChecker(problem, Kind(from_rest=True), batch=MANY)
 
 
 def attained(checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
@@ -92,7 +92,7 @@ def attained(checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]]) ->
     """
     sizes = [len(angles) for _, angles in sets]
     places = np.repeat([place for place, _ in sets], sizes, axis=0)
-    found = symmetries(checker.shared.robot)
+    found = symmetries(checker.problem.robot)
     every = np.concatenate([angles for _, angles in sets])
     good = attainable.attained(checker, places, every, places[:, 2], max_arcs=MAX_ARCS, found=found)
     return np.split(good, np.cumsum(sizes)[:-1])
@@ -123,7 +123,7 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
 
 
 def _cells(checker: PoseChecker, places: list[np.ndarray], definition: str, divisions: int) -> list[dict[str, float]]:
-    sets = [accessible(checker.shared.robot, place, definition, divisions) for place in places]
+    sets = [accessible(checker.problem.robot, place, definition, divisions) for place in places]
     masks = attained(checker, [(place, inside.angles) for place, inside in zip(places, sets, strict=True)])
     return [
         {
@@ -149,7 +149,7 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
     found: dict[Key, float | None] = {}
     for amplitude in choice.amplitudes:
         checker = checker_of(amplitude)
-        robot = checker.shared.robot
+        robot = checker.problem.robot
         azimuths = np.unique(np.round(folded(symmetries(robot), _AZIMUTHS), 9))
         divisions = DIVISIONS * choice.finer
         for definition in choice.definitions:

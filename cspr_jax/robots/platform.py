@@ -9,6 +9,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
+from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.point_mass import (
     LARGEST_LENGTH,
     SMALLEST_AREA_RATIO,
@@ -17,7 +18,6 @@ from cspr_jax.robots.point_mass import (
     check_axis,
     check_numbers,
 )
-from cspr_jax.schema.limits import NO_LIMITS, Limits
 
 CABLES = 6
 # Points nearer to each other than this part of the largest distance are one point.

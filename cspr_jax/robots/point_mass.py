@@ -14,7 +14,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
-from cspr_jax.schema.limits import NO_LIMITS, Limits
+from cspr_jax.robots.limits import NO_LIMITS, Limits
 
 STANDARD_GRAVITY = 9.81
 # Below these ratios three spools count as lying on a line, and their plane as vertical.

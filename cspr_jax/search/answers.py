@@ -15,8 +15,9 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.point_mass import criteria
-from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, Shared, prove
+from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, prove
 from cspr_jax.feasibility.point_mass.margins import margins
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
@@ -83,18 +84,18 @@ class Known(NamedTuple):
 
 
 def decided(
-    shared: Shared,
+    problem: Problem,
     parities: dict[int, Segment],
     upper: np.ndarray,
     infinity: np.ndarray,
     *,
     known: Known | None = None,
-    measure: Callable[[Shared, Segment, np.ndarray], np.ndarray] = margins,
+    measure: Callable[[Problem, Segment, np.ndarray], np.ndarray] = margins,
 ) -> Answers:
     """Answers from upper bounds.
 
     Args:
-        shared: robot, limits and amplitude.
+        problem: robot, limits and amplitude.
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
         upper: (n, max_arcs) upper bounds of the margin, column p - 1 for p arcs; -inf where it is out of the question.
         infinity: (n,) left-hand side of (2.55).
@@ -105,17 +106,17 @@ def decided(
         the answers.
     """
     known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
-    found, doubtful, bound = _search(shared, parities, upper, known)
-    tried, slack = _best(shared, parities, upper, found, measure)
+    found, doubtful, bound = _search(problem, parities, upper, known)
+    tried, slack = _best(problem, parities, upper, found, measure)
     chosen = pick(parities, np.arange(len(found)), tried)
     duration = in_batches(_durations, (chosen, tried.astype(float)), size=BATCH)
     none = np.flatnonzero(found == 0)
     if len(none):
-        bound[none] = prove(shared, pick(parities, none, tried[none]), tried[none]).bound[:, :2].min(1)
+        bound[none] = prove(problem, pick(parities, none, tried[none]), tried[none]).bound[:, :2].min(1)
     return Answers(
         found,
         tried,
-        _verdicts(shared, found, doubtful, slack),
+        _verdicts(problem, found, doubtful, slack),
         duration,
         slack[:, :2].min(1),
         bound,
@@ -125,13 +126,13 @@ def decided(
 
 
 @jax.jit
-def end_slacks(shared: Shared, arcs: float, segments: Segment) -> jax.Array:
+def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
     """Smallest slack at the two ends.
 
     There the velocity is zero and the acceleration a pendulum's, whatever the number of arcs.
 
     Args:
-        shared: robot, limits and amplitude.
+        problem: robot, limits and amplitude.
         arcs: any number of arcs of the segments' parity.
         segments: leaves (n, ...).
 
@@ -140,7 +141,7 @@ def end_slacks(shared: Shared, arcs: float, segments: Segment) -> jax.Array:
     """
 
     def one(segment):
-        at_ends = jax.vmap(lambda t: jnp.stack(criteria.slacks(*shared, segment, jnp.asarray(arcs), t)))(
+        at_ends = jax.vmap(lambda t: jnp.stack(criteria.slacks(*problem, segment, jnp.asarray(arcs), t)))(
             jnp.asarray([0.0, 1.0])
         )
         return jnp.min(at_ends)
@@ -186,7 +187,7 @@ def pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Se
 
 
 def _search(
-    shared: Shared, parities: dict[int, Segment], upper: np.ndarray, known: Known
+    problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: Known
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, and the proved margin.
     found, doubtful, bound = np.zeros(len(upper), int), np.zeros(len(upper), bool), np.full(len(upper), -np.inf)
@@ -201,7 +202,7 @@ def _search(
         rows, arcs = rows[~given], arcs[~given]
         if not len(rows):
             continue
-        proof = prove(shared, pick(parities, rows, arcs), arcs)
+        proof = prove(problem, pick(parities, rows, arcs), arcs)
         found[rows[proof.feasible]] = arcs[proof.feasible]
         bound[rows] = proof.bound[:, :2].min(1)
         doubtful[rows[~proof.feasible & ~proof.infeasible]] = True
@@ -209,11 +210,11 @@ def _search(
 
 
 def _best(
-    shared: Shared, parities: dict[int, Segment], upper: np.ndarray, found: np.ndarray, measure: Callable
+    problem: Problem, parities: dict[int, Segment], upper: np.ndarray, found: np.ndarray, measure: Callable
 ) -> tuple[np.ndarray, np.ndarray]:
     # Margins at the number of arcs found, else at the candidate with the largest; upper bounds say where to look next.
     tried = np.where(found > 0, found, np.argmax(upper, axis=1) + 1)
-    slack = measure(shared, pick(parities, np.arange(len(found)), tried), tried)
+    slack = measure(problem, pick(parities, np.arange(len(found)), tried), tried)
     best = slack.min(1)
     rest = np.where(found[:, None] > 0, -np.inf, upper)
     rest[np.arange(len(rest)), tried - 1] = -np.inf
@@ -222,16 +223,16 @@ def _best(
         if not len(rows):
             return tried, slack
         arcs = np.argmax(rest[rows], axis=1) + 1
-        candidate = measure(shared, pick(parities, rows, arcs), arcs)
+        candidate = measure(problem, pick(parities, rows, arcs), arcs)
         rest[rows, arcs - 1] = -np.inf
         better = candidate.min(1) > best[rows]
         tried[rows[better]], slack[rows[better]] = arcs[better], candidate[better]
         best[rows[better]] = candidate.min(1)[better]
 
 
-def _verdicts(shared: Shared, found: np.ndarray, doubtful: np.ndarray, slack: np.ndarray) -> np.ndarray:
+def _verdicts(problem: Problem, found: np.ndarray, doubtful: np.ndarray, slack: np.ndarray) -> np.ndarray:
     broken = np.zeros(len(found), np.uint16)
-    for flag, column in zip(criteria.flags(shared.limits), slack.T, strict=True):
+    for flag, column in zip(criteria.flags(problem.limits), slack.T, strict=True):
         broken |= np.where(column <= 0.0, flag.value, 0).astype(np.uint16)
     broken |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(np.uint16)
     none = np.where(doubtful, Verdict.UNDECIDED.value, Verdict.NO_ARCS.value | broken)

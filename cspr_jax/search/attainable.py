@@ -108,7 +108,7 @@ def _motions(
     checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
 ) -> tuple[Candidates, np.ndarray]:
     # Transitions from rest, and (n, values) of beta-hat at their ends.
-    robot, count = checker.shared.robot, len(angles)
+    robot, count = checker.problem.robot, len(angles)
     towards = np.arctan2(*places.T[1::-1])  # (3.98)
     ends = (places, from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
     bends, can_end = end_options(robot, *ends, z0, values)

@@ -13,8 +13,9 @@ import numpy as np
 from jax import lax
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, Shared, tolerance
+from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, tolerance
 from cspr_jax.feasibility.point_mass.proof_slacks import given
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.feasibility.transition.envelopes import proved_envelope
@@ -55,22 +56,22 @@ class OscillationAnswers(Answers):
 
 
 @jax.jit
-def _transitions(shared: Shared, arguments) -> Segment:
-    return jax.vmap(partial(transition.transition, shared.robot, shared.amplitude))(*arguments)
+def _transitions(problem: Problem, arguments) -> Segment:
+    return jax.vmap(partial(transition.transition, problem.robot, problem.amplitude))(*arguments)
 
 
-def transitions_to(shared: Shared, targets: np.ndarray, z0: np.ndarray) -> Segment:
+def transitions_to(problem: Problem, targets: np.ndarray, z0: np.ndarray) -> Segment:
     """Transitions from rest to many targets.
 
     Args:
-        shared: gives the robot and the amplitude function.
+        problem: gives the robot and the amplitude function.
         targets: (n, 3) from the centroid of the spools, z down, m.
         z0: (n,) m.
 
     Returns:
         the segments, leaves (n, ...).
     """
-    return in_batches(partial(_transitions, shared), (targets, z0), size=BATCH)
+    return in_batches(partial(_transitions, problem), (targets, z0), size=BATCH)
 
 
 @jax.jit
@@ -78,21 +79,21 @@ def _best_inclinations(amplitude: Amplitude, weights: jax.Array) -> jax.Array:
     return jax.vmap(lambda w: counts.best_inclination(amplitude, w)[0])(weights)
 
 
-def best_inclinations(shared: Shared, targets: np.ndarray) -> np.ndarray:
+def best_inclinations(problem: Problem, targets: np.ndarray) -> np.ndarray:
     """The inclination of each target that asks for the fewest oscillations.
 
     Args:
-        shared: gives the robot and the amplitude function.
+        problem: gives the robot and the amplitude function.
         targets: (n, 3) from the centroid of the spools, z down, m.
 
     Returns:
         (n,) v.
     """
     # The weights depend on neither the depth of p0 nor that of the target.
-    weights = transition.weights(transitions_to(shared, targets, np.ones(len(targets))))
-    if not np.any(shared.amplitude.largest[2]):  # A = tau
+    weights = transition.weights(transitions_to(problem, targets, np.ones(len(targets))))
+    if not np.any(problem.amplitude.largest[2]):  # A = tau
         return np.asarray(jax.vmap(lambda w: zero_tension.best_inclination(w)[0])(weights))
-    return in_batches(partial(_best_inclinations, shared.amplitude), np.asarray(weights), size=BATCH)
+    return in_batches(partial(_best_inclinations, problem.amplitude), np.asarray(weights), size=BATCH)
 
 
 @jax.jit
@@ -143,23 +144,25 @@ def _proofs(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
     return jax.vmap(one)(*arguments)
 
 
-def _known(shared: Shared, segments: Segment, of_targets: tuple[np.ndarray, np.ndarray], allowed: np.ndarray) -> Known:
+def _known(
+    problem: Problem, segments: Segment, of_targets: tuple[np.ndarray, np.ndarray], allowed: np.ndarray
+) -> Known:
     # Whole numbers of oscillations that the envelopes prove.
     n = np.where(np.isfinite(allowed), allowed, 1.0)
-    kernel = partial(_proofs, shared.amplitude)
+    kernel = partial(_proofs, problem.amplitude)
     bound, near = in_batches(kernel, (segments, *of_targets, n), size=BATCH)
     return Known(np.where(np.isfinite(allowed) & (bound > near), 2 * n, 0).astype(int), bound)
 
 
 def minimum_oscillations(
-    shared: Shared, segments: Segment, z0: np.ndarray, *, max_arcs: int = 30, arcs=None, steady=None
+    problem: Problem, segments: Segment, z0: np.ndarray, *, max_arcs: int = 30, arcs=None, steady=None
 ) -> OscillationAnswers:
     """Smallest number of oscillations of transitions.
 
     Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
 
     Args:
-        shared: robot, limits and amplitude, which meets (1.27) and (1.28).
+        problem: robot, limits and amplitude, which meets (1.27) and (1.28).
         segments: as `transitions_to` gives them, leaves (n, ...).
         z0: (n,) depth of p0 below the centroid of the spools, m; positive.
         max_arcs: twice the largest number of oscillations tried, at least 2.
@@ -172,30 +175,30 @@ def minimum_oscillations(
     Raises:
         InputError: max_arcs below 1; z0 not positive; jax without 64 bits.
     """
-    check_numbers(shared.robot, z0, max_arcs)
+    check_numbers(problem.robot, z0, max_arcs)
     stage(f"numbers of oscillations, 1 to {max_arcs // 2}")
     largest = max(max_arcs // 2, 1)
     v, weights = np.asarray(transition.inclination(segments)), np.asarray(transition.weights(segments))
     envelopes = _level if (v == 0.0).all() else _envelopes
-    look = in_batches(partial(envelopes, shared.amplitude), (weights, v), size=BATCH)
+    look = in_batches(partial(envelopes, problem.amplitude), (weights, v), size=BATCH)
     real, gain = (np.array(found) for found in look)
     loads = v[:, None] + weights
     extreme = (np.maximum(loads.max(1), 0.0), np.minimum(loads.min(1), 0.0), v)
-    kernel = partial(_upper_bounds, shared.amplitude, largest=largest)
+    kernel = partial(_upper_bounds, problem.amplitude, largest=largest)
     upper = np.full((len(v), 2 * largest), -np.inf)
     upper[:, 1::2] = in_batches(kernel, extreme, size=BATCH)
-    at_ends = in_batches(partial(end_slacks, shared, 4.0), segments, size=BATCH)
+    at_ends = in_batches(partial(end_slacks, problem, 4.0), segments, size=BATCH)
     if steady is not None:
         upper[steady, 1::2], real[steady], gain[steady] = np.inf, 0.0, 0.0
     upper = np.minimum(upper, at_ends[:, None] + SMALLEST_MARGIN)
-    infinity = 1.0 - np.abs(v) * max(abs(float(shared.amplitude.lowest)), float(shared.amplitude.highest))
+    infinity = 1.0 - np.abs(v) * max(abs(float(problem.amplitude.lowest)), float(problem.amplitude.highest))
     allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
     parities, wanted = {0: segments, 1: segments}, only(upper, arcs)
     if steady is None:
-        known = None if given(shared.limits) else _known(shared, segments, (weights, v), allowed)
-        answers = decided(shared, parities, wanted, infinity, known=known, measure=transition_margins)
+        known = None if given(problem.limits) else _known(problem, segments, (weights, v), allowed)
+        answers = decided(problem, parities, wanted, infinity, known=known, measure=transition_margins)
     else:
-        answers = decided(shared, parities, wanted, infinity)
+        answers = decided(problem, parities, wanted, infinity)
     return OscillationAnswers(
         **vars(answers),
         oscillations=answers.arcs // 2,

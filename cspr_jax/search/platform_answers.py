@@ -71,7 +71,7 @@ def settled(
     none = np.flatnonzero(tried == 0)
     tried = tried.copy()
     tried[none] = best_candidates(checker, candidates.rows(none), max_arcs=max_arcs)
-    segments, checks = segments_with(checker.shared.robot, candidates, tried), found.checks
+    segments, checks = segments_with(checker.problem.robot, candidates, tried), found.checks
     others = np.flatnonzero(found.arcs == 0)
     checks.put(others, checker.check(rows(segments, others), tried[others]))
     duration = checker.durations(segments, tried)

@@ -115,7 +115,7 @@ def smallest_arcs(
         return Found(found, undecided, checks)
     last = np.full(len(candidates.z0), max_arcs)
     only = np.zeros(len(last), int) if fixed is None else fixed
-    segments = _Segments(checker.shared.robot, candidates)
+    segments = _Segments(checker.problem.robot, candidates)
     for arcs in range(1, max_arcs + 1):
         if not (last >= arcs).any():
             break
@@ -161,7 +161,7 @@ def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: i
     best, highest = np.ones(len(every), int), np.full(len(every), -np.inf)
     if not len(best):
         return best
-    segments = _Segments(checker.shared.robot, candidates)
+    segments = _Segments(checker.problem.robot, candidates)
     for arcs in range(1, max_arcs + 1):
         stage(f"best of what fails, arcs {arcs} of {max_arcs}")
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)

@@ -11,7 +11,8 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts, room
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, Shared
+from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.runtime.stages import stage
 from cspr_jax.search import arc_sieve
@@ -25,21 +26,21 @@ PART = 16 * arc_sieve.BATCH
 
 
 @jax.jit
-def _segments(shared: Shared, points) -> tuple[Segment, Segment, jax.Array]:
+def _segments(problem: Problem, points) -> tuple[Segment, Segment, jax.Array]:
     def one(start, end, z0):
-        even, odd = (hypocycloid.segment(shared.robot, start, end, z0, odd=jnp.asarray(odd)) for odd in (False, True))
-        return even, odd, hypocycloid.feasibility_at_infinity(even, shared.amplitude)
+        even, odd = (hypocycloid.segment(problem.robot, start, end, z0, odd=jnp.asarray(odd)) for odd in (False, True))
+        return even, odd, hypocycloid.feasibility_at_infinity(even, problem.amplitude)
 
     return jax.vmap(one)(*points)
 
 
 def segments_between(
-    shared: Shared, starts: np.ndarray, ends: np.ndarray, z0: np.ndarray
+    problem: Problem, starts: np.ndarray, ends: np.ndarray, z0: np.ndarray
 ) -> tuple[dict[int, Segment], np.ndarray]:
     """Segments of many pairs of points.
 
     Args:
-        shared: gives the robot and the amplitude function.
+        problem: gives the robot and the amplitude function.
         starts: (n, 3) from the centroid of the spools, z down, m.
         ends: (n, 3) likewise.
         z0: (n,) m.
@@ -48,12 +49,12 @@ def segments_between(
         the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...), and the
         left-hand side of (2.55), (n,).
     """
-    even, odd, infinity = in_batches(partial(_segments, shared), (starts, ends, z0), size=arc_sieve.BATCH)
+    even, odd, infinity = in_batches(partial(_segments, problem), (starts, ends, z0), size=arc_sieve.BATCH)
     return {0: even, 1: odd}, infinity
 
 
 def minimum_arcs(
-    shared: Shared,
+    problem: Problem,
     starts: np.ndarray,
     ends: np.ndarray,
     z0: np.ndarray,
@@ -67,7 +68,7 @@ def minimum_arcs(
     Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
 
     Args:
-        shared: robot, limits and amplitude.
+        problem: robot, limits and amplitude.
         starts: (n, 3) from the centroid of the spools, z down, m.
         ends: (n, 3) likewise.
         z0: (n,) depth of p0 below the centroid of the spools, m; positive.
@@ -81,18 +82,18 @@ def minimum_arcs(
     Raises:
         InputError: an amplitude function that breaks (2.49); max_arcs below 1; z0 not positive; jax without 64 bits.
     """
-    check_numbers(shared.robot, z0, max_arcs)
-    broken = boundary_errors(shared.amplitude)
+    check_numbers(problem.robot, z0, max_arcs)
+    broken = boundary_errors(problem.amplitude)
     if broken:
         raise InputError(
-            "amplitude", shared.amplitude.name, "an amplitude function that meets (2.49): " + "; ".join(broken)
+            "amplitude", problem.amplitude.name, "an amplitude function that meets (2.49): " + "; ".join(broken)
         )
 
     def part(which: slice) -> Answers:
         stage(f"numbers of arcs, 1 to {max_arcs}")
-        parities, infinity = segments_between(shared, starts[which], ends[which], z0[which])
-        upper = _sieved(shared, parities[0], parities[1], max_arcs, dtype)
-        return decided(shared, parities, only(upper, None if arcs is None else np.asarray(arcs)[which]), infinity)
+        parities, infinity = segments_between(problem, starts[which], ends[which], z0[which])
+        upper = _sieved(problem, parities[0], parities[1], max_arcs, dtype)
+        return decided(problem, parities, only(upper, None if arcs is None else np.asarray(arcs)[which]), infinity)
 
     # Not two batches where one has room for all.
     return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(arc_sieve.BATCH) else part(slice(None))
@@ -122,10 +123,10 @@ def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
         raise InputError("z0", float(np.asarray(z0)[~fits][0]), "a number > 0, at most 1e6 m")
 
 
-def _sieved(shared: Shared, even: Segment, odd: Segment, max_arcs: int, dtype: str) -> np.ndarray:
+def _sieved(problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype: str) -> np.ndarray:
     # Upper bounds (n, max_arcs): of the sieve, and of the two ends, where every slack is known.
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
     kernel = partial(arc_sieve.upper_bounds, max_arcs=max_arcs)
-    upper = in_batches(lambda pair: kernel(shared.amplitude, *pair), cast, size=arc_sieve.BATCH).astype(float)
-    at_ends = in_batches(partial(end_slacks, shared, 3.0), odd, size=arc_sieve.BATCH)
+    upper = in_batches(lambda pair: kernel(problem.amplitude, *pair), cast, size=arc_sieve.BATCH).astype(float)
+    at_ends = in_batches(partial(end_slacks, problem, 3.0), odd, size=arc_sieve.BATCH)
     return np.where(np.isnan(upper), -np.inf, np.minimum(upper, at_ends[:, None] + SMALLEST_MARGIN))

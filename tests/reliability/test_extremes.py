@@ -9,16 +9,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cspr_jax import problem
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import CATALOGUE, resolve_robot
 from cspr_jax.errors import ConfigError, CsprError, InputError
-from cspr_jax.feasibility.platform.slacks import PoseShared
-from cspr_jax.feasibility.point_mass.certificate import Shared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.choices import chosen_depth
 from cspr_jax.plans.platform_sequence import Poses
 from cspr_jax.plans.sequence import sequence_of
+from cspr_jax.problem import build_amplitude, build_limits, platform_of, point_mass_of
 from cspr_jax.robots.reference_pose import aligned, reference_pose
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.tile import TileMap
@@ -131,14 +130,14 @@ def ready(path):
     keys = checked(PlanFile, read_toml(path), path)
     spec = resolve_robot(keys.robot, path, path.parent)
     sequence = (Poses if spec.is_platform else sequence_of)(spec, keys, path)
-    robot = (problem.platform_of if spec.is_platform else problem.point_mass_of)(spec, keys, path)
-    rest = problem.build_limits(spec, keys, keys.floor, path), problem.build_amplitude(keys, path, epsilon=0.2)
+    robot = (platform_of if spec.is_platform else point_mass_of)(spec, keys, path)
+    rest = build_limits(spec, keys, keys.floor, path), build_amplitude(keys, path, epsilon=0.2)
     if not spec.is_platform:
-        return sequence.points(chosen_depth(Shared(robot, *rest), sequence))
-    shared = PoseShared(aligned(robot)[0], *rest)
-    sequence.check_poses(shared)
+        return sequence.points(chosen_depth(Problem(robot, *rest), sequence))
+    problem = Problem(aligned(robot)[0], *rest)
+    sequence.check_poses(problem)
     try:
-        return reference_pose(robot, chosen_depth(shared, sequence))
+        return reference_pose(robot, chosen_depth(problem, sequence))
     except InputError as error:
         raise ConfigError(path, f"robot.{error}") from error
 

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cspr_jax import problem
 from cspr_jax.cli import main
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import CsprError
+from cspr_jax.problem import build_amplitude, build_limits, build_robot
 from cspr_jax.store.seal import sealed
 from cspr_jax.sweep.definition import read_sweep
 from reliability.support import SWEEP, content, go, sweep_of
@@ -268,9 +268,9 @@ def read_anything(kind, path):
     keys = checked(PlanFile, read_toml(path), path)
     spec = resolve_robot(keys.robot, path, path.parent)
     return (
-        problem.build_robot(spec, keys, path),
-        problem.build_limits(spec, keys, keys.floor, path),
-        problem.build_amplitude(keys, path, epsilon=0.2),
+        build_robot(spec, keys, path),
+        build_limits(spec, keys, keys.floor, path),
+        build_amplitude(keys, path, epsilon=0.2),
     )
 
 

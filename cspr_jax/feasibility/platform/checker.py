@@ -20,7 +20,8 @@ from cspr_jax.feasibility.platform.kernels import glances, look_along, moving_al
 from cspr_jax.feasibility.platform.prefilter import FIRST, FirstLook
 from cspr_jax.feasibility.platform.samples import Motions, Narrowing, Places, Seen, along, low_points
 from cspr_jax.feasibility.platform.slack_lanes import order
-from cspr_jax.feasibility.platform.slacks import PoseShared, flags
+from cspr_jax.feasibility.platform.slacks import flags
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.interference import contacts
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment, duration
@@ -80,7 +81,7 @@ class PoseChecker:
     """Checks motions of one robot.
 
     Args:
-        shared: robot, limits, amplitude.
+        problem: robot, limits, amplitude.
         kind: of the motions.
         batch: how many are computed at a time.
 
@@ -90,18 +91,18 @@ class PoseChecker:
             were checked.
     """
 
-    def __init__(self, shared: PoseShared, kind: Kind = USUAL, *, batch: int = FEW) -> None:
+    def __init__(self, problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> None:
         """Find what can meet."""
-        self.shared, self.kind, self.batch = shared, kind, batch
+        self.problem, self.kind, self.batch = problem, kind, batch
         self.done, self._lock = {"first look": 0, "checks": 0, "motions": 0}, threading.Lock()
-        found = contacts(shared.robot)
+        found = contacts(problem.robot)
         self._platform, self._pairs = (found.sides, found.normal), tuple((int(i), int(j)) for i, j in found.pairs)
-        self._flags = flags(shared.limits)
-        self._size = float(np.linalg.norm(np.asarray(shared.robot.platform_points), axis=1).max())
-        knots = np.asarray(shared.amplitude.knots)
+        self._flags = flags(problem.limits)
+        self._size = float(np.linalg.norm(np.asarray(problem.robot.platform_points), axis=1).max())
+        knots = np.asarray(problem.amplitude.knots)
         count = partial(self._count, "first look")
-        self.look = FirstLook(shared.robot, shared.amplitude, kind, -TOLERANCE, FIRST * batch, count)
-        self._of_motion = Narrowing(shared, kind, None, batch)
+        self.look = FirstLook(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
+        self._of_motion = Narrowing(problem, kind, None, batch)
         self._of_pose = self._of_motion._replace(pairs=self._pairs)
         self._knots = np.sort(np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT]))
 
@@ -168,7 +169,7 @@ class PoseChecker:
         return PoseChecks(np.zeros(count, int), np.full((count, len(self._flags)), np.nan), np.full(count, np.nan))
 
     def _along(self, kernel: Callable, motions: Motions) -> Seen:
-        seen = along(partial(kernel, self.shared, kind=self.kind), motions, size=self.batch)
+        seen = along(partial(kernel, self.problem, kind=self.kind), motions, size=self.batch)
         self._count("checks", len(jax.tree.leaves(seen.values)[0]) * len(seen.row))
         return seen
 
@@ -187,7 +188,7 @@ class PoseChecker:
         look, seen = looks.values, looks._replace(values=looks.values.values)
         still = self._of_pose.around(motions, seen)
         self._beside_singularities(motions, seen, moving)
-        nearest, least = still[-1], np.concatenate([moving, still[:-1]])[order(self.shared.limits)]
+        nearest, least = still[-1], np.concatenate([moving, still[:-1]])[order(self.problem.limits)]
         is_finite = np.isfinite(least).all(0) & ~np.isnan(nearest) & (self.durations(*motions) > 0.0)
         step, item = np.nonzero(look.wide)
         ends = seen.instants(motions, item, step), seen.instants(motions, item, step + 1)
@@ -227,6 +228,6 @@ class PoseChecker:
         self._of_motion.lower(moving, motions, Places(*(x[some] for x in places)))
 
     def _glances(self, motions: Motions, row: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        kernel = partial(glances, self.shared, pairs=self._pairs, kind=self.kind)
+        kernel = partial(glances, self.problem, pairs=self._pairs, kind=self.kind)
         gap, view = in_batches(kernel, (*motions.items(row), tau), size=self.batch)
         return gap, view / np.linalg.norm(view, axis=2, keepdims=True)

@@ -12,7 +12,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.demands import SIGNS, Extremes
 from cspr_jax.feasibility.narrowing import narrowed
 from cspr_jax.feasibility.platform.samples import SAMPLES
-from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.runtime.stages import stage
@@ -22,9 +22,9 @@ BATCH = 512
 
 
 @partial(jax.jit, static_argnames="kind")
-def _demands(shared: PoseShared, arguments, *, kind: Kind) -> Array:
+def _demands(problem: Problem, arguments, *, kind: Kind) -> Array:
     def one(segment, arcs, tau):
-        robot, pose = shared.robot, motion(segment, shared.amplitude, arcs, tau, kind=kind)
+        robot, pose = problem.robot, motion(segment, problem.amplitude, arcs, tau, kind=kind)
         per_length = wrench_balance.tensions_per_length(robot, pose)
         lengths, rates, bends = wrench_balance.cable_motion(robot, pose)
         force = robot.mass * per_length * lengths
@@ -46,12 +46,12 @@ def _demands(shared: PoseShared, arguments, *, kind: Kind) -> Array:
 
 
 def pose_extremes(
-    shared: PoseShared, segments: PoseSegment, arcs: np.ndarray, least_samples: int, *, kind: Kind
+    problem: Problem, segments: PoseSegment, arcs: np.ndarray, least_samples: int, *, kind: Kind
 ) -> Extremes:
     """What segments ask of the robot: at least 64 samples an arc, narrowed where a value is extreme.
 
     Args:
-        shared: robot, limits, amplitude, reference.
+        problem: robot, limits, amplitude, reference.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,).
         least_samples: smallest number of samples of a segment.
@@ -68,7 +68,7 @@ def pose_extremes(
 
         def at(points, segment=segment, p=p):
             items = jax.tree.map(lambda x: np.broadcast_to(x, (len(points), *np.shape(x))), (segment, float(p)))
-            return in_batches(partial(_demands, shared, kind=kind), (*items, points), size=BATCH)
+            return in_batches(partial(_demands, problem, kind=kind), (*items, points), size=BATCH)
 
         smallest = narrowed(at, tau, at(tau))
         found.append(smallest * SIGNS + 0.0)  # no -0

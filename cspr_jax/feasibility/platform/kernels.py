@@ -9,7 +9,7 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.lanes import dot, smallest, stored
 from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, still_slacks
-from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import contact_lanes
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.trajectories.platform_lanes import Instant, instant, instant_of_arc, state
@@ -38,11 +38,11 @@ class Look(NamedTuple):
 
 
 @partial(jax.jit, static_argnames="kind")
-def moving_along(shared: PoseShared, within: Array, arcs, *, kind: Kind) -> Array:
+def moving_along(problem: Problem, within: Array, arcs, *, kind: Kind) -> Array:
     """The criteria that depend on the motion, along arcs of many segments.
 
     Args:
-        shared: robot, limits, amplitude.
+        problem: robot, limits, amplitude.
         within: (m,) places within an arc, from 0 to 1.
         arcs: segments (leaves (n, ...)), their numbers of arcs (n,), and which of them (n,), from 0 on.
         kind: of the motions.
@@ -53,36 +53,36 @@ def moving_along(shared: PoseShared, within: Array, arcs, *, kind: Kind) -> Arra
     segments, count, arc = arcs
 
     def at(place):
-        now = instant_of_arc(shared.amplitude, segments.sense, count, arc, place)
-        return moving_slacks(shared, segments, count, now, kind)
+        now = instant_of_arc(problem.amplitude, segments.sense, count, arc, place)
+        return moving_slacks(problem, segments, count, now, kind)
 
     # Stacked once they are there: within a loop XLA would compute all of them for each, a thousand times slower.
     return jnp.stack(lax.map(at, within), axis=1)
 
 
 def _seen(
-    shared: PoseShared, pairs: tuple, segments: PoseSegment, arcs: Array, now: Instant, kind: Kind
+    problem: Problem, pairs: tuple, segments: PoseSegment, arcs: Array, now: Instant, kind: Kind
 ) -> tuple[list[Array], list, list]:
     # (n,) each: the still slacks, and the smallest distance between cables; the vectors between cables; the views.
-    one = jnp.where(shared.robot.mass > 0.0, 1.0, 2.0).astype(segments.rate.dtype)
+    one = jnp.where(problem.robot.mass > 0.0, 1.0, 2.0).astype(segments.rate.dtype)
     here = state(segments, arcs, now, kind, one)
-    wires = cables(shared.robot, here.position, here.turn)
+    wires = cables(problem.robot, here.position, here.turn)
     wires = wires._replace(rays=stored(wires.rays, one))
-    apart = contact_lanes.gaps(shared.robot.base_points, pairs, wires)
+    apart = contact_lanes.gaps(problem.robot.base_points, pairs, wires)
     squares = [dot(gap, gap) for gap in apart]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
-    values = [*still_slacks(shared, segments, here, wires), nearest]
+    values = [*still_slacks(problem, segments, here, wires), nearest]
     return values, apart, contact_lanes.views(wires, here.turn)
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))
 def look_along(
-    shared: PoseShared, within: Array, arcs, *, platform: tuple[Array, Array], pairs: tuple, kind: Kind
+    problem: Problem, within: Array, arcs, *, platform: tuple[Array, Array], pairs: tuple, kind: Kind
 ) -> Look:
     """The criteria that depend on the pose alone, and what meets, along arcs of many segments.
 
     Args:
-        shared: robot, limits, amplitude.
+        problem: robot, limits, amplitude.
         within: (m,) increasing places within an arc, from 0 to 1.
         arcs: segments (leaves (n, ...)), their numbers of arcs (n,), and which of them (n,), from 0 on.
         platform: sides (6, 2, 3) and normal (3,) of `interference.Contacts`.
@@ -95,8 +95,8 @@ def look_along(
     segments, count, arc = arcs
 
     def seen(place):
-        now = instant_of_arc(shared.amplitude, segments.sense, count, arc, place)
-        return _seen(shared, pairs, segments, count, now, kind)
+        now = instant_of_arc(problem.amplitude, segments.sense, count, arc, place)
+        return _seen(problem, pairs, segments, count, now, kind)
 
     def step(before, place):
         values, gaps, views = seen(place)
@@ -115,11 +115,11 @@ def look_along(
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind", "sections"))
-def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind, sections: int = SECTIONS) -> Array:
+def narrowed(problem: Problem, items, *, pairs: tuple | None, kind: Kind, sections: int = SECTIONS) -> Array:
     """The smallest value of one criterion around a sample, by golden sections.
 
     Args:
-        shared: robot, limits, amplitude.
+        problem: robot, limits, amplitude.
         items: segments (leaves (n, ...)), arcs (n,), instants (n,), half the width of the bracket (n,), and which
             value (n,) of `moving_along`, or of `look_along`.
         pairs: of cables that can meet; None: for `moving_along`.
@@ -132,11 +132,11 @@ def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind, sect
     segments, arcs, tau, width, which = items
 
     def at(points):
-        now = instant(shared.amplitude, segments.sense, arcs, points)
+        now = instant(problem.amplitude, segments.sense, arcs, points)
         if pairs is None:
-            values = moving_slacks(shared, segments, arcs, now, kind)
+            values = moving_slacks(problem, segments, arcs, now, kind)
         else:
-            values = _seen(shared, pairs, segments, arcs, now, kind)[0]
+            values = _seen(problem, pairs, segments, arcs, now, kind)[0]
         found = values[0]
         for k, value in enumerate(values[1:], start=1):
             found = jnp.where(which == k, value, found)
@@ -167,11 +167,11 @@ def narrowed(shared: PoseShared, items, *, pairs: tuple | None, kind: Kind, sect
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))
-def glances(shared: PoseShared, items, *, pairs: tuple, kind: Kind) -> tuple[Array, Array]:
+def glances(problem: Problem, items, *, pairs: tuple, kind: Kind) -> tuple[Array, Array]:
     """The vectors between cables, and the views of them, at one instant of each of many segments.
 
     Args:
-        shared: robot, amplitude.
+        problem: robot, amplitude.
         items: segments (leaves (n, ...)), arcs (n,), instants (n,).
         pairs: of cables that can meet.
         kind: of the motions.
@@ -180,5 +180,5 @@ def glances(shared: PoseShared, items, *, pairs: tuple, kind: Kind) -> tuple[Arr
         (n, n_pairs, 3) m, and (n, 6, 3).
     """
     segments, arcs, tau = items
-    now = instant(shared.amplitude, segments.sense, arcs, tau)
-    return contact_lanes.as_arrays(*_seen(shared, pairs, segments, arcs, now, kind)[1:])
+    now = instant(problem.amplitude, segments.sense, arcs, tau)
+    return contact_lanes.as_arrays(*_seen(problem, pairs, segments, arcs, now, kind)[1:])

@@ -9,7 +9,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.platform.kernels import SECTIONS, narrowed
-from cspr_jax.feasibility.platform.slacks import PoseShared
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 SAMPLES = 64  # an arc
@@ -159,13 +159,13 @@ class Narrowing(NamedTuple):
     """Finds smallest values of the criteria that depend on the motion, or of those that depend on the pose alone.
 
     Fields:
-        shared: robot, limits, amplitude.
+        problem: robot, limits, amplitude.
         kind: of the motions.
         pairs: of cables that can meet; None: for what depends on the motion.
         size: how many places are looked at in one call.
     """
 
-    shared: PoseShared
+    problem: Problem
     kind: Kind
     pairs: tuple | None
     size: int
@@ -202,7 +202,7 @@ class Narrowing(NamedTuple):
         if not len(row):
             return np.zeros(0)
         items = (*motions.items(row), tau, width, which.astype(np.int32))
-        kernel = partial(narrowed, self.shared, pairs=self.pairs, kind=self.kind, sections=sections)
+        kernel = partial(narrowed, self.problem, pairs=self.pairs, kind=self.kind, sections=sections)
         found = in_batches(kernel, items, size=self.size)
         np.minimum.at(least, (which, row), found)
         return found

@@ -4,8 +4,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import dot, smallest
-from cspr_jax.feasibility.platform.slacks import PoseShared
 from cspr_jax.feasibility.point_mass.proof_slacks import Limits, given
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.platform import CABLES, PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import Balance, Cables, balance, cable_rates, cables, conditioning, inertial_wrench
@@ -76,11 +76,11 @@ def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now:
     return certain_tension(segment.rate, segment.regular, wires, found)
 
 
-def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> list[Array]:
+def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> list[Array]:
     """Smallest slacks of the criteria that depend on the motion, at one instant of many segments.
 
     Args:
-        shared: robot, limits.
+        problem: robot, limits.
         segment: leaves (n, ...), of the parity of `arcs`.
         arcs: () or (n,) number of arcs, a float.
         now: of these arcs.
@@ -89,7 +89,7 @@ def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: In
     Returns:
         (n,) each, in the order of `MOVING`; infinite where the fast balance has no digits.
     """
-    robot, limits = shared.robot, shared.limits
+    robot, limits = problem.robot, problem.limits
     here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
     wires = cables(robot, here.position, here.turn)
     found = _balanced(robot, here, wires, squared)
@@ -113,11 +113,11 @@ def moving_slacks(shared: PoseShared, segment: PoseSegment, arcs: Array, now: In
     return values
 
 
-def still_slacks(shared: PoseShared, segment: PoseSegment, here: State, wires: Cables) -> list[Array]:
+def still_slacks(problem: Problem, segment: PoseSegment, here: State, wires: Cables) -> list[Array]:
     """Smallest slacks of the criteria that depend on the pose alone, at one instant of many segments.
 
     Args:
-        shared: robot, limits.
+        problem: robot, limits.
         segment: leaves (n, ...).
         here: the state.
         wires: the cables there.
@@ -125,7 +125,7 @@ def still_slacks(shared: PoseShared, segment: PoseSegment, here: State, wires: C
     Returns:
         (n,) each, in the order of `STILL`.
     """
-    robot, limits, z0 = shared.robot, shared.limits, shared.robot.gravity / segment.rate
+    robot, limits, z0 = problem.robot, problem.limits, problem.robot.gravity / segment.rate
     normal = plane_normal(robot)
     below = dot([normal[i] for i in range(3)], here.position) / z0
     values = [conditioning(robot, wires) / segment.regular, below]

@@ -10,32 +10,15 @@ With f the tensions, rho the cable lengths, m the mass:
     length, speed, acceleration    1 - value / largest
 """
 
-from typing import NamedTuple
-
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.feasibility.point_mass.proof_slacks import FLAGS, Limits, given
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import wrench_balance
-from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_balance import Pose
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.trajectories.amplitudes import Amplitude
-
-
-class PoseShared(NamedTuple):
-    """What all segments between poses share.
-
-    Fields:
-        robot: in its reference axes.
-        limits: limits beyond taut cables.
-        amplitude: A.
-    """
-
-    robot: PlatformRobot
-    limits: Limits
-    amplitude: Amplitude
 
 
 def flags(limits: Limits) -> tuple[Verdict, ...]:
@@ -50,11 +33,11 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
     return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(FLAGS[name] for name in given(limits)))
 
 
-def pose_slacks(shared: PoseShared, pose: Pose, z0: Array, regular: Array) -> Array:
+def pose_slacks(problem: Problem, pose: Pose, z0: Array, regular: Array) -> Array:
     """The smallest slack of each criterion at one instant.
 
     Args:
-        shared: robot, limits.
+        problem: robot, limits.
         pose: the state.
         z0: () m.
         regular: () determinant at rest in P0.
@@ -62,7 +45,7 @@ def pose_slacks(shared: PoseShared, pose: Pose, z0: Array, regular: Array) -> Ar
     Returns:
         (n_criteria,) in the order of `flags`.
     """
-    robot, limits = shared.robot, shared.limits
+    robot, limits = problem.robot, problem.limits
     per_length = wrench_balance.tensions_per_length(robot, pose)
     found = [
         6.0 * z0 / robot.gravity * jnp.min(per_length),

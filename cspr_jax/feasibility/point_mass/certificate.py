@@ -15,7 +15,6 @@ on the floor, counts as met: limits are allowed twice the tolerance.
 
 import dataclasses
 from functools import partial
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -25,29 +24,15 @@ from jax import Array
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.point_mass.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.feasibility.point_mass.criteria import curvatures, slacks
-from cspr_jax.feasibility.point_mass.proof_slacks import Limits, given
+from cspr_jax.feasibility.point_mass.proof_slacks import given
 from cspr_jax.feasibility.point_mass.slacks import largest_term
-from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.hypocycloid import Segment
 
 SMALLEST_MARGIN = 1e-9
 BATCH = 1024
 FINEST_CUT = 12
-
-
-class Shared(NamedTuple):
-    """What all segments of a call share.
-
-    Fields:
-        robot: a point mass on three cables.
-        limits: limits beyond taut cables.
-        amplitude: A.
-    """
-
-    robot: PointMassRobot
-    limits: Limits
-    amplitude: Amplitude
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,11 +70,11 @@ def tolerance(amplitude: Amplitude, segment: Segment, arcs: Array) -> Array:
     return SMALLEST_MARGIN + 512.0 * jnp.finfo(terms.dtype).eps * terms
 
 
-def block_bounds(shared: Shared, segments: Segment, arcs: Array, start: Array, stop: Array) -> tuple[Array, Array]:
+def block_bounds(problem: Problem, segments: Segment, arcs: Array, start: Array, stop: Array) -> tuple[Array, Array]:
     """Smallest sampled slack, and proved lower bound, of each criterion over one block of each segment.
 
     Args:
-        shared: robot, limits and amplitude.
+        problem: robot, limits and amplitude.
         segments: leaves (n, ...).
         arcs: (n,).
         start: (n,) tau where each block starts.
@@ -100,37 +85,37 @@ def block_bounds(shared: Shared, segments: Segment, arcs: Array, start: Array, s
     """
     weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
     tau = start * (1.0 - weight) + stop * weight
-    values = jax.vmap(jax.vmap(partial(slacks, *shared)), in_axes=(None, None, 0))(segments, arcs, tau)
+    values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
     sampled = jnp.stack([jnp.min(v, axis=0) for v in values])
-    bound = jnp.stack(jax.vmap(partial(curvatures, *shared))(segments, arcs, start, stop))
+    bound = jnp.stack(jax.vmap(partial(curvatures, *problem))(segments, arcs, start, stop))
     return sampled, sampled - bound * ((stop - start) / INTERVALS) ** 2 / 8.0
 
 
 @jax.jit
-def _first_look(shared: Shared, edges: Array, counts: Array, arguments) -> tuple[Array, Array, Array]:
+def _first_look(problem: Problem, edges: Array, counts: Array, arguments) -> tuple[Array, Array, Array]:
     segments, arcs = arguments
 
     def step(state, start, stop):
-        sampled, proved = block_bounds(shared, segments, arcs, start, stop)
+        sampled, proved = block_bounds(problem, segments, arcs, start, stop)
         return jnp.minimum(state[0], sampled), jnp.minimum(state[1], proved)
 
-    nothing = jnp.full((2 + len(given(shared.limits)), *arcs.shape), jnp.inf, arcs.dtype)
+    nothing = jnp.full((2 + len(given(problem.limits)), *arcs.shape), jnp.inf, arcs.dtype)
     sampled, proved = over_blocks(edges, counts, arcs, (nothing, nothing), step)
-    near = jax.vmap(partial(tolerance, shared.amplitude))(segments, arcs)
+    near = jax.vmap(partial(tolerance, problem.amplitude))(segments, arcs)
     return sampled.T, proved.T, near
 
 
 @jax.jit
-def _closer_look(shared: Shared, arguments) -> tuple[Array, Array]:
-    sampled, proved = block_bounds(shared, *arguments)
+def _closer_look(problem: Problem, arguments) -> tuple[Array, Array]:
+    sampled, proved = block_bounds(problem, *arguments)
     return sampled.T, proved.T
 
 
-def prove(shared: Shared, segments: Segment, arcs: np.ndarray) -> Proof:
+def prove(problem: Problem, segments: Segment, arcs: np.ndarray) -> Proof:
     """Decide segments, each with a given number of arcs.
 
     Args:
-        shared: robot, limits and amplitude.
+        problem: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`; float64.
         arcs: (n,) number of arcs, 1 or more.
 
@@ -138,11 +123,11 @@ def prove(shared: Shared, segments: Segment, arcs: np.ndarray) -> Proof:
         the proofs.
     """
     arcs = np.asarray(arcs, float)
-    edges, counts = blocks(shared.amplitude, int(arcs.max()))
+    edges, counts = blocks(problem.amplitude, int(arcs.max()))
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    look = in_batches(partial(_first_look, shared, edges, counts), arguments, size=BATCH)
+    look = in_batches(partial(_first_look, problem, edges, counts), arguments, size=BATCH)
     sampled, bound, near = jax.tree.map(lambda x: x[back], look)
     allowed = _allowance(sampled.shape[1], near)
     feasible = (bound + allowed > near[:, None]).all(1)
@@ -151,7 +136,7 @@ def prove(shared: Shared, segments: Segment, arcs: np.ndarray) -> Proof:
     if len(open_ones):
         some_segments, some_arcs = jax.tree.map(lambda x: x[open_ones], (segments, arcs))
         table = (edges, counts)
-        feasible[open_ones], infeasible[open_ones] = _cut(shared, some_segments, some_arcs, near[open_ones], table)
+        feasible[open_ones], infeasible[open_ones] = _cut(problem, some_segments, some_arcs, near[open_ones], table)
     return Proof(feasible, infeasible, sampled, bound)
 
 
@@ -161,7 +146,9 @@ def _allowance(n_criteria: int, near: np.ndarray) -> np.ndarray:
     return 2.0 * near[:, None] * is_limit
 
 
-def _cut(shared: Shared, segments: Segment, arcs: np.ndarray, near: np.ndarray, table) -> tuple[np.ndarray, np.ndarray]:
+def _cut(
+    problem: Problem, segments: Segment, arcs: np.ndarray, near: np.ndarray, table
+) -> tuple[np.ndarray, np.ndarray]:
     # Items are blocks of segments that are still open: owner, start, stop.
     edges, counts = table
     refuted, stuck = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool)
@@ -172,7 +159,7 @@ def _cut(shared: Shared, segments: Segment, arcs: np.ndarray, near: np.ndarray, 
     start, stop = edges[row, place], edges[row, place + 1]
     for _ in range(FINEST_CUT):
         items = (*jax.tree.map(lambda x, o=owner: x[o], (segments, arcs)), start, stop)
-        sampled, proved = in_batches(partial(_closer_look, shared), items, size=BATCH)
+        sampled, proved = in_batches(partial(_closer_look, problem), items, size=BATCH)
         limit, allowed = near[owner, None], _allowance(sampled.shape[1], near[owner])
         np.logical_or.at(refuted, owner, ~(sampled + allowed >= -limit).all(1))
         unproved = ~(proved + allowed > limit)

@@ -16,8 +16,9 @@ from jax import Array, lax
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import vertex
 from cspr_jax.feasibility.point_mass.blocks import INTERVALS, blocks, over_blocks
-from cspr_jax.feasibility.point_mass.certificate import BATCH, Shared
+from cspr_jax.feasibility.point_mass.certificate import BATCH
 from cspr_jax.feasibility.point_mass.criteria import counts, smooth_slacks
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.trajectories.hypocycloid import Segment
 
 CANDIDATES = 3
@@ -25,11 +26,11 @@ CANDIDATES = 3
 FIRST_WIDTH, NARROWER, ROUNDS = 1.0 / 4.0, 1.0 / 6.0, 7
 
 
-def _block_estimates(function, shared: Shared, segment: Segment, arcs: Array, start: Array, stop: Array):
+def _block_estimates(function, problem: Problem, segment: Segment, arcs: Array, start: Array, stop: Array):
     # For each function: an estimate of its minimum in the block, and where.
     weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
     tau = start * (1.0 - weight) + stop * weight
-    values = jnp.stack(jax.vmap(partial(function, *shared, segment, arcs))(tau))
+    values = jnp.stack(jax.vmap(partial(function, *problem, segment, arcs))(tau))
     # A parabola through every three neighbours: the lowest sample may be of the valley of another block.
     moves, vertices = vertex(values[:, :-2], values[:, 1:-1], values[:, 2:])
     return _lowest(vertices, tau[1:-1] + moves * (tau[1] - tau[0]))
@@ -118,12 +119,12 @@ def _best_of_groups(groups: tuple[int, ...], estimates: Array, places: Array) ->
 
 
 @partial(jax.jit, static_argnums=0)
-def _minima(functions: Functions, shared: Shared, edges: Array, counts: Array, arguments) -> Array:
+def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array, arguments) -> Array:
     segments, arcs = arguments
     evaluate, groups = functions
 
     def step(state, start, stop):
-        found = jax.vmap(partial(_block_estimates, evaluate, shared), out_axes=1)(segments, arcs, start, stop)
+        found = jax.vmap(partial(_block_estimates, evaluate, problem), out_axes=1)(segments, arcs, start, stop)
         return _insert(state, *found)
 
     nothing = jnp.full((CANDIDATES, sum(groups), *arcs.shape), jnp.inf, arcs.dtype)
@@ -135,7 +136,7 @@ def _minima(functions: Functions, shared: Shared, edges: Array, counts: Array, a
     def refine(segment, p, which, where, width):
         # which, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.
         def one(which, tau):
-            return refined_minimum(lambda t: jnp.stack(evaluate(*shared, segment, p, t))[which], tau, width)
+            return refined_minimum(lambda t: jnp.stack(evaluate(*problem, segment, p, t))[which], tau, width)
 
         return jnp.min(jax.vmap(jax.vmap(one))(which, where), axis=1)
 
@@ -143,13 +144,13 @@ def _minima(functions: Functions, shared: Shared, edges: Array, counts: Array, a
 
 
 def smallest_values(
-    functions: Functions, shared: Shared, segments: Segment, arcs: np.ndarray, table, *, batch: int = BATCH
+    functions: Functions, problem: Problem, segments: Segment, arcs: np.ndarray, table, *, batch: int = BATCH
 ) -> np.ndarray:
     """Smallest values along each segment of functions of one instant.
 
     Args:
         functions: of one instant, in groups.
-        shared: robot, limits and amplitude.
+        problem: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, 1 or more.
         table: blocks to sample, from `blocks.blocks`.
@@ -161,26 +162,26 @@ def smallest_values(
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    found = in_batches(partial(_minima, functions, shared, *table), arguments, size=batch)
+    found = in_batches(partial(_minima, functions, problem, *table), arguments, size=batch)
     return found[np.argsort(order, kind="stable")]
 
 
-def margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> np.ndarray:
+def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
     """Smallest slack of each criterion along each segment.
 
     The smallest sample of every block is refined, so the value does not depend on where the samples lie.
 
     Args:
-        shared: robot, limits and amplitude.
+        problem: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, 1 or more.
 
     Returns:
         (n, n_criteria) in the order of `criteria.flags`; NaN where the motion is not finite.
     """
-    table = blocks(shared.amplitude, int(np.max(arcs)))
+    table = blocks(problem.amplitude, int(np.max(arcs)))
     # The smallest over the cables has kinks, each cable's own slack has none.
-    functions = Functions(smooth_slacks, counts(shared.robot, shared.limits))
-    smallest = smallest_values(functions, shared, segments, arcs, table)
+    functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))
+    smallest = smallest_values(functions, problem, segments, arcs, table)
     # A compiled minimum may pass over NaN; what has no finite minimum has none.
     return np.where(np.isfinite(smallest), smallest, np.nan)

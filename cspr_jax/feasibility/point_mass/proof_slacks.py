@@ -20,8 +20,8 @@ from jax import Array
 from cspr_jax.arithmetic.bounds import Bounds
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.feasibility.point_mass.slacks import Instant, Stretch, row_bounds
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
-from cspr_jax.schema.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.hypocycloid import Segment, duration, oscillation
 

@@ -9,9 +9,9 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.feasibility.point_mass.blocks import blocks
-from cspr_jax.feasibility.point_mass.certificate import Shared
 from cspr_jax.feasibility.point_mass.margins import Functions, margins, smallest_values
 from cspr_jax.feasibility.point_mass.proof_slacks import given
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.trajectories import transition
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment, oscillation
@@ -32,25 +32,25 @@ def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segmen
     return level - jnp.maximum(jnp.max(loads), 0.0) * pull, level - jnp.minimum(jnp.min(loads), 0.0) * pull
 
 
-def transition_margins(shared: Shared, segments: Segment, arcs: np.ndarray) -> np.ndarray:
+def transition_margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
     """Smallest slack of each criterion along each transition, as `margins` gives them.
 
     Where both are positive, the slack of the cables stands in both of the first two columns.
 
     Args:
-        shared: robot, limits and amplitude.
+        problem: robot, limits and amplitude.
         segments: transitions from rest, leaves (n, ...).
         arcs: (n,) even.
 
     Returns:
         (n, n_criteria); NaN where the motion is not finite.
     """
-    if given(shared.limits):
-        return margins(shared, segments, arcs)
-    table = blocks(shared.amplitude, int(np.max(arcs)))
-    smallest = smallest_values(Functions(_extreme_pseudotensions, (1, 1)), shared, segments, arcs, table).min(1)
+    if given(problem.limits):
+        return margins(problem, segments, arcs)
+    table = blocks(problem.amplitude, int(np.max(arcs)))
+    smallest = smallest_values(Functions(_extreme_pseudotensions, (1, 1)), problem, segments, arcs, table).min(1)
     found = np.stack([smallest, smallest], axis=1)
     unclear = np.flatnonzero(~(np.isfinite(smallest) & (smallest > 0.0)))
     if len(unclear):
-        found[unclear] = margins(shared, jax.tree.map(lambda leaf: leaf[unclear], segments), arcs[unclear])
+        found[unclear] = margins(problem, jax.tree.map(lambda leaf: leaf[unclear], segments), arcs[unclear])
     return found
