@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from cspr_jax.cli import main
 from cspr_jax.feasibility.point_mass.margins import margins
+from cspr_jax.feasibility.point_mass.transition_margins import transition_margins
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.feasibility.transition.envelopes import lower_envelope, proved_envelope
-from cspr_jax.feasibility.transition.margins import transition_margins
 from cspr_jax.robots.limits import Limits
 from cspr_jax.search.oscillations import transitions_to
 from cspr_jax.store.result import open_result

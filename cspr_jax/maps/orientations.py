@@ -4,8 +4,8 @@ import numpy as np
 
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Orientations, SweepFile
+from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
-from cspr_jax.feasibility.point_mass.proof_slacks import given
 from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
 from cspr_jax.problem import motion_kind
 from cspr_jax.robots.symmetries import NONE, folded, symmetries

@@ -12,8 +12,8 @@ from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.feasibility.demands import Extremes, extremes
 from cspr_jax.feasibility.platform.demands import pose_extremes
+from cspr_jax.feasibility.point_mass.demands import Extremes, extremes
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.choices import best_amplitude, chosen_depth
 from cspr_jax.plans.platform_sequence import Poses

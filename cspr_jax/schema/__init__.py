@@ -1,1 +1,1 @@
-"""What results are made of: verdicts, quantities, limits, tiles, identities. No jax."""
+"""What results are made of: verdicts, quantities, tiles, identities. No jax."""

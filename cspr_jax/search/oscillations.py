@@ -13,13 +13,13 @@ import numpy as np
 from jax import lax
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, tolerance
-from cspr_jax.feasibility.point_mass.proof_slacks import given
+from cspr_jax.feasibility.point_mass.transition_margins import transition_margins
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.feasibility.transition.envelopes import proved_envelope
-from cspr_jax.feasibility.transition.margins import transition_margins
 from cspr_jax.runtime.stages import stage
 from cspr_jax.search.answers import BATCH, Answers, Known, decided, end_slacks, only
 from cspr_jax.search.point_mass_arcs import check_numbers

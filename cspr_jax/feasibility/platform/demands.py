@@ -9,9 +9,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.demands import SIGNS, Extremes
-from cspr_jax.feasibility.narrowing import narrowed
+from cspr_jax.arithmetic.minima import narrowed
 from cspr_jax.feasibility.platform.samples import SAMPLES
+from cspr_jax.feasibility.point_mass.demands import SIGNS, Extremes
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.point_mass import plane_normal

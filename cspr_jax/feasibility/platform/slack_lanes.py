@@ -4,8 +4,9 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import dot, smallest
-from cspr_jax.feasibility.point_mass.proof_slacks import Limits, given
+from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import CABLES, PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import Balance, Cables, balance, cable_rates, cables, conditioning, inertial_wrench

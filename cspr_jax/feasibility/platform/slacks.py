@@ -13,9 +13,10 @@ With f the tensions, rho the cable lengths, m the mass:
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.feasibility.point_mass.proof_slacks import FLAGS, Limits, given
+from cspr_jax.feasibility.limits import FLAGS, given
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import wrench_balance
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_balance import Pose
 from cspr_jax.schema.verdicts import Verdict

@@ -22,9 +22,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.feasibility.point_mass.criteria import curvatures, slacks
-from cspr_jax.feasibility.point_mass.proof_slacks import given
 from cspr_jax.feasibility.point_mass.slacks import largest_term
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.trajectories.amplitudes import Amplitude

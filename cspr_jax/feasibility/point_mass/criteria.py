@@ -6,8 +6,10 @@ import itertools
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.feasibility.point_mass.proof_slacks import FLAGS, Limits, count, given, limit_curvatures, limit_slacks
+from cspr_jax.feasibility.limits import FLAGS, count, given
+from cspr_jax.feasibility.point_mass.proof_slacks import limit_curvatures, limit_slacks
 from cspr_jax.feasibility.point_mass.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.amplitudes import Amplitude

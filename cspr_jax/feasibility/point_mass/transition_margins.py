@@ -8,9 +8,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.blocks import blocks
 from cspr_jax.feasibility.point_mass.margins import Functions, margins, smallest_values
-from cspr_jax.feasibility.point_mass.proof_slacks import given
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.trajectories import transition
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
