@@ -12,11 +12,11 @@ import numpy as np
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.problem import Problem
 from cspr_jax.outputs.plan_report import is_feasible
 from cspr_jax.plans.planning import Plan
 from cspr_jax.problem import motion_kind
 from cspr_jax.robots import force_balance, wrench_balance
+from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.store.disk import Disk
@@ -105,7 +105,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
 
 
 def _states(plan: Plan, segment, arcs: float, tau: np.ndarray):
-    if isinstance(plan.problem, Problem):
+    if isinstance(plan.problem.robot, PlatformRobot):
         return _pose_states(plan.problem, segment, arcs, tau, kind=motion_kind(plan.keys))
     return _point_states(plan.problem, segment, arcs, tau)
 
