@@ -8,19 +8,22 @@ import numpy as np
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, from_tilt_torsion
-from cspr_jax.config.robot import LimitKeys, RobotFile
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
-from cspr_jax.robots.reference_pose import reference_pose
+from cspr_jax.robots.reference_pose import aligned, reference_pose
+from cspr_jax.schema.families import FAMILIES
 from cspr_jax.trajectories import amplitudes
 from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors
 from cspr_jax.trajectories.platform_segment import Kind
 
-RobotKind = TypeVar("RobotKind", PointMassRobot, PlatformRobot)
+RobotKind = TypeVar("RobotKind", bound=PointMassRobot | PlatformRobot)
 
 
 def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
@@ -167,7 +170,7 @@ def build_amplitude(
         amplitude, given = amplitudes.named(key.name, value), shown(key.name)
     else:
         amplitude, given = amplitudes.named(key), shown(key)
-    free_end = keys.family == "transition"
+    free_end = all(FAMILIES[name].free_end for name in keys.families)
     broken = [] if key == "ideal" and for_bounds else boundary_errors(amplitude, free_end=free_end)
     if broken:
         conditions = "(1.27) and (1.28)" if free_end else "(2.49)"
@@ -240,6 +243,39 @@ def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None) ->
         raise InputError("limits.floor", floor, "a finite number: z of the floor")
     depth = None if floor is None else leaf(frame_of(robot.base_points, robot.z_axis).depth(floor))
     return Limits(floor=depth, **found)
+
+
+def build_problem(
+    spec: RobotFile,
+    keys: TrajectoryKeys,
+    limits: LimitTable | PlanFile,
+    file: object,
+    *,
+    epsilon: float | None = None,
+    at: str = "",
+    for_bounds: bool = False,
+) -> Problem:
+    """Robot, limits and amplitude function of a plan or sweep, as the kernels take them.
+
+    Args:
+        spec: the robot file's content.
+        keys: of the trajectory.
+        limits: keys of the limits.
+        file: named in errors.
+        epsilon: stands in for an amplitude function's "best".
+        at: prefix of keys of the trajectory in errors.
+        for_bounds: whether the amplitude function may be "ideal", which is no motion.
+
+    Returns:
+        the problem: its robot is centred; a platform in its reference axes.
+
+    Raises:
+        ConfigError: the robot, the amplitude function or the limits cannot be used.
+    """
+    amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
+    given = build_limits(spec, limits, limits.floor, file)
+    robot, _ = centred(build_robot(spec, keys, file))
+    return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
 
 
 def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> Kind:

@@ -86,6 +86,16 @@ class RobotFile(LimitKeys):
         """Whether it is a rigid platform on six cables."""
         return self.platform_points is not None
 
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom of the effector."""
+        return 6 if self.is_platform else 2 if self.planar else 3
+
+    @property
+    def kind(self) -> str:
+        """What it is, for people."""
+        return {2: "a planar robot", 3: "a point mass", 6: "a platform"}[self.dof]
+
     @field_validator("base_points")
     @classmethod
     def _number(cls, points: list[Point]) -> list[Point]:

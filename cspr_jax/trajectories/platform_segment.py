@@ -22,6 +22,7 @@ from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point, spool_radius
+from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_balance import Pose, conditioning
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn
@@ -204,3 +205,49 @@ def _swing(
         return jnp.stack([axial * vector[0] + lateral * vector[1], axial * vector[1] - lateral * vector[0]])
 
     return turned(place), turned(pace), turned(bend)
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class PlatformMotion:
+    """Motion of a platform between two poses; see `Motion`.
+
+    Fields:
+        segment: of the parity of `arcs`.
+        amplitude: A.
+        arcs: () number of arcs, a float.
+        kind: of the motion; known when a function is compiled.
+    """
+
+    segment: PoseSegment
+    amplitude: Amplitude
+    arcs: Array
+    kind: Kind = dataclasses.field(default=USUAL, metadata={"static": True})
+
+    @property
+    def z0(self) -> Array:
+        """Depth of P0 below the centroid of the spools, () m."""
+        return self.segment.hub[..., 2]
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return duration(self.segment, self.arcs)
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+        tau = jnp.asarray(tau, float)
+        pose = motion(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        quaternion = quaternion_at(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        return State(
+            pose.position,
+            pose.velocity,
+            pose.acceleration,
+            quaternion,
+            pose.rotation,
+            pose.angular_velocity,
+            pose.angular_acceleration,
+        )
+
+    def breaks(self) -> Array:
+        """Knots of the amplitude function; see `Motion.breaks`."""
+        return self.amplitude.knots

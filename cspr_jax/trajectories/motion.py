@@ -1,0 +1,106 @@
+"""Motion of an effector: what every trajectory family gives, and what plans, margins, demands and files take.
+
+A motion is a pytree that holds its own amplitude function, number of arcs and depth of P0, so that it can be jitted,
+vmapped and differentiated. Normalised time tau runs from 0 to 1.
+"""
+
+import dataclasses
+from typing import Any, Generic, Protocol, TypeVar
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.robots import state as states
+from cspr_jax.robots.state import State
+
+jax.tree_util.register_dataclass(Frame, ["signs", "origin", "rest"], [])
+
+
+class Motion(Protocol):
+    """Motion over normalised time."""
+
+    def duration(self) -> Array:
+        """Duration T, () s."""
+        ...
+
+    def state(self, tau: Array) -> State:
+        """State at a normalised time tau (), with derivatives in time."""
+        ...
+
+    def breaks(self) -> Array:
+        """Values (n,) of tau in ]0, 1[ where the acceleration or its derivative may jump."""
+        ...
+
+
+Kind = TypeVar("Kind", bound=Motion)
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Backwards(Generic[Kind]):
+    """Motion run from its end to its start; see `Motion`.
+
+    Fields:
+        motion: the motion.
+    """
+
+    motion: Kind
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return self.motion.duration()
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+        return states.backwards(self.motion.state(1.0 - tau))
+
+    def breaks(self) -> Array:
+        """Breaks; see `Motion.breaks`."""
+        return jnp.flip(1.0 - self.motion.breaks())
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Placed(Generic[Kind]):
+    """Motion in the axes of a robot file; see `Motion`.
+
+    Fields:
+        motion: in the kernels' axes: from the centroid of the spools, z down.
+        frame: of the robot.
+    """
+
+    motion: Kind
+    frame: Frame
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return self.motion.duration()
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+        return outward(self.frame, self.motion.state(tau))
+
+    def breaks(self) -> Array:
+        """Breaks; see `Motion.breaks`."""
+        return self.motion.breaks()
+
+
+def outward(frame: Frame, state: State) -> State:
+    """State in the axes of a robot file.
+
+    Args:
+        frame: of the robot.
+        state: from the centroid of the spools, z down; leaves (..., 3), (..., 4) or (..., 3, 3).
+
+    Returns:
+        the state.
+    """
+    turned: dict[str, Any] = {"position": frame.outward(state.position)}
+    turned |= {name: frame.turned(getattr(state, name)) for name in ("velocity", "acceleration")}
+    if state.rotation is not None:
+        turned["quaternion"] = frame.turned_quaternions(state.quaternion)
+        turned["rotation"] = frame.signs[:, None] * state.rotation * frame.signs
+        turned |= {name: frame.turned(getattr(state, name)) for name in ("angular_velocity", "angular_acceleration")}
+    return State(**turned)
