@@ -23,22 +23,6 @@ from cspr_jax.search.point_mass_arcs import minimum_arcs as _minimum_arcs
 from cspr_jax.trajectories.amplitudes import Amplitude, named
 
 
-def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
-    """A robot of the catalogue, or of a file, with its axes and its limits.
-
-    Args:
-        reference: a catalogue name, or the path of a robot file.
-
-    Returns:
-        the robot; with six cables, a platform.
-
-    Raises:
-        ConfigError: no such robot, or a mistake in its file.
-    """
-    spec = resolve_robot(str(reference), reference, Path.cwd())
-    return build_robot(spec, TrajectoryKeys(), reference)
-
-
 def plan(path: str | Path) -> Plan:
     """Plan the sequence of a plan file; see `cspr_jax.reports.plan_object` for plain values.
 

@@ -1,6 +1,7 @@
 """From checked files to what the kernels take: robot, limits, amplitude function, axes."""
 
 import dataclasses
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -9,7 +10,7 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, from_tilt_torsion
 from cspr_jax.config.plan import PlanFile
-from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile
+from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.feasibility.problem import Problem
@@ -80,6 +81,22 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
         return platform_robot(spec.base_points, spec.platform_points, **given)
     except InputError as error:
         raise ConfigError(file, spec.typed(error)) from error
+
+
+def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
+    """A robot of the catalogue, or of a file, with its axes and its limits.
+
+    Args:
+        reference: a catalogue name, or the path of a robot file.
+
+    Returns:
+        the robot; with six cables, a platform.
+
+    Raises:
+        ConfigError: no such robot, or a mistake in its file.
+    """
+    spec = resolve_robot(str(reference), reference, Path.cwd())
+    return build_robot(spec, TrajectoryKeys(), reference)
 
 
 def point_mass_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot:
