@@ -22,15 +22,30 @@ class Motion(Protocol):
     """Motion over normalised time."""
 
     def duration(self) -> Array:
-        """Duration T, () s."""
+        """Duration T.
+
+        Returns:
+            () s.
+        """
         ...
 
     def state(self, tau: Array) -> State:
-        """State at a normalised time tau (), with derivatives in time."""
+        """State at one instant, with derivatives in time.
+
+        Args:
+            tau: () normalised time in [0, 1].
+
+        Returns:
+            the state.
+        """
         ...
 
     def breaks(self) -> Array:
-        """Values (n,) of tau in ]0, 1[ where the acceleration or its derivative may jump."""
+        """Instants at which the acceleration or its derivative may jump.
+
+        Returns:
+            (n,) tau in ]0, 1[, increasing.
+        """
         ...
 
 
