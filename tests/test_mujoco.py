@@ -13,6 +13,7 @@ import cspr_jax
 from cspr_jax.outputs import motion_files
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.state import State
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import duration
 
@@ -49,7 +50,7 @@ def asymmetrical(_):
         poses.append((position, oracle.pose_quaternion(position, angles)))
     segment, tau = made(robot, *poses, Z0, (-3.0, -2.0), arcs), np.linspace(0.0, 1.0, SAMPLES)
     at = states(robot, segment, amplitude, float(arcs), tau)
-    length, rate, _ = jax.vmap(lambda *x: wrench_balance.cable_motion(robot, wrench_balance.Pose(*x)))(*at)
+    length, rate, _ = jax.vmap(lambda *x: wrench_balance.cable_motion(robot, State(*x)))(*at)
     quaternion = np.zeros((SAMPLES, 4))
     for q, rotation in zip(quaternion, np.asarray(at.rotation), strict=True):
         mujoco.mju_mat2Quat(q, rotation.ravel())
@@ -63,7 +64,7 @@ def asymmetrical(_):
         "omega_dot": at.angular_acceleration,
         "length": length,
         "rate": rate,
-        "tension": jax.vmap(lambda *x: wrench_balance.tensions(robot, wrench_balance.Pose(*x)))(*at),
+        "tension": jax.vmap(lambda *x: wrench_balance.tensions(robot, State(*x)))(*at),
     }
     spread = np.linalg.svd(at.angular_velocity, compute_uv=False)
     assert spread[1] > 0.5 * spread[0] and columns["tension"].min() > 0.0

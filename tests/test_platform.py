@@ -22,6 +22,7 @@ from cspr_jax.problem import platform_of
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import pairs_apart, platform_robot
 from cspr_jax.robots.reference_pose import reference_pose
+from cspr_jax.robots.state import State
 from cspr_jax.trajectories import platform_segment as segments
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import USUAL, Kind
@@ -84,7 +85,7 @@ def _lowest(chosen, robot, amplitude, poses, p):
     poses = [(jnp.where(jnp.isnan(x), jnp.stack([z0 * 0.0, z0 * 0.0, z0]), x), q) for x, q in poses]
     one = _made(robot, *poses, z0, tuple(bends), p % 2.0 == 1.0)
     at = jax.vmap(lambda t: segments.motion(one, amplitude, p, t))(jnp.linspace(0.0, 1.0, 201))
-    return jnp.min(jax.vmap(lambda *leaves: wrench_balance.tensions(robot, wrench_balance.Pose(*leaves)))(*at))
+    return jnp.min(jax.vmap(lambda *leaves: wrench_balance.tensions(robot, State(*leaves)))(*at))
 
 
 lowest, slopes = jax.jit(_lowest), jax.jit(jax.grad(_lowest))
@@ -180,7 +181,7 @@ def test_wrench_balance(robot):
     for _ in range(50):
         position, quaternion = random_pose(rng)
         rotation, (velocity, omega, pull, spin) = oracle.matrix(quaternion), rng.normal(size=(4, 3))
-        pose = wrench_balance.Pose(*(jnp.asarray(x) for x in (position, rotation, velocity, omega, pull, spin)))
+        pose = State(*(jnp.asarray(x) for x in (position, velocity, pull, rotation, omega, spin)))
         tension = np.asarray(wrench_balance.tensions(found, pose))
         arms = robot.platform @ rotation.T
         cables = position + arms - robot.base
@@ -212,8 +213,8 @@ def test_work_of_the_cables_is_the_change_of_energy():
         at = states(
             package, segment, amplitude, float(p), np.concatenate([[a], 0.5 * (a + b) + 0.5 * (b - a) * nodes, [b]])
         )
-        tension = np.asarray(jax.vmap(lambda *x: wrench_balance.tensions(package, wrench_balance.Pose(*x)))(*at))
-        _, rate, _ = jax.vmap(lambda *x: wrench_balance.cable_motion(package, wrench_balance.Pose(*x)))(*at)
+        tension = np.asarray(jax.vmap(lambda *x: wrench_balance.tensions(package, State(*x)))(*at))
+        _, rate, _ = jax.vmap(lambda *x: wrench_balance.cable_motion(package, State(*x)))(*at)
         power = -(tension * np.asarray(rate)).sum(1)
         work += 0.5 * (b - a) * time * float(parts @ power[1:-1])
 
@@ -340,7 +341,7 @@ def readable(package, poses):
     """Tensions per mass and length, and determinants, of many poses."""
 
     def one(*x):
-        pose = wrench_balance.Pose(*x)
+        pose = State(*x)
         found = wrench_balance.tensions_per_length(package, pose)
         return found, wrench_balance.conditioning(package, pose.position, pose.rotation)
 

@@ -14,8 +14,9 @@ from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, stil
 from cspr_jax.feasibility.platform.slacks import pose_slacks
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.planning import plan
-from cspr_jax.robots import contact_lanes, interference, wrench_balance
+from cspr_jax.robots import contact_lanes, interference
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.amplitudes import named
@@ -118,7 +119,7 @@ def test_lanes_are_the_readable_slacks(robot):
         views = np.stack([np.stack(v, -1) for v in contact_lanes.views(wires, here.turn)], 1)
         for i, segment in enumerate(some):
             at = jax.tree.map(lambda x: x[0], states(package, segment, amplitude, float(p), np.array([t])))
-            pose = wrench_balance.Pose(*at)
+            pose = State(*at)
             wanted = np.asarray(pose_slacks(problem, pose, jnp.asarray(Z0), segment.regular))
             if abs(wanted[1]) > 1e-3:
                 np.testing.assert_allclose(found[:, i], wanted, rtol=1e-7, atol=1e-8)

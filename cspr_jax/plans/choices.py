@@ -13,7 +13,8 @@ from cspr_jax.feasibility.transition.oscillations import best_inclination
 from cspr_jax.plans.sequence import Sequence
 from cspr_jax.plans.stops import Stops
 from cspr_jax.problem import build_amplitude
-from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, HasSpools, rest_point, spool_radius
+from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, rest_point, spool_radius
+from cspr_jax.robots.robot import Robot
 from cspr_jax.runtime.stages import within
 from cspr_jax.trajectories import depths
 from cspr_jax.trajectories.amplitudes import Amplitude
@@ -78,7 +79,7 @@ def _check_depth_keys(stops: Stops) -> None:
         raise ConfigError(path, "z0, inclination: must be one of them")
 
 
-def _check_rest(robot: HasSpools, stops: Stops, z0: float) -> None:
+def _check_rest(robot: Robot, stops: Stops, z0: float) -> None:
     at_rest, near = rest_point(np.asarray(z0)), AT_P0 * float(spool_radius(robot))
     for i, pose in enumerate(stops.poses):
         if not pose.rest or pose.position is None:

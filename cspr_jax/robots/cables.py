@@ -1,20 +1,18 @@
 """Cables of any robot at one instant: tensions, lengths and their rates, by the balance of its kind."""
 
+from typing import TypeAlias
+
 from jax import Array
 
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.state import State
-from cspr_jax.robots.wrench_balance import Pose
+
+AnyRobot: TypeAlias = PointMassRobot | PlatformRobot
 
 
-def _pose(state: State) -> Pose:
-    # Of a platform: nothing of it is None.
-    return Pose(*(getattr(state, name) for name in Pose._fields))
-
-
-def tensions(robot: PointMassRobot | PlatformRobot, state: State) -> Array:
+def tensions(robot: AnyRobot, state: State) -> Array:
     """Cable tensions.
 
     Args:
@@ -25,11 +23,11 @@ def tensions(robot: PointMassRobot | PlatformRobot, state: State) -> Array:
         (n_cables,) in cable order, N; negative where a cable would have to push.
     """
     if isinstance(robot, PlatformRobot):
-        return wrench_balance.tensions(robot, _pose(state))
+        return wrench_balance.tensions(robot, state)
     return force_balance.tensions(robot, state.position, state.acceleration)
 
 
-def cable_motion(robot: PointMassRobot | PlatformRobot, state: State) -> tuple[Array, Array, Array]:
+def cable_motion(robot: AnyRobot, state: State) -> tuple[Array, Array, Array]:
     """Lengths of the cables and their first two derivatives in time.
 
     Args:
@@ -40,5 +38,5 @@ def cable_motion(robot: PointMassRobot | PlatformRobot, state: State) -> tuple[A
         lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2.
     """
     if isinstance(robot, PlatformRobot):
-        return wrench_balance.cable_motion(robot, _pose(state))
+        return wrench_balance.cable_motion(robot, state)
     return force_balance.cable_motion(robot, state.position, state.velocity, state.acceleration)

@@ -14,7 +14,7 @@ def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: Cables) ->
     """The shortest vectors between cables.
 
     Args:
-        base_points: (6, 3) m.
+        base_points: (n_cables, 3) m.
         pairs: indices of cables; known when this is compiled.
         wires: the cables.
 
@@ -58,7 +58,7 @@ def as_arrays(between: Sequence[Vector], seen: Sequence[Vector]) -> tuple[Array,
         seen: of `views`.
 
     Returns:
-        (n, n_pairs, 3) and (n, 6, 3).
+        (n, n_pairs, 3) and (n, n_cables, 3).
     """
     arrays = [jnp.stack([jnp.stack(v, -1) for v in vectors], 1) for vectors in (between, seen) if vectors]
     return arrays[0] if between else jnp.zeros((len(arrays[-1]), 0, 3)), arrays[-1]
@@ -86,7 +86,7 @@ def platform_hit(sides: Array, normal: Array, before: Sequence[Vector], after: S
     """Whether any cable swept over the platform between two instants; see `interference.platform_hit`.
 
     Args:
-        sides: (6, 2, 3) of `interference.contacts`.
+        sides: (n_cables, 2, 3) of `interference.contacts`.
         normal: (3,) of it.
         before: of `views`.
         after: of `views`.

@@ -3,7 +3,8 @@
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.robots.point_mass import PointMassRobot, is_planar
+from cspr_jax.robots.point_mass import PointMassRobot, is_planar, relative_acceleration
+from cspr_jax.robots.robot import check_determined
 
 
 def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
@@ -19,16 +20,20 @@ def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) 
 
     Returns:
         (n_cables,) in cable order, m^3/s^2 (planar: m^2/s^2); positive pulls, as long as the mass is below the spools.
+
+    Raises:
+        InputError: more cables.
     """
+    check_determined(robot)
     if is_planar(robot):
         adjugate = _planar_adjugate(robot.base_points - position)
         side = jnp.sign(robot.base_points[1, 0] - robot.base_points[0, 0])
-        return side * (adjugate @ _relative_acceleration(robot, acceleration))
+        return side * (adjugate @ relative_acceleration(robot, acceleration))
     a = robot.base_points
     following, preceding = jnp.roll(a, -1, axis=0), jnp.roll(a, -2, axis=0)
     adjugate = jnp.cross(position, following - preceding) + jnp.cross(following, preceding)
     area = jnp.cross(a[1] - a[0], a[2] - a[0])[2]
-    return -jnp.sign(area) * (adjugate @ _relative_acceleration(robot, acceleration))
+    return -jnp.sign(area) * (adjugate @ relative_acceleration(robot, acceleration))
 
 
 def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
@@ -42,7 +47,11 @@ def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Arr
     Returns:
         (n_cables,) in cable order, N. Not clipped: a negative entry is the push that a cable cannot give.
         Infinite or NaN in the spool plane, where M is singular.
+
+    Raises:
+        InputError: more cables.
     """
+    check_determined(robot)
     rays = robot.base_points - position  # (2.6)
     if is_planar(robot):
         adjugate = _planar_adjugate(rays)
@@ -50,7 +59,7 @@ def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Arr
     else:
         adjugate = jnp.stack([jnp.cross(rays[1], rays[2]), jnp.cross(rays[2], rays[0]), jnp.cross(rays[0], rays[1])])
         determinant = jnp.dot(adjugate[2], rays[2])  # (2.9)
-    per_length = adjugate @ _relative_acceleration(robot, acceleration) / determinant  # (2.7), (2.11)
+    per_length = adjugate @ relative_acceleration(robot, acceleration) / determinant  # (2.7), (2.11)
     return robot.mass * per_length * jnp.linalg.norm(rays, axis=1)  # (2.4)
 
 
@@ -60,7 +69,7 @@ def cable_motion(
     """Lengths of the cables, (2.1), and their first two derivatives in time.
 
     Args:
-        robot: a point mass on three cables, or on two in a plane.
+        robot: a point mass on any number of cables.
         position: (3,) m.
         velocity: (3,) m/s.
         acceleration: (3,) m/s^2.
@@ -78,7 +87,3 @@ def _planar_adjugate(rays: Array) -> Array:
     # Rows whose product with p'' - g are the two unknowns' numerators by Cramer's rule, in the plane y = 0.
     turned = jnp.stack([rays[:, 2], jnp.zeros_like(rays[:, 0]), -rays[:, 0]], axis=1)
     return jnp.stack([turned[1], -turned[0]])
-
-
-def _relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:
-    return acceleration.at[2].add(-robot.gravity)  # p'' - g, z down

@@ -6,8 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.robots.platform import PlatformRobot, pairs_apart
-from cspr_jax.robots.wrench_balance import rays
+from cspr_jax.robots.platform import PlatformRobot, pairs_apart, rays
 
 # Points nearer than this part of the platform's size are one corner.
 SAME = 1e-9
@@ -19,7 +18,8 @@ class Contacts(NamedTuple):
 
     Fields:
         pairs: (n_pairs, 2) indices of cables.
-        sides: (6, 2, 3) from each platform point along both edges of the platform that leave it, platform axes, m.
+        sides: (n_cables, 2, 3) from each platform point along both edges of the platform that leave it, platform
+            axes, m.
         normal: (3,) of the platform, platform axes.
     """
 
@@ -95,7 +95,7 @@ def views(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
         rotation: (3, 3).
 
     Returns:
-        (6, 3) platform axes.
+        (n_cables, 3) platform axes.
     """
     cables, _ = rays(robot, position, rotation)
     return -(cables / jnp.linalg.norm(cables, axis=1, keepdims=True)) @ rotation
@@ -118,13 +118,13 @@ def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, afte
     """Cables that swept over the platform between two instants: as in the text, in platform axes.
 
     Args:
-        sides: (6, 2, 3) of `contacts`.
+        sides: (n_cables, 2, 3) of `contacts`.
         normal: (3,) of `contacts`.
-        before: (..., 6, 3) of `views`.
-        after: (..., 6, 3).
+        before: (..., n_cables, 3) of `views`.
+        after: (..., n_cables, 3).
 
     Returns:
-        (..., 6).
+        (..., n_cables).
     """
     high, low = before @ normal, after @ normal
     through = high * low <= 0.0

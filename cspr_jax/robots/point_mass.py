@@ -1,11 +1,11 @@
-"""Point-mass robots: geometry, mass, gravity, limits.
+"""Point-mass robots: geometry, mass, gravity, limits, wrenches.
 
 A robot that is loaded or made has the axes of its file. Kernels take it from the centroid of its spools and with z
 down, as `problem.centred` gives it.
 """
 
 import dataclasses
-from typing import Literal, Protocol
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -15,9 +15,13 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
 from cspr_jax.robots.limits import NO_LIMITS, Limits
+from cspr_jax.robots.robot import Robot
+from cspr_jax.robots.state import State
 
 STANDARD_GRAVITY = 9.81
-# Below these ratios three spools count as lying on a line, and their plane as vertical.
+# Degrees of freedom of a point mass in space, and in the plane y = 0.
+SPATIAL, PLANAR = 3, 2
+# Below these ratios spools count as lying on a line, and their plane as vertical.
 SMALLEST_AREA_RATIO = 1e-6
 LARGEST_LENGTH = 1e6  # m; beyond, products of lengths lose their meaning
 SMALLEST_LEVEL_RATIO = 1e-3
@@ -31,7 +35,7 @@ Axis = Literal["down", "up"]
 
 @dataclasses.dataclass(frozen=True)
 class PointMassRobot:
-    """A point mass on three cables, or on two in the plane y = 0.
+    """A point mass on three cables or more, or on two or more in the plane y = 0.
 
     Fields:
         base_points: (n_cables, 3) where the cables leave their spools, one a row, in cable order; m.
@@ -40,6 +44,7 @@ class PointMassRobot:
         limits: limits beyond taut cables.
         name: for people.
         z_axis: where z points, "down" or "up"; known when a function is compiled.
+        dof: degrees of freedom, 3, or 2 in the plane y = 0; known when a function is compiled.
     """
 
     base_points: Array
@@ -48,11 +53,31 @@ class PointMassRobot:
     limits: Limits = NO_LIMITS
     name: str = ""
     z_axis: Axis = "down"
+    dof: int = SPATIAL
+
+    @property
+    def n_cables(self) -> int:
+        """Number of cables."""
+        return self.base_points.shape[-2]
+
+    def wrench_matrix(self, state: State) -> Array:
+        """Wrenches of unit tensions; see `Robot.wrench_matrix`."""
+        rays = self.base_points - state.position
+        return (rays / jnp.linalg.norm(rays, axis=1, keepdims=True)).T[self._directions]
+
+    def inertial_wrench(self, state: State) -> Array:
+        """Wrench that the cables must supply; see `Robot.inertial_wrench`."""
+        return self.mass * relative_acceleration(self, state.acceleration)[self._directions]
+
+    @property
+    def _directions(self) -> np.ndarray:
+        # In which the effector moves: x and z in the plane y = 0.
+        return np.array([0, 2] if self.dof == PLANAR else [0, 1, 2])
 
 
 # The name stays outside: compiled functions do not see it, and are not compiled again for another one.
 jax.tree_util.register_dataclass(
-    PointMassRobot, ["base_points", "mass", "gravity", "limits"], ["z_axis"], drop_fields=["name"]
+    PointMassRobot, ["base_points", "mass", "gravity", "limits"], ["z_axis", "dof"], drop_fields=["name"]
 )
 
 
@@ -68,7 +93,8 @@ def point_mass_robot(
     """A point-mass robot, its geometry checked.
 
     Args:
-        base_points: (3, 3) spool points, one a row, m. Any triangle whose plane is not vertical, anywhere.
+        base_points: (n_cables, 3) spool points, one a row, three or more, m. Anywhere, as long as their plane (of more
+            than three: that of least squares) is not vertical.
         mass: kg, positive.
         gravity: m/s^2, positive.
         name: for people.
@@ -82,18 +108,13 @@ def point_mass_robot(
         InputError: wrong shape, not finite, spools on a line, a vertical spool plane, mass or gravity not positive,
             another z_axis.
     """
-    points = np.asarray(base_points, float)
-    if points.shape != (3, 3) or not (np.abs(points) <= LARGEST_LENGTH).all():
-        raise InputError("base_points", base_points, "three points of three coordinates, at most 1e6 m")
+    points = checked_points("base_points", base_points, SPATIAL)
     check_numbers(mass, gravity)
     check_axis(z_axis)
-    sides = np.roll(points, -1, 0) - points
-    normal = np.cross(sides[0], sides[1])
-    size = np.linalg.norm(normal)
-    if not size > SMALLEST_AREA_RATIO * (np.linalg.norm(sides, axis=1).max() ** 2):
-        raise InputError("base_points", points.tolist(), "three spools that are not on one line")
-    if not abs(normal[2]) > SMALLEST_LEVEL_RATIO * size:
-        raise InputError("base_points", points.tolist(), "three spools whose plane is not vertical")
+    # The product of both spreads from above, over that of both in space: how far the plane is from vertical.
+    spreads, level = spread(points), spread(points[:, :2])
+    if not level[0] * level[1] > SMALLEST_LEVEL_RATIO * spreads[0] * spreads[1]:
+        raise InputError("base_points", points.tolist(), "spools whose plane is not vertical")
     return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis)
 
 
@@ -106,10 +127,10 @@ def planar_robot(
     z_axis: Axis = "down",
     limits: Limits | None = None,
 ) -> PointMassRobot:
-    """A point mass on two cables, moving in the plane y = 0, its geometry checked.
+    """A point mass on cables, moving in the plane y = 0, its geometry checked.
 
     Args:
-        base_points: (2, 3) spool points on a level line, y = 0; m.
+        base_points: (n_cables, 3) spool points, two or more, y = 0, two of them on a level line; m.
         mass: kg, positive.
         gravity: m/s^2, positive.
         name: for people.
@@ -120,20 +141,71 @@ def planar_robot(
         the robot, float64 NumPy leaves.
 
     Raises:
-        InputError: wrong shape, not finite, y not 0, spools at one place or not on a level line, mass or gravity,
-            another z_axis.
+        InputError: wrong shape, not finite, y not 0, spools on a vertical line, two that are not on a level one, mass
+            or gravity, another z_axis.
     """
-    points = np.asarray(base_points, float)
-    if points.shape != (2, 3) or not (np.abs(points) <= LARGEST_LENGTH).all():
-        raise InputError("base_points", base_points, "two points of three coordinates, at most 1e6 m")
+    points = checked_points("base_points", base_points, PLANAR)
     check_numbers(mass, gravity)
     check_axis(z_axis)
     if (points[:, 1] != 0.0).any():
         raise InputError("base_points", points.tolist(), "points with y = 0: the plane of a planar robot")
-    gap = np.abs(points[1] - points[0])
-    if not gap[2] <= LEVEL * gap[0]:
-        raise InputError("base_points", points.tolist(), "two spools apart from each other on a level line")
-    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis)
+    width, _, height = np.ptp(points, axis=0)
+    if not width > SMALLEST_LEVEL_RATIO * height:
+        raise InputError("base_points", points.tolist(), "spools that are not on a vertical line")
+    if len(points) == PLANAR and not height <= LEVEL * width:
+        raise InputError("base_points", points.tolist(), "two spools on a level line")
+    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, PLANAR)
+
+
+def checked_points(key: str, given, least: int) -> np.ndarray:
+    """Points of a robot's geometry.
+
+    Args:
+        key: named in errors.
+        given: (n, 3) m.
+        least: smallest number of them.
+
+    Returns:
+        (n, 3) m.
+
+    Raises:
+        InputError: fewer, another shape, not finite, too far away; three or more on one line, or two at one place.
+    """
+    points = np.asarray(given, float)
+    if points.ndim != 2 or points.shape[1] != 3 or not (np.abs(points) <= LARGEST_LENGTH).all():
+        raise InputError(key, given, f"{least} points or more of three coordinates, at most 1e6 m")
+    if len(points) < least:
+        raise InputError(key, given, f"must be {least} or more, one a cable", fault=f"{len(points)} points")
+    if least > PLANAR:
+        sizes = spread(points)
+        if not sizes[1] > SMALLEST_AREA_RATIO * sizes[0]:
+            raise InputError(key, points.tolist(), "points that are not all on one line, or coincident")
+    return points
+
+
+def spread(points: np.ndarray) -> np.ndarray:
+    """Spread of points about their centroid along their principal axes.
+
+    Args:
+        points: (n, m).
+
+    Returns:
+        (min(n, m),) singular values, the largest first.
+    """
+    return np.linalg.svd(points - points.mean(0), compute_uv=False)
+
+
+def relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:
+    """Acceleration beyond that of free fall, p'' - g.
+
+    Args:
+        robot: gives gravity.
+        acceleration: (3,) z down, m/s^2.
+
+    Returns:
+        (3,) m/s^2.
+    """
+    return acceleration.at[2].add(-robot.gravity)
 
 
 def check_numbers(mass: float, gravity: float) -> None:
@@ -165,23 +237,15 @@ def check_axis(z_axis: str) -> None:
 
 
 def is_planar(robot: PointMassRobot) -> bool:
-    """Whether the robot has two cables and moves in the plane y = 0.
+    """Whether the robot moves in the plane y = 0.
 
     Args:
         robot: the robot.
 
     Returns:
-        the claim; a matter of shapes, so that compiled functions can ask.
+        the claim; known when a function is compiled.
     """
-    return robot.base_points.shape[0] == 2
-
-
-class HasSpools(Protocol):
-    """Any robot, as far as its spools are concerned."""
-
-    @property
-    def base_points(self) -> Array:
-        """(n_cables, 3) m."""
+    return robot.dof == PLANAR
 
 
 def rest_point(z0):
@@ -198,7 +262,7 @@ def rest_point(z0):
     return xp.stack([xp.zeros_like(z0), xp.zeros_like(z0), z0], axis=-1)
 
 
-def spool_radius(robot: HasSpools) -> Array:
+def spool_radius(robot: Robot) -> Array:
     """Largest distance of a spool from the centroid of all: the size of a robot.
 
     Args:
@@ -210,7 +274,7 @@ def spool_radius(robot: HasSpools) -> Array:
     return jnp.max(jnp.linalg.norm(robot.base_points, axis=1))
 
 
-def plane_normal(robot: HasSpools) -> Array:
+def plane_normal(robot: Robot) -> Array:
     """Normal of the spool plane, scaled so that its vertical component is 1.
 
     Of more than three spools it is the plane of least squares. The depth below the plane, measured along the
@@ -223,10 +287,12 @@ def plane_normal(robot: HasSpools) -> Array:
         (3,) the third component is 1; (0, 0, 1) for level spools.
     """
     a = robot.base_points
-    if a.shape[0] == 2:
-        return jnp.zeros_like(a[0]).at[2].set(1.0)
-    if a.shape[0] > 3:
-        x, y, z = a.T
+    x, y, z = a.T
+    if robot.dof == PLANAR:
+        if robot.n_cables == PLANAR:  # level
+            return jnp.zeros_like(a[0]).at[2].set(1.0)
+        return jnp.stack([-jnp.dot(x, z) / jnp.dot(x, x), jnp.zeros_like(x[0]), jnp.ones_like(x[0])])
+    if robot.n_cables > SPATIAL:
         xx, xy, yy, xz, yz = jnp.dot(x, x), jnp.dot(x, y), jnp.dot(y, y), jnp.dot(x, z), jnp.dot(y, z)
         slope = jnp.stack([xz * yy - yz * xy, yz * xx - xz * xy]) / (xx * yy - xy**2)
         return jnp.stack([-slope[0], -slope[1], jnp.ones_like(xx)])

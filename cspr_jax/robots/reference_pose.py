@@ -1,4 +1,4 @@
-"""The reference orientation of a six-cable robot, and whether it hangs still there, thesis sections 3.4.3 and 3.9.
+"""The reference orientation of a platform, and whether it hangs still there, thesis sections 3.4.3 and 3.9.
 
 The plane of the attachment points is level, and the platform is turned about the vertical so that the squares of the
 level parts of the cables are smallest in sum. The text adds up the level parts of unit vectors along the cables
@@ -44,7 +44,7 @@ class Reference(NamedTuple):
         robot: the robot, its platform axes parallel to the fixed ones in the reference orientation.
         rotation: (3, 3) from the axes of the robot file to these.
         conditioning: of `robots.wrench_balance.conditioning` at P0; its sign is the one that must not change.
-        tensions: (6,) at rest in P0 over their mean.
+        tensions: (n_cables,) at rest in P0 over their mean.
     """
 
     robot: PlatformRobot
@@ -105,7 +105,7 @@ def _free(robot: PlatformRobot, hub: np.ndarray) -> str:
     cables = np.asarray(robot.base_points) - hub - points
     along = cables / np.linalg.norm(cables, axis=1, keepdims=True)
     size = np.linalg.norm(points, axis=1).max()
-    still = np.linalg.svd(np.hstack([along, np.cross(points, along) / size]))[2][5]
+    still = np.linalg.svd(np.hstack([along, np.cross(points, along) / size]))[2][-1]
     parts = {
         "be pushed sideways": np.linalg.norm(still[:2]),
         "be lifted": abs(still[2]),

@@ -1,4 +1,4 @@
-"""State of a robot at one instant: where its effector is, and how it moves."""
+"""State of an effector at one instant: where it is, and how it moves."""
 
 from typing import NamedTuple
 
@@ -6,25 +6,27 @@ from jax import Array
 
 
 class State(NamedTuple):
-    """State of an effector at one instant; a point mass has no orientation.
+    """Position, orientation and their derivatives in time at one instant; a point mass has no orientation.
 
     Fields:
         position: (3,) of the mass centre, m.
         velocity: (3,) m/s.
         acceleration: (3,) m/s^2.
-        quaternion: (4,) unit, scalar first, from platform to fixed axes; continuous along a motion.
-        rotation: (3, 3) the same.
-        angular_velocity: (3,) fixed axes, rad/s.
-        angular_acceleration: (3,) fixed axes, rad/s^2.
+        rotation: (3, 3) from platform to fixed axes; None for a point mass.
+        angular_velocity: (3,) fixed axes, rad/s; None for a point mass.
+        angular_acceleration: (3,) fixed axes, rad/s^2; None for a point mass.
+        quaternion: (4,) the rotation as a unit quaternion, scalar first, continuous along a motion; None where it is
+            not asked for.
     """
 
     position: Array
     velocity: Array
     acceleration: Array
-    quaternion: Array | None = None
-    rotation: Array | None = None
-    angular_velocity: Array | None = None
-    angular_acceleration: Array | None = None
+    # A platform's are always there: what handles platforms need not ask.
+    rotation: Array = None  # type: ignore[assignment]
+    angular_velocity: Array = None  # type: ignore[assignment]
+    angular_acceleration: Array = None  # type: ignore[assignment]
+    quaternion: Array = None  # type: ignore[assignment]
 
 
 def backwards(state: State) -> State:
@@ -36,5 +38,5 @@ def backwards(state: State) -> State:
     Returns:
         the state with velocity and angular velocity of the other sign.
     """
-    turning = None if state.angular_velocity is None else -state.angular_velocity
+    turning = None if state.rotation is None else -state.angular_velocity
     return state._replace(velocity=-state.velocity, angular_velocity=turning)

@@ -12,7 +12,9 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import Matrix, Vector, combined, cross, dot, turned, turned_back
-from cspr_jax.robots.platform import CABLES, PlatformRobot
+from cspr_jax.robots.platform import PlatformRobot
+
+CABLES = 6  # what the adjugates and Laplace's expansion here are written for
 
 
 class Cables(NamedTuple):

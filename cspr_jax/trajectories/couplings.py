@@ -5,6 +5,7 @@ from jax import Array
 
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.robot import check_determined
 
 
 def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Array, Array]:
@@ -20,7 +21,11 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
 
     Returns:
         tilt (n,), 1/m; pull (n_cables, n), 1/m, one row a cable; twist (n_cables,), 1/m^2, zero for a line.
+
+    Raises:
+        InputError: more cables.
     """
+    check_determined(robot)
     if point_mass.is_planar(robot):
         half = robot.base_points[:, 0]
         tilt = axes[2] / hub[2]

@@ -2,15 +2,16 @@
 
 import numpy as np
 
-from cspr_jax.robots.point_mass import HasSpools, plane_normal
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.robot import Robot
 
 
-def _depths(robot: HasSpools, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _depths(robot: Robot, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     normal = np.asarray(plane_normal(robot))
     return targets, targets @ normal, normal
 
 
-def mean_depth(robot: HasSpools, targets: np.ndarray) -> float:
+def mean_depth(robot: Robot, targets: np.ndarray) -> float:
     """Mean height of the targets, as chosen in thesis section 2.9.
 
     Args:
@@ -23,7 +24,7 @@ def mean_depth(robot: HasSpools, targets: np.ndarray) -> float:
     return float(_depths(robot, targets)[0][:, 2].mean())
 
 
-def least_depth(robot: HasSpools, targets: np.ndarray) -> float:
+def least_depth(robot: Robot, targets: np.ndarray) -> float:
     """Bound (2.59): below it some target cannot be reached with many arcs, though perhaps with few.
 
     Args:
@@ -36,7 +37,7 @@ def least_depth(robot: HasSpools, targets: np.ndarray) -> float:
     return float(_depths(robot, targets)[1].max() / 2.0)
 
 
-def conservative_depth(robot: HasSpools, targets: np.ndarray) -> float:
+def conservative_depth(robot: Robot, targets: np.ndarray) -> float:
     """Bound (2.58): above it every segment between the targets is feasible with enough arcs.
 
     It keeps every target inside the sphere about P0 that touches the spool plane,

@@ -23,7 +23,7 @@ from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point, spool_radius
 from cspr_jax.robots.state import State
-from cspr_jax.robots.wrench_balance import Pose, conditioning
+from cspr_jax.robots.wrench_balance import conditioning
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn
 from cspr_jax.trajectories.swing_plane import swing_plane
@@ -124,7 +124,7 @@ def _share(segment: PoseSegment, arcs: Array) -> Array:
     return (1.0 - ratio) * (1.0 + ratio)
 
 
-def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: Kind = USUAL) -> Pose:
+def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: Kind = USUAL) -> State:
     """The state of the platform at one instant.
 
     Args:
@@ -142,12 +142,12 @@ def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, 
     c, c1, c2 = _swing(segment, values, arcs, tau, variable=kind.variable)
     quaternions = _quaternions(segment, values, arcs, tau, kind)
     omega, omega1 = rates(quaternions)
-    return Pose(
+    return State(
         segment.hub + segment.plane @ c,  # (3.43)
-        rotations.matrix(quaternions[0]),
         segment.plane @ c1 / time,
-        omega / time,
         segment.plane @ c2 / time**2,
+        rotations.matrix(quaternions[0]),
+        omega / time,
         omega1 / time**2,
     )
 
@@ -236,17 +236,9 @@ class PlatformMotion:
     def state(self, tau: Array) -> State:
         """State; see `Motion.state`."""
         tau = jnp.asarray(tau, float)
-        pose = motion(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
         quaternion = quaternion_at(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
-        return State(
-            pose.position,
-            pose.velocity,
-            pose.acceleration,
-            quaternion,
-            pose.rotation,
-            pose.angular_velocity,
-            pose.angular_acceleration,
-        )
+        found = motion(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        return found._replace(quaternion=quaternion)
 
     def breaks(self) -> Array:
         """Knots of the amplitude function; see `Motion.breaks`."""

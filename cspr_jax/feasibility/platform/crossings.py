@@ -9,7 +9,7 @@ from cspr_jax.robots.interference import cables_cross, platform_hit
 
 HALVINGS = 12
 
-Glance = tuple[np.ndarray, np.ndarray]  # vectors between cables (k, n_pairs, 3), views (k, 6, 3)
+Glance = tuple[np.ndarray, np.ndarray]  # vectors between cables (k, n_pairs, 3), views (k, n_cables, 3)
 
 
 def swept(
@@ -23,7 +23,7 @@ def swept(
 
     Args:
         glances: of motions (k,) at instants (k,).
-        platform: sides (6, 2, 3) and normal (3,) of `interference.Contacts`.
+        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
         row: (k,) whose step it is.
         ends: (k,) instants before and after each.
         count: n, of motions.

@@ -11,8 +11,8 @@ from jax import Array
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import length, solved
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.wrench_balance import jacobian, rays
+from cspr_jax.robots.platform import PlatformRobot, rays
+from cspr_jax.robots.wrench_balance import jacobian
 
 # At rest the reference orientation makes beta-hat free; this value swings like a pendulum.
 AT_REST = -1.0
@@ -24,8 +24,8 @@ class Endpoint(NamedTuple):
     """Tensions per mass and length at an end, offset + beta-hat slope, and what follows.
 
     Fields:
-        offset: (6,) 1/s^2.
-        slope: (6,) 1/s^2.
+        offset: (n_cables,) 1/s^2.
+        slope: (n_cables,) 1/s^2.
         preferred: () beta-hat of (3.91), which makes the tensions as equal as it can.
         lowest: () of the interval (3.92) in which every cable is taut; above `highest` if it is empty.
         highest: ().
@@ -60,7 +60,7 @@ def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array
     # Of (3.13): the combined tension that the translation asks for; eta where both centroids are at the origin.
     cables, _ = rays(robot, position, rotation)
     pull = jnp.mean(cables, axis=0)
-    even = eta * jnp.dot(position, pull) / jnp.dot(pull, pull) / 6.0
+    even = eta * jnp.dot(position, pull) / jnp.dot(pull, pull) / robot.n_cables
     size = jnp.dot(slope, slope)
     is_flat = size <= (FLAT * even) ** 2
     preferred = -jnp.dot(offset - even, slope) / jnp.where(is_flat, 1.0, size)  # (3.91)

@@ -85,7 +85,7 @@ def look_along(
         problem: robot, limits, amplitude.
         within: (m,) increasing places within an arc, from 0 to 1.
         arcs: segments (leaves (n, ...)), their numbers of arcs (n,), and which of them (n,), from 0 on.
-        platform: sides (6, 2, 3) and normal (3,) of `interference.Contacts`.
+        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
         pairs: of cables that can meet.
         kind: of the motions.
 
@@ -177,7 +177,7 @@ def glances(problem: Problem, items, *, pairs: tuple, kind: Kind) -> tuple[Array
         kind: of the motions.
 
     Returns:
-        (n, n_pairs, 3) m, and (n, 6, 3).
+        (n, n_pairs, 3) m, and (n, n_cables, 3).
     """
     segments, arcs, tau = items
     now = instant(problem.amplitude, segments.sense, arcs, tau)

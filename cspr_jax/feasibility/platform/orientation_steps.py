@@ -12,7 +12,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.lanes import rotation, stored
 from cspr_jax.robots import contact_lanes, wrench_lanes
 from cspr_jax.robots.interference import Contacts, cables_cross, contacts, platform_hit
-from cspr_jax.robots.platform import CABLES, PlatformRobot
+from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal, rest_point
 from cspr_jax.robots.wrench_balance import conditioning
 from cspr_jax.robots.wrench_lanes import cables
@@ -35,7 +35,7 @@ class Sights(NamedTuple):
         share: (n,) determinant over that of the reference orientation at the same place; NaN where that is singular
             itself, or the place is not below the spools.
         gaps: (n, n_pairs, 3) shortest vectors between cables, m.
-        views: (n, 6, 3) cables seen from the platform, m.
+        views: (n, n_cables, 3) cables seen from the platform, m.
     """
 
     share: np.ndarray
@@ -85,7 +85,7 @@ class Watch:
         self._pairs = tuple((int(i), int(j)) for i, j in self._contacts.pairs)
         self._reference = reference_share(robot, self._place)
         self._size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
-        self._side = np.zeros(CABLES)  # of each cable; not yet known, and nothing lies in the platform there
+        self._side = np.zeros(robot.n_cables)  # of each cable; not yet known, and nothing lies in the platform there
         self._side = np.sign(self.at(np.array([[1.0, 0.0, 0.0, 0.0]])).views[0] @ self._contacts.normal)
 
     def at(self, quaternions: np.ndarray) -> Sights:

@@ -7,9 +7,18 @@ from cspr_jax.arithmetic.lanes import dot, smallest
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.platform import CABLES, PlatformRobot
+from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
-from cspr_jax.robots.wrench_lanes import Balance, Cables, balance, cable_rates, cables, conditioning, inertial_wrench
+from cspr_jax.robots.wrench_lanes import (
+    CABLES,
+    Balance,
+    Cables,
+    balance,
+    cable_rates,
+    cables,
+    conditioning,
+    inertial_wrench,
+)
 from cspr_jax.trajectories.platform_lanes import Instant, State, squared_duration, state
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
@@ -37,7 +46,7 @@ def _is_flat(wires: Cables, found: Balance) -> Array:
 
 def _smallest_tension(rate: Array, found: Balance) -> Array:
     # Over its value at rest in P0 if all were equal.
-    share = 6.0 / (rate * found.denominator)
+    share = CABLES / (rate * found.denominator)
     return smallest([x * share for x in found.numerators])
 
 
@@ -103,8 +112,8 @@ def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Inst
     pace, weight = jnp.sqrt(squared), robot.mass * robot.gravity
     force = [robot.mass * x / found.denominator * y for x, y in zip(found.numerators, lengths, strict=True)]
     slacks = {
-        "tension_min": lambda x, k: (force[k] - x) * 6.0 / weight,
-        "tension_max": lambda x, k: (x - force[k]) * 6.0 / weight,
+        "tension_min": lambda x, k: (force[k] - x) * CABLES / weight,
+        "tension_max": lambda x, k: (x - force[k]) * CABLES / weight,
         "cable_speed_max": lambda x, k: 1.0 - jnp.abs(rates[k]) / pace / x,
         "cable_acceleration_max": lambda x, k: 1.0 - jnp.abs(bends[k]) / squared / x,
     }

@@ -1,11 +1,11 @@
 """Criteria of a platform's motion as slacks at one instant: taut cables, no singularity, below the spools, limits.
 
-With f the tensions, rho the cable lengths, m the mass:
+With n the number of cables, f the tensions, m the mass:
 
-    taut           6 z0 mu / g, the tension over its value at rest in P0 if all were equal
+    taut           n z0 mu / g, the tension over its value at rest in P0 if all were equal
     regular        determinant (`robots.wrench_balance.conditioning`) over its value at rest in P0
     below          depth of the mass centre below the spool plane, over z0
-    tension        (f - f_min) 6 / (m g),  (f_max - f) 6 / (m g)
+    tension        (f - f_min) n / (m g),  (f_max - f) n / (m g)
     floor          (floor - z) / z0
     length, speed, acceleration    1 - value / largest
 """
@@ -18,7 +18,7 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import plane_normal
-from cspr_jax.robots.wrench_balance import Pose
+from cspr_jax.robots.state import State
 from cspr_jax.schema.verdicts import Verdict
 
 
@@ -34,12 +34,12 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
     return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(FLAGS[name] for name in given(limits)))
 
 
-def pose_slacks(problem: Problem, pose: Pose, z0: Array, regular: Array) -> Array:
+def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Array:
     """The smallest slack of each criterion at one instant.
 
     Args:
         problem: robot, limits.
-        pose: the state.
+        state: the state.
         z0: () m.
         regular: () determinant at rest in P0.
 
@@ -47,21 +47,21 @@ def pose_slacks(problem: Problem, pose: Pose, z0: Array, regular: Array) -> Arra
         (n_criteria,) in the order of `flags`.
     """
     robot, limits = problem.robot, problem.limits
-    per_length = wrench_balance.tensions_per_length(robot, pose)
+    per_length = wrench_balance.tensions_per_length(robot, state)
     found = [
-        6.0 * z0 / robot.gravity * jnp.min(per_length),
-        wrench_balance.conditioning(robot, pose.position, pose.rotation) / regular,
-        plane_normal(robot) @ pose.position / z0,
+        robot.n_cables * z0 / robot.gravity * jnp.min(per_length),
+        wrench_balance.conditioning(robot, state.position, state.rotation) / regular,
+        plane_normal(robot) @ state.position / z0,
     ]
     names = given(limits)
     if not names:
         return jnp.stack(found)
-    lengths, rates, bends = wrench_balance.cable_motion(robot, pose)
-    force, weight = robot.mass * per_length * lengths, robot.mass * robot.gravity / 6.0
+    lengths, rates, bends = wrench_balance.cable_motion(robot, state)
+    force, weight = robot.mass * per_length * lengths, robot.mass * robot.gravity / robot.n_cables
     slacks = {
         "tension_min": lambda limit: jnp.min(force - limit) / weight,
         "tension_max": lambda limit: jnp.min(limit - force) / weight,
-        "floor": lambda limit: (limit - pose.position[2]) / z0,
+        "floor": lambda limit: (limit - state.position[2]) / z0,
         "cable_length_max": lambda limit: jnp.min(1.0 - lengths / limit),
         "cable_speed_max": lambda limit: jnp.min(1.0 - jnp.abs(rates) / limit),
         "cable_acceleration_max": lambda limit: jnp.min(1.0 - jnp.abs(bends) / limit),

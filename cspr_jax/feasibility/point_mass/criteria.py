@@ -38,8 +38,7 @@ def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
     Returns:
         n_criteria numbers.
     """
-    n_cables = robot.base_points.shape[0]
-    return (n_cables, 1, *(count(name, n_cables) for name in given(limits)))
+    return (robot.n_cables, 1, *(count(name, robot.n_cables) for name in given(limits)))
 
 
 def smooth_slacks(

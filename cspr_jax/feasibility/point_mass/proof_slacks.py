@@ -112,9 +112,7 @@ def limit_curvatures(
         limit = getattr(limits, name)
         if name in ("tension_min", "tension_max"):
             whole = kappa._replace(value=1.0 + kappa.value)
-            bound = (
-                (whole * length).times(1.0 / (robot.base_points.shape[0] * z0)) + eta.times(limit / weight)
-            ).curvature
+            bound = ((whole * length).times(1.0 / (robot.n_cables * z0)) + eta.times(limit / weight)).curvature
         elif name == "floor":
             bound = row_bounds(segment, arcs, over, segment.plane[2]).curvature / z0
         elif name == "cable_length_max":
