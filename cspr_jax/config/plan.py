@@ -64,7 +64,7 @@ class PlanFile(TrajectoryKeys, LimitKeys):
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
     floor: Coordinate | None = Field(None, description="z of the floor, m")
     limits: LimitTable | None = Field(
-        None, description="[limits], as in a sweep: the same keys as here, each in one of both places"
+        None, description="[limits], as in a sweep: the same keys as here, each in one of the two places"
     )
     pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
         description="the poses in their order, at least two [[pose]] tables"

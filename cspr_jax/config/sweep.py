@@ -113,7 +113,7 @@ class Orientations(Table):
         'absent: "scan", but "grid" in map = "orientations", which has no other',
     )
     divisions: Annotated[int, Field(ge=4, le=128, multiple_of=2)] = Field(
-        32, description="of pi: the step is pi / divisions; even, for errors are estimated with twice the step"
+        32, description="of pi: the step is pi / divisions; even, since errors are estimated with twice the step"
     )
     values: Annotated[int, Field(ge=1, le=100)] | None = Field(
         None, description="orientations, attainability: values of beta-hat tried at each orientation; absent: 20"
@@ -124,7 +124,7 @@ class Run(Table):
     """How to compute and what to keep."""
 
     dtype: Literal["float64", "float32"] = Field(
-        "float64", description="of stored numbers, and of the sieve; verdicts are float64's in both"
+        "float64", description="type of stored numbers and of the sieve; verdicts use float64 either way"
     )
     tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1, fail_fast=True)] | None = (
         Field(None, description="shape of the block computed at a time, one number an axis")
@@ -155,7 +155,7 @@ class SweepFile(Table):
         "attainability",
     ] = Field(
         description='kind of map: "minimum-arcs"; of transitions "minimum-oscillations", or "transition-envelopes": '
-        'what each instant asks for; of platforms "poses": smallest numbers of arcs, '
+        'oscillations needed at each instant; of platforms "poses": smallest numbers of arcs, '
         '"orientations": the same for all accessible orientations of places, '
         '"orientation-workspace": accessible orientations of places, "attainability": which of them are attained'
     )

@@ -94,7 +94,7 @@ class TrajectoryKeys(Table):
     max_arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] = Field(
         30, description="largest number of arcs tried; two arcs are an oscillation"
     )
-    gravity: Positive | None = Field(None, description="gravity, m/s^2; stands over the robot file's (default 9.81)")
+    gravity: Positive | None = Field(None, description="gravity, m/s^2; overrides the robot file's (default 9.81)")
 
     @property
     def families(self) -> tuple[str, ...]:

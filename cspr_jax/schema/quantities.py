@@ -63,17 +63,24 @@ REFUSALS = {
     "refused_cable_platform": Verdict.CABLE_PLATFORM,
 }
 _REFUSED = (
-    "the best motion asks a cable to push.",
+    "a cable would have to push on the best motion.",
     "the best motion passes a singularity.",
     "two cables touch on the best motion.",
     "a cable touches the platform on the best motion.",
 )
 
+# What verdicts rest on, and what they are about.
+_HOW = ", proved for point masses, from refined samples for platforms"
+_MARGIN = (
+    "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
+    "or depth below the spools over z0."
+)
+
 QUANTITIES = {
     q.name: q
     for q in (
-        Quantity("arcs", "1", "smallest number of arcs", "Smallest number of arcs proved feasible; 0: none.", "int16"),
-        Quantity("verdict", "1", "verdict", "Bit flags; 0 is feasible.", "uint16"),
+        Quantity("arcs", "1", "smallest number of arcs", f"Smallest number of feasible arcs{_HOW}; 0: none.", "int16"),
+        Quantity("verdict", "1", "verdict", f"Bit flags{_HOW}; 0 is feasible.", "uint16"),
         Quantity(
             "duration",
             "s",
@@ -84,10 +91,13 @@ QUANTITIES = {
             "margin",
             "1",
             "smallest normalised pseudotension",
-            "Smallest pseudotension over its value at rest in P0, or depth below the spools over z0.",
+            _MARGIN,
         ),
         Quantity(
-            "margin_bound", "1", "proved lower bound of the margin", "No instant of the segment has a smaller margin."
+            "margin_bound",
+            "1",
+            "proved lower bound of the margin",
+            "No instant of the segment has a smaller margin: proved for point masses, absent for platforms.",
         ),
         Quantity(
             "feasible_at_infinity",
@@ -106,7 +116,8 @@ QUANTITIES = {
             "limit_margin",
             "1",
             "smallest slack of the limits",
-            "Smallest dimensionless slack of the limits given (docs/theory.md); infinite where there is none.",
+            "Smallest dimensionless slack of the limits given; infinite where none is. Point masses and platforms have "
+            "formulas of their own (docs/theory.md), equal in sign alone.",
         ),
         Quantity(
             "oscillations",
@@ -133,7 +144,7 @@ QUANTITIES = {
             "least_oscillations",
             "1",
             "number of oscillations n, a real number",
-            "What the envelopes ask for, (1.48) and (1.94); NaN where no number will do (|v A| reaches 1).",
+            "Number that the envelopes require, (1.48) and (1.94); NaN where no number will do (|v A| reaches 1).",
         ),
         Quantity(
             "inclination_gain",
@@ -158,13 +169,13 @@ QUANTITIES = {
             "det_margin",
             "1",
             "smallest determinant",
-            "Smallest determinant of J, with cables and platform of unit size, over its value at rest in P0.",
+            "Smallest determinant of the structure matrix (cables and platform of unit size) over that at rest in P0.",
         ),
         Quantity(
             "cable_distance",
             "m",
             "smallest distance between cables",
-            "Of those that can meet: that share neither spool nor platform point.",
+            "Between cables that share neither spool nor platform point.",
         ),
         Quantity("beta_hat", "1", "beta-hat at the target", "Of the motion that the other quantities belong to."),
         Quantity(
@@ -209,7 +220,7 @@ QUANTITIES = {
             )
             for (name, flag), words in zip(REFUSALS.items(), _REFUSED, strict=True)
         ),
-        Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination asks for."),
+        Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
 }
 _COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
@@ -281,7 +292,7 @@ SEGMENTS = {
             "segment_arcs",
             "1",
             "smallest number of arcs",
-            "Smallest number of arcs proved feasible, or that the plan gives; 0: none.",
+            f"Smallest number of feasible arcs, or the plan's own if feasible{_HOW}; 0: none.",
             "int16",
         ),
         Quantity(
@@ -291,8 +302,8 @@ SEGMENTS = {
             "Equal to `segment_arcs` where it is positive, else that of the best candidate.",
             "int16",
         ),
-        Quantity("segment_verdict", "1", "verdict", "Bit flags; 0 is feasible.", "uint16"),
-        Quantity("segment_margin", "1", "margin", "Smallest pseudotension over its value at rest in P0."),
+        Quantity("segment_verdict", "1", "verdict", f"Bit flags{_HOW}; 0 is feasible.", "uint16"),
+        Quantity("segment_margin", "1", "margin", _MARGIN),
     )
 }
 # Those that only a rigid platform has.
