@@ -111,16 +111,15 @@ def point_mass_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointM
         the robot, centred.
 
     Raises:
-        ConfigError: its geometry cannot be used, or it is a rigid platform.
+        ConfigError: its geometry cannot be used, it has more cables than degrees of freedom, or is a rigid platform.
     """
-    robot = build_robot(spec, keys, file)
-    if isinstance(robot, PlatformRobot):
+    if spec.is_platform:
         raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass here')
-    return centred(robot)[0]
+    return _determined(spec, keys, file)
 
 
 def platform_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PlatformRobot:
-    """The six-cable robot of a file, as the kernels take it; its platform axes are still those of the file.
+    """The platform of a file, as the kernels take it; its platform axes are still those of the file.
 
     Args:
         spec: the robot file's content.
@@ -131,11 +130,23 @@ def platform_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Platform
         the robot, centred.
 
     Raises:
-        ConfigError: its geometry or inertia cannot be used, or it is a point mass.
+        ConfigError: its geometry or inertia cannot be used, it has more than six cables, or is a point mass.
     """
-    robot = build_robot(spec, keys, file)
-    if not isinstance(robot, PlatformRobot):
+    if not spec.is_platform:
         raise ConfigError(file, f'robot "{spec.name}" is a point mass: must be a platform on six cables here')
+    return _determined(spec, keys, file)
+
+
+def _determined(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Any:
+    # Centred; its tensions follow from its motion.
+    robot: Any = build_robot(spec, keys, file)
+    if robot.n_cables != robot.dof:
+        place, key = spec.placed("base_points", file)
+        raise ConfigError(
+            place,
+            f'{key}: {robot.n_cables} points: must be {robot.dof} for family "{keys.family}" '
+            "(plans and maps of more cables than degrees of freedom do not exist yet)",
+        )
     return centred(robot)[0]
 
 
@@ -148,6 +159,8 @@ def fault_at_rest(spec: RobotFile) -> str | None:
     Returns:
         the reason; None if it hangs with every cable taut.
     """
+    if len(spec.base_points) > spec.dof:
+        return "not known: more cables than degrees of freedom share the weight in many ways"
     try:
         if spec.is_platform:
             robot = platform_of(spec, TrajectoryKeys(), spec.name)
@@ -291,7 +304,7 @@ def build_problem(
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     given = build_limits(spec, limits, limits.floor, file)
-    robot, _ = centred(build_robot(spec, keys, file))
+    robot = _determined(spec, keys, file)
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
 
 

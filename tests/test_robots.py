@@ -9,7 +9,11 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import platform as oracle
 
+import cspr_jax
+from cspr_jax.cli import main
+from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import InputError
+from cspr_jax.problem import centred, fault_at_rest
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.point_mass import planar_robot, plane_normal, point_mass_robot
@@ -132,3 +136,90 @@ UPRIGHT = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]
 def test_geometry_that_is_none(make, points, line):
     with pytest.raises(InputError, match=line):
         make(points, mass=1.0)
+
+
+SPOOLS = [[-2.0, -2.0, 3.0], [2.0, -2.0, 3.1], [2.0, 2.0, 3.0], [-2.0, 2.0, 2.9]]
+BOX = [*SPOOLS, *([x, y, 0.0] for x, y, _ in SPOOLS)]
+CORNERS = [[0.1 * x, 0.1 * y, 0.05 * z] for x, y, z in BOX]
+FILES = {
+    "four": ("3T", SPOOLS, ""),
+    "three planar": ("2T", [[-1, 0, 2], [1, 0, 2.5], [0, 0, 0]], "planar = true"),
+    "seven": ("3R3T", BOX[:7], f"platform_points = {CORNERS[:7]}"),
+    "eight": ("3R3T", BOX, f"platform_points = {CORNERS}"),
+    "eight on a mass": ("3T", BOX, ""),
+}
+PLAN = """schema = 1
+robot = "robot.toml"
+family = "{family}"
+z0 = 1.4
+[[pose]]
+rest = true
+[[pose]]
+position = [0.5, 0.0, 1.4]
+"""
+SWEEP = """schema = 1
+map = "{kind}"
+robot = "robot.toml"
+[axes]
+x = [0.5]
+y = [0.0]
+z = [1.4]
+z0 = [1.4]
+[trajectory]
+family = "{family}"
+from = {{ rest = true }}
+"""
+
+
+def written(folder, name):
+    pattern, points, more = FILES[name]
+    body = "inertia = [[0.02, 0, 0], [0, 0.03, 0], [0, 0, 0.04]]" if pattern == "3R3T" else ""
+    each = [round(0.1 * (k + 1), 1) for k in range(len(points))]
+    text = f"""name = "{name}"\nbase_points = {points}\nmass = 2.0\nz_axis = "up"\npattern = "{pattern}"\n{more}\n{body}
+tension_min = {each}\ntension_max = 90.0\ncable_speed_max = 3.0\n"""
+    (folder / "robot.toml").write_text(text)
+    return folder / "robot.toml", each
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_of_any_number_of_cables_load(tmp_path, name):
+    """With their limits, in the file's axes; what a plan or a map would need more for says so in one line."""
+    path, each = written(tmp_path, name)
+    robot, (pattern, points, _) = cspr_jax.load_robot(path), FILES[name]
+    assert (robot.n_cables, robot.z_axis, robot.dof) == (len(points), "up", {"2T": 2, "3T": 3, "3R3T": 6}[pattern])
+    np.testing.assert_array_equal(robot.base_points, points)
+    np.testing.assert_array_equal(robot.limits.tension_min, each)
+    np.testing.assert_array_equal(robot.limits.tension_max, [90.0] * len(points))
+    assert "more cables than degrees of freedom" in fault_at_rest(read_robot(path))
+    at, is_platform = state(robot, RNG), pattern == "3R3T"
+    own = centred(robot)[0]
+    assert np.asarray(own.wrench_matrix(at)).shape == (robot.dof, len(points))
+    if not is_platform and robot.dof != 2:
+        with pytest.raises(InputError, match=f"base_points: {len(points)} points: must be 3"):
+            cspr_jax.minimum_arcs(robot, np.array([[0.5, 0.1, 1.0]]), z0=1.4)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_plans_and_maps_of_more_cables_say_that_they_do_not_exist(tmp_path, name, capsys):
+    path, _ = written(tmp_path, name)
+    is_platform, count = FILES[name][0] == "3R3T", len(FILES[name][1])
+    family = "hypocycloid" if is_platform else "transition" if "planar" in name else "hypocycloid-standard"
+    kind = "poses" if is_platform else "minimum-oscillations" if "planar" in name else "minimum-arcs"
+    head = SWEEP.replace("from = {{ rest = true }}\n", "") if family == "transition" else SWEEP
+    (tmp_path / "plan.toml").write_text(PLAN.format(family=family))
+    (tmp_path / "sweep.toml").write_text(head.format(family=family, kind=kind))
+    freedoms = 6 if is_platform else 2 if "planar" in name else 3
+    for command in (["plan", "plan.toml"], ["run", "sweep.toml", "-o", str(tmp_path / "run")]):
+        code = main([command[0], str(tmp_path / command[1]), *command[2:]])
+        line = capsys.readouterr().err.strip()
+        wanted = f'{path}: base_points: {count} points: must be {freedoms} for family "{family}" (plans and maps'
+        assert code == 2 and wanted in line and len(line.splitlines()) == 1, line
+        assert not (tmp_path / "run").exists()
+
+
+def test_an_inline_robot_of_more_cables_is_named_where_it_stands(tmp_path, capsys):
+    inline = f'{{ name = "r", base_points = {SPOOLS}, mass = 1.0 }}'
+    text = PLAN.format(family="hypocycloid-standard").replace('"robot.toml"', inline)
+    (tmp_path / "plan.toml").write_text(text)
+    assert main(["plan", str(tmp_path / "plan.toml")]) == 2
+    assert "plan.toml: robot.base_points: 4 points: must be 3 for family" in capsys.readouterr().err
