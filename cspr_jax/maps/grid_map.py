@@ -1,7 +1,6 @@
 """What all maps of a sweep share: robot, limits, amplitude function, and the targets of a grid."""
 
 import abc
-from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -21,12 +20,11 @@ from cspr_jax.trajectories.amplitudes import Amplitude
 
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
-SharedKind = TypeVar("SharedKind", Problem, Problem)
-OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
+_OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
 
-class GridMap(abc.ABC, Generic[SharedKind]):
-    """The map of a sweep, ready to compute tiles.
+class GridMap(abc.ABC):
+    """The map of a sweep, ready to compute tiles; its row in `schema.map_kinds` names its class.
 
     Args:
         spec: the robot.
@@ -44,10 +42,10 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         self._frame = frame_of(spec.base_points, spec.z_axis)
         amplitude = build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=for_bounds)
         limits = build_limits(spec, keys.limits, keys.limits.floor, file)
-        self._problem: SharedKind = self._built(spec, limits, amplitude)
+        self._problem = self._built(spec, limits, amplitude)
 
     @abc.abstractmethod
-    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> SharedKind:
+    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
         # What the kernels take.
         ...
 
@@ -82,9 +80,8 @@ class GridMap(abc.ABC, Generic[SharedKind]):
             "a feasible cell without a duration": found & ~lasts,
         }
 
-    @abc.abstractmethod
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse a grid in which no cell can have an answer.
+        """Refuse a grid in which no cell can have an answer, as where all targets are out of reach.
 
         Args:
             grid: the grid.
@@ -92,6 +89,7 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         Raises:
             ConfigError: what is wrong with all of them.
         """
+        self._refuse_out_of_reach(self._targets(self._corners(grid, _OF_TARGETS)), "axes")
 
     def _targets(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates. Radius and azimuth are about the vertical through the centroid of the spools.
@@ -125,7 +123,7 @@ class GridMap(abc.ABC, Generic[SharedKind]):
             raise ConfigError(self._file, f"{key}: every point is below the floor: must be some above it")
 
 
-class PlatformMap(GridMap[Problem]):
+class PlatformMap(GridMap):
     """The map of a sweep of a platform; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
@@ -141,7 +139,7 @@ class PlatformMap(GridMap[Problem]):
         return Problem(aligned(robot)[0], limits, amplitude)
 
 
-class PointMassMap(GridMap[Problem]):
+class PointMassMap(GridMap):
     """The map of a sweep of a point mass; see `GridMap`."""
 
     def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
