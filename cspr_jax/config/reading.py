@@ -2,12 +2,10 @@
 
 import re
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
-from pydantic_core import PydanticKnownError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from cspr_jax.config import wording
 from cspr_jax.errors import ConfigError
@@ -26,24 +24,6 @@ class Table(BaseModel):
     """A TOML table: every key known, types as written, numbers finite, nothing changed afterwards."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
-
-
-def row_of(rows: Mapping[str, object]) -> BeforeValidator:
-    """What makes a string the name of a row of a table that may grow; else it is like a Literal of its names.
-
-    Args:
-        rows: the table.
-
-    Returns:
-        for the annotation of a field.
-    """
-
-    def check(value: Any) -> Any:
-        if isinstance(value, str) and value in rows:
-            return value
-        raise PydanticKnownError("literal_error", {"expected": wording.either(rows).replace('"', "'")})
-
-    return BeforeValidator(check)
 
 
 def read_text(path: Path) -> str:

@@ -4,9 +4,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
-from cspr_jax.config.reading import Table, row_of
+from cspr_jax.config.names import name_of
+from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Coordinate, LimitTable, Point
 from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
+from cspr_jax.config.wording import either
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
@@ -130,8 +132,8 @@ class Run(Table):
     tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1, fail_fast=True)] | None = (
         Field(None, description="shape of the block computed at a time, one number an axis")
     )
-    store: Annotated[list[Annotated[str, row_of(QUANTITIES)]], Field(min_length=1, fail_fast=True)] | None = Field(
-        None, description="quantities to store; see `cspr quantities`"
+    store: Annotated[list[Annotated[str, name_of(lambda: QUANTITIES)]], Field(min_length=1, fail_fast=True)] | None = (
+        Field(None, description="quantities to store; see `cspr quantities`")
     )
 
     @field_validator("store")
@@ -146,9 +148,7 @@ class SweepFile(Table):
     """A sweep."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
-    map: Annotated[str, row_of(MAP_KINDS)] = Field(
-        description="kind of map: " + "; ".join(f'"{kind.name}": {kind.description}' for kind in MAP_KINDS.values())
-    )
+    map: Annotated[str, name_of(lambda: MAP_KINDS)] = Field(description=f"kind of map: {either(MAP_KINDS)}")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
     axes: Axes = Field(
         description="[axes] x, y (or radius, azimuth), z and z0 (or inclination), each { start, stop, count } or a list"

@@ -60,6 +60,7 @@ class GridMap(abc.ABC):
             (n,) for each quantity.
         """
 
+    @abc.abstractmethod
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other, as a broken processor, driver or compiler gives them.
 
@@ -69,16 +70,6 @@ class GridMap(abc.ABC):
         Returns:
             for each kind of contradiction, (n,) where it is.
         """
-        found, margin, verdict = answers["arcs"] > 0, answers["margin"], answers["verdict"]
-        unsure = np.uint16(Verdict.FEWER_ARCS_UNDECIDED.value)
-        lasts = np.isfinite(answers["duration"]) & (answers["duration"] > 0.0)
-        return {
-            "a feasible cell with a margin below zero": found & ~(margin > -ROUNDING),
-            "a feasible cell whose verdict is not": found & ((verdict & ~unsure) != 0),
-            "an infeasible cell whose verdict is 0": ~found & (verdict == 0),
-            "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
-            "a feasible cell without a duration": found & ~lasts,
-        }
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse a grid in which no cell can have an answer, as where all targets are out of reach.
@@ -138,9 +129,32 @@ class PlatformMap(GridMap):
         robot = platform_of(spec, self._keys.trajectory, self._file)
         return Problem(aligned(robot)[0], limits, amplitude)
 
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        found = answers["arcs"] > 0
+        margins = np.minimum(np.minimum(answers["margin"], answers["limit_margin"]), answers["det_margin"])
+        return {
+            "a feasible cell with a margin below zero": found & ~(margins > 0.0),
+            "an infeasible cell whose verdict is 0": ~found & (answers["verdict"] == 0),
+            "a feasible cell without a duration": found & ~(answers["duration"] > 0.0),
+        }
+
 
 class PointMassMap(GridMap):
     """The map of a sweep of a point mass; see `GridMap`."""
 
     def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
         return Problem(point_mass_of(spec, self._keys.trajectory, self._file), limits, amplitude)
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        found, margin, verdict = answers["arcs"] > 0, answers["margin"], answers["verdict"]
+        unsure = np.uint16(Verdict.FEWER_ARCS_UNDECIDED.value)
+        lasts = np.isfinite(answers["duration"]) & (answers["duration"] > 0.0)
+        return {
+            "a feasible cell with a margin below zero": found & ~(margin > -ROUNDING),
+            "a feasible cell whose verdict is not": found & ((verdict & ~unsure) != 0),
+            "an infeasible cell whose verdict is 0": ~found & (verdict == 0),
+            "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
+            "a feasible cell without a duration": found & ~lasts,
+        }

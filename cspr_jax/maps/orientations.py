@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
+from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.maps.places import DIGITS, AttainabilityMap
 from cspr_jax.maps.poses import TILT_TORSION
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.accessible import accessible
-from cspr_jax.search.platform_answers import contradictions
 
 # What has no value where nothing is accessible.
 FLOATS = tuple(name for name in MAP_KINDS["orientations"].quantities if QUANTITIES[name].kind == "float")
@@ -51,7 +51,7 @@ class OrientationsMap(AttainabilityMap):
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        return contradictions(answers)
+        return PlatformMap.contradictions(self, answers)
 
 
 def _index(angles: np.ndarray, divisions: int) -> tuple[np.ndarray, ...]:

@@ -16,7 +16,7 @@ from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.answers import joined
 from cspr_jax.search.beta_hat import OPTIONS
-from cspr_jax.search.platform_answers import PoseAnswers, contradictions, reached
+from cspr_jax.search.platform_answers import PoseAnswers, reached
 from cspr_jax.search.platform_arcs import CANDIDATES, Candidates
 from cspr_jax.search.pose_ends import end_options
 
@@ -91,7 +91,3 @@ class PosesMap(PlatformMap):
                 errors.append(error)
         if len(errors) == len(grid.axes["z0"]):
             raise ConfigError(self._file, f"robot.{errors[0]}") from errors[0]
-
-    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        return contradictions(answers)

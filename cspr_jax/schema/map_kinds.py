@@ -1,17 +1,20 @@
 """The one table of the kinds of maps: what each asks of a sweep file, what it gives, and the class that computes it.
 
-A kind from outside of the package is a class beside `maps.grid_map.GridMap` and a row given to `register`, after those
-of its own quantities (`schema.quantities.register`). Rows hold for the process that registers them: what imports their
-module first can call `cspr_jax.cli.main`. Processes and schedulers' workers that compute tiles get the row with the
-sweep, and import the class by its name, "module:Class": its module must be importable where they run.
+A kind from outside of the package is a subclass of `maps.grid_map.GridMap`, its row, and the rows of its own
+quantities; the module that holds them gives the rows to `register`. They hold in the process that has imported that
+module, and then in all that `cspr_jax.cli.main` does there. Other processes that compute tiles, and workers of a
+scheduler, get the row with the sweep and import the class by its name, "module:Class": they must find that module.
 """
 
+import contextlib
 import dataclasses
 import importlib
+from collections.abc import Iterator
 from typing import Any, Literal
 
 from cspr_jax.errors import InputError
-from cspr_jax.schema.quantities import QUANTITIES, REFUSALS
+from cspr_jax.schema.quantities import QUANTITIES, REFUSALS, Quantity
+from cspr_jax.schema.quantities import register as register_quantity
 from cspr_jax.schema.tiles import LARGEST_TILE
 
 
@@ -136,7 +139,7 @@ MAP_KINDS: dict[str, MapKind] = {
         MapKind(
             name="poses",
             title="Smallest number of arcs to poses",
-            description="platforms: smallest number of arcs to each pose",
+            description="smallest number of arcs of a platform to each pose",
             implementation="cspr_jax.maps.poses:PosesMap",
             quantities=_OF_POSES,
             stored=_POSES_STORED,
@@ -152,7 +155,7 @@ MAP_KINDS: dict[str, MapKind] = {
         MapKind(
             name="orientations",
             title="Smallest number of arcs to accessible orientations",
-            description="platforms: smallest number of arcs from rest to each accessible orientation of each place",
+            description="smallest number of arcs of a platform from rest to each orientation accessible at each place",
             implementation="cspr_jax.maps.orientations:OrientationsMap",
             quantities=_OF_POSES,
             stored=_POSES_STORED,
@@ -165,7 +168,7 @@ MAP_KINDS: dict[str, MapKind] = {
         MapKind(
             name="orientation-workspace",
             title="Accessible orientations",
-            description="platforms: accessible orientations of each place",
+            description="orientations of a platform that are accessible at each place",
             implementation="cspr_jax.maps.places:OrientationWorkspaceMap",
             quantities=_OF_PLACES,
             stored=_OF_PLACES,
@@ -178,7 +181,7 @@ MAP_KINDS: dict[str, MapKind] = {
         MapKind(
             name="attainability",
             title="Accessible and attainable orientations",
-            description="platforms: accessible orientations of each place, and which of them are attained from rest",
+            description="orientations of a platform that are accessible at each place, and attained from rest",
             implementation="cspr_jax.maps.places:AttainabilityMap",
             quantities=(*_OF_PLACES, *_OF_ATTAINED),
             stored=(*_OF_PLACES, *_OF_ATTAINED),
@@ -192,25 +195,49 @@ MAP_KINDS: dict[str, MapKind] = {
 }
 
 
-def register(kind: MapKind) -> None:
+def register(kind: MapKind, *own: Quantity) -> None:
     """Add a kind of map from outside of the package; a second time changes nothing.
 
     Args:
-        kind: its row; all of its quantities are known.
+        kind: its row.
+        own: rows of those of its quantities that are not in the table yet.
 
     Raises:
-        InputError: another kind has that name, or it names quantities that it does not give, or that nobody knows.
+        InputError: another kind, quantity or axis has such a name, or the row names quantities that it does not give,
+            or that nobody knows.
     """
     if MAP_KINDS.get(kind.name, kind) != kind:
         raise InputError("map", kind.name, "a name that no other kind of map has")
     for name in kind.quantities:
-        if name not in QUANTITIES:
+        if name not in QUANTITIES and name not in [quantity.name for quantity in own]:
             raise InputError("quantities", name, "a row of schema.quantities.QUANTITIES")
     for key, names in (("stored", kind.stored), ("pictured", kind.pictured), ("motionless", kind.motionless)):
         for name in names:
             if name not in kind.quantities:
                 raise InputError(key, name, "one of the quantities of the map")
+    for quantity in own:
+        register_quantity(quantity)
     MAP_KINDS[kind.name] = kind
+
+
+@contextlib.contextmanager
+def registered(kind: MapKind, *own: Quantity) -> Iterator[None]:
+    """Add a kind of map for as long as a block lasts; see `register`.
+
+    Args:
+        kind: its row.
+        own: rows of its own quantities.
+
+    Yields:
+        nothing.
+    """
+    register(kind, *own)
+    try:
+        yield
+    finally:
+        del MAP_KINDS[kind.name]
+        for quantity in own:
+            del QUANTITIES[quantity.name]
 
 
 def kinds_with(key: str) -> list[str]:

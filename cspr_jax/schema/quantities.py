@@ -282,7 +282,7 @@ def register(quantity: Quantity) -> None:
     QUANTITIES[quantity.name] = quantity
 
 
-def registered() -> list[Quantity]:
+def from_outside() -> list[Quantity]:
     """Quantities from outside of the package, which another process does not know.
 
     Returns:
