@@ -40,8 +40,21 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
     if isinstance(robot, PlatformRobot):
         changes["platform_points"] = leaf(frame.turned(robot.platform_points))
-        changes["inertia"] = leaf(np.asarray(robot.inertia) * np.outer(frame.signs, frame.signs))
+        changes["inertia"] = leaf(robot.inertia) * np.outer(frame.signs, frame.signs)
     return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
+
+
+def prepared(robot: RobotKind) -> tuple[RobotKind, Frame]:
+    """A robot as the kernels take it, a platform also in its reference axes.
+
+    Args:
+        robot: in its own axes.
+
+    Returns:
+        the robot, and the frame that takes points to it and back.
+    """
+    own, frame = centred(robot)
+    return (aligned(own)[0] if isinstance(own, PlatformRobot) else own), frame  # type: ignore[return-value]
 
 
 def gravity_of(spec: RobotFile, keys: TrajectoryKeys) -> float:
