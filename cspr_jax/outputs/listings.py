@@ -5,6 +5,7 @@ from typing import Any
 
 from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
 from cspr_jax.problem import fault_at_rest
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 
 
@@ -33,7 +34,7 @@ def robots_table(found: list[dict[str, Any]]):
             str(len(robot["base_points"])),
             f"{robot['mass']:g}",
             robot["z_axis"],
-            ", ".join(key for key in robot if key.startswith(("tension", "cable"))),
+            ", ".join(row.name for row in LIMITS if row.name in robot),
             robot["source"],
             robot["fault"] or "taut",
         )
