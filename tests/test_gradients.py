@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.api.motions import hypocycloid, make_problem, platform_motion, sampled_margin, slacks, tensions, transition
+from cspr_jax.api.motions import (
+    hypocycloid,
+    make_problem,
+    platform_motion,
+    sampled_margin,
+    slacks,
+    tensions,
+    transition,
+)
 from cspr_jax.errors import InputError
 
 FAR = np.array([120.0, -40.0, 7.0])
@@ -25,7 +33,7 @@ def point_mass(z_axis="down", offset=FAR):
 def of_point_mass(base_points, z0, target):
     """Sampled margin of a hypocycloid of four arcs from beside P0, as a function of what it depends on."""
     robot = dataclasses.replace(point_mass()[0], base_points=base_points)
-    problem = make_problem(robot, limits=cspr_jax.Limits(cable_length_max=jnp.full(3, 4.0)))
+    problem = make_problem(robot, limits=cspr_jax.Limits(cable_length_max=np.full(3, 4.0)))
     motion = hypocycloid(robot, FAR + np.array([0.2, -0.1, 1.5]), FAR + target, z0=z0, arcs=4)
     return sampled_margin(problem, motion)
 

@@ -79,7 +79,7 @@ def test_more_cables_than_any_robot_has():
         ({"base_points": SPOOLS[:2]}, ("base_points = 2 points", "must be at least 3 (a point mass)", *SUPPORTED)),
         (BODY, ("base_points = 3 points", "must be at least 6", *SUPPORTED)),
         (BODY | {"base_points": [*RING, [0.0, 0.0, 1.0]]}, ("platform_points = 6 points: must be 7, as many as base",)),
-        ({"tension_max": [1.0, 2.0]}, ("tension_max = [1.0, 2.0]: must be one number, or 3: one a cable",)),
+        ({"tension_max": [1.0, 2.0]}, ("tension_max = [1.0, 2.0]: must be a number > 0, or 3: one a cable",)),
         ({"pattern": "2T"}, ('pattern = "2T": must be "3T", or absent: as the other keys say',)),
         ({"pattern": "3R3T"}, ('pattern = "3R3T": must be "3T"',)),
         (BODY | {"base_points": RING, "pattern": "2R3T"}, ('pattern = "2R3T": must be "3R3T"',)),

@@ -11,14 +11,19 @@ from oracles import platform as oracle
 
 import cspr_jax
 from cspr_jax.cli import main
-from cspr_jax.config.robot import read_robot
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, read_robot
 from cspr_jax.errors import InputError
+from cspr_jax.feasibility.limits import Values, scales, slack, values
+from cspr_jax.feasibility.point_mass import proof_slacks
 from cspr_jax.problem import centred, fault_at_rest
 from cspr_jax.robots import force_balance, wrench_balance
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.point_mass import planar_robot, plane_normal, point_mass_robot
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
+from cspr_jax.schema.limits import LIMITS
 
 RNG = np.random.default_rng(5)
 RING = np.array([[np.cos(a), np.sin(a), 0.1 * np.sin(3.0 * a)] for a in np.arange(8) * 0.7])
@@ -122,7 +127,7 @@ UPRIGHT = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]
     [
         (point_mass_robot, equilateral(1.0)[:2], "base_points: 2 points: must be 3 or more, one a cable"),
         (planar_robot, [[1.0, 0.0, 0.0]], "base_points: 1 points: must be 2 or more, one a cable"),
-        (point_mass_robot, LINE, "not all on one line"),
+        (point_mass_robot, LINE, "not on one line"),
         (point_mass_robot, UPRIGHT, "plane is not vertical"),
         (point_mass_robot, np.zeros((3, 2)), "three coordinates"),
         (planar_robot, [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], "not on a vertical line"),
@@ -223,3 +228,28 @@ def test_an_inline_robot_of_more_cables_is_named_where_it_stands(tmp_path, capsy
     (tmp_path / "plan.toml").write_text(text)
     assert main(["plan", str(tmp_path / "plan.toml")]) == 2
     assert "plan.toml: robot.base_points: 4 points: must be 3 for family" in capsys.readouterr().err
+
+
+def test_a_limit_is_one_row():
+    """Keys in files, fields of `Limits`, closed forms of point masses and values of a state: of each row one."""
+    names = [row.name for row in LIMITS]
+    assert {field.name for field in dataclasses.fields(Limits)} == set(names) == set(proof_slacks.CLOSED)
+    assert set(LimitTable.model_fields) == set(names) <= set(PlanFile.model_fields)
+    assert set(LimitKeys.model_fields) == {row.name for row in LIMITS if row.per_cable} <= set(RobotFile.model_fields)
+    assert {row.quantity for row in LIMITS} == set(Values._fields)
+    assert len({(row.quantity, row.sense) for row in LIMITS}) == len(names)
+
+
+@pytest.mark.parametrize("name", ["planar", "three", "six"])
+def test_slacks_of_limits_have_the_sign_of_the_limit(name):
+    """Of a value just inside of each limit, and just outside."""
+    robot, rng = ROBOTS[name], np.random.default_rng(7)
+    now = values(robot, state(robot, rng))
+    scale = scales(robot.n_cables, robot.mass * robot.gravity, jnp.asarray(1.3))
+    for row in LIMITS:
+        value = np.asarray(getattr(now, row.quantity))
+        least = row.sense == "least"
+        for share in (-0.1, 0.1):
+            limit = value - share * np.abs(value) * (1.0 if least else -1.0)
+            found = np.asarray(slack(row, limit, value, scale))
+            assert (np.sign(found) == np.sign(share)).all(), row.name

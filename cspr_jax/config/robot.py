@@ -1,15 +1,16 @@
 """Robot files and the catalogue."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
+from pydantic import Discriminator, Field, PrivateAttr, Tag, create_model, model_validator
 
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import Table, checked, read_toml
 from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.schema.limits import LIMITS
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
@@ -35,22 +36,32 @@ NotNegativePerCable = Annotated[
 ]
 
 
-class LimitKeys(Table):
+def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for row in LIMITS:
+        if row.per_cable == per_cable:
+            kind = (NotNegativePerCable if row.from_zero else PerCable) if per_cable else Coordinate
+            text = f"{row.description}{', one number or one a cable' * per_cable}, {row.unit}"
+            found[row.name] = (kind | None, Field(None, description=text))
+    return found
+
+
+# Their fields are rows of `schema.limits.LIMITS`; of a base that it does not know mypy asks nothing.
+_Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=True))
+
+
+class LimitKeys(_Cables):
     """Limits beyond taut cables; a plan's or a sweep's stand over those of the robot file."""
 
-    tension_min: NotNegativePerCable | None = Field(None, description="smallest tension, one number or one a cable, N")
-    tension_max: PerCable | None = Field(None, description="largest tension, one number or one a cable, N")
-    cable_length_max: PerCable | None = Field(None, description="largest cable length, one number or one a cable, m")
-    cable_speed_max: PerCable | None = Field(None, description="largest cable speed, one number or one a cable, m/s")
-    cable_acceleration_max: PerCable | None = Field(
-        None, description="largest cable acceleration, one number or one a cable, m/s^2"
-    )
+
+_Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(per_cable=False))
 
 
-class LimitTable(LimitKeys):
+class LimitTable(_Heights):
     """Limits of all motions of the file."""
 
-    floor: Coordinate | None = Field(None, description="z of the floor, m")
+    if TYPE_CHECKING:
+        floor: float | None = None
 
 
 # Motions of the effector, R rotations and T translations, and how a file says which it makes.
@@ -138,10 +149,10 @@ class RobotFile(LimitKeys):
 
     @model_validator(mode="after")
     def _one_a_cable(self) -> "RobotFile":
-        for name in LimitKeys.model_fields:
-            value, count = getattr(self, name), len(self.base_points)
+        for row in LIMITS:
+            value, count = getattr(self, row.name, None), len(self.base_points)
             if isinstance(value, list) and len(value) != count:
-                raise fault(name, value, f"one number, or {count}: one a cable")
+                raise fault(row.name, value, f"{row.allowed}, or {count}: one a cable")
         return self
 
     def placed(self, key: str, file: object) -> tuple[object, str]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from cspr_jax.config.robot import catalogue_names, resolve_robot
 from cspr_jax.problem import fault_at_rest
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 
 
@@ -34,7 +35,7 @@ def robots_table(found: list[dict[str, Any]]):
             str(len(robot["base_points"])),
             f"{robot['mass']:g}",
             robot["z_axis"],
-            ", ".join(key for key in robot if key.startswith(("tension", "cable"))),
+            ", ".join(row.name for row in LIMITS if row.name in robot),
             robot["source"],
             robot["fault"] or "taut",
         )

@@ -179,7 +179,7 @@ def checked_points(key: str, given, least: int) -> np.ndarray:
     if least > PLANAR:
         sizes = spread(points)
         if not sizes[1] > SMALLEST_AREA_RATIO * sizes[0]:
-            raise InputError(key, points.tolist(), "points that are not all on one line, or coincident")
+            raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
     return points
 
 

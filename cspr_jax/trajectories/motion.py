@@ -127,7 +127,8 @@ def inward(frame: Frame, state: State) -> State:
         the state, from the centroid of the spools, z down.
     """
     # Turning is its own inverse.
-    return outward(frame, state)._replace(position=frame.inward(state.position))
+    place: Any = frame.inward(state.position)
+    return outward(frame, state)._replace(position=place)
 
 
 def outward(frame: Frame, state: State) -> State:
