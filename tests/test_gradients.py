@@ -20,7 +20,7 @@ from cspr_jax.api.motions import (
 from cspr_jax.errors import InputError
 
 FAR = np.array([120.0, -40.0, 7.0])
-TARGET = np.array([0.9, 0.5, 2.1])
+TARGET = np.array([-0.6, 0.4, 1.8])
 STEP = 1e-6
 
 
@@ -31,10 +31,10 @@ def point_mass(z_axis="down", offset=FAR):
 
 
 def of_point_mass(base_points, z0, target):
-    """Sampled margin of a hypocycloid of four arcs from beside P0, as a function of what it depends on."""
+    """Sampled margin of a hypocycloid of four arcs, as a function of what it depends on."""
     robot = dataclasses.replace(point_mass()[0], base_points=base_points)
     problem = make_problem(robot, limits=cspr_jax.Limits(cable_length_max=np.full(3, 4.0)))
-    motion = hypocycloid(robot, FAR + np.array([0.2, -0.1, 1.5]), FAR + target, z0=z0, arcs=4)
+    motion = hypocycloid(robot, FAR + np.array([0.7, 0.3, 1.6]), FAR + target, z0=z0, arcs=4)
     return sampled_margin(problem, motion)
 
 
@@ -42,8 +42,7 @@ def of_platform(base_points, z0, target):
     """Sampled margin of a motion of four arcs of the MSSM, from rest to a tilted pose."""
     robot = dataclasses.replace(cspr_jax.load_robot("laval-mssm"), base_points=base_points)
     turned = (np.array([1.0, 0.0, 0.0, 0.0]), np.array([np.cos(0.1), np.sin(0.1), 0.0, 0.0]))
-    start = jnp.stack([0.0 * z0, 0.0 * z0, z0])
-    motion = platform_motion(robot, start, target, z0=z0, arcs=4, orientations=turned, beta_hat=(-1.0, -1.3))
+    motion = platform_motion(robot, None, target, z0=z0, arcs=4, orientations=turned, beta_hat=(-1.0, -1.3))
     return sampled_margin(make_problem(robot), motion)
 
 
@@ -131,12 +130,12 @@ def test_slacks_are_mapped_and_compiled():
     @jax.jit
     @jax.vmap
     def lowest(target, depth):
-        motion = hypocycloid(robot, jnp.stack([0.0 * depth, 0.0 * depth, depth]), target, z0=depth, arcs=5)
+        motion = hypocycloid(robot, None, target, z0=depth, arcs=5)
         return jnp.min(slacks(problem, motion, 0.4))
 
     found = lowest(targets, jnp.asarray(z0))
     for value, target, depth in zip(found, targets, z0, strict=True):
-        motion = hypocycloid(robot, [0.0, 0.0, depth], target, z0=depth, arcs=5)
+        motion = hypocycloid(robot, None, target, z0=depth, arcs=5)
         assert float(jnp.min(slacks(problem, motion, 0.4))) == pytest.approx(float(value), abs=1e-12)
 
 

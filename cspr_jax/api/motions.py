@@ -11,6 +11,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility import slacks as feasibility
 from cspr_jax.feasibility.problem import Problem
@@ -19,7 +20,7 @@ from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.point_mass import PointMassRobot, rest_point
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
 from cspr_jax.trajectories import transition as transitions
@@ -59,7 +60,7 @@ def hypocycloid(
 
     Args:
         robot: a point mass on three cables.
-        start: (3,) in the robot's axes, m.
+        start: (3,) in the robot's axes, m; None: at rest in P0.
         end: (3,) likewise.
         z0: () depth of P0 below the centroid of the spools, m.
         arcs: () number of arcs.
@@ -73,7 +74,7 @@ def hypocycloid(
     """
     own, frame = _prepared(robot, PointMassRobot, (3,), "a point mass on three cables")
     function, p = _amplitude(amplitude, free_end=False), jnp.asarray(arcs, float)
-    first, last = (jnp.asarray(frame.inward(point), float) for point in (start, end))
+    first, last = _places(frame, start, end, z0)
     found = segment(own, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
     return Placed(Hypocycloid(found, function, p), frame)
 
@@ -119,7 +120,7 @@ def platform_motion(
 
     Args:
         robot: a platform on six cables; jax may trace its spools, but not its platform points.
-        start: (3,) position of the mass centre in the robot's axes, m.
+        start: (3,) position of the mass centre in the robot's axes, m; None: P0.
         end: (3,) likewise.
         z0: () depth of P0 below the centroid of the spools, m.
         arcs: () number of arcs.
@@ -136,7 +137,7 @@ def platform_motion(
     """
     own, frame = _prepared(robot, PlatformRobot, (6,), "a platform on six cables")
     function, p = _amplitude(amplitude, free_end=False), jnp.asarray(arcs, float)
-    places = [jnp.asarray(frame.inward(point), float) for point in (start, end)]
+    places = _places(frame, start, end, z0)
     turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
     bends = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
     first, last = zip(places, turns, strict=True)
@@ -189,6 +190,12 @@ def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array
         () without a unit.
     """
     return feasibility.sampled_margin(problem, _inner(motion), samples)
+
+
+def _places(frame: Frame, start, end, z0) -> tuple[Array, Array]:
+    # In the kernels' axes.
+    first = rest_point(jnp.asarray(z0, float)) if start is None else jnp.asarray(frame.inward(start), float)
+    return first, jnp.asarray(frame.inward(end), float)
 
 
 def _inner(motion: Motion) -> Motion:

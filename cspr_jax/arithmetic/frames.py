@@ -109,7 +109,10 @@ def frame_of(base_points, z_axis: str) -> Frame:
     Returns:
         the frame.
     """
-    points = np.asarray(base_points, float)
+    points, signs = _numbers(base_points), np.array(_TURN[z_axis])
+    if not isinstance(points, np.ndarray):
+        origin = points.mean(0)
+        return Frame(signs, origin, (points - origin).mean(0))
     origin = np.array([math.fsum(column) / len(points) for column in points.T])
     rest = np.array([math.fsum(column) / len(points) for column in (points - origin).T])
-    return Frame(np.array(_TURN[z_axis]), origin, rest)
+    return Frame(signs, origin, rest)

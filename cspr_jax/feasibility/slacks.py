@@ -19,6 +19,7 @@ from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, rest_point
 from cspr_jax.robots.state import State
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.motion import Motion
 
 
@@ -43,6 +44,24 @@ def slacks(problem: Problem, motion: Motion, tau: Array) -> Array:
             limit = jnp.asarray(getattr(problem.limits, row.name))
             found.append(jnp.atleast_1d(slack(row, limit, getattr(now, row.quantity), scale)))
     return jnp.concatenate(found)
+
+
+def flags(problem: Problem) -> tuple[Verdict, ...]:
+    """Flag that each slack breaks.
+
+    Args:
+        problem: robot, limits and amplitude.
+
+    Returns:
+        n_slacks flags, in the order of `slacks`.
+    """
+    robot, found = problem.robot, [Verdict.SLACK_CABLE] * problem.robot.n_cables
+    if isinstance(robot, PlatformRobot):
+        found.append(Verdict.SINGULAR)
+    found.append(Verdict.ABOVE_SPOOLS)
+    for row in given(problem.limits):
+        found += [row.flag] * (robot.n_cables if row.per_cable else 1)
+    return tuple(found)
 
 
 def _of_point_mass(robot: PointMassRobot, state: State, z0: Array) -> list[Array]:
