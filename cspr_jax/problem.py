@@ -9,7 +9,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
-from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, from_tilt_torsion
+from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
 from cspr_jax.config.robot import LimitKeys, RobotFile
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
@@ -39,7 +39,7 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
     if isinstance(robot, PlatformRobot):
         changes["platform_points"] = leaf(frame.turned(robot.platform_points))
-        changes["inertia"] = leaf(np.asarray(robot.inertia) * np.outer(frame.signs, frame.signs))
+        changes["inertia"] = leaf(frame.turned_tensor(robot.inertia))
     return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
 
 
@@ -277,9 +277,7 @@ def orientations(frame: Frame, points: np.ndarray, angles: np.ndarray) -> np.nda
     Returns:
         (n, 4) unit quaternions.
     """
-    own = frame.turned(points)
-    towards = np.arctan2(own[:, 1], own[:, 0])
-    return frame.turned_quaternions(from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
+    return frame.turned_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.turned(points))))
 
 
 def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> np.ndarray:

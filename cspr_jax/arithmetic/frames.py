@@ -82,6 +82,28 @@ class Frame:
         """
         return np.asarray(vectors, float) * self.signs
 
+    def turned_tensor(self, tensor) -> np.ndarray:
+        """A tensor in the other axes, either way.
+
+        Args:
+            tensor: (3, 3).
+
+        Returns:
+            (3, 3).
+        """
+        return np.asarray(tensor, float) * np.outer(self.signs, self.signs)
+
+    def turned_angles(self, angles) -> np.ndarray:
+        """Angles of tilt and torsion in the other axes, either way.
+
+        Args:
+            angles: (..., 3) phi, theta, sigma.
+
+        Returns:
+            (..., 3).
+        """
+        return np.asarray(angles, float) * np.array([self.signs[1], 1.0, self.signs[2]])
+
     def turned_quaternions(self, quaternions) -> np.ndarray:
         """Orientations in the other axes, either way.
 

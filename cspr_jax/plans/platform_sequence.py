@@ -22,7 +22,7 @@ from cspr_jax.problem import given_quaternion, motion_kind, orientations
 from cspr_jax.robots.interference import contacts, gaps
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal, rest_point
-from cspr_jax.robots.wrench_balance import conditioning
+from cspr_jax.robots.wrench_balance import normalised_determinant
 from cspr_jax.search.beta_hat import BEYOND, cheapest_path, options
 from cspr_jax.search.platform_answers import PoseAnswers, settled
 from cspr_jax.search.platform_arcs import Candidates, Found, segments_with, smallest_arcs
@@ -189,7 +189,7 @@ def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: A
     depth = plane_normal(robot) @ position
     middle = (rest_point(depth), jnp.eye(3))
     apart = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)
-    return depth, conditioning(robot, *where) / conditioning(robot, *middle), apart
+    return depth, normalised_determinant(robot, *where) / normalised_determinant(robot, *middle), apart
 
 
 def _check_pose(
