@@ -7,9 +7,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cspr_jax.api import load_robot as load_robot
-    from cspr_jax.api import minimum_arcs as minimum_arcs
-    from cspr_jax.api import plan as plan
+    from cspr_jax.api.files import plan as plan
+    from cspr_jax.api.searches import minimum_arcs as minimum_arcs
+    from cspr_jax.problem import load_robot as load_robot
     from cspr_jax.robots.limits import Limits as Limits
     from cspr_jax.robots.point_mass import point_mass_robot as point_mass_robot
     from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
@@ -24,10 +24,10 @@ _PUBLIC = {
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
     "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
-    "load_robot": ("cspr_jax.api", "load_robot"),
-    "minimum_arcs": ("cspr_jax.api", "minimum_arcs"),
+    "load_robot": ("cspr_jax.problem", "load_robot"),
+    "minimum_arcs": ("cspr_jax.api.searches", "minimum_arcs"),
     "open_result": ("cspr_jax.store.result", "open_result"),
-    "plan": ("cspr_jax.api", "plan"),
+    "plan": ("cspr_jax.api.files", "plan"),
     "point_mass_robot": ("cspr_jax.robots.point_mass", "point_mass_robot"),
 }
 __all__ = [

@@ -294,7 +294,7 @@ def _plan(options: argparse.Namespace) -> int:
         from cspr_jax.plans import planning
 
         plan = planning.plan(options.plan)
-    feasible = plan_report.is_feasible(plan)
+    feasible = plan.feasible
     for line in plan.warnings:
         _warn(line)
     _hint(robot_hints(plan.spec) + ([] if feasible else plan_hints(plan.keys, plan.spec)))

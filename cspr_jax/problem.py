@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -10,20 +11,22 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
-from cspr_jax.config.robot import LimitKeys, RobotFile
+from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
-from cspr_jax.robots.reference_pose import reference_pose
+from cspr_jax.robots.reference_pose import aligned, reference_pose
+from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.limits import LIMITS, Limit
 from cspr_jax.trajectories import amplitudes
 from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors
 from cspr_jax.trajectories.platform_segment import Kind
 
-RobotKind = TypeVar("RobotKind", PointMassRobot, PlatformRobot)
+RobotKind = TypeVar("RobotKind", bound=PointMassRobot | PlatformRobot)
 
 
 def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
@@ -39,8 +42,21 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
     if isinstance(robot, PlatformRobot):
         changes["platform_points"] = leaf(frame.turned(robot.platform_points))
-        changes["inertia"] = leaf(frame.turned_tensor(robot.inertia))
+        changes["inertia"] = frame.turned_tensor(leaf(robot.inertia))
     return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
+
+
+def prepared(robot: RobotKind) -> tuple[RobotKind, Frame]:
+    """A robot as the kernels take it, a platform also in its reference axes.
+
+    Args:
+        robot: in its own axes.
+
+    Returns:
+        the robot, and the frame that takes points to it and back.
+    """
+    own, frame = centred(robot)
+    return (aligned(own)[0] if isinstance(own, PlatformRobot) else own), frame  # type: ignore[return-value]
 
 
 def gravity_of(spec: RobotFile, keys: TrajectoryKeys) -> float:
@@ -80,6 +96,22 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
         return platform_robot(spec.base_points, spec.platform_points, **given)
     except InputError as error:
         raise ConfigError(file, spec.typed(error)) from error
+
+
+def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
+    """A robot of the catalogue, or of a file, with its axes and its limits.
+
+    Args:
+        reference: a catalogue name, or the path of a robot file.
+
+    Returns:
+        the robot; with six cables, a platform.
+
+    Raises:
+        ConfigError: no such robot, or a mistake in its file.
+    """
+    spec = resolve_robot(str(reference), reference, Path.cwd())
+    return build_robot(spec, TrajectoryKeys(), reference)
 
 
 def point_mass_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot:
@@ -183,7 +215,7 @@ def build_amplitude(
         amplitude, given = amplitudes.named(key.name, value), shown(key.name)
     else:
         amplitude, given = amplitudes.named(key), shown(key)
-    free_end = keys.family == "transition"
+    free_end = all(FAMILIES[name].free_end for name in keys.families)
     broken = [] if key == "ideal" and for_bounds else boundary_errors(amplitude, free_end=free_end)
     if broken:
         conditions = "(1.27) and (1.28)" if free_end else "(2.49)"
@@ -251,6 +283,39 @@ def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
     if numbers.shape not in shapes or not ((numbers >= least) & np.isfinite(numbers)).all():
         raise InputError(f"{at}{row.name}", value, row.allowed + f", or {n_cables}: one a cable" * row.per_cable)
     return leaf(np.broadcast_to(numbers, (n_cables,) if row.per_cable else ()))
+
+
+def build_problem(
+    spec: RobotFile,
+    keys: TrajectoryKeys,
+    limits: LimitTable,
+    file: object,
+    *,
+    epsilon: float | None = None,
+    at: str = "",
+    for_bounds: bool = False,
+) -> Problem:
+    """Robot, limits and amplitude function of a plan or sweep, as the kernels take them.
+
+    Args:
+        spec: the robot file's content.
+        keys: of the trajectory.
+        limits: keys of the limits.
+        file: named in errors.
+        epsilon: stands in for an amplitude function's "best".
+        at: prefix of keys of the trajectory in errors.
+        for_bounds: whether the amplitude function may be "ideal", which is no motion.
+
+    Returns:
+        the problem: its robot is centred; a platform in its reference axes.
+
+    Raises:
+        ConfigError: the robot, the amplitude function or the limits cannot be used.
+    """
+    amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
+    given = build_limits(spec, limits, limits.floor, file)
+    robot = _determined(spec, keys, file)
+    return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
 
 
 def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> Kind:

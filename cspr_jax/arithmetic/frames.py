@@ -13,6 +13,11 @@ import numpy as np
 _TURN = {"down": (1.0, 1.0, 1.0), "up": (1.0, -1.0, -1.0)}
 
 
+def _numbers(given):
+    # As float64, but for arrays that are not NumPy's: those of jax stay what they are, so that they can be traced.
+    return given if hasattr(given, "at") else np.asarray(given, float)
+
+
 @dataclasses.dataclass(frozen=True)
 class Frame:
     """Axes and origin of a robot file, as the kernels' see them.
@@ -36,7 +41,7 @@ class Frame:
         Returns:
             (..., 3) from the centroid of the spools, z down, m.
         """
-        return ((np.asarray(points, float) - self.origin) - self.rest) * self.signs
+        return ((_numbers(points) - self.origin) - self.rest) * self.signs
 
     def outward(self, points) -> np.ndarray:
         """Points of the kernels in the file's coordinates.
@@ -47,7 +52,7 @@ class Frame:
         Returns:
             (..., 3) m.
         """
-        return self.origin + (np.asarray(points, float) * self.signs + self.rest)
+        return self.origin + (_numbers(points) * self.signs + self.rest)
 
     def depth(self, height) -> np.ndarray:
         """Depth below the centroid of the spools of a z of the file.
@@ -58,7 +63,7 @@ class Frame:
         Returns:
             (...) z in the kernels' coordinates, m.
         """
-        return ((np.asarray(height, float) - self.origin[2]) - self.rest[2]) * self.signs[2]
+        return ((_numbers(height) - self.origin[2]) - self.rest[2]) * self.signs[2]
 
     def height(self, depth) -> np.ndarray:
         """A depth below the centroid of the spools as z of the file.
@@ -69,7 +74,7 @@ class Frame:
         Returns:
             (...) z in the file's axes, m.
         """
-        return self.origin[2] + (np.asarray(depth, float) * self.signs[2] + self.rest[2])
+        return self.origin[2] + (_numbers(depth) * self.signs[2] + self.rest[2])
 
     def turned(self, vectors) -> np.ndarray:
         """Vectors in the other axes, either way.
@@ -80,18 +85,18 @@ class Frame:
         Returns:
             (..., 3).
         """
-        return np.asarray(vectors, float) * self.signs
+        return _numbers(vectors) * self.signs
 
-    def turned_tensor(self, tensor) -> np.ndarray:
+    def turned_tensor(self, tensor):
         """A tensor in the other axes, either way.
 
         Args:
-            tensor: (3, 3).
+            tensor: (3, 3), NumPy or jax.
 
         Returns:
             (3, 3).
         """
-        return np.asarray(tensor, float) * np.outer(self.signs, self.signs)
+        return self.signs[:, None] * tensor * self.signs
 
     def turned_angles(self, angles) -> np.ndarray:
         """Angles of tilt and torsion in the other axes, either way.
@@ -113,7 +118,7 @@ class Frame:
         Returns:
             (..., 4).
         """
-        return np.asarray(quaternions, float) * np.append(1.0, self.signs)
+        return _numbers(quaternions) * np.append(1.0, self.signs)
 
 
 def frame_of(base_points, z_axis: str) -> Frame:

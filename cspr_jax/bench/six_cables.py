@@ -13,10 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.api import load_robot
 from cspr_jax.arithmetic.batches import in_batches, in_threads, padded
 from cspr_jax.bench.timing import best, operations
 from cspr_jax.feasibility.platform.prefilter import smallest_tensions
+from cspr_jax.problem import load_robot
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.reference_pose import aligned

@@ -8,7 +8,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import Table, checked, parse_toml
 from cspr_jax.config.robot import LimitTable, Point, Positive
-from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
+from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, FamilyName, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import shown
 
@@ -46,6 +46,9 @@ class Pose(Table):
     arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] | None = Field(
         None, description="fixes the number of arcs of the segment that ends here; 2 n for n oscillations"
     )
+    family: FamilyName | None = Field(
+        None, description="family of the segment that ends here, in place of the plan's; not of the first pose"
+    )
 
 
 class PlanFile(TrajectoryKeys, LimitTable):
@@ -60,11 +63,33 @@ class PlanFile(TrajectoryKeys, LimitTable):
     )
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
     limits: LimitTable | None = Field(
-        None, description="[limits], as in a sweep: the same keys as here, each in one of both places"
+        None, description="[limits], as in a sweep: the same keys as here, each in one of the two places"
     )
     pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
         description="the poses in their order, at least two [[pose]] tables"
     )
+
+    def family_of(self, segment: int) -> str:
+        """Family of a segment.
+
+        Args:
+            segment: from 0 on.
+
+        Returns:
+            its name.
+        """
+        return self.pose[segment + 1].family or self.family
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """Names of the families in use, in the order of their first segments."""
+        return tuple(dict.fromkeys(map(self.family_of, range(len(self.pose) - 1))))
+
+    @model_validator(mode="after")
+    def _first_family(self) -> "PlanFile":
+        if self.pose[0].family is not None:
+            raise fault("pose[0].family", self.pose[0].family, "absent: no segment ends at the first pose")
+        return self
 
     @model_validator(mode="after")
     def _one_place(self) -> "PlanFile":

@@ -121,6 +121,11 @@ class RobotFile(LimitKeys):
         """Degrees of freedom of the effector."""
         return FREEDOMS[self.own_pattern]
 
+    @property
+    def kind(self) -> str:
+        """What it is, for people."""
+        return {2: "a planar robot", 3: "a point mass", 6: "a platform"}[self.dof]
+
     @model_validator(mode="after")
     def _kind(self) -> "RobotFile":
         if (self.platform_points is None) != (self.inertia is None):

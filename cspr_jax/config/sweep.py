@@ -4,10 +4,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
+from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Coordinate, LimitTable, Point
 from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
-from cspr_jax.schema.quantities import STORABLE
+from cspr_jax.config.wording import either
+from cspr_jax.schema.map_kinds import MAP_KINDS
+from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
 
 LARGEST_COUNT = 10_000_000
@@ -113,7 +116,7 @@ class Orientations(Table):
         'absent: "scan", but "grid" in map = "orientations", which has no other',
     )
     divisions: Annotated[int, Field(ge=4, le=128, multiple_of=2)] = Field(
-        32, description="of pi: the step is pi / divisions; even, for errors are estimated with twice the step"
+        32, description="of pi: the step is pi / divisions; even, since errors are estimated with twice the step"
     )
     values: Annotated[int, Field(ge=1, le=100)] | None = Field(
         None, description="orientations, attainability: values of beta-hat tried at each orientation; absent: 20"
@@ -124,13 +127,13 @@ class Run(Table):
     """How to compute and what to keep."""
 
     dtype: Literal["float64", "float32"] = Field(
-        "float64", description="of stored numbers, and of the sieve; verdicts are float64's in both"
+        "float64", description="type of stored numbers and of the sieve; verdicts use float64 either way"
     )
     tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1, fail_fast=True)] | None = (
         Field(None, description="shape of the block computed at a time, one number an axis")
     )
-    store: Annotated[list[Literal[STORABLE]], Field(min_length=1, fail_fast=True)] | None = Field(  # type: ignore[valid-type]
-        None, description="quantities to store; see `cspr quantities`"
+    store: Annotated[list[Annotated[str, name_of(lambda: QUANTITIES)]], Field(min_length=1, fail_fast=True)] | None = (
+        Field(None, description="quantities to store; see `cspr quantities`")
     )
 
     @field_validator("store")
@@ -145,20 +148,7 @@ class SweepFile(Table):
     """A sweep."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
-    map: Literal[
-        "minimum-arcs",
-        "minimum-oscillations",
-        "transition-envelopes",
-        "poses",
-        "orientations",
-        "orientation-workspace",
-        "attainability",
-    ] = Field(
-        description='kind of map: "minimum-arcs"; of transitions "minimum-oscillations", or "transition-envelopes": '
-        'what each instant asks for; of platforms "poses": smallest numbers of arcs, '
-        '"orientations": the same for all accessible orientations of places, '
-        '"orientation-workspace": accessible orientations of places, "attainability": which of them are attained'
-    )
+    map: Annotated[str, name_of(lambda: MAP_KINDS)] = Field(description=f"kind of map: {either(MAP_KINDS)}")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
     axes: Axes = Field(
         description="[axes] x, y (or radius, azimuth), z and z0 (or inclination), each { start, stop, count } or a list"

@@ -4,8 +4,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Positive
+from cspr_jax.schema.families import FAMILIES
 
 LARGEST_MAX_ARCS = 1000
 
@@ -63,10 +65,13 @@ Inclination = Annotated[
 ]
 
 
+FamilyName = Annotated[str, name_of(lambda: FAMILIES)]
+
+
 class TrajectoryKeys(Table):
     """What both a plan and a sweep say of the trajectory."""
 
-    family: Literal["hypocycloid-standard", "transition", "hypocycloid"] = Field(
+    family: FamilyName = Field(
         "hypocycloid-standard",
         description='trajectory family: "hypocycloid-standard" (thesis chapter 2), "transition" (1), or "hypocycloid" '
         "of variable amplitude (3), for platforms",
@@ -89,4 +94,9 @@ class TrajectoryKeys(Table):
     max_arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] = Field(
         30, description="largest number of arcs tried; two arcs are an oscillation"
     )
-    gravity: Positive | None = Field(None, description="gravity, m/s^2; stands over the robot file's (default 9.81)")
+    gravity: Positive | None = Field(None, description="gravity, m/s^2; overrides the robot file's (default 9.81)")
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """Names of the families in use."""
+        return (self.family,)

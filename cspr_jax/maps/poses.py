@@ -1,4 +1,4 @@
-"""Cells of a sweep of poses: positions and orientations of a grid to the quantities of a result file."""
+"""Maps of smallest numbers of arcs of platforms to poses."""
 
 import numpy as np
 
@@ -9,14 +9,14 @@ from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
-from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
+from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.problem import given_quaternion, motion_kind, orientations
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.answers import joined
 from cspr_jax.search.beta_hat import OPTIONS
-from cspr_jax.search.platform_answers import PoseAnswers, contradictions, reached
+from cspr_jax.search.platform_answers import PoseAnswers, reached
 from cspr_jax.search.platform_arcs import CANDIDATES, Candidates
 from cspr_jax.search.pose_ends import end_options
 
@@ -25,8 +25,8 @@ _OWN = (None, "beta_ff")
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 
 
-class PoseMap(PlatformMap):
-    """The map of a sweep of poses; see `GridMap`."""
+class PosesMap(PlatformMap):
+    """The smallest number of arcs to each pose; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a start that is no pose."""
@@ -82,7 +82,7 @@ class PoseMap(PlatformMap):
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""
-        self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")
+        super().refuse_hopeless(grid)
         errors = []
         for z0 in grid.axes["z0"]:
             try:
@@ -91,7 +91,3 @@ class PoseMap(PlatformMap):
                 errors.append(error)
         if len(errors) == len(grid.axes["z0"]):
             raise ConfigError(self._file, f"robot.{errors[0]}") from errors[0]
-
-    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        return contradictions(answers)

@@ -2,7 +2,6 @@
 
 import csv
 import io
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +11,25 @@ import numpy as np
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.plan_report import is_feasible
 from cspr_jax.plans.planning import Plan
-from cspr_jax.problem import motion_kind
-from cspr_jax.robots import force_balance, wrench_balance
-from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots import cables
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
-from cspr_jax.trajectories import hypocycloid
-from cspr_jax.trajectories.platform_segment import motion, quaternion_at
+from cspr_jax.trajectories.motion import Motion, outward
 
 SCHEMA = 2
-# Those that change sign when time runs backwards.
-_RATES = ("velocity", "omega", "rate")
+# Fields of a state by their names in files.
+_FIELDS = {
+    "position": "position",
+    "velocity": "velocity",
+    "acceleration": "acceleration",
+    "quaternion": "quaternion",
+    "omega": "angular_velocity",
+    "omega_dot": "angular_acceleration",
+}
 _VECTORS = ("position", "velocity", "acceleration", "omega", "omega_dot")
 LARGEST_ROWS = 20_000_000
 # A tick that lies so near to the end of a segment, in parts of a tick, is that end.
@@ -35,33 +37,11 @@ SAME_TICK = 1e-6
 
 
 @jax.jit
-def _point_states(problem, segment, arcs, tau):
+def _states(robot, motion: Motion, tau):
     def one(t):
-        position, velocity, acceleration = hypocycloid.motion(segment, problem.amplitude, arcs, t)
-        length, rate, _ = force_balance.cable_motion(problem.robot, position, velocity, acceleration)
-        force = force_balance.tensions(problem.robot, position, acceleration)
-        states = (position, velocity, acceleration, length, rate, force)
-        return dict(zip(("position", "velocity", "acceleration", "length", "rate", "tension"), states, strict=True))
-
-    return jax.vmap(one)(tau)
-
-
-@partial(jax.jit, static_argnames="kind")
-def _pose_states(problem, segment, arcs, tau, *, kind):
-    def one(t):
-        pose = motion(segment, problem.amplitude, arcs, t, kind=kind)
-        length, rate, _ = wrench_balance.cable_motion(problem.robot, pose)
-        return {
-            "position": pose.position,
-            "velocity": pose.velocity,
-            "acceleration": pose.acceleration,
-            "quaternion": quaternion_at(segment, problem.amplitude, arcs, t, kind=kind),
-            "omega": pose.angular_velocity,
-            "omega_dot": pose.angular_acceleration,
-            "length": length,
-            "rate": rate,
-            "tension": wrench_balance.tensions(problem.robot, pose),
-        }
+        state = motion.state(t)
+        length, rate, _ = cables.cable_motion(robot, state)
+        return state, {"length": length, "rate": rate, "tension": cables.tensions(robot, state)}
 
     return jax.vmap(one)(tau)
 
@@ -77,7 +57,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
         axes; those of `schema.quantities.OF_PLATFORMS` only for a platform.
     """
-    duration = plan.answers.duration
+    duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     parts = []
     for i, length in enumerate(duration):
@@ -88,26 +68,12 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
             tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
             if i == len(duration) - 1:
                 tau = np.append(tau, 1.0)
-        segment = jax.tree.map(lambda x, i=i: x[i], plan.segments)
-        back = bool(plan.backwards[i])
-        states = _states(plan, segment, float(plan.answers.tried_arcs[i]), 1.0 - tau if back else tau)
-        part = {name: -np.asarray(x) if back and name in _RATES else np.asarray(x) for name, x in states.items()}
+        state, of_cables = jax.tree.map(np.asarray, _states(plan.problem.robot, motions[i], tau))
+        state = outward(plan.frame, state)
+        part = {name: getattr(state, field) for name, field in _FIELDS.items()} | of_cables
         parts.append({"t": starts[i] + tau * length, **part})
-    names = [name for name in TRAJECTORY if name in parts[0]]
-    found = {name: np.concatenate([part[name] for part in parts]) for name in names}
-    for name in names:
-        if name in _VECTORS:
-            change = plan.frame.outward if name == "position" else plan.frame.turned
-            found[name] = change(found[name])
-    if "quaternion" in found:
-        found["quaternion"] = plan.frame.turned_quaternions(found["quaternion"])
-    return found
-
-
-def _states(plan: Plan, segment, arcs: float, tau: np.ndarray):
-    if isinstance(plan.problem.robot, PlatformRobot):
-        return _pose_states(plan.problem, segment, arcs, tau, kind=motion_kind(plan.keys))
-    return _point_states(plan.problem, segment, arcs, tau)
+    names = [name for name in TRAJECTORY if parts[0].get(name) is not None]
+    return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
 
 def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
@@ -130,7 +96,7 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
     if not all(np.isfinite(values).all() for name, values in found.items() if name != "tension"):
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
     if path.suffix == ".csv":
-        publish(Disk(), path, _csv(found, None if is_feasible(plan) else _feasible_rows(plan, found["t"])).encode())
+        publish(Disk(), path, _csv(found, None if plan.feasible else _feasible_rows(plan, found["t"])).encode())
     else:
         _write_hdf5(plan, path, found)
 
@@ -164,9 +130,9 @@ def _parts(name: str, count: int) -> list[str]:
 
 def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
     segments = _segments(plan)
-    cables = list(range(1, found["tension"].shape[1] + 1))
+    numbers = list(range(1, found["tension"].shape[1] + 1))
     with new_hdf5(path, _attributes(plan)) as file:
-        scales = {"t": found["t"], "axis": list("xyz"), "cable": cables, "segment": segments["segment"]}
+        scales = {"t": found["t"], "axis": list("xyz"), "cable": numbers, "segment": segments["segment"]}
         if "quaternion" in found:
             scales["component"] = list("wxyz")
         for name, labels in scales.items():
@@ -191,10 +157,10 @@ def _attributes(plan: Plan) -> dict[str, Any]:
     spec = plan.spec
     return {
         "Conventions": "CF-1.11",
-        "title": f"Motion of robot {spec.name}" + ("" if is_feasible(plan) else ", not proved feasible"),
+        "title": f"Motion of robot {spec.name}" + ("" if plan.feasible else ", not proved feasible"),
         "schema": SCHEMA,
         "software": f"cspr_jax {__version__}",
-        "feasible": int(is_feasible(plan)),
+        "feasible": int(plan.feasible),
         "family": plan.keys.family,
         "plan": plan.text,
         "robot": spec.name,

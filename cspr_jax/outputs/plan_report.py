@@ -5,8 +5,6 @@ from typing import Any
 
 from cspr_jax.plans.planning import Plan
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.oscillations import OscillationAnswers
-from cspr_jax.search.platform_answers import PoseAnswers
 
 SCHEMA = 1
 
@@ -31,21 +29,9 @@ def plan_object(plan: Plan) -> dict[str, Any]:
         "gravity": float(plan.problem.robot.gravity),
         "segments": segments,
         "total_duration": float(plan.answers.duration.sum()),
-        "feasible": is_feasible(plan),
+        "feasible": plan.feasible,
     }
     return _finite(found)
-
-
-def is_feasible(plan: Plan) -> bool:
-    """Whether every segment is proved feasible.
-
-    Args:
-        plan: the plan.
-
-    Returns:
-        the claim.
-    """
-    return bool((plan.answers.arcs > 0).all())
 
 
 def verdict_text(verdict: int, arcs: int) -> str:
@@ -61,21 +47,29 @@ def verdict_text(verdict: int, arcs: int) -> str:
     return "feasible" if arcs > 0 else Verdict(int(verdict)).text
 
 
+# What only some families or robots have.
+_OF_SOME = (
+    "oscillations",
+    "envelope_oscillations",
+    "least_oscillations",
+    "inclination",
+    "det_margin",
+    "cable_interference",
+    "cable_distance_min",
+    "platform_interference",
+    "beta_hat",
+)
+
+
 def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
-    answers, asked = plan.answers, plan.extremes
+    answers, asked = plan.answers, plan.demands
     arcs = int(answers.arcs[i])
-    swings = answers if isinstance(answers, OscillationAnswers) else None
-    poses = answers if isinstance(answers, PoseAnswers) else None
-    verdict = Verdict(int(answers.verdict[i]))
-    return {
+    found = {
         "from": i,
         "to": i + 1,
+        "family": plan.keys.family_of(i),
         "arcs": arcs or None,
         "tried_arcs": int(answers.tried_arcs[i]),
-        "oscillations": int(swings.oscillations[i]) or None if swings else None,
-        "envelope_oscillations": int(swings.envelope_oscillations[i]) or None if swings else None,
-        "least_oscillations": float(swings.least_oscillations[i]) if swings else None,
-        "inclination": float(swings.used_inclination[i]) if swings else None,
         "duration": float(answers.duration[i]),
         "tension_min": float(asked.tension_min[i]),
         "tension_max": float(asked.tension_max[i]),
@@ -83,14 +77,9 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "margin": float(answers.margin[i]),
         "margin_bound": float(answers.margin_bound[i]),
         "limit_margin": float(answers.limit_margin[i]),
-        "det_sign_constant": bool((poses.det_margin if poses else asked.depth_ratio_min)[i] > 0.0),
-        "det_margin": float(poses.det_margin[i]) if poses else None,
-        "cable_interference": bool(verdict & Verdict.CABLE_CABLE) if poses else None,
-        "cable_distance_min": float(poses.cable_distance[i]) if poses else None,
-        "platform_interference": bool(verdict & Verdict.CABLE_PLATFORM) if poses else None,
+        "det_sign_constant": bool(asked.depth_min[i] > 0.0),
         "verdict": verdict_text(answers.verdict[i], arcs),
         "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
-        "beta_hat": [float(value) for value in poses.beta_hat[i]] if poses else None,
         "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
         "z_lowest": float(asked.lowest[i]),
         "cable_length_max": float(asked.length_max[i]),
@@ -98,6 +87,7 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "cable_acceleration_max": float(asked.acceleration_max[i]),
         "samples": int(asked.samples[i]),
     }
+    return found | dict.fromkeys(_OF_SOME) | plan.details(i)
 
 
 def _finite(value: Any) -> Any:
@@ -119,15 +109,17 @@ def plan_table(plan: Plan):
     """
     from rich.table import Table  # only a terminal needs it
 
-    title = f"{plan.spec.name}: {plan.keys.family}, {plan.problem.amplitude.name}, z0 = {plan.z0:.6g} m"
+    title = f"{plan.spec.name}: {', '.join(plan.keys.families)}, {plan.problem.amplitude.name}, z0 = {plan.z0:.6g} m"
     table = Table(title=title, caption=_caption(plan), title_justify="left", caption_justify="left")
-    swings = isinstance(plan.answers, OscillationAnswers)
+    segments = plan_object(plan)["segments"]
+    # Oscillations are counted where every segment has them.
+    swings = all(segment["inclination"] is not None for segment in segments)
     count = ("oscillations", "v") if swings else ("arcs",)
-    last = "beta-hat" if isinstance(plan.answers, PoseAnswers) else "p → ∞"
+    last = "beta-hat" if any(segment["beta_hat"] for segment in segments) else "p → ∞"
     heads = ("to", "position (m)", *count, "T (s)", "margin", "tension (N)", last, "verdict")
     for head in heads:
         table.add_column(head, justify="left" if head in ("position (m)", "verdict") else "right")
-    for i, segment in enumerate(plan_object(plan)["segments"]):
+    for i, segment in enumerate(segments):
         position = ", ".join(f"{round(value, 9) + 0.0:.4g}" for value in plan.points[i + 1])
         bends = " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
         found = segment["oscillations" if swings else "arcs"]
@@ -148,7 +140,7 @@ def plan_table(plan: Plan):
 
 def _caption(plan: Plan) -> str:
     total = f"total {plan.answers.duration.sum():.2f} s; z {plan.spec.z_axis}"
-    note = "" if is_feasible(plan) else "; in brackets: none found, the numbers are those of the best candidate"
+    note = "" if plan.feasible else "; in brackets: none found, the numbers are those of the best candidate"
     return f"{total}{note}"
 
 

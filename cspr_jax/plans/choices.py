@@ -11,6 +11,7 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.transition.oscillations import best_inclination
 from cspr_jax.plans.sequence import Sequence
+from cspr_jax.plans.stops import Stops
 from cspr_jax.problem import build_amplitude
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, rest_point, spool_radius
 from cspr_jax.robots.robot import Robot
@@ -38,12 +39,13 @@ def chosen_depth(problem: Any, sequence: Sequence) -> float:
     Raises:
         ConfigError: a rest pose off P0, or no z0 that can be chosen.
     """
-    keys, path, targets = sequence.keys, sequence.path, sequence.targets
-    _check_depth_keys(sequence)
+    stops = sequence.stops
+    keys, path, targets = stops.keys, stops.path, stops.targets
+    _check_depth_keys(stops)
     if isinstance(keys.z0, float):
         if keys.z0 > LARGEST_LENGTH:
             raise ConfigError(path, f"z0 = {shown(keys.z0)}: must be at most 1e6 m")
-        _check_rest(problem.robot, sequence, keys.z0)
+        _check_rest(problem.robot, stops, keys.z0)
         return keys.z0
     for i, pose in enumerate(keys.pose):
         if pose.rest and pose.position is not None:
@@ -51,7 +53,7 @@ def chosen_depth(problem: Any, sequence: Sequence) -> float:
     if not len(targets):
         raise ConfigError(path, "z0 = { choose = ... }: must be a number where every pose is at rest")
     if not isinstance(keys.z0, Choice):
-        return _depth_of_inclination(problem, sequence)
+        return _depth_of_inclination(problem, stops)
     if keys.z0.choose == "mean":
         z0 = depths.mean_depth(problem.robot, targets)
     elif keys.z0.choose == "conservative":
@@ -60,16 +62,16 @@ def chosen_depth(problem: Any, sequence: Sequence) -> float:
         with within("fastest z0"):
             z0 = _fastest_depth(problem, sequence)
     if not 0.0 < z0 <= LARGEST_LENGTH:
-        hint = "".join(f" ({line})" for line in plan_hints(keys, sequence.spec))
+        hint = "".join(f" ({line})" for line in plan_hints(keys, stops.spec))
         why = f"since no z0 in ]0, 1e6] m follows from the poses{hint}"
         raise ConfigError(path, f'z0.choose = "{keys.z0.choose}": must be a number here, {why}')
     return z0
 
 
-def _check_depth_keys(sequence: Sequence) -> None:
-    keys, path = sequence.keys, sequence.path
+def _check_depth_keys(stops: Stops) -> None:
+    keys, path = stops.keys, stops.path
     if keys.z0 is None and keys.inclination is None:
-        other = ", or inclination" if keys.family == "transition" else ""
+        other = ", or inclination" if set(keys.families) == {"transition"} else ""
         raise ConfigError(
             path, f'z0 is missing: depth of P0, m, or {{ choose = "mean" | "conservative" | "fastest" }}{other}'
         )
@@ -77,20 +79,20 @@ def _check_depth_keys(sequence: Sequence) -> None:
         raise ConfigError(path, "z0, inclination: must be one of them")
 
 
-def _check_rest(robot: Robot, sequence: Sequence, z0: float) -> None:
+def _check_rest(robot: Robot, stops: Stops, z0: float) -> None:
     at_rest, near = rest_point(np.asarray(z0)), AT_P0 * float(spool_radius(robot))
-    for i, pose in enumerate(sequence.keys.pose):
+    for i, pose in enumerate(stops.poses):
         if not pose.rest or pose.position is None:
             continue
-        if np.linalg.norm(sequence.frame.inward(pose.position) - at_rest) > near:
-            place = [float(f"{value:.12g}") for value in sequence.frame.outward(at_rest)]
+        if np.linalg.norm(stops.frame.inward(pose.position) - at_rest) > near:
+            place = [float(f"{value:.12g}") for value in stops.frame.outward(at_rest)]
             raise ConfigError(
-                sequence.path, f"pose[{i}].position = {shown(pose.position)}: must be P0 = {place} at rest, or absent"
+                stops.path, f"pose[{i}].position = {shown(pose.position)}: must be P0 = {place} at rest, or absent"
             )
 
 
-def _depth_of_inclination(problem: Problem, sequence: Sequence) -> float:
-    targets, path, inclination = sequence.targets, sequence.path, sequence.keys.inclination
+def _depth_of_inclination(problem: Problem, stops: Stops) -> float:
+    targets, path, inclination = stops.targets, stops.path, stops.keys.inclination
     if inclination == "best":
         if (targets != targets[0]).any():
             raise ConfigError(path, 'inclination = "best": must be a number in a plan with more than one target')
@@ -105,7 +107,7 @@ def _depth_of_inclination(problem: Problem, sequence: Sequence) -> float:
             path, f"inclination = {v:g}: must be replaced by z0, since the targets lie at different depths"
         )
     if not found[0] > 0.0:
-        hint = "".join(f" ({line})" for line in plan_hints(sequence.keys, sequence.spec))
+        hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.spec))
         why = f"since the targets are not below the spool plane{hint}"
         raise ConfigError(path, f"inclination: must be replaced by z0, {why}")
     return found[0]
@@ -113,16 +115,15 @@ def _depth_of_inclination(problem: Problem, sequence: Sequence) -> float:
 
 def _fastest_depth(problem: Problem, sequence: Sequence) -> float:
     # The duration grows with the root of z0 between changes of the arcs: a coarse look, then a fine one at the best.
-    least = max(depths.least_depth(problem.robot, sequence.targets), 1e-3)
-    safe = depths.conservative_depth(problem.robot, sequence.targets)
+    least = max(depths.least_depth(problem.robot, sequence.stops.targets), 1e-3)
+    safe = depths.conservative_depth(problem.robot, sequence.stops.targets)
     trial = np.linspace(0.5 * least, max(1.5 * least, safe if np.isfinite(safe) else 0.0), DEPTHS)
     for _ in range(2):
-        points = np.stack([sequence.points(z0) for z0 in trial])
-        answers = sequence.answers(problem, points, np.repeat(trial, len(sequence)))
-        cost = np.where(answers.arcs > 0, answers.duration, np.inf).reshape(DEPTHS, -1).sum(1)
+        found = sequence.table(problem, trial)
+        cost = np.where(found["arcs"] > 0, found["duration"], np.inf).sum(1)
         best = int(np.argmin(cost))
         if not np.isfinite(cost[best]):
-            worst = np.nan_to_num(answers.margin, nan=-np.inf).reshape(DEPTHS, -1).min(1)
+            worst = np.nan_to_num(found["margin"], nan=-np.inf).min(1)
             best = int(np.argmax(worst))
         chosen = float(trial[best])
         trial = np.linspace(trial[max(best - 1, 0)], chosen, DEPTHS)
@@ -142,12 +143,11 @@ def best_amplitude(problem: Any, sequence: Sequence, z0: float) -> tuple[Amplitu
     """
     ranked: list[tuple[float, float, int, Amplitude, float]] = []
     for epsilon in EPSILONS:
-        amplitude = build_amplitude(sequence.keys, sequence.path, epsilon=float(epsilon))
+        amplitude = build_amplitude(sequence.stops.keys, sequence.stops.path, epsilon=float(epsilon))
         trial = problem._replace(amplitude=amplitude)
-        depth = chosen_depth(trial, sequence) if sequence.keys.inclination == "best" else z0
-        points = sequence.points(depth)
+        depth = chosen_depth(trial, sequence) if sequence.stops.keys.inclination == "best" else z0
         with within(f"epsilon {epsilon:.2f} of {EPSILONS[-1]:.2f}"):
-            answers = sequence.answers(trial, points, np.full(len(sequence), depth))
-        cost = np.where(answers.arcs > 0, answers.duration, np.inf).sum()
-        ranked.append((round(float(cost), 9), -float(answers.margin.min()), len(ranked), amplitude, depth))
+            found = sequence.table(trial, np.array([depth]))
+        cost = np.where(found["arcs"] > 0, found["duration"], np.inf).sum()
+        ranked.append((round(float(cost), 9), -float(found["margin"].min()), len(ranked), amplitude, depth))
     return min(ranked)[-2:]

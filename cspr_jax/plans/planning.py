@@ -1,8 +1,12 @@
-"""Plans: a sequence of poses, each segment with its smallest number of arcs and what it asks of the cables."""
+"""Plans: a sequence of poses, each segment with its smallest number of arcs and its demands on the robot."""
 
 import dataclasses
+import itertools
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -11,25 +15,35 @@ from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
-from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.feasibility.platform.demands import pose_extremes
-from cspr_jax.feasibility.point_mass.demands import Extremes, extremes
+from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.demands import SAMPLES, Demands, demands
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.choices import best_amplitude, chosen_depth
-from cspr_jax.plans.platform_sequence import Poses
-from cspr_jax.plans.sequence import Sequence, sequence_of
-from cspr_jax.problem import build_amplitude, build_limits, motion_kind, platform_of, point_mass_of
-from cspr_jax.robots.reference_pose import aligned, reference_pose
-from cspr_jax.search.answers import Answers
-from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
-from cspr_jax.trajectories.hypocycloid import Segment
-from cspr_jax.trajectories.platform_segment import PoseSegment
+from cspr_jax.plans.sequence import Sequence
+from cspr_jax.problem import build_problem
+from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.search.answers import Answers, joined
+from cspr_jax.trajectories.motion import Motion, Placed
 
-# A third derivative that changes more than this, relative to its largest value, just beside a knot makes tensions jump.
-JUMP, NEAR_KNOT = 1e-6, 1e-12
-_JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
 # Where a search for z0 takes "best" epsilon to be, until it is chosen.
 FIRST_EPSILON = 0.2
+# Where families change, positions may differ by so much of the robot's size, accelerations of gravity.
+CONTINUOUS = 1e-9
+
+
+@dataclasses.dataclass(frozen=True)
+class JoinedLeg:
+    """Segments of one family, joined.
+
+    Fields:
+        family: its name.
+        answers: of its segments.
+        motions: of the same, from the centroid of the spools, z down.
+    """
+
+    family: str
+    answers: Answers
+    motions: list[Motion]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,30 +53,59 @@ class Plan:
     Fields:
         spec: the robot as its file has it.
         keys: the plan file.
-        problem: robot, limits, amplitude function; of a platform its reference too.
+        problem: robot, limits, amplitude function; centred.
         z0: m.
         frame: of the robot file.
         points: (n + 1, 3) in the axes of the robot file, m.
-        answers: of the n segments.
-        extremes: of the n segments; `lowest` is z in the axes of the robot file.
-        segments: of the n segments, each of the parity of its number of arcs; in the kernels' coordinates.
-        backwards: (n,) whether a segment runs against its normalised time, from its target back to rest.
+        legs: consecutive segments of one family each, n segments in all.
+        demands: of the n segments; `lowest` is z in the axes of the robot file.
         warnings: what its user should know, one line each.
         text: of the plan file; empty for a plan that has none.
     """
 
     spec: RobotFile
     keys: PlanFile
-    problem: Problem | Problem
+    problem: Problem
     z0: float
     frame: Frame
     points: np.ndarray
-    answers: Answers
-    extremes: Extremes
-    segments: Segment | PoseSegment
-    backwards: np.ndarray
+    legs: tuple[JoinedLeg, ...]
+    demands: Demands
     warnings: tuple[str, ...] = ()
     text: str = ""
+
+    @cached_property
+    def answers(self) -> Answers:
+        """Answers of the n segments; of a plan of several legs, what every family says."""
+        if len(self.legs) == 1:
+            return self.legs[0].answers
+        names = [field.name for field in dataclasses.fields(Answers)]
+        return joined([Answers(**{name: getattr(leg.answers, name) for name in names}) for leg in self.legs])
+
+    def details(self, i: int) -> dict[str, Any]:
+        """What only its family says of a segment.
+
+        Args:
+            i: number of the segment.
+
+        Returns:
+            plain values, by their names in JSON.
+        """
+        for leg in self.legs:
+            if i < len(leg.motions):
+                return leg.answers.details(i)
+            i -= len(leg.motions)
+        raise IndexError(i)
+
+    @property
+    def motions(self) -> list[Placed]:
+        """Motions of the n segments, in the axes of the robot file."""
+        return [Placed(motion, self.frame) for leg in self.legs for motion in leg.motions]
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every segment is feasible."""
+        return bool((self.answers.arcs > 0).all())
 
 
 def plan(path: Path) -> Plan:
@@ -95,59 +138,46 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
         ConfigError: a mistake in it.
     """
     spec = resolve_robot(keys.robot, path, path.parent)
-    if spec.is_platform:
-        return _plan_of_poses(spec, keys, path)
-    sequence = sequence_of(spec, keys, path)
-    robot = point_mass_of(spec, keys, path)
-    limits = build_limits(spec, keys, keys.floor, path)
-    amplitude = build_amplitude(keys, path, epsilon=FIRST_EPSILON)
-    problem = Problem(robot, limits, amplitude)
+    sequence = Sequence(spec, keys, path)
+    problem = build_problem(spec, keys, keys, path, epsilon=FIRST_EPSILON)
+    for leg in sequence.legs:
+        leg.check(problem)
     z0 = chosen_depth(problem, sequence)
     if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
         amplitude, z0 = best_amplitude(problem, sequence, z0)
         problem = problem._replace(amplitude=amplitude)
-    points = sequence.points(z0)
-    depth = np.full(len(sequence), z0)
-    answers = sequence.answers(problem, points, depth)
-    segments = sequence.segments(problem, points, depth, answers)
-    asked = extremes(problem, segments, answers.tried_arcs, keys.samples)
-    return _plan(sequence, problem, z0, points, (answers, asked, segments))
-
-
-def _plan(sequence: Sequence, problem, z0: float, points: np.ndarray, found: tuple, warnings: tuple = ()) -> Plan:
-    # What leaves the kernels is in the axes of the robot file.
-    frame, (answers, asked, segments) = sequence.frame, found
+    legs = tuple(JoinedLeg(leg.stops.family, *leg.join(problem, z0)) for leg in sequence.legs)
+    _refuse_jumps(problem, sequence, legs)
+    frame = sequence.stops.frame
+    asked = _demands(problem, legs, keys.samples)
     asked = dataclasses.replace(asked, lowest=frame.height(asked.lowest))
-    places, backwards = frame.outward(points), sequence.backwards
-    return Plan(sequence.spec, sequence.keys, problem, z0, frame, places, answers, asked, segments, backwards, warnings)
+    points = frame.outward(sequence.stops.points(z0))
+    warnings = tuple(dict.fromkeys(line for leg in sequence.legs for line in leg.warnings(problem)))
+    return Plan(spec, keys, problem, z0, frame, points, legs, asked, warnings)
 
 
-def _jumps(amplitude: Amplitude) -> bool:
-    # Whether A''' jumps between pieces.
-    sides = [derivatives(amplitude, jnp.asarray(amplitude.knots) + s, order=3)[3] for s in (-NEAR_KNOT, NEAR_KNOT)]
-    return bool((np.abs(np.asarray(sides[1] - sides[0])) > JUMP * float(amplitude.largest[3])).any())
+def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], samples: int) -> Demands:
+    motions = [motion for leg in legs for motion in leg.motions]
+    arcs = np.concatenate([leg.answers.tried_arcs for leg in legs])
+    return demands(problem.robot, motions, np.maximum(SAMPLES * arcs, samples) + 1)
 
 
-def _plan_of_poses(spec: RobotFile, keys: PlanFile, path: Path) -> Plan:
-    # Of a rigid platform, thesis chapter 3.
-    sequence = Poses(spec, keys, path)
-    robot = platform_of(spec, keys, path)
-    limits = build_limits(spec, keys, keys.floor, path)
-    amplitude = build_amplitude(keys, path, epsilon=FIRST_EPSILON)
-    problem = Problem(aligned(robot)[0], limits, amplitude)
-    sequence.check_poses(problem)
-    z0 = chosen_depth(problem, sequence)
-    try:
-        reference_pose(robot, z0)
-    except InputError as error:
-        raise ConfigError(path, spec.typed(error)) from error
-    if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
-        amplitude, z0 = best_amplitude(problem, sequence, z0)
-        problem = problem._replace(amplitude=amplitude)
-    points, depth = sequence.points(z0), np.full(len(sequence), z0)
-    answers = sequence.answers(problem, points, depth)
-    segments = sequence.segments(problem, points, depth, answers)
-    kind = motion_kind(keys)
-    asked = pose_extremes(problem, segments, answers.tried_arcs, keys.samples, kind=kind)
-    warnings = (_JUMPS.format(amplitude.name),) if kind.variable and _jumps(amplitude) else ()
-    return _plan(sequence, problem, z0, points, (answers, asked, segments), warnings)
+@jax.jit
+def _ends(before: Motion, after: Motion):
+    return before.state(jnp.asarray(1.0))[:3], after.state(jnp.asarray(0.0))[:3]
+
+
+def _refuse_jumps(problem: Problem, sequence: Sequence, legs: tuple[JoinedLeg, ...]) -> None:
+    # Where another family goes on, positions, velocities and accelerations must meet.
+    size, gravity = float(spool_radius(problem.robot)), float(problem.robot.gravity)
+    scales = {"position": size, "velocity": np.sqrt(size * gravity), "acceleration": gravity}
+    for leg, (before, after) in zip(sequence.legs[1:], itertools.pairwise(legs), strict=True):
+        last, first = _ends(before.motions[-1], after.motions[0])
+        for (name, scale), a, b in zip(scales.items(), last, first, strict=True):
+            jump = float(np.abs(np.asarray(a) - np.asarray(b)).max())
+            if not jump <= CONTINUOUS * scale:
+                raise ConfigError(
+                    sequence.stops.path,
+                    f'pose[{leg.stops.first + 1}].family = "{after.family}": must be one whose {name} goes on from '
+                    f'"{before.family}": it jumps by {jump:.2g} at pose[{leg.stops.first}]',
+                )

@@ -63,7 +63,9 @@ def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Arr
     return robot.mass * per_length * jnp.linalg.norm(rays, axis=1)  # (2.4)
 
 
-def cable_motion(robot: PointMassRobot, position: Array, velocity: Array, acceleration: Array) -> tuple[Array, ...]:
+def cable_motion(
+    robot: PointMassRobot, position: Array, velocity: Array, acceleration: Array
+) -> tuple[Array, Array, Array]:
     """Lengths of the cables, (2.1), and their first two derivatives in time.
 
     Args:

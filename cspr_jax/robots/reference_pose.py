@@ -9,7 +9,7 @@ It is computed, not assumed, and so is the sign of det J.
 
 import dataclasses
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -59,15 +59,18 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
     """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
 
     Args:
-        robot: centred, in any platform axes.
+        robot: centred, in any platform axes; jax may be tracing its spools, but not its platform points.
 
     Returns:
         the robot, and the rotation (3, 3) from its former axes to these.
     """
-    rotation = _level_and_straight(robot)
-    if np.abs(rotation - np.eye(3)).max() < ALIGNED:
-        rotation = np.eye(3)
-    points, inertia = np.asarray(robot.platform_points) @ rotation.T, rotation @ np.asarray(robot.inertia) @ rotation.T
+    if isinstance(robot.base_points, jax.core.Tracer):
+        rotation = _traced(robot)
+    else:
+        rotation = _level_and_straight(robot)
+        if np.abs(rotation - np.eye(3)).max() < ALIGNED:
+            rotation = np.eye(3)
+    points, inertia = leaf(robot.platform_points) @ rotation.T, rotation @ leaf(robot.inertia) @ rotation.T
     return dataclasses.replace(robot, platform_points=leaf(points), inertia=leaf(inertia)), rotation
 
 
@@ -132,6 +135,24 @@ def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
     found = [_straightest(points @ side.T, base) for side in sides]
     best = int(np.argmax([nearness for _, nearness in found]))
     return about_vertical(found[best][0]) @ sides[best]
+
+
+def _traced(robot: PlatformRobot) -> Any:
+    # The same, where jax is tracing the spools: on these depends the turn about the vertical alone.
+    points = np.asarray(robot.platform_points)
+    normal = np.linalg.svd(points - points.mean(0))[2][2]
+    found = []
+    for side in (_to_vertical(sign * normal) for sign in (1.0, -1.0)):
+        x, y, _ = (points @ side.T).T
+        along = x @ robot.base_points[:, 0] + y @ robot.base_points[:, 1]
+        across = x @ robot.base_points[:, 1] - y @ robot.base_points[:, 0]
+        nearness = jnp.hypot(along, across)
+        zero, one = jnp.zeros_like(along), jnp.ones_like(along)
+        turn = jnp.stack([along, -across, zero, across, along, zero, zero, zero, nearness]).reshape(3, 3) / nearness
+        found.append((nearness, jnp.where(nearness > ALIGNED * one, turn, jnp.eye(3)) @ side))
+    (first, rotation), (second, other) = found
+    chosen = jnp.where(first >= second, rotation, other)
+    return jnp.where(jnp.max(jnp.abs(chosen - jnp.eye(3))) < ALIGNED, jnp.eye(3), chosen)
 
 
 def _to_vertical(normal: np.ndarray) -> np.ndarray:

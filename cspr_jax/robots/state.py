@@ -1,4 +1,4 @@
-"""The state of an effector: where it is, and how it moves."""
+"""State of an effector at one instant: where it is, and how it moves."""
 
 from typing import NamedTuple
 
@@ -15,6 +15,8 @@ class State(NamedTuple):
         rotation: (3, 3) from platform to fixed axes; None for a point mass.
         angular_velocity: (3,) fixed axes, rad/s; None for a point mass.
         angular_acceleration: (3,) fixed axes, rad/s^2; None for a point mass.
+        quaternion: (4,) the rotation as a unit quaternion, scalar first, continuous along a motion; None where it is
+            not asked for.
     """
 
     position: Array
@@ -24,3 +26,17 @@ class State(NamedTuple):
     rotation: Array = None  # type: ignore[assignment]
     angular_velocity: Array = None  # type: ignore[assignment]
     angular_acceleration: Array = None  # type: ignore[assignment]
+    quaternion: Array = None  # type: ignore[assignment]
+
+
+def backwards(state: State) -> State:
+    """State of the same motion with time reversed.
+
+    Args:
+        state: of the motion.
+
+    Returns:
+        the state with velocity and angular velocity of the other sign.
+    """
+    turning = None if state.rotation is None else -state.angular_velocity
+    return state._replace(velocity=-state.velocity, angular_velocity=turning)

@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from cspr_jax.errors import InputError
 from cspr_jax.schema.verdicts import SENTENCES, Verdict
 
 
@@ -18,6 +19,9 @@ class Quantity:
         long_name: a short phrase for labels.
         description: one sentence.
         kind: "float" (of the run's dtype) or the NumPy name of an integer type.
+        unflagged: of flags of a verdict: what pictures say where none is set; empty: it is no verdict.
+        signed: whether either sign is as good as the other, so that zero is in the middle of a picture's colours.
+        contoured: whether sections of it show where it is a whole number.
     """
 
     name: str
@@ -25,6 +29,9 @@ class Quantity:
     long_name: str
     description: str
     kind: Literal["float", "uint16", "int16"] = "float"
+    unflagged: str = ""
+    signed: bool = False
+    contoured: bool = False
 
 
 AXES = {
@@ -63,17 +70,24 @@ REFUSALS = {
     "refused_cable_platform": Verdict.CABLE_PLATFORM,
 }
 _REFUSED = (
-    "the best motion asks a cable to push.",
+    "a cable would have to push on the best motion.",
     "the best motion passes a singularity.",
     "two cables touch on the best motion.",
     "a cable touches the platform on the best motion.",
 )
 
+# What verdicts rest on, and what they are about.
+_HOW = ", proved for point masses, from refined samples for platforms"
+_MARGIN = (
+    "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
+    "or depth below the spools over z0."
+)
+
 QUANTITIES = {
     q.name: q
     for q in (
-        Quantity("arcs", "1", "smallest number of arcs", "Smallest number of arcs proved feasible; 0: none.", "int16"),
-        Quantity("verdict", "1", "verdict", "Bit flags; 0 is feasible.", "uint16"),
+        Quantity("arcs", "1", "smallest number of arcs", f"Smallest number of feasible arcs{_HOW}; 0: none.", "int16"),
+        Quantity("verdict", "1", "verdict", f"Bit flags{_HOW}; 0 is feasible.", "uint16", unflagged="feasible"),
         Quantity(
             "duration",
             "s",
@@ -84,10 +98,13 @@ QUANTITIES = {
             "margin",
             "1",
             "smallest normalised pseudotension",
-            "Smallest pseudotension over its value at rest in P0, or depth below the spools over z0.",
+            _MARGIN,
         ),
         Quantity(
-            "margin_bound", "1", "proved lower bound of the margin", "No instant of the segment has a smaller margin."
+            "margin_bound",
+            "1",
+            "proved lower bound of the margin",
+            "No instant of the segment has a smaller margin: proved for point masses, absent for platforms.",
         ),
         Quantity(
             "feasible_at_infinity",
@@ -106,7 +123,8 @@ QUANTITIES = {
             "limit_margin",
             "1",
             "smallest slack of the limits",
-            "Smallest dimensionless slack of the limits given (docs/theory.md); infinite where there is none.",
+            "Smallest dimensionless slack of the limits given; infinite where none is. Point masses and platforms have "
+            "formulas of their own (docs/theory.md), equal in sign alone.",
         ),
         Quantity(
             "oscillations",
@@ -133,7 +151,8 @@ QUANTITIES = {
             "least_oscillations",
             "1",
             "number of oscillations n, a real number",
-            "What the envelopes ask for, (1.48) and (1.94); NaN where no number will do (|v A| reaches 1).",
+            "Number that the envelopes require, (1.48) and (1.94); NaN where no number will do (|v A| reaches 1).",
+            contoured=True,
         ),
         Quantity(
             "inclination_gain",
@@ -153,18 +172,18 @@ QUANTITIES = {
             "lower envelope of the normalised pseudotension",
             "(1.39) of the cable, or the lowest over the cables, with the real number `least_oscillations`.",
         ),
-        Quantity("used_inclination", "1", "inclination v", "Inclination of the transition, v of (1.31)."),
+        Quantity("used_inclination", "1", "inclination v", "Inclination of the transition, v of (1.31).", signed=True),
         Quantity(
             "det_margin",
             "1",
             "smallest determinant",
-            "Smallest determinant of J, with cables and platform of unit size, over its value at rest in P0.",
+            "Smallest determinant of the structure matrix (cables and platform of unit size) over that at rest in P0.",
         ),
         Quantity(
             "cable_distance",
             "m",
             "smallest distance between cables",
-            "Of those that can meet: that share neither spool nor platform point.",
+            "Between cables that share neither spool nor platform point.",
         ),
         Quantity("beta_hat", "1", "beta-hat at the target", "Of the motion that the other quantities belong to."),
         Quantity(
@@ -202,6 +221,7 @@ QUANTITIES = {
             "main reason",
             "Why most of the accessible orientations that are not attained are not: a verdict's flag; 0: all are.",
             "uint16",
+            unflagged="all attained",
         ),
         *(
             Quantity(
@@ -209,51 +229,8 @@ QUANTITIES = {
             )
             for (name, flag), words in zip(REFUSALS.items(), _REFUSED, strict=True)
         ),
-        Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination asks for."),
+        Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
-}
-_COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
-_OF_OSCILLATIONS = (
-    "oscillations",
-    "tried_oscillations",
-    "envelope_oscillations",
-    "least_oscillations",
-    "inclination_gain",
-    "used_inclination",
-    "used_z0",
-)
-_OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
-_OF_POSES = (
-    "arcs",
-    "tried_arcs",
-    "verdict",
-    "duration",
-    "margin",
-    "det_margin",
-    "cable_distance",
-    "limit_margin",
-    "beta_hat",
-)
-_OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
-_OF_ATTAINED = (
-    "attainable",
-    "attainable_fraction",
-    "attainable_volume",
-    "attainable_error",
-    "mean_arcs",
-    "undecided_fraction",
-    "main_reason",
-    *REFUSALS,
-)
-# What each kind of map can store.
-OF_MAP = {
-    "minimum-arcs": ("arcs", "tried_arcs", *_COMMON),
-    "minimum-oscillations": (*_OF_OSCILLATIONS, *_COMMON),
-    "transition-envelopes": _OF_INSTANTS,
-    "poses": _OF_POSES,
-    "orientations": _OF_POSES,
-    "orientation-workspace": _OF_PLACES,
-    "attainability": (*_OF_PLACES, *_OF_ATTAINED),
 }
 TRAJECTORY = {
     q.name: q
@@ -281,7 +258,7 @@ SEGMENTS = {
             "segment_arcs",
             "1",
             "smallest number of arcs",
-            "Smallest number of arcs proved feasible, or that the plan gives; 0: none.",
+            f"Smallest number of feasible arcs, or the plan's own if feasible{_HOW}; 0: none.",
             "int16",
         ),
         Quantity(
@@ -291,41 +268,38 @@ SEGMENTS = {
             "Equal to `segment_arcs` where it is positive, else that of the best candidate.",
             "int16",
         ),
-        Quantity("segment_verdict", "1", "verdict", "Bit flags; 0 is feasible.", "uint16"),
-        Quantity("segment_margin", "1", "margin", "Smallest pseudotension over its value at rest in P0."),
+        Quantity("segment_verdict", "1", "verdict", f"Bit flags{_HOW}; 0 is feasible.", "uint16"),
+        Quantity("segment_margin", "1", "margin", _MARGIN),
     )
 }
 # Those that only a rigid platform has.
 OF_PLATFORMS = ("quaternion", "omega", "omega_dot")
-STORABLE = tuple(QUANTITIES)
-DEFAULT_STORE = {
-    "minimum-arcs": ("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
-    "minimum-oscillations": (
-        "oscillations",
-        "envelope_oscillations",
-        "least_oscillations",
-        "verdict",
-        "duration",
-        "margin",
-        "inclination_gain",
-        "used_inclination",
-        "used_z0",
-    ),
-    "transition-envelopes": _OF_INSTANTS,
-    "poses": ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat"),
-    "orientations": ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat"),
-    "orientation-workspace": _OF_PLACES,
-    "attainability": (*_OF_PLACES, *_OF_ATTAINED),
-}
-TITLES = {
-    "minimum-arcs": "Smallest number of arcs",
-    "minimum-oscillations": "Smallest number of oscillations",
-    "transition-envelopes": "Envelopes of the pseudotensions along transitions",
-    "poses": "Smallest number of arcs to poses",
-    "orientations": "Smallest number of arcs to accessible orientations",
-    "orientation-workspace": "Accessible orientations",
-    "attainability": "Accessible and attainable orientations",
-}
+_OWN = frozenset(QUANTITIES)
+
+
+def register(quantity: Quantity) -> None:
+    """Add a quantity that maps can give, from outside of the package; a second time changes nothing.
+
+    Args:
+        quantity: its row.
+
+    Raises:
+        InputError: another quantity, or a coordinate, has that name.
+    """
+    tables = (AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
+    known = next((table[quantity.name] for table in tables if quantity.name in table), quantity)
+    if known != quantity:
+        raise InputError("quantity", quantity.name, "a name that no other quantity or axis has")
+    QUANTITIES[quantity.name] = quantity
+
+
+def from_outside() -> list[Quantity]:
+    """Quantities from outside of the package, which another process does not know.
+
+    Returns:
+        their rows.
+    """
+    return [quantity for name, quantity in QUANTITIES.items() if name not in _OWN]
 
 
 def flag_attributes() -> dict[str, object]:

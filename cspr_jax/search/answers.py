@@ -7,7 +7,7 @@ candidate with the largest margin is reported.
 
 import dataclasses
 from collections.abc import Callable
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -53,6 +53,17 @@ class Answers:
     limit_margin: np.ndarray
     feasible_at_infinity: np.ndarray
 
+    def details(self, i: int) -> dict[str, Any]:
+        """What only this kind of answers says of a segment, by its name in a plan's JSON.
+
+        Args:
+            i: number of the segment.
+
+        Returns:
+            plain values.
+        """
+        return {}
+
 
 def joined(parts: list[Said]) -> Said:
     """Answers side by side.
@@ -91,7 +102,7 @@ def decided(
     *,
     known: Known | None = None,
     measure: Callable[[Problem, Segment, np.ndarray], np.ndarray] = margins,
-) -> Answers:
+) -> tuple[Answers, Segment]:
     """Answers from upper bounds.
 
     Args:
@@ -103,7 +114,7 @@ def decided(
         measure: finds the margins, as `margins` does.
 
     Returns:
-        the answers.
+        the answers; the segments that durations and margins belong to, leaves (n, ...).
     """
     known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
     found, doubtful, bound = _search(problem, parities, upper, known)
@@ -113,7 +124,7 @@ def decided(
     none = np.flatnonzero(found == 0)
     if len(none):
         bound[none] = prove(problem, pick(parities, none, tried[none]), tried[none]).bound[:, :2].min(1)
-    return Answers(
+    answers = Answers(
         found,
         tried,
         _verdicts(problem, found, doubtful, slack),
@@ -123,6 +134,7 @@ def decided(
         slack[:, 2:].min(1, initial=np.inf),
         infinity,
     )
+    return answers, chosen
 
 
 @jax.jit

@@ -6,6 +6,7 @@ smallest integer that they allow stands beside the smallest that is proved from 
 
 import dataclasses
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -53,6 +54,16 @@ class OscillationAnswers(Answers):
     inclination_gain: np.ndarray
     used_inclination: np.ndarray
     used_z0: np.ndarray
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Numbers of oscillations; see `Answers.details`."""
+        return {
+            "oscillations": int(self.oscillations[i]) or None,
+            "tried_oscillations": int(self.tried_oscillations[i]),
+            "envelope_oscillations": int(self.envelope_oscillations[i]) or None,
+            "least_oscillations": float(self.least_oscillations[i]),
+            "inclination": float(self.used_inclination[i]),
+        }
 
 
 @jax.jit
@@ -196,9 +207,9 @@ def minimum_oscillations(
     parities, wanted = {0: segments, 1: segments}, only(upper, arcs)
     if steady is None:
         known = None if given(problem.limits) else _known(problem, segments, (weights, v), allowed)
-        answers = decided(problem, parities, wanted, infinity, known=known, measure=transition_margins)
+        answers, _ = decided(problem, parities, wanted, infinity, known=known, measure=transition_margins)
     else:
-        answers = decided(problem, parities, wanted, infinity)
+        answers, _ = decided(problem, parities, wanted, infinity)
     return OscillationAnswers(
         **vars(answers),
         oscillations=answers.arcs // 2,

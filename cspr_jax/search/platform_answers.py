@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from cspr_jax.feasibility.platform.samples import rows
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.platform_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 NEVER = np.iinfo(int).max
 
@@ -29,32 +31,26 @@ class PoseAnswers(Answers):
     det_margin: np.ndarray
     cable_distance: np.ndarray
 
+    def details(self, i: int) -> dict[str, Any]:
+        """Determinant, contacts and beta-hat; see `Answers.details`."""
+        verdict = Verdict(int(self.verdict[i]))
+        return {
+            "det_sign_constant": bool(self.det_margin[i] > 0.0),
+            "det_margin": float(self.det_margin[i]),
+            "cable_interference": bool(verdict & Verdict.CABLE_CABLE),
+            "cable_distance_min": float(self.cable_distance[i]),
+            "platform_interference": bool(verdict & Verdict.CABLE_PLATFORM),
+            "beta_hat": [float(value) for value in self.beta_hat[i]],
+        }
+
     def rows(self, which: np.ndarray) -> "PoseAnswers":
         """Some of them: indices, or (n,) a mask."""
         return PoseAnswers(**{name: values[which] for name, values in vars(self).items()})
 
 
-def contradictions(answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Cells whose numbers contradict each other; see `GridMap.contradictions`.
-
-    Args:
-        answers: (n,) each.
-
-    Returns:
-        for each kind of contradiction, (n,) where it is.
-    """
-    found = answers["arcs"] > 0
-    margins = np.minimum(np.minimum(answers["margin"], answers["limit_margin"]), answers["det_margin"])
-    return {
-        "a feasible cell with a margin below zero": found & ~(margins > 0.0),
-        "an infeasible cell whose verdict is 0": ~found & (answers["verdict"] == 0),
-        "a feasible cell without a duration": found & ~(answers["duration"] > 0.0),
-    }
-
-
 def settled(
     checker: PoseChecker, candidates: Candidates, found: Found, *, max_arcs: int, fixed: np.ndarray | None = None
-) -> PoseAnswers:
+) -> tuple[PoseAnswers, PoseSegment]:
     """Answers with all margins.
 
     Args:
@@ -65,7 +61,7 @@ def settled(
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
 
     Returns:
-        the answers; nothing is proved, and (2.55) does not apply: NaN.
+        the answers; nothing is proved, and (2.55) does not apply: NaN. The segments that they belong to.
     """
     tried = found.arcs if fixed is None else np.where(found.arcs > 0, found.arcs, fixed)
     none = np.flatnonzero(tried == 0)
@@ -82,7 +78,7 @@ def settled(
     refused = np.where(doubtful, Verdict.UNDECIDED.value, checks.verdict | Verdict.NO_ARCS.value)
     less = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
     nothing = np.full(len(tried), np.nan)
-    return PoseAnswers(
+    answers = PoseAnswers(
         arcs=found.arcs,
         tried_arcs=tried,
         verdict=np.where(found.arcs > 0, less, refused).astype(np.uint16),
@@ -95,6 +91,7 @@ def settled(
         det_margin=checks.slack[:, 1],
         cable_distance=checks.gap,
     )
+    return answers, segments
 
 
 def trials(motions: Candidates, values: np.ndarray, *, same: bool = False) -> tuple[np.ndarray, Candidates]:
@@ -137,7 +134,7 @@ def reached(
     checks.put(cell[best], found.checks.rows(best))
     np.minimum.at(undecided, cell, np.where(found.undecided > 0, found.undecided, NEVER))
     best_found = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
-    return settled(checker, _with_ends(motions, bends, same=same), best_found, max_arcs=max_arcs)
+    return settled(checker, _with_ends(motions, bends, same=same), best_found, max_arcs=max_arcs)[0]
 
 
 def _with_ends(motions: Candidates, bends: np.ndarray, *, same: bool) -> Candidates:

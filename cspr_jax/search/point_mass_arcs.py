@@ -83,20 +83,53 @@ def minimum_arcs(
         InputError: an amplitude function that breaks (2.49); max_arcs below 1; z0 not positive; jax without 64 bits.
     """
     check_numbers(problem.robot, z0, max_arcs)
+
+    def part(which: slice) -> Answers:
+        fixed = None if arcs is None else np.asarray(arcs)[which]
+        points = (starts[which], ends[which], z0[which])
+        return arcs_and_segments(problem, *points, max_arcs=max_arcs, arcs=fixed, dtype=dtype)[0]
+
+    # Not two batches where one has room for all.
+    return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(arc_sieve.BATCH) else part(slice(None))
+
+
+def arcs_and_segments(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    z0: np.ndarray,
+    *,
+    max_arcs: int = 30,
+    arcs=None,
+    dtype="float64",
+) -> tuple[Answers, Segment]:
+    """Smallest number of arcs of each segment, with the segments: `minimum_arcs` in one part.
+
+    Args:
+        problem: robot, limits and amplitude.
+        starts: (n, 3) from the centroid of the spools, z down, m.
+        ends: (n, 3) likewise.
+        z0: (n,) depth of p0 below the centroid of the spools, m; positive.
+        max_arcs: largest number of arcs tried.
+        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
+        dtype: precision of the sieve, "float64" or "float32"; the verdicts are the same.
+
+    Returns:
+        the answers, and the segments that they belong to, leaves (n, ...).
+
+    Raises:
+        InputError: as `minimum_arcs` does.
+    """
+    check_numbers(problem.robot, z0, max_arcs)
     broken = boundary_errors(problem.amplitude)
     if broken:
         raise InputError(
             "amplitude", problem.amplitude.name, "an amplitude function that meets (2.49): " + "; ".join(broken)
         )
-
-    def part(which: slice) -> Answers:
-        stage(f"numbers of arcs, 1 to {max_arcs}")
-        parities, infinity = segments_between(problem, starts[which], ends[which], z0[which])
-        upper = _sieved(problem, parities[0], parities[1], max_arcs, dtype)
-        return decided(problem, parities, only(upper, None if arcs is None else np.asarray(arcs)[which]), infinity)
-
-    # Not two batches where one has room for all.
-    return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(arc_sieve.BATCH) else part(slice(None))
+    stage(f"numbers of arcs, 1 to {max_arcs}")
+    parities, infinity = segments_between(problem, starts, ends, z0)
+    upper = _sieved(problem, parities[0], parities[1], max_arcs, dtype)
+    return decided(problem, parities, only(upper, arcs), infinity)
 
 
 def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:

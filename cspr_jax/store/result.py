@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from collections import ChainMap
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ LARGEST_NUMBER, LARGEST_MASS = 1e30, 1e9
 # Settings have some ten tables and lists, and some fifty keys.
 _MOST_PARTS = 10_000
 _BLOCK = 1 << 20
-_EVERY = AXES | QUANTITIES | TRAJECTORY | SEGMENTS
+_EVERY = ChainMap(AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
 
 
 @dataclasses.dataclass(frozen=True)

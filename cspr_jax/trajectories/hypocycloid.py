@@ -26,6 +26,7 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.state import State
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.couplings import couplings
 from cspr_jax.trajectories.swing_plane import swing_plane
@@ -197,6 +198,39 @@ def motion(segment: Segment, amplitude: Amplitude, arcs: Array, tau: Array) -> t
     velocity = segment.plane @ (r1 * u + r * u1) / time  # (2.42)
     acceleration = segment.plane @ (r2 * u + 2.0 * r1 * u1 + r * u2) / time**2  # (2.43)
     return position, velocity, acceleration
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Hypocycloid:
+    """Motion along a hypocycloid, or a transition of chapter 1; see `Motion`.
+
+    Fields:
+        segment: of the parity of `arcs`.
+        amplitude: A.
+        arcs: () number of arcs, a float.
+    """
+
+    segment: Segment
+    amplitude: Amplitude
+    arcs: Array
+
+    @property
+    def z0(self) -> Array:
+        """Depth of P0 below the centroid of the spools, () m."""
+        return self.segment.hub[..., 2]
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return duration(self.segment, self.arcs)
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+        return State(*motion(self.segment, self.amplitude, self.arcs, jnp.asarray(tau, float)))
+
+    def breaks(self) -> Array:
+        """Knots of the amplitude function; see `Motion.breaks`."""
+        return self.amplitude.knots
 
 
 def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Array:

@@ -205,3 +205,41 @@ def _swing(
         return jnp.stack([axial * vector[0] + lateral * vector[1], axial * vector[1] - lateral * vector[0]])
 
     return turned(place), turned(pace), turned(bend)
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class PlatformMotion:
+    """Motion of a platform between two poses; see `Motion`.
+
+    Fields:
+        segment: of the parity of `arcs`.
+        amplitude: A.
+        arcs: () number of arcs, a float.
+        kind: of the motion; known when a function is compiled.
+    """
+
+    segment: PoseSegment
+    amplitude: Amplitude
+    arcs: Array
+    kind: Kind = dataclasses.field(default=USUAL, metadata={"static": True})
+
+    @property
+    def z0(self) -> Array:
+        """Depth of P0 below the centroid of the spools, () m."""
+        return self.segment.hub[..., 2]
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return duration(self.segment, self.arcs)
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+        tau = jnp.asarray(tau, float)
+        quaternion = quaternion_at(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        found = motion(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        return found._replace(quaternion=quaternion)
+
+    def breaks(self) -> Array:
+        """Knots of the amplitude function; see `Motion.breaks`."""
+        return self.amplitude.knots

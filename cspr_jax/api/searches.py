@@ -1,58 +1,19 @@
-"""The package from Python: load a robot, plan a sequence, map an array of targets, open a result.
+"""Searches from Python: arrays of targets in, answers out.
 
-Everything here is in the axes of the robot file, and computed in float64 whatever jax is set to.
+In the axes of the robot, and in float64 whatever jax is set to. They give NumPy arrays, which cannot be differentiated.
 """
-
-from pathlib import Path
 
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.config.robot import resolve_robot
-from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.plans import planning
-from cspr_jax.plans.planning import Plan
-from cspr_jax.problem import build_robot, centred, limits_over
+from cspr_jax.problem import centred, limits_over
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot, is_planar, rest_point
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.point_mass_arcs import minimum_arcs as _minimum_arcs
 from cspr_jax.trajectories.amplitudes import Amplitude, named
-
-
-def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
-    """A robot of the catalogue, or of a file, with its axes and its limits.
-
-    Args:
-        reference: a catalogue name, or the path of a robot file.
-
-    Returns:
-        the robot; with six cables, a platform.
-
-    Raises:
-        ConfigError: no such robot, or a mistake in its file.
-    """
-    spec = resolve_robot(str(reference), reference, Path.cwd())
-    return build_robot(spec, TrajectoryKeys(), reference)
-
-
-def plan(path: str | Path) -> Plan:
-    """Plan the sequence of a plan file; see `cspr_jax.reports.plan_object` for plain values.
-
-    Args:
-        path: the file.
-
-    Returns:
-        the plan, feasible or not.
-
-    Raises:
-        ConfigError: a mistake in the file.
-    """
-    with double_precision():
-        return planning.plan(Path(path))
 
 
 def minimum_arcs(

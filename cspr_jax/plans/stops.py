@@ -1,0 +1,83 @@
+"""Stops: consecutive poses of a plan that one family joins, as points of the kernels."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.config.plan import PlanFile, Pose
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.robots.point_mass import rest_point
+
+
+@dataclasses.dataclass(frozen=True)
+class Stops:
+    """Consecutive poses of a plan.
+
+    Fields:
+        spec: the robot.
+        keys: the plan.
+        path: of the plan, named in errors.
+        frame: of the robot.
+        family: name of the family that joins them.
+        first: number of the first of them among the poses of the plan.
+        last: number of the last of them.
+    """
+
+    spec: RobotFile
+    keys: PlanFile
+    path: Path
+    frame: Frame
+    family: str
+    first: int
+    last: int
+
+    def __len__(self) -> int:
+        """Number of segments."""
+        return self.last - self.first
+
+    @property
+    def poses(self) -> list[Pose]:
+        """The poses, one more than segments."""
+        return self.keys.pose[self.first : self.last + 1]
+
+    @property
+    def arcs(self) -> np.ndarray:
+        """Number of arcs that a pose fixes for the segment before it, (n_segments,); 0 where it is free."""
+        return np.array([pose.arcs or 0 for pose in self.poses[1:]])
+
+    @property
+    def max_arcs(self) -> int:
+        """Largest number of arcs tried."""
+        return max(self.keys.max_arcs, int(self.arcs.max()))
+
+    def name(self, i: int) -> str:
+        """Name of a pose in messages.
+
+        Args:
+            i: number of the pose among these.
+
+        Returns:
+            as in "pose[3]".
+        """
+        return f"pose[{self.first + i}]"
+
+    def points(self, z0) -> np.ndarray:
+        """Places of the poses; those at rest are P0.
+
+        Args:
+            z0: (...) m.
+
+        Returns:
+            (..., n_poses, 3) from the centroid of the spools, z down, m.
+        """
+        at_rest = rest_point(np.asarray(z0))
+        places = [at_rest if pose.rest else self.frame.inward(pose.position) for pose in self.poses]
+        return np.stack([np.broadcast_to(place, at_rest.shape) for place in places], axis=-2)
+
+    @property
+    def targets(self) -> np.ndarray:
+        """Poses that are not at rest, (n, 3) from the centroid of the spools, z down, m."""
+        moving = [pose.position for pose in self.poses if not pose.rest]
+        return self.frame.inward(np.asarray(moving, float).reshape(-1, 3))

@@ -1,0 +1,93 @@
+"""Table of trajectory families: one row a family.
+
+A new family is a motion (`trajectories.motion.Motion`), a class that joins poses by it (`plans.leg.Leg`), and a row.
+"""
+
+import contextlib
+import dataclasses
+import importlib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+
+@dataclasses.dataclass(frozen=True)
+class Family:
+    """Trajectory family.
+
+    Fields:
+        name: in files.
+        description: for people, without a full stop.
+        legs: by degrees of freedom of the robots that it moves, the class that joins poses: "module:Class".
+        free_end: whether A''(1) of its amplitude function is free: (1.27) and (1.28) in place of (2.49).
+    """
+
+    name: str
+    description: str
+    legs: Mapping[int, str]
+    free_end: bool = False
+
+    def leg(self, dof: int) -> Any:
+        """Class that joins the poses of a robot.
+
+        Args:
+            dof: degrees of freedom of the robot.
+
+        Returns:
+            the class.
+
+        Raises:
+            KeyError: the family does not move such robots.
+        """
+        module, _, name = self.legs[dof].partition(":")
+        return getattr(importlib.import_module(module), name)
+
+
+_LEGS = "cspr_jax.plans.{}"
+_ROWS = (
+    Family(
+        "hypocycloid-standard",
+        "standard hypocycloids between any poses (thesis chapter 2)",
+        {3: _LEGS.format("hypocycloids:Hypocycloids"), 6: _LEGS.format("platform_poses:StandardPoses")},
+    ),
+    Family(
+        "transition",
+        "from rest to a target, swings at it, and back to rest (1)",
+        {2: _LEGS.format("transitions:Transitions"), 3: _LEGS.format("transitions:Transitions")},
+        free_end=True,
+    ),
+    Family(
+        "hypocycloid",
+        "hypocycloids of variable amplitude (3), for platforms",
+        {6: _LEGS.format("platform_poses:VariablePoses")},
+    ),
+)
+FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}
+
+
+def moving(dof: int) -> list[str]:
+    """Names of the families that move a robot.
+
+    Args:
+        dof: degrees of freedom of the robot.
+
+    Returns:
+        the names.
+    """
+    return [row.name for row in FAMILIES.values() if dof in row.legs]
+
+
+@contextlib.contextmanager
+def registered(family: Family) -> Iterator[None]:
+    """Add a family for as long as a block lasts.
+
+    Args:
+        family: its row; the module that it names is imported when it is first used.
+
+    Yields:
+        nothing.
+    """
+    FAMILIES[family.name] = family
+    try:
+        yield
+    finally:
+        del FAMILIES[family.name]

@@ -1,0 +1,150 @@
+"""Motion of an effector: what every trajectory family gives, and what plans, margins, demands and files take.
+
+A motion is a pytree that holds its own amplitude function, number of arcs and depth of P0, so that it can be jitted,
+vmapped and differentiated. Normalised time tau runs from 0 to 1.
+"""
+
+import dataclasses
+from typing import Any, Generic, Protocol, TypeVar
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.robots import state as states
+from cspr_jax.robots.state import State
+
+jax.tree_util.register_dataclass(Frame, ["signs", "origin", "rest"], [])
+
+
+class Motion(Protocol):
+    """Motion over normalised time."""
+
+    @property
+    def z0(self) -> Array:
+        """Depth of P0, at which slacks are normalised, below the centroid of the spools, () m."""
+
+    def duration(self) -> Array:
+        """Duration T.
+
+        Returns:
+            () s.
+        """
+        ...
+
+    def state(self, tau: Array) -> State:
+        """State at one instant, with derivatives in time.
+
+        Args:
+            tau: () normalised time in [0, 1].
+
+        Returns:
+            the state.
+        """
+        ...
+
+    def breaks(self) -> Array:
+        """Instants at which the acceleration or its derivative may jump.
+
+        Returns:
+            (n,) tau in ]0, 1[, increasing.
+        """
+        ...
+
+
+Kind = TypeVar("Kind", bound=Motion)
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Backwards(Generic[Kind]):
+    """Motion run from its end to its start; see `Motion`.
+
+    Fields:
+        motion: the motion.
+    """
+
+    motion: Kind
+
+    @property
+    def z0(self) -> Array:
+        """Depth of P0; see `Motion.z0`."""
+        return self.motion.z0
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return self.motion.duration()
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+        return states.backwards(self.motion.state(1.0 - tau))
+
+    def breaks(self) -> Array:
+        """Breaks; see `Motion.breaks`."""
+        return jnp.flip(1.0 - self.motion.breaks())
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Placed(Generic[Kind]):
+    """Motion in the axes of a robot file; see `Motion`.
+
+    Fields:
+        motion: in the kernels' axes: from the centroid of the spools, z down.
+        frame: of the robot.
+    """
+
+    motion: Kind
+    frame: Frame
+
+    @property
+    def z0(self) -> Array:
+        """Depth of P0; see `Motion.z0`."""
+        return self.motion.z0
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return self.motion.duration()
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+        return outward(self.frame, self.motion.state(tau))
+
+    def breaks(self) -> Array:
+        """Breaks; see `Motion.breaks`."""
+        return self.motion.breaks()
+
+
+def inward(frame: Frame, state: State) -> State:
+    """State of the axes of a robot file in those of the kernels.
+
+    Args:
+        frame: of the robot.
+        state: in the axes of the file; leaves (..., 3), (..., 4) or (..., 3, 3).
+
+    Returns:
+        the state, from the centroid of the spools, z down.
+    """
+    # Turning is its own inverse.
+    place: Any = frame.inward(state.position)
+    return outward(frame, state)._replace(position=place)
+
+
+def outward(frame: Frame, state: State) -> State:
+    """State in the axes of a robot file.
+
+    Args:
+        frame: of the robot.
+        state: from the centroid of the spools, z down; leaves (..., 3), (..., 4) or (..., 3, 3).
+
+    Returns:
+        the state.
+    """
+    turned: dict[str, Any] = {"position": frame.outward(state.position)}
+    turned |= {name: frame.turned(getattr(state, name)) for name in ("velocity", "acceleration")}
+    if state.rotation is not None:
+        turned["quaternion"] = None if state.quaternion is None else frame.turned_quaternions(state.quaternion)
+        turned["rotation"] = frame.signs[:, None] * state.rotation * frame.signs
+        turned |= {name: frame.turned(getattr(state, name)) for name in ("angular_velocity", "angular_acceleration")}
+    return State(**turned)
