@@ -10,7 +10,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
-from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, from_tilt_torsion
+from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
 from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
@@ -42,7 +42,7 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
     if isinstance(robot, PlatformRobot):
         changes["platform_points"] = leaf(frame.turned(robot.platform_points))
-        changes["inertia"] = leaf(robot.inertia) * np.outer(frame.signs, frame.signs)
+        changes["inertia"] = frame.turned_tensor(leaf(robot.inertia))
     return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
 
 
@@ -342,9 +342,7 @@ def orientations(frame: Frame, points: np.ndarray, angles: np.ndarray) -> np.nda
     Returns:
         (n, 4) unit quaternions.
     """
-    own = frame.turned(points)
-    towards = np.arctan2(own[:, 1], own[:, 0])
-    return frame.turned_quaternions(from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
+    return frame.turned_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.turned(points))))
 
 
 def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> np.ndarray:

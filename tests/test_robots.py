@@ -10,6 +10,7 @@ from conftest import TILTED, equilateral
 from oracles import platform as oracle
 
 import cspr_jax
+from cspr_jax.arithmetic import minima, rotations
 from cspr_jax.cli import main
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, read_robot
@@ -141,6 +142,36 @@ UPRIGHT = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]
 def test_geometry_that_is_none(make, points, line):
     with pytest.raises(InputError, match=line):
         make(points, mass=1.0)
+
+
+def test_what_is_singular():
+    """One rule: what is beyond a singularity, or no number, is not regular either; the reference pose is."""
+    found = wrench_balance.is_regular(np.array([1.0, 2e-6, 1e-7, -1e-7, -1.0, np.nan]))
+    assert found.tolist() == [True, True, False, False, False, False]
+    share = wrench_balance.determinant_share(ROBOTS["six"], jnp.array([0.0, 0.0, 1.2]), jnp.eye(3))
+    assert float(share) == pytest.approx(1.0)
+
+
+def test_cylindrical_frames_turn_with_their_place():
+    """(3.98): a tilt towards the vertical axis is one, wherever the place lies; a turn about it moves both alike."""
+    places, angle = np.array([[1.0, 0.2, 1.0], [-0.3, 0.8, 2.0], [-1.0, -1.0, 1.0]]), 0.7
+    turned = places @ rotations.about_vertical(angle).T
+    shift = rotations.cylindrical_frames(turned) - rotations.cylindrical_frames(places)
+    np.testing.assert_allclose(np.cos(shift[:, 0] - angle), 1.0, atol=1e-14)
+    assert (shift[:, 1:] == 0.0).all()
+
+
+def test_golden_sections_find_a_minimum():
+    def function(x):
+        return jnp.abs(x - 0.3) + 0.1 * x**2
+
+    left, right = minima.inner_points(jnp.asarray(0.0), jnp.asarray(1.0))
+    bracket = minima.Bracket(jnp.asarray(0.0), jnp.asarray(1.0), left, right, function(left), function(right))
+    for _ in range(40):
+        bracket, value = minima.golden_step(function, bracket)
+    assert float(bracket.low) <= 0.3 + 1e-9 and float(bracket.high) >= 0.3 - 1e-9
+    assert float(bracket.high - bracket.low) == pytest.approx(minima.GOLDEN**40, rel=1e-6, abs=1e-15)
+    assert float(value) == pytest.approx(0.009, abs=1e-7)
 
 
 SPOOLS = [[-2.0, -2.0, 3.0], [2.0, -2.0, 3.1], [2.0, 2.0, 3.0], [-2.0, 2.0, 2.9]]

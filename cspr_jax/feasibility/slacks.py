@@ -72,8 +72,8 @@ def _of_point_mass(robot: PointMassRobot, state: State, z0: Array) -> list[Array
 
 def _of_platform(robot: PlatformRobot, state: State, z0: Array) -> list[Array]:
     hub = rest_point(z0)
-    at_rest = wrench_balance.conditioning(robot, hub, jnp.eye(3))
-    here = wrench_balance.conditioning(robot, state.position, state.rotation)
+    at_rest = wrench_balance.normalised_determinant(robot, hub, jnp.eye(3))
+    here = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
     per_length = wrench_balance.tensions_per_length(robot, state)
     return [robot.n_cables * z0 / robot.gravity * per_length, jnp.atleast_1d(here / at_rest)]
 

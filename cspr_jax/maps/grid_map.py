@@ -39,7 +39,7 @@ class GridMap(abc.ABC):
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Build what all tiles share."""
         self._keys, self._file = keys, file
-        self._frame = frame_of(spec.base_points, spec.z_axis)
+        self._frame, self._z_axis = frame_of(spec.base_points, spec.z_axis), spec.z_axis
         amplitude = build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=for_bounds)
         limits = build_limits(spec, keys.limits, keys.limits.floor, file)
         self._problem = self._built(spec, limits, amplitude)
@@ -86,9 +86,9 @@ class GridMap(abc.ABC):
         # In the kernels' coordinates. Radius and azimuth are about the vertical through the centroid of the spools.
         if "radius" not in cells:
             return self._frame.inward(np.stack([cells["x"], cells["y"], cells["z"]], axis=1))
-        radius, azimuth, signs = cells["radius"], cells["azimuth"], self._frame.signs
-        level: list[np.ndarray] = [signs[0] * radius * np.cos(azimuth), signs[1] * radius * np.sin(azimuth)]
-        return np.stack([*level, self._frame.depth(cells["z"])], axis=1)
+        radius, azimuth = cells["radius"], cells["azimuth"]
+        level = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.zeros_like(radius)], axis=1)
+        return np.c_[self._frame.turned(level)[:, :2], self._frame.depth(cells["z"])]
 
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         # Cells among which depths and heights have their extremes. Of azimuths the one down the slope of the spool
@@ -106,7 +106,7 @@ class GridMap(abc.ABC):
         depth = points @ np.asarray(plane_normal(self._problem.robot))
         floor = self._problem.limits.floor
         if not (depth > 0.0).any():
-            question = axis_question("down" if self._frame.signs[2] > 0.0 else "up")
+            question = axis_question(self._z_axis)
             raise ConfigError(
                 self._file, f"{key}: every point is above the spool plane: must be some below ({question})"
             )

@@ -16,8 +16,8 @@ from cspr_jax.robots.wrench_lanes import (
     balance,
     cable_rates,
     cables,
-    conditioning,
     inertial_wrench,
+    normalised_determinant,
 )
 from cspr_jax.schema.limits import Limit
 from cspr_jax.trajectories.platform_lanes import Instant, State, squared_duration, state
@@ -134,7 +134,7 @@ def still_slacks(problem: Problem, segment: PoseSegment, here: State, wires: Cab
     robot, limits, z0 = problem.robot, problem.limits, problem.robot.gravity / segment.rate
     normal = plane_normal(robot)
     below = dot([normal[i] for i in range(3)], here.position) / z0
-    values = [conditioning(robot, wires) / segment.regular, below]
+    values = [normalised_determinant(robot, wires) / segment.regular, below]
     scale = scales(CABLES, robot.mass * robot.gravity, z0)
     each = {"depth": [here.position[2]], "length": [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]}
     return values + [_least(row, limits, each[row.quantity], scale) for row in _given(limits, of_motion=False)]

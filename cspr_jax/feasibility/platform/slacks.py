@@ -3,7 +3,7 @@
 With n the number of cables, f the tensions, m the mass:
 
     taut           n z0 mu / g, the tension over its value at rest in P0 if all were equal
-    regular        determinant (`robots.wrench_balance.conditioning`) over its value at rest in P0
+    regular        determinant (`robots.wrench_balance.normalised_determinant`) over its value at rest in P0
     below          depth of the mass centre below the spool plane, over z0
     tension        (f - f_min) n / (m g),  (f_max - f) n / (m g)
     floor          (floor - z) / z0
@@ -50,7 +50,7 @@ def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Ar
     per_length = wrench_balance.tensions_per_length(robot, state)
     found = [
         robot.n_cables * z0 / robot.gravity * jnp.min(per_length),
-        wrench_balance.conditioning(robot, state.position, state.rotation) / regular,
+        wrench_balance.normalised_determinant(robot, state.position, state.rotation) / regular,
         plane_normal(robot) @ state.position / z0,
     ]
     rows = given(limits)
