@@ -14,7 +14,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.plans.planning import Plan
 from cspr_jax.robots import cables
 from cspr_jax.schema.identity import canonical_json
-from cspr_jax.schema.quantities import SEGMENTS, TRAJECTORY, flag_attributes
+from cspr_jax.schema.quantities import ACROSS, PARTS, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
@@ -30,7 +30,6 @@ _FIELDS = {
     "omega": "angular_velocity",
     "omega_dot": "angular_acceleration",
 }
-_VECTORS = ("position", "velocity", "acceleration", "omega", "omega_dot")
 LARGEST_ROWS = 20_000_000
 # A tick that lies so near to the end of a segment, in parts of a tick, is that end.
 SAME_TICK = 1e-6
@@ -123,18 +122,16 @@ def _csv(found: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
 
 
 def _parts(name: str, count: int) -> list[str]:
-    if name in _VECTORS:
-        return list("xyz")
-    return list("wxyz") if name == "quaternion" else [str(k + 1) for k in range(count)]
+    return list(PARTS.get(ACROSS[name], [str(k + 1) for k in range(count)]))
 
 
 def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
-    segments = _segments(plan)
+    of_segments = segments(plan)
     numbers = list(range(1, found["tension"].shape[1] + 1))
-    with new_hdf5(path, _attributes(plan)) as file:
-        scales = {"t": found["t"], "axis": list("xyz"), "cable": numbers, "segment": segments["segment"]}
+    with new_hdf5(path, attributes(plan)) as file:
+        scales = {"t": found["t"], "axis": list(PARTS["axis"]), "cable": numbers, "segment": of_segments["segment"]}
         if "quaternion" in found:
-            scales["component"] = list("wxyz")
+            scales["component"] = list(PARTS["component"])
         for name, labels in scales.items():
             file[name] = labels
             file[name].make_scale(name)
@@ -143,9 +140,8 @@ def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
             describe(data, TRAJECTORY[name])
             if name != "t":
                 data.dims[0].attach_scale(file["t"])
-                across = "axis" if name in _VECTORS else "component" if name == "quaternion" else "cable"
-                data.dims[1].attach_scale(file[across])
-        for name, values in segments.items():
+                data.dims[1].attach_scale(file[ACROSS[name]])
+        for name, values in of_segments.items():
             data = file[name] if name == "segment" else file.create_dataset(name, data=values)
             describe(data, SEGMENTS[name])
             if name != "segment":
@@ -153,7 +149,15 @@ def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
         set_attributes(file["segment_verdict"], flag_attributes())
 
 
-def _attributes(plan: Plan) -> dict[str, Any]:
+def attributes(plan: Plan) -> dict[str, Any]:
+    """What a motion file says of its plan.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        attributes of the whole file.
+    """
     spec = plan.spec
     return {
         "Conventions": "CF-1.11",
@@ -172,7 +176,15 @@ def _attributes(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _segments(plan: Plan) -> dict[str, np.ndarray]:
+def segments(plan: Plan) -> dict[str, np.ndarray]:
+    """What a motion file holds of each segment.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        (n,) each, by the names of `schema.quantities.SEGMENTS`.
+    """
     answers, ends = plan.answers, np.cumsum(plan.answers.duration)
     found = {
         "segment": np.arange(1, len(ends) + 1),

@@ -306,6 +306,14 @@ SEGMENTS = {
         Quantity("segment_margin", "1", "margin", _MARGIN),
     )
 }
+# The second dimension of those over time, and the parts of vectors.
+ACROSS = {
+    **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot"), "axis"),
+    "quaternion": "component",
+    **dict.fromkeys(("length", "rate", "tension"), "cable"),
+}
+PARTS = {"axis": tuple("xyz"), "component": tuple("wxyz")}
+EVERY = AXES | QUANTITIES | TRAJECTORY | SEGMENTS
 # Those that only a rigid platform has.
 OF_PLATFORMS = ("quaternion", "omega", "omega_dot")
 STORABLE = tuple(QUANTITIES)
