@@ -18,7 +18,7 @@ def plain(value: Any) -> Any:
         dictionaries, lists and Python's own numbers in their place; anything else as it is, for the schema to refuse.
     """
     if isinstance(value, Mapping):
-        return {key: plain(inner) for key, inner in value.items()}
+        return {str(key): plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
         return [plain(inner) for inner in value]
     if isinstance(value, np.ndarray | np.generic):

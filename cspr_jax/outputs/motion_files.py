@@ -55,7 +55,16 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
     Returns:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
         axes; those of `schema.quantities.OF_PLATFORMS` only for a platform.
+
+    Raises:
+        ConfigError: a rate that is no number > 0, or too many rows.
     """
+    if rate is not None and not 0.0 < rate < float("inf"):
+        raise ConfigError("--rate", f"{rate}: must be a number > 0, in Hz")
+    if rate is not None and rate * plan.answers.duration.sum() > LARGEST_ROWS:
+        raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
+    if rate is None and plan.keys.samples * len(plan.answers.duration) > LARGEST_ROWS:
+        raise ConfigError("samples", f"{plan.keys.samples}: must give at most {LARGEST_ROWS} rows in all")
     duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     parts = []
@@ -87,10 +96,6 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
         ConfigError: too many rows, or a best candidate that is not finite.
         StoreError: the disk or the folder refuses.
     """
-    if rate is not None and rate * plan.answers.duration.sum() > LARGEST_ROWS:
-        raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
-    if rate is None and plan.keys.samples * len(plan.answers.duration) > LARGEST_ROWS:
-        raise ConfigError("samples", f"{plan.keys.samples}: must give at most {LARGEST_ROWS} rows in all")
     found = rows(plan, rate=rate)
     if not all(np.isfinite(values).all() for name, values in found.items() if name != "tension"):
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
