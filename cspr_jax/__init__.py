@@ -7,8 +7,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cspr_jax.api.lists import copy_examples as copy_examples
-    from cspr_jax.api.lists import list_examples as list_examples
+    from cspr_jax.api.examples import copy_examples as copy_examples
+    from cspr_jax.api.examples import list_examples as list_examples
     from cspr_jax.api.lists import list_quantities as list_quantities
     from cspr_jax.api.lists import list_robots as list_robots
     from cspr_jax.api.pictures import plot as plot
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from cspr_jax.api.runs import status as status
     from cspr_jax.api.runs import verify as verify
     from cspr_jax.api.searches import minimum_arcs as minimum_arcs
+    from cspr_jax.api.speed import benchmark as benchmark
     from cspr_jax.api.sweeps import compute as compute
     from cspr_jax.api.sweeps import run as run
-    from cspr_jax.api.tables import benchmark as benchmark
     from cspr_jax.api.tables import table as table
     from cspr_jax.api.tables import table_names as table_names
     from cspr_jax.problem import load_robot as load_robot
@@ -35,11 +35,11 @@ _PUBLIC = {
     "Limits": ("cspr_jax.robots.limits", "Limits"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
     "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
-    "benchmark": ("cspr_jax.api.tables", "benchmark"),
+    "benchmark": ("cspr_jax.api.speed", "benchmark"),
     "compute": ("cspr_jax.api.sweeps", "compute"),
-    "copy_examples": ("cspr_jax.api.lists", "copy_examples"),
+    "copy_examples": ("cspr_jax.api.examples", "copy_examples"),
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
-    "list_examples": ("cspr_jax.api.lists", "list_examples"),
+    "list_examples": ("cspr_jax.api.examples", "list_examples"),
     "list_quantities": ("cspr_jax.api.lists", "list_quantities"),
     "list_robots": ("cspr_jax.api.lists", "list_robots"),
     "load_robot": ("cspr_jax.problem", "load_robot"),

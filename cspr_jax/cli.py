@@ -329,11 +329,11 @@ def _listed(options: argparse.Namespace, found: Any, table: Callable[[Any], Any]
 
 
 def _examples(options: argparse.Namespace) -> int:
-    from cspr_jax.api import lists
+    from cspr_jax.api import examples
 
-    known = lists.list_examples()
+    known = examples.list_examples()
     names = list(known) if options.all else options.name
-    found = [str(path) for path in lists.copy_examples(names, options.output)] if names else known
+    found = [str(path) for path in examples.copy_examples(names, options.output)] if names else known
     lines = found if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
     _print_json(found) if options.json else sys.stdout.write("".join(f"{line}\n" for line in lines))
     return ExitCode.DONE
@@ -341,7 +341,7 @@ def _examples(options: argparse.Namespace) -> int:
 
 def _bench(options: argparse.Namespace) -> int:
     _prepare_jax(options)
-    from cspr_jax.api.tables import benchmark
+    from cspr_jax.api.speed import benchmark
     from cspr_jax.bench import lines
 
     found = benchmark(options.kernels)

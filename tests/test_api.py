@@ -167,6 +167,19 @@ def test_runs(folder, capsys):
     assert cspr_jax.status("path")["shards"] == 0
 
 
+def test_an_interrupted_run_goes_on(folder):
+    def interrupt(done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        cspr_jax.run("sweep.toml", "run", on_tile=interrupt)
+    assert cspr_jax.status("run")["shards"] == 1
+    seen = []
+    cspr_jax.run("sweep.toml", "run", on_tile=lambda done, total: seen.append(done))
+    assert seen == [2, 4]
+
+
 def test_status_and_verify(folder, capsys):
     path = cspr_jax.run("sweep.toml", "run")
     assert cspr_jax.status("run") == strict_json(cspr(capsys, "status", "run", "--json"))

@@ -1,9 +1,5 @@
-"""Published tables and raw speed from Python, as `cspr table` and `cspr bench` have them."""
+"""Published tables from Python, computed again as by `cspr table`."""
 
-from pathlib import Path
-from typing import Any
-
-from cspr_jax import bench
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.table_layout import Cell
@@ -40,19 +36,3 @@ def table(name: str, *, definition: str | None = None, amplitude: str | None = N
     choice = tables.chosen(name, {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None})
     with double_precision():
         return tables.table_cells(name, choice)
-
-
-def benchmark(kernels: str | Path | None = None) -> dict[str, Any]:
-    """Measure checks per second, beside a NumPy version of the same check; it takes a minute.
-
-    Args:
-        kernels: folder of C++ kernels to measure beside, such as `benchmarks` of a checkout; None: without them.
-
-    Returns:
-        what `cspr bench --json` prints.
-
-    Raises:
-        ConfigError: there is no compiler, or it refuses a kernel, or that computes something else.
-    """
-    with double_precision():
-        return bench.bench(None if kernels is None else Path(kernels))
