@@ -18,8 +18,8 @@ def main() -> None:
     import numpy as np
 
     jax.config.update("jax_enable_x64", True)
-    from cspr_jax.problem import load_robot
     from cspr_jax.feasibility.problem import Problem
+    from cspr_jax.problem import load_robot
     from cspr_jax.robots.limits import Limits
     from cspr_jax.search.oscillations import minimum_oscillations, transitions_to
     from cspr_jax.trajectories.amplitudes import named

@@ -7,12 +7,12 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from cspr_jax import __version__
-from cspr_jax.errors import ConfigError, CsprError, ExitCode, shown
+from cspr_jax.errors import ConfigError, CsprError, ExitCode
 from cspr_jax.outputs.plots.options import add_style
 from cspr_jax.runtime import compile_cache
 from cspr_jax.runtime.progress import progress, waiting
@@ -23,7 +23,6 @@ EPILOGUE = (
     "5 numerical self-check failed; 70 internal error; 130, 143 stopped, run it again to go on"
 )
 
-LARGEST_WORKERS = 256
 VERIFIED = ("tiles", "shards", "missing", "cells", "cells_near_zero", "mixed", "rows", "segments", "feasible")
 
 
@@ -159,13 +158,11 @@ def _add_listings(add: Callable[..., argparse.ArgumentParser]) -> None:
     examples.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 
-def _start_jax(options: argparse.Namespace) -> None:
+def _prepare_jax(options: argparse.Namespace) -> None:
     from cspr_jax.runtime import xla
 
-    xla.prepare(options.device, _warn)
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
+    if getattr(options, "scheduler", None) is None:  # its workers have settings of their own
+        xla.prepare(options.device, _warn)
     xla.check_device(options.device)
     xla.tell_compiling()
 
@@ -182,27 +179,20 @@ def _print(renderable: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from cspr_jax.config.hints import robot_hints
+    from cspr_jax.api import sweeps
     from cspr_jax.sweep import engine
-    from cspr_jax.sweep.definition import read_sweep, run_directory
 
-    if options.workers < 1 or options.workers > LARGEST_WORKERS:
-        raise ConfigError("--workers", f"{options.workers}: must be an integer from 1 to {LARGEST_WORKERS}")
-    if options.scheduler is not None and options.workers != 1:
-        raise ConfigError("--workers", f"{options.workers}: must be absent beside --scheduler")
     if options.scheduler is not None and options.device is not None:
         raise ConfigError("--device", f"{options.device}: must be absent beside --scheduler, whose workers choose")
-    sweep = read_sweep(options.sweep)
-    directory = options.output or run_directory(sweep)
+    sweep = sweeps.sweep_given(options.sweep)
+    directory = options.output or sweeps.run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
     with stop_signals(_warn) as stop, progress() as on_tile:
         hooks = engine.Hooks(stop, on_tile, warn=_warn)
-        work = engine.Run(sweep, directory, choices, hooks)
-        path = work.finished()
+        job = sweeps.Job(sweep, directory, choices, hooks, options.workers, options.scheduler)
+        path = job.finished()
         if path is None:
-            with _executor(options, sweep, stop) as executor:  # refuses in one line, so hints come after it
-                _hint(robot_hints(sweep.robot))
-                path = work.go(executor).result
+            path = job.go(lambda: _prepare_jax(options))
         else:
             sys.stdout.write("already finished; nothing was computed\n")
     sys.stdout.write(f"{path}\n")
@@ -218,36 +208,8 @@ def _hint(lines: list[str]) -> None:
         _warn(f"hint: {line}")
 
 
-@contextlib.contextmanager
-def _executor(options: argparse.Namespace, sweep: Any, stop: Any) -> Iterator[Any]:
-    from cspr_jax.runtime import xla
-
-    if options.scheduler is None:  # the workers of a scheduler have settings of their own
-        xla.prepare(options.device, _warn)
-    # These import jax, which is too late for settings.
-    from cspr_jax.sweep import executors
-    from cspr_jax.sweep.tile import TileMap
-
-    xla.check_device(options.device)
-    xla.tell_compiling()
-    tile_map = TileMap(sweep)  # refuses a hopeless sweep before anything is made
-    if options.scheduler is not None:
-        from cspr_jax.sweep.distributed import Scheduler
-
-        accept = options.accept_environment_change
-        workers = Scheduler(sweep, options.scheduler, accept_environment_change=accept, stop=stop, warn=_warn)
-        try:
-            yield workers
-        finally:
-            workers.close()
-    elif options.workers > 1:
-        yield executors.Processes(sweep, options.workers)
-    else:
-        yield executors.ThisProcess(tile_map)
-
-
 def _status(options: argparse.Namespace) -> int:
-    from cspr_jax.sweep.inspection import status
+    from cspr_jax.api.runs import status
 
     found = status(options.path)
     if options.json:
@@ -265,7 +227,7 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    from cspr_jax.sweep.inspection import verify
+    from cspr_jax.api.runs import verify
 
     found = verify(options.path)
     if options.json:
@@ -289,22 +251,22 @@ def _plan(options: argparse.Namespace) -> int:
     from cspr_jax.config.hints import plan_hints, robot_hints
 
     with waiting():
-        _start_jax(options)
-        from cspr_jax.outputs import motion_files, plan_report
-        from cspr_jax.plans import planning
+        _prepare_jax(options)
+        from cspr_jax.api import plans
+        from cspr_jax.outputs.plan_report import plan_table
 
-        plan = planning.plan(options.plan)
+        plan = plans.plan(options.plan)
     feasible = plan.feasible
     for line in plan.warnings:
         _warn(line)
     _hint(robot_hints(plan.spec) + ([] if feasible else plan_hints(plan.keys, plan.spec)))
     if options.json:
-        _print_json(plan_report.plan_object(plan))
+        _print_json(plan.to_dict())
     else:
-        _print(plan_report.plan_table(plan))
+        _print(plan_table(plan))
     if options.output is not None and (feasible or options.anyway):
         with waiting():
-            motion_files.write_rows(plan, options.output, rate=options.rate)
+            plan.save(options.output, options.rate, anyway=True)
         if not feasible:
             _warn(f"{options.output}: is not proved feasible; it says so itself")
     elif options.output is not None:
@@ -313,52 +275,52 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from cspr_jax.outputs.plots import draw, selection
-    from cspr_jax.outputs.plots.style import style_of
+    from cspr_jax.api.pictures import plot
+    from cspr_jax.outputs.plots import selection
 
     at = selection.places(options.at)
     results = [selection.result_at(path) for path in options.result]
     output = options.output or results[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
-    chosen = {"quantity": options.quantity, "at": at, "lines": options.lines, "envelope": options.envelope}
+    names = ("quantity", "lines", "envelope", "size", "dpi", "font_size")
     with waiting():
-        draw.plot(results, output, **chosen, style=style_of(options.size, options.dpi, options.font_size))
+        plot(results, at=at, output=output, **{name: getattr(options, name) for name in names})
     sys.stdout.write(f"{output}\n")
     return ExitCode.DONE
 
 
 def _table(options: argparse.Namespace) -> int:
     with waiting():
-        _start_jax(options)
-        from cspr_jax.published import tables
+        _prepare_jax(options)
+        from cspr_jax.api import tables
+        from cspr_jax.published.tables import table_for_people, table_object
 
     if options.list:
-        sys.stdout.write("".join(f"{name}  {source.title}\n" for name, source in tables.TABLES.items()))
+        sys.stdout.write("".join(f"{name}  {title}\n" for name, title in tables.table_names().items()))
         return ExitCode.DONE
-    if options.name not in tables.TABLES:
-        raise ConfigError("table", f"{shown(options.name)}: must be one of {', '.join(tables.TABLES)}")
-    given = {"--definition": options.definition, "--amplitude": options.amplitude, "--fine": options.fine or None}
-    choice = tables.chosen(options.name, given)
+    choices = {name: getattr(options, name) for name in ("definition", "amplitude", "fine")}
     with waiting():
-        cells = tables.table_cells(options.name, choice)
+        cells = tables.table(options.name, **choices)
     if options.json:
-        _print_json(tables.table_object(options.name, cells))
+        _print_json(table_object(options.name, cells))
     else:
-        _print(tables.table_for_people(options.name, cells))
+        _print(table_for_people(options.name, cells))
     return ExitCode.DONE
 
 
 def _robots(options: argparse.Namespace) -> int:
-    from cspr_jax.outputs import listings
+    from cspr_jax.api import lists
+    from cspr_jax.outputs.listings import robots_table
 
-    return _listed(options, listings.robots(), listings.robots_table)
+    return _listed(options, lists.list_robots(), robots_table)
 
 
 def _quantities(options: argparse.Namespace) -> int:
-    from cspr_jax.outputs import listings
+    from cspr_jax.api import lists
+    from cspr_jax.outputs.listings import quantities_table
 
-    return _listed(options, listings.quantities(), listings.quantities_table)
+    return _listed(options, lists.list_quantities(), quantities_table)
 
 
 def _listed(options: argparse.Namespace, found: Any, table: Callable[[Any], Any]) -> int:
@@ -367,21 +329,22 @@ def _listed(options: argparse.Namespace, found: Any, table: Callable[[Any], Any]
 
 
 def _examples(options: argparse.Namespace) -> int:
-    from cspr_jax.outputs import example_files
+    from cspr_jax.api import examples
 
-    known = example_files.examples()
+    known = examples.list_examples()
     names = list(known) if options.all else options.name
-    found = [str(path) for path in example_files.copy(names, options.output)] if names else known
+    found = [str(path) for path in examples.copy_examples(names, options.output)] if names else known
     lines = found if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
     _print_json(found) if options.json else sys.stdout.write("".join(f"{line}\n" for line in lines))
     return ExitCode.DONE
 
 
 def _bench(options: argparse.Namespace) -> int:
-    _start_jax(options)
-    from cspr_jax.bench import bench, lines
+    _prepare_jax(options)
+    from cspr_jax.api.speed import benchmark
+    from cspr_jax.bench import lines
 
-    found = bench(options.kernels)
+    found = benchmark(options.kernels)
     if options.json:
         _print_json(found)
     else:

@@ -32,6 +32,11 @@ ROOMS = [room for floor in FLOORS for room in floor]
 KERNELS = [room for floor in FLOORS[:6] for room in floor if room not in ("config", "store", "runtime", "problem")]
 # Folders, all of them, and modules that never import jax.
 WITHOUT_JAX = (
+    "api.examples",
+    "api.given",
+    "api.pictures",
+    "api.runs",
+    "api.sweeps",
     "arithmetic.frames",
     "cli",
     "config",

@@ -10,24 +10,12 @@ from oracles import point_mass
 from test_outputs import cspr, strict_json
 
 from cspr_jax import load_robot
-from cspr_jax.bench import six_cables, three_cables, timing
+from cspr_jax.bench import six_cables, three_cables
 from cspr_jax.cli import main
 from cspr_jax.search import arc_sieve
 
 ROOT = Path(__file__).parent.parent
 with_compiler = pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler")
-
-
-@pytest.fixture
-def small_bench(monkeypatch):
-    monkeypatch.setattr(timing, "REPEATS", 1)
-    monkeypatch.setattr(timing, "SIDE", 8)
-    monkeypatch.setattr(timing, "COPIED", 4096)
-    monkeypatch.setattr(three_cables, "BATCHES", 1)
-    monkeypatch.setattr(three_cables, "NUMPY_SEGMENTS", 2)
-    monkeypatch.setattr(six_cables, "NUMPY_TRAJECTORIES", 2)
-    monkeypatch.setattr(six_cables, "TRAJECTORIES", 400)
-    monkeypatch.setattr(six_cables, "LANES", 64)
 
 
 @pytest.mark.parametrize("kernels", [None, pytest.param(ROOT / "benchmarks", marks=with_compiler)])

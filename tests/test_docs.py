@@ -62,6 +62,20 @@ def test_python_of_the_readme_runs(checkout, capsys):
     assert capsys.readouterr().out.strip()
 
 
+def test_the_page_of_python_runs(checkout, capsys, small_bench):
+    """One block after another; a block of text under one is what it prints."""
+    page = ROOT / "docs" / "python.md"
+    shown = FENCE.findall(page.read_text("utf-8"))
+    namespace: dict[str, object] = {"__name__": "python"}
+    assert len(blocks(page, "python")) >= 8
+    for i, (language, text) in enumerate(shown):
+        if language == "python":
+            exec(compile(text, page.name, "exec"), namespace)
+            printed = capsys.readouterr().out
+            following = shown[i + 1] if i + 1 < len(shown) else ("", "")
+            assert printed == (following[1] if following[0] == "text" else ""), text
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_commands_of_the_documents_parse(page, checkout):
     for words in commands(page):

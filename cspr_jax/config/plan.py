@@ -116,6 +116,21 @@ def read_plan(text: str, path: Path) -> PlanFile:
     Raises:
         ConfigError: a mistake in it.
     """
-    data = parse_toml(text, path)
-    refuse_other_kinds(data, "plan", path)
-    return checked(PlanFile, data, path)
+    return plan_keys(parse_toml(text, path), path)
+
+
+def plan_keys(data: dict[str, Any], file: object) -> PlanFile:
+    """Parsed content of a plan file.
+
+    Args:
+        data: its tables.
+        file: named in errors.
+
+    Returns:
+        its content, limits of [limits] beside the other keys.
+
+    Raises:
+        ConfigError: a mistake in it.
+    """
+    refuse_other_kinds(data, "plan", file)
+    return checked(PlanFile, data, file)

@@ -14,7 +14,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.plans.planning import Plan
 from cspr_jax.robots import cables
 from cspr_jax.schema.identity import canonical_json
-from cspr_jax.schema.quantities import SEGMENTS, TRAJECTORY, flag_attributes
+from cspr_jax.schema.quantities import ACROSS, PARTS, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
@@ -30,7 +30,6 @@ _FIELDS = {
     "omega": "angular_velocity",
     "omega_dot": "angular_acceleration",
 }
-_VECTORS = ("position", "velocity", "acceleration", "omega", "omega_dot")
 LARGEST_ROWS = 20_000_000
 # A tick that lies so near to the end of a segment, in parts of a tick, is that end.
 SAME_TICK = 1e-6
@@ -56,7 +55,16 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
     Returns:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
         axes; those of `schema.quantities.OF_PLATFORMS` only for a platform.
+
+    Raises:
+        ConfigError: a rate that is no number > 0, or too many rows.
     """
+    if rate is not None and not 0.0 < rate < float("inf"):
+        raise ConfigError("--rate", f"{rate}: must be a number > 0, in Hz")
+    if rate is not None and rate * plan.answers.duration.sum() > LARGEST_ROWS:
+        raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
+    if rate is None and plan.keys.samples * len(plan.answers.duration) > LARGEST_ROWS:
+        raise ConfigError("samples", f"{plan.keys.samples}: must give at most {LARGEST_ROWS} rows in all")
     duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     parts = []
@@ -88,10 +96,6 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
         ConfigError: too many rows, or a best candidate that is not finite.
         StoreError: the disk or the folder refuses.
     """
-    if rate is not None and rate * plan.answers.duration.sum() > LARGEST_ROWS:
-        raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
-    if rate is None and plan.keys.samples * len(plan.answers.duration) > LARGEST_ROWS:
-        raise ConfigError("samples", f"{plan.keys.samples}: must give at most {LARGEST_ROWS} rows in all")
     found = rows(plan, rate=rate)
     if not all(np.isfinite(values).all() for name, values in found.items() if name != "tension"):
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
@@ -123,18 +127,16 @@ def _csv(found: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
 
 
 def _parts(name: str, count: int) -> list[str]:
-    if name in _VECTORS:
-        return list("xyz")
-    return list("wxyz") if name == "quaternion" else [str(k + 1) for k in range(count)]
+    return list(PARTS.get(ACROSS[name], [str(k + 1) for k in range(count)]))
 
 
 def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
-    segments = _segments(plan)
+    of_segments = segments(plan)
     numbers = list(range(1, found["tension"].shape[1] + 1))
-    with new_hdf5(path, _attributes(plan)) as file:
-        scales = {"t": found["t"], "axis": list("xyz"), "cable": numbers, "segment": segments["segment"]}
+    with new_hdf5(path, attributes(plan)) as file:
+        scales = {"t": found["t"], "axis": list(PARTS["axis"]), "cable": numbers, "segment": of_segments["segment"]}
         if "quaternion" in found:
-            scales["component"] = list("wxyz")
+            scales["component"] = list(PARTS["component"])
         for name, labels in scales.items():
             file[name] = labels
             file[name].make_scale(name)
@@ -143,9 +145,8 @@ def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
             describe(data, TRAJECTORY[name])
             if name != "t":
                 data.dims[0].attach_scale(file["t"])
-                across = "axis" if name in _VECTORS else "component" if name == "quaternion" else "cable"
-                data.dims[1].attach_scale(file[across])
-        for name, values in segments.items():
+                data.dims[1].attach_scale(file[ACROSS[name]])
+        for name, values in of_segments.items():
             data = file[name] if name == "segment" else file.create_dataset(name, data=values)
             describe(data, SEGMENTS[name])
             if name != "segment":
@@ -153,7 +154,15 @@ def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
         set_attributes(file["segment_verdict"], flag_attributes())
 
 
-def _attributes(plan: Plan) -> dict[str, Any]:
+def attributes(plan: Plan) -> dict[str, Any]:
+    """What a motion file says of its plan.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        attributes of the whole file.
+    """
     spec = plan.spec
     return {
         "Conventions": "CF-1.11",
@@ -172,7 +181,15 @@ def _attributes(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _segments(plan: Plan) -> dict[str, np.ndarray]:
+def segments(plan: Plan) -> dict[str, np.ndarray]:
+    """What a motion file holds of each segment.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        (n,) each, by the names of `schema.quantities.SEGMENTS`.
+    """
     answers, ends = plan.answers, np.cumsum(plan.answers.duration)
     found = {
         "segment": np.arange(1, len(ends) + 1),

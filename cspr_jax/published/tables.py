@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.errors import ConfigError
+from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.table_layout import Cell, grid
 from cspr_jax.plans.planning import plan
 from cspr_jax.published import chapter_1, chapter_3, table_3_2
@@ -168,7 +168,7 @@ def chosen(name: str, given: dict[str, Any]) -> Choice | None:
         the choice; None for a table that has none.
 
     Raises:
-        ConfigError: an option given with such a table.
+        ConfigError: an option given with such a table, or a value that it does not have.
     """
     if not TABLES[name].with_choice:
         for option, value in given.items():
@@ -178,8 +178,10 @@ def chosen(name: str, given: dict[str, Any]) -> Choice | None:
     usual = Choice()
 
     def every(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
-        value = given[option]
-        return otherwise if value is None else tuple(names) if value == "all" else (value,)
+        value, known = given[option], tuple(names)
+        if value not in (None, "all", *known):
+            raise ConfigError(option, f"{shown(value)}: must be one of {', '.join(known)}, all")
+        return otherwise if value is None else known if value == "all" else (value,)
 
     return Choice(
         every("--definition", chapter_3.DEFINITIONS, usual.definitions),

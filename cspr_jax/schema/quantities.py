@@ -1,6 +1,7 @@
 """The one table of everything that a result file can hold: it gives names, units, labels and docs."""
 
 import dataclasses
+from collections import ChainMap
 from typing import Literal
 
 import numpy as np
@@ -272,6 +273,14 @@ SEGMENTS = {
         Quantity("segment_margin", "1", "margin", _MARGIN),
     )
 }
+# The second dimension of those over time, and the parts of vectors.
+ACROSS = {
+    **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot"), "axis"),
+    "quaternion": "component",
+    **dict.fromkeys(("length", "rate", "tension"), "cable"),
+}
+PARTS = {"axis": tuple("xyz"), "component": tuple("wxyz")}
+EVERY = ChainMap(AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
 # Those that only a rigid platform has.
 OF_PLATFORMS = ("quaternion", "omega", "omega_dot")
 _OWN = frozenset(QUANTITIES)

@@ -2,9 +2,8 @@
 
 import dataclasses
 import json
-from collections import ChainMap
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,16 +11,19 @@ from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import LARGEST_LENGTH, MOST_CABLES, RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, StoreError, one_line, shown
-from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema import labelled
+from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES, SEGMENTS
 from cspr_jax.store.isolated import fetch
 from cspr_jax.store.seal import DamagedError
+
+if TYPE_CHECKING:
+    import xarray
 
 # No number of a result is larger, but those that are infinite.
 LARGEST_NUMBER, LARGEST_MASS = 1e30, 1e9
 # Settings have some ten tables and lists, and some fifty keys.
 _MOST_PARTS = 10_000
 _BLOCK = 1 << 20
-_EVERY = ChainMap(AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,6 +50,21 @@ class Result:
     def is_map(self) -> bool:
         """Whether it is a map, not a motion over time."""
         return "map" in self.attributes
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The result for xarray: named dimensions, units and long names, and the attributes of the file.
+
+        Returns:
+            of a map, quantities over its axes; of a motion, rows over "t" and segments over "segment".
+
+        Raises:
+            ConfigError: xarray is not installed.
+        """
+        if self.is_map:
+            return labelled.dataset(
+                {name: (tuple(self.axes), data) for name, data in self.data.items()}, self.axes, self.attributes
+            )
+        return labelled.motion(self.axes | self.data, self.attributes)
 
 
 def open_result(path: Path) -> Result:
@@ -79,7 +96,7 @@ def open_result(path: Path) -> Result:
     except ConfigError as error:
         raise StoreError(str(error)) from error
     names = [*axes, *data]
-    units, labels = ({n: getattr(_EVERY[n], key) for n in names} for key in ("units", "long_name"))
+    units, labels = ({n: getattr(EVERY[n], key) for n in names} for key in ("units", "long_name"))
     return Result(axes, data, units, labels, attributes, settings)
 
 
@@ -168,7 +185,7 @@ def _motion(
             wanted = (len(time),)
         elif name in segments:
             wanted = (segments["segment"].size if "segment" in segments else -1,)
-        kind = _EVERY[name].kind
+        kind = EVERY[name].kind
         if array.shape != wanted or array.dtype != (np.float64 if kind == "float" else kind):
             raise DamagedError(f"{name} has another shape or type than in a motion")
         # The best candidate of a motion that is not feasible may pass a singularity.

@@ -84,7 +84,23 @@ def read_sweep(path: Path) -> Sweep:
     if len(os.fsencode(path.stem)) > LONGEST_NAME:
         raise ConfigError(path, f"a name of {len(os.fsencode(path.stem))} bytes: must be at most {LONGEST_NAME}")
     text = read_text(path)
-    data = parse_toml(text, path)
+    return sweep_of(parse_toml(text, path), path, text=text)
+
+
+def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
+    """A sweep file's parsed content, checked without computing anything.
+
+    Args:
+        data: its tables.
+        path: of the file, named in errors; paths in it are relative to its folder.
+        text: of the file, which a run keeps.
+
+    Returns:
+        the sweep.
+
+    Raises:
+        ConfigError: a mistake in it.
+    """
     refuse_other_kinds(data, "sweep", path)
     keys = checked(SweepFile, data, path)
     robot = resolve_robot(keys.robot, path, path.parent)

@@ -19,6 +19,7 @@ if "PAPER_CORES" in os.environ:
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[: int(os.environ["PAPER_CORES"])])
 
 from cspr_jax import cli
+from cspr_jax.api import sweeps
 from reliability.support import Paper
 
 
@@ -42,15 +43,15 @@ class Slow(Paper):
 
 
 @contextlib.contextmanager
-def paper(options, sweep, stop):
+def paper(job, prepare):
     if "PAPER_USER" in os.environ and os.getuid() == 0:  # root may write everywhere
         os.setgroups([])
         os.setgid(int(os.environ["PAPER_USER"]))
         os.setuid(int(os.environ["PAPER_USER"]))
-    yield Slow(sweep)
+    yield Slow(job.sweep)
 
 
 if __name__ == "__main__":
     SECONDS = float(sys.argv[1])
-    cli._executor = paper
+    sweeps._executor = paper
     sys.exit(cli.main(sys.argv[2:]))

@@ -6,6 +6,7 @@ import warnings
 
 import jax
 import pytest
+from cspr_jax.plans.platform_sequence import Poses
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -15,7 +16,6 @@ from cspr_jax.config.robot import CATALOGUE, resolve_robot
 from cspr_jax.errors import ConfigError, CsprError, InputError
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.choices import chosen_depth
-from cspr_jax.plans.platform_sequence import Poses
 from cspr_jax.plans.sequence import sequence_of
 from cspr_jax.problem import build_amplitude, build_limits, platform_of, point_mass_of
 from cspr_jax.robots.reference_pose import aligned, reference_pose

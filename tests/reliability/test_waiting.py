@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from cspr_jax.api.pictures import plot
 from cspr_jax.cli import main
 from cspr_jax.errors import StoreError
-from cspr_jax.outputs.plots.draw import plot
 from cspr_jax.runtime import stages
 from cspr_jax.runtime.progress import Pace, progress, waiting
 from reliability.support import go, sweep_of
@@ -21,6 +21,7 @@ from reliability.support import go, sweep_of
 STUCK = """
 import contextlib, ctypes, sys, threading
 from cspr_jax import cli
+from cspr_jax.api import sweeps
 def stuck(*_):
     system, lock = ctypes.CDLL(None), ctypes.create_string_buffer(256)
     system.pthread_mutex_init(lock, None)
@@ -31,7 +32,7 @@ class Tiles:
     environment = staticmethod(lambda: {"paper": 1})
     tiles = staticmethod(stuck)
 cli._robots = stuck
-cli._executor = lambda *_: contextlib.nullcontext(Tiles)
+sweeps._executor = lambda *_: contextlib.nullcontext(Tiles)
 sys.argv[0] = "cspr"
 sys.exit(cli.main())
 """
@@ -136,10 +137,10 @@ def test_a_picture_is_there_whole_or_not_at_all(tmp_path, monkeypatch):
 
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        plot([result], picture)
+        plot([result], output=picture)
     assert not picture.exists()
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, target, **keywords: target.write(b"whole"))
-    plot([result], picture)
+    plot([result], output=picture)
     assert picture.read_bytes() == b"whole" and not [name for name in os.listdir(tmp_path) if name.endswith(".part")]
     with pytest.raises(StoreError, match="cannot be written"):
-        plot([result], tmp_path / "nowhere" / "map.png")
+        plot([result], output=tmp_path / "nowhere" / "map.png")

@@ -1,4 +1,4 @@
-"""From result files to a picture: which kind it is, and which part of the data it shows."""
+"""From results to a picture: which kind it is, and which part of the data it shows."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
 from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, value, values
 from cspr_jax.outputs.plots.lines import Line, line_figure, lines_of, names_of, overlaid
@@ -14,12 +14,8 @@ from cspr_jax.outputs.plots.motion import motion_figure
 from cspr_jax.outputs.plots.notes import notes
 from cspr_jax.outputs.plots.sections import AROUND, POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
-from cspr_jax.outputs.plots.style import Style, in_style, rendered
-from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.map_kinds import MAP_KINDS
-from cspr_jax.store.disk import Disk
-from cspr_jax.store.publishing import publish
-from cspr_jax.store.result import Result, open_result
+from cspr_jax.store.result import Result
 
 # Pairs of axes that belong into one plane, the second upward or, in polar coordinates, outward: the first of these that
 # vary, or the one of the others that has the most cells.
@@ -45,52 +41,39 @@ class View(NamedTuple):
     place: dict[str, float]
 
 
-def plot(
-    paths: list[Path],
-    output: Path,
+def drawn(
+    results: list[Result],
+    names: list[str],
     *,
     quantity: str | None = None,
     at: dict[str, float] | None = None,
     lines: str | None = None,
     envelope: bool = False,
-    style: Style | None = None,
-) -> None:
-    """Draw one result file, or several maps as lines in one picture.
+) -> Figure:
+    """The picture of one result, or of several maps as lines; made inside `style.in_style`.
 
     Args:
-        paths: results of `cspr run`, or one motion of `cspr plan -o`.
-        output: picture to write; its ending is the format.
+        results: of `cspr run`, or one motion of `cspr plan -o`.
+        names: of their files.
         quantity: which one of a map; None: the one that its kind of map is about.
         at: fixed values of axes, within their ranges; the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
-        style: size, resolution and letters; None: the default.
+
+    Returns:
+        the figure.
 
     Raises:
-        StoreError: a file cannot be read, or the picture cannot be written.
-        ConfigError: no such quantity or axis, nothing to draw, or an unknown picture format.
+        InputError: no such quantity or axis, or nothing to draw.
     """
-    stage("reading")
-    results = [open_result(path) for path in paths]
-    stage("drawing")
-    style = style or Style()
-    try:
-        with in_style(style):
-            if envelope:
-                figure = _envelope(results, quantity, at or {}, lines)
-            elif len(results) > 1:
-                figure = _overlay(paths, results, quantity, at or {}, lines)
-            elif results[0].is_map:
-                figure = _map_figure(results[0], quantity, at or {}, lines)
-            else:
-                _refuse_choices(quantity, at, lines)
-                figure = motion_figure(results[0])
-            picture = rendered(figure, output.suffix, style)
-    except InputError as error:
-        raise ConfigError(paths[0], str(error)) from error
-    except ValueError as error:
-        raise ConfigError(output, str(error).splitlines()[0]) from error
-    publish(Disk(), output, picture)
+    if envelope:
+        return _envelope(results, quantity, at or {}, lines)
+    if len(results) > 1:
+        return _overlay([Path(name) for name in names], results, quantity, at or {}, lines)
+    if results[0].is_map:
+        return _map_figure(results[0], quantity, at or {}, lines)
+    _refuse_choices(quantity, at, lines)
+    return motion_figure(results[0])
 
 
 def _refuse_choices(quantity: str | None, at: dict[str, float] | None, lines: str | None) -> None:

@@ -56,11 +56,11 @@ class Style(NamedTuple):
     font_size: float = 10.0
 
 
-def style_of(size: str | None, dpi: float | None, font_size: float | None) -> Style:
-    """The style that command-line options ask for.
+def style_of(size: str | tuple[float, float] | None, dpi: float | None, font_size: float | None) -> Style:
+    """The style that is asked for.
 
     Args:
-        size: such as "16x10", cm; None: what suits the picture.
+        size: such as "16x10" or (16, 10), cm; None: what suits the picture.
         dpi: pixels an inch; None: the default.
         font_size: points; None: the default.
 
@@ -72,7 +72,7 @@ def style_of(size: str | None, dpi: float | None, font_size: float | None) -> St
     """
     default = Style()
     return Style(
-        None if size is None else _sides(size),
+        None if size is None else _sides(size if isinstance(size, str) else "x".join(f"{side:g}" for side in size)),
         default.dpi if dpi is None else _bounded("--dpi", dpi, DPIS),
         default.font_size if font_size is None else _bounded("--font-size", font_size, FONT_SIZES),
     )
@@ -109,20 +109,15 @@ def in_style(style: Style) -> Iterator[None]:
         yield
 
 
-def rendered(figure: Figure, ending: str, style: Style) -> bytes:
-    """The content of a picture's file.
+def laid_out(figure: Figure, style: Style) -> None:
+    """Give a picture its size, and its texts their lines.
 
     Args:
         figure: the picture, made inside `in_style`.
-        ending: of its file, such as ".png": the format.
         style: the chosen one.
 
-    Returns:
-        the content.
-
     Raises:
-        InputError: too many pixels, or no room for the panels.
-        ValueError: an unknown format.
+        InputError: too many pixels.
     """
     if style.size is not None:
         figure.set_size_inches(style.size[0] / INCH, style.size[1] / INCH)
@@ -130,14 +125,40 @@ def rendered(figure: Figure, ending: str, style: Style) -> bytes:
     most = math.floor(math.sqrt(LARGEST_PIXELS / (width * height)))
     if style.dpi > most:
         raise InputError("--dpi", style.dpi, f"at most {most} for {width * INCH:.3g}x{height * INCH:.3g} cm")
-    content, ending = io.BytesIO(), ending.lower()
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from")  # a letter that the font lacks is drawn as a box
-        warnings.filterwarnings("error", "constrained_layout not applied")
+    with _no_missing_letters():
         fit(figure)
+
+
+def rendered(figure: Figure, ending: str, style: Style) -> bytes:
+    """The content of a picture's file.
+
+    Args:
+        figure: the picture, `laid_out`.
+        ending: of its file, such as ".png": the format.
+        style: the chosen one.
+
+    Returns:
+        the content.
+
+    Raises:
+        InputError: no room for the panels.
+        ValueError: an unknown format.
+    """
+    content, ending = io.BytesIO(), ending.lower()
+    with _no_missing_letters():
+        warnings.filterwarnings("error", "constrained_layout not applied")
         try:
             figure.savefig(content, format=ending[1:], dpi=style.dpi, metadata=METADATA.get(ending))
         except UserWarning as warning:
+            width, height = figure.get_size_inches()
             size = f"{width * INCH:.3g}x{height * INCH:.3g}"
             raise InputError("--size", size, "larger, or --font-size smaller: the texts leave no room") from warning
     return content.getvalue()
+
+
+@contextmanager
+def _no_missing_letters() -> Iterator[None]:
+    # A letter that the font lacks is drawn as a box.
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from")
+        yield

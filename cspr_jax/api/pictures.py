@@ -1,0 +1,74 @@
+"""Pictures of results from Python, as `cspr plot` draws them."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.outputs.plots.draw import drawn
+from cspr_jax.outputs.plots.selection import result_at
+from cspr_jax.outputs.plots.style import in_style, laid_out, rendered, style_of
+from cspr_jax.runtime.stages import stage
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.publishing import publish
+from cspr_jax.store.result import Result, open_result
+
+
+def plot(
+    results: str | Path | Result | Sequence[str | Path | Result],
+    *,
+    quantity: str | None = None,
+    at: Mapping[str, float] | None = None,
+    lines: str | None = None,
+    envelope: bool = False,
+    size: str | tuple[float, float] | None = None,
+    dpi: float | None = None,
+    font_size: float | None = None,
+    output: str | Path | None = None,
+) -> Figure:
+    """Draw one result, or several maps as lines in one picture.
+
+    Args:
+        results: of `open_result`, or the path of a result, a run directory or a motion file; or several maps.
+        quantity: which one of a map; None: "arcs", or the first there is.
+        at: fixed values of axes, within their ranges; the nearest point is taken.
+        lines: axis whose points become lines; None: sections, or one line.
+        envelope: whether to draw all orientations of one place, in three dimensions.
+        size: width and height, cm, as (16, 10) or "16x10"; None: what suits the picture.
+        dpi: pixels an inch of a file; None: 160.
+        font_size: points; None: 10.
+        output: picture to write; its ending is the format. None: nothing is written.
+
+    Returns:
+        the figure of matplotlib.
+
+    Raises:
+        StoreError: a file cannot be read, or the picture cannot be written.
+        ConfigError: no such quantity or axis, nothing to draw, a size out of bounds, or an unknown picture format.
+    """
+    given = [results] if isinstance(results, str | Path | Result) else list(results)
+    if not given:
+        raise ConfigError("results", "[]: must be one result, or more")
+    style = style_of(size, dpi, font_size)
+    stage("reading")
+    files = [one if isinstance(one, Result) else result_at(Path(one)) for one in given]
+    loaded = [one if isinstance(one, Result) else open_result(one) for one in files]
+    names = [f"result {i + 1}" if isinstance(one, Result) else str(one) for i, one in enumerate(files)]
+    picture = None
+    stage("drawing")
+    try:
+        with in_style(style):
+            figure = drawn(
+                loaded, names, quantity=quantity, at=None if at is None else dict(at), lines=lines, envelope=envelope
+            )
+            laid_out(figure, style)
+            if output is not None:
+                picture = rendered(figure, Path(output).suffix, style)
+    except InputError as error:
+        raise ConfigError(names[0], str(error)) from error
+    except ValueError as error:
+        raise ConfigError(output or names[0], str(error).splitlines()[0]) from error
+    if picture is not None:
+        publish(Disk(), Path(str(output)), picture)
+    return figure

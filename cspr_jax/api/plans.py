@@ -1,0 +1,117 @@
+"""Plans from Python: what `cspr plan` computes, prints and writes."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cspr_jax.api.given import plain, text_of
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.config.plan import plan_keys
+from cspr_jax.errors import ConfigError
+from cspr_jax.outputs import motion_files, plan_report
+from cspr_jax.plans import planning
+from cspr_jax.schema import labelled
+
+if TYPE_CHECKING:
+    import xarray
+
+# What errors name where there is no file; paths are relative to the current folder.
+NAME = Path("plan")
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan(planning.Plan):
+    """A planned sequence, and what can be had of it; see `cspr_jax.plans.planning.Plan` for its fields."""
+
+    def rows(self, rate: float | None = None) -> dict[str, np.ndarray]:
+        """The motion as rows over time.
+
+        Args:
+            rate: rows a second over the whole plan, Hz, and one at its end; None: `samples` rows a segment.
+
+        Returns:
+            "t" (n,) s, and by the names of `schema.quantities.TRAJECTORY` (n, 3), (n, 4) or (n, n_cables) each, in the
+            axes of the robot file.
+
+        Raises:
+            ConfigError: a rate that is no number > 0, or too many rows.
+        """
+        with double_precision():
+            return motion_files.rows(self, rate=rate)
+
+    def save(self, path: str | Path, rate: float | None = None, anyway: bool = False) -> Path:
+        """Write the motion.
+
+        Args:
+            path: of a .csv or .h5 file, which is replaced if it is there.
+            rate: as for `rows`.
+            anyway: whether to write a plan that is not feasible, too; the file says so.
+
+        Returns:
+            the path.
+
+        Raises:
+            ConfigError: another ending, a plan that is not feasible, or a rate that gives too many rows.
+            StoreError: the disk or the folder refuses.
+        """
+        path = Path(path)
+        if path.suffix not in (".csv", ".h5"):
+            raise ConfigError(path, "must end in .csv or .h5")
+        if not (self.feasible or anyway):
+            raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
+        with double_precision():
+            motion_files.write_rows(self, path, rate=rate)
+        return path
+
+    def to_dict(self) -> dict[str, Any]:
+        """The plan as plain values, for JSON.
+
+        Returns:
+            what `cspr plan --json` prints.
+        """
+        with double_precision():
+            return plan_report.plan_object(self)
+
+    def to_xarray(self, rate: float | None = None) -> "xarray.Dataset":
+        """The motion for xarray, with units and long names.
+
+        Args:
+            rate: as for `rows`.
+
+        Returns:
+            rows over "t" and segments over "segment", as `open_result(...).to_xarray()` gives them of a motion file.
+
+        Raises:
+            ConfigError: xarray is not installed, or too many rows.
+        """
+        labelled.need_xarray()
+        arrays = self.rows(rate) | motion_files.segments(self)
+        return labelled.motion(arrays, motion_files.attributes(self))
+
+
+def plan(given: str | Path | Mapping[str, Any]) -> Plan:
+    """Plan a sequence of poses.
+
+    Args:
+        given: path of a plan file, or what it holds: parsed TOML, in which arrays are lists, too. A dictionary's paths
+            are relative to the current folder.
+
+    Returns:
+        the plan, feasible or not.
+
+    Raises:
+        ConfigError: a mistake in it; its `lines` are all that were found.
+    """
+    with double_precision():
+        if isinstance(given, Mapping):
+            data = plain(given)
+            found = planning.plan_of(plan_keys(data, NAME), NAME)
+            text = text_of(data)
+        else:
+            found = planning.plan(Path(given))
+            text = found.text
+    fields = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
+    return Plan(**fields | {"text": text})

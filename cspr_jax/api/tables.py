@@ -1,0 +1,38 @@
+"""Published tables from Python, computed again as by `cspr table`."""
+
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.errors import ConfigError, shown
+from cspr_jax.outputs.table_layout import Cell
+from cspr_jax.published import tables
+
+
+def table_names() -> dict[str, str]:
+    """The published tables that can be computed again.
+
+    Returns:
+        title, with its source, by name.
+    """
+    return {name: source.title for name, source in tables.TABLES.items()}
+
+
+def table(name: str, *, definition: str | None = None, amplitude: str | None = None, fine: bool = False) -> list[Cell]:
+    """Compute a published table again.
+
+    Args:
+        name: of `table_names`.
+        definition: of accessible orientations in tables 3.3 and 3.4: "grid", "scan", "equal-volume" or "all"; None: the
+            usual one.
+        amplitude: in these: "quintic", "effective", "effective-c3" or "all"; None: the usual one.
+        fine: in these: whether the step is pi/64 instead of pi/32.
+
+    Returns:
+        its cells, each with `row`, `column`, `computed`, `published`, `variant` and `differs`.
+
+    Raises:
+        ConfigError: no such table, or a choice that it does not have.
+    """
+    if name not in tables.TABLES:
+        raise ConfigError("table", f"{shown(name)}: must be one of {', '.join(tables.TABLES)}")
+    choice = tables.chosen(name, {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None})
+    with double_precision():
+        return tables.table_cells(name, choice)

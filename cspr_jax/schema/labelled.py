@@ -1,0 +1,121 @@
+"""Arrays under the names of the table of quantities, as datasets of xarray with units and long names."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.schema.quantities import ACROSS, EVERY, PARTS, SEGMENTS, flag_attributes
+
+if TYPE_CHECKING:
+    import xarray
+
+# Of answers with a value at either end of a segment.
+ENDS = ("start", "target")
+
+
+def need_xarray() -> None:
+    """Refuse to begin what would end in a dataset where there is no xarray.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    try:
+        import xarray  # noqa: F401
+    except ImportError as error:
+        raise ConfigError("xarray", "is not installed: pip install 'cspr_jax[xarray]'") from error
+
+
+def dataset(
+    variables: Mapping[str, tuple[tuple[str, ...], np.ndarray]],
+    axes: Mapping[str, Any],
+    attributes: Mapping[str, Any] | None = None,
+) -> "xarray.Dataset":
+    """A dataset whose variables and axes bear what the table of quantities says of them.
+
+    Args:
+        variables: names of dimensions and values by name.
+        axes: (n,) coordinates by name.
+        attributes: of the whole dataset.
+
+    Returns:
+        the dataset.
+
+    Raises:
+        ConfigError: xarray is not installed.
+    """
+    need_xarray()
+    import xarray
+
+    return xarray.Dataset(
+        {name: (dims, values, _described(name)) for name, (dims, values) in variables.items()},
+        {name: (name, np.asarray(points), _described(name)) for name, points in axes.items()},
+        attributes,
+    )
+
+
+def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "xarray.Dataset":
+    """A motion: rows over time, and what there is of its segments.
+
+    Args:
+        arrays: by the names of `schema.quantities.TRAJECTORY` and `SEGMENTS`.
+        attributes: of the whole dataset.
+
+    Returns:
+        the dataset, over "t" with "axis", "component" or "cable", and over "segment".
+
+    Raises:
+        ConfigError: xarray is not installed.
+    """
+    cables = range(1, arrays["tension"].shape[1] + 1)
+    axes: dict[str, Any] = {"t": arrays["t"], **PARTS, "cable": np.array(cables)}
+    if "quaternion" not in arrays:
+        del axes["component"]
+    axes |= {"segment": arrays["segment"]} if "segment" in arrays else {}
+    variables = {
+        name: (("segment",) if name in SEGMENTS else ("t", ACROSS[name]), values)
+        for name, values in arrays.items()
+        if name not in axes
+    }
+    return dataset(variables, axes, attributes)
+
+
+def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "xarray.Dataset":
+    """Answers over the product of some dimensions.
+
+    Args:
+        arrays: (n,), or (n, 2) for both ends of a segment, by name.
+        dims: coordinates by name, the last one varying fastest; None: one dimension "target".
+
+    Returns:
+        the dataset.
+
+    Raises:
+        InputError: dimensions of another number of points.
+        ConfigError: xarray is not installed.
+    """
+    count = len(next(iter(arrays.values())))
+    axes = {name: np.asarray(points) for name, points in ({"target": range(count)} if dims is None else dims).items()}
+    shape = tuple(points.size for points in axes.values())
+    if any(points.ndim != 1 for points in axes.values()) or math.prod(shape) != count:
+        given = {name: list(points.shape) for name, points in axes.items()}
+        raise InputError("dims", given, f"lists of coordinates whose product has {count} points")
+    both = {"end": ENDS} if any(values.ndim > 1 for values in arrays.values()) else {}
+    variables = {
+        name: ((*axes, *both) if values.ndim > 1 else tuple(axes), values.reshape(*shape, *values.shape[1:]))
+        for name, values in arrays.items()
+    }
+    found = dataset(variables, axes | both)
+    if "beta_hat" in found and both:
+        found["beta_hat"].attrs = {"units": "1", "long_name": "beta-hat"}  # the table's is at the target alone
+    return found
+
+
+def _described(name: str) -> dict[str, Any]:
+    if name not in EVERY:
+        return {}
+    quantity = EVERY[name]
+    found = {"units": quantity.units, "long_name": quantity.long_name, "description": quantity.description}
+    return found | (flag_attributes() if name.endswith("verdict") else {})
