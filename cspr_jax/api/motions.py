@@ -7,30 +7,28 @@ float64, as searches use whatever jax is set to.
 from typing import Any
 
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 
+from cspr_jax.api.arguments import amplitude_of, kernel_problem
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility import slacks as feasibility
+from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.problem import limits_over, prepared
+from cspr_jax.problem import prepared
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
-from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
+from cspr_jax.search.pose_targets import REFERENCE
 from cspr_jax.trajectories import transition as transitions
-from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors, named
+from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.hypocycloid import Hypocycloid, segment
 from cspr_jax.trajectories.motion import Motion, Placed, inward
 from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, pose_segment
-
-REFERENCE = (1.0, 0.0, 0.0, 0.0)
-AT_REST = -1.0
 
 
 def make_problem(
@@ -49,8 +47,7 @@ def make_problem(
     Raises:
         InputError: limits that contradict each other, an unknown amplitude function, or too many cables.
     """
-    check_determined(robot)
-    return Problem(prepared(robot)[0], limits_over(robot, limits), _amplitude(amplitude))
+    return kernel_problem(robot, amplitude, limits, free_end=None)[0]
 
 
 def hypocycloid(
@@ -73,7 +70,7 @@ def hypocycloid(
         InputError: another kind of robot, or an amplitude function that breaks (2.49).
     """
     own, frame = _prepared(robot, PointMassRobot, (3,), "a point mass on three cables")
-    function, p = _amplitude(amplitude, free_end=False), jnp.asarray(arcs, float)
+    function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     first, last = _places(frame, start, end, z0)
     found = segment(own, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
     return Placed(Hypocycloid(found, function, p), frame)
@@ -98,7 +95,7 @@ def transition(
         InputError: another kind of robot, or an amplitude function that breaks (1.27) or (1.28).
     """
     own, frame = _prepared(robot, PointMassRobot, (2, 3), "a point mass")
-    function = _amplitude(amplitude, free_end=True)
+    function = amplitude_of(amplitude, free_end=True)
     end = jnp.asarray(frame.inward(target), float)
     found = transitions.transition(own, function, end, jnp.asarray(z0, float))
     return Placed(Hypocycloid(found, function, 2.0 * jnp.asarray(oscillations, float)), frame)
@@ -136,7 +133,7 @@ def platform_motion(
         InputError: another kind of robot, or an amplitude function that breaks (2.49).
     """
     own, frame = _prepared(robot, PlatformRobot, (6,), "a platform on six cables")
-    function, p = _amplitude(amplitude, free_end=False), jnp.asarray(arcs, float)
+    function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     places = _places(frame, start, end, z0)
     turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
     bends = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
@@ -206,14 +203,3 @@ def _prepared(robot: Any, kind: type, dofs: tuple[int, ...], allowed: str) -> tu
     if not isinstance(robot, kind) or robot.dof not in dofs or robot.n_cables != robot.dof:  # type: ignore[attr-defined]
         raise InputError("robot", getattr(robot, "name", robot), allowed)
     return prepared(robot)
-
-
-def _amplitude(given: str | Amplitude, *, free_end: bool | None = None) -> Amplitude:
-    found = named(given) if isinstance(given, str) else given
-    # What jax is tracing cannot be checked.
-    if free_end is not None and isinstance(found.coefficients, np.ndarray):
-        broken = boundary_errors(found, free_end=free_end)
-        if broken:
-            conditions = "(1.27) and (1.28)" if free_end else "(2.49)"
-            raise InputError("amplitude", found.name, f"one that meets {conditions}: " + "; ".join(broken))
-    return found

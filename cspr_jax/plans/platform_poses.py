@@ -13,7 +13,6 @@ from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import Pose
-from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.platform.checker import FEW, MANY, TOUCH, PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST, endpoint
@@ -26,6 +25,7 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular
+from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.search.beta_hat import BEYOND, cheapest_path, options
 from cspr_jax.search.platform_answers import PoseAnswers, settled
 from cspr_jax.search.platform_arcs import Candidates, Found, smallest_arcs

@@ -6,9 +6,9 @@ import numpy as np
 
 from cspr_jax.config.reading import Table
 from cspr_jax.config.sweep import Axes, SweepFile
-from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, kinds_with
 
 _TARGETS = ("x", "y", "radius", "azimuth", "z")
