@@ -68,5 +68,14 @@ def platform(
         InputError: what a robot file with these numbers would be refused for.
     """
     centre = (0.0, 0.0, 0.0) if centre_of_mass is None else centre_of_mass
-    more = {"gravity": gravity, "name": name, "z_axis": z_axis, "limits": limits}
-    return platform_robot(base_points, platform_points, mass=mass, inertia=inertia, centre_of_mass=centre, **more)
+    return platform_robot(
+        base_points,
+        platform_points,
+        mass=mass,
+        inertia=inertia,
+        centre_of_mass=centre,
+        gravity=gravity,
+        name=name,
+        z_axis=z_axis,
+        limits=limits,
+    )

@@ -118,7 +118,8 @@ class Frame:
         Returns:
             (..., 4).
         """
-        return _numbers(quaternions) * np.append(1.0, self.signs)
+        # The first sign is always +1, as that of the scalar part is.
+        return _numbers(quaternions) * self.signs[np.array([0, 0, 1, 2])]
 
 
 def frame_of(base_points, z_axis: str) -> Frame:

@@ -171,6 +171,8 @@ def checked_points(key: str, given, least: int) -> np.ndarray:
     Raises:
         InputError: fewer, another shape, not finite, too far away; three or more on one line, or two at one place.
     """
+    if isinstance(given, jax.core.Tracer):
+        raise InputError(key, "a traced array", "numbers; to differentiate, dataclasses.replace(robot, ...) takes both")
     points = np.asarray(given, float)
     if points.ndim != 2 or points.shape[1] != 3 or not (np.abs(points) <= LARGEST_LENGTH).all():
         raise InputError(key, given, f"{least} points or more of three coordinates, at most 1e6 m")

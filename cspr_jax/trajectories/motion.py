@@ -145,6 +145,6 @@ def outward(frame: Frame, state: State) -> State:
     turned |= {name: frame.turned(getattr(state, name)) for name in ("velocity", "acceleration")}
     if state.rotation is not None:
         turned["quaternion"] = None if state.quaternion is None else frame.turned_quaternions(state.quaternion)
-        turned["rotation"] = frame.signs[:, None] * state.rotation * frame.signs
+        turned["rotation"] = frame.turned_tensor(state.rotation)
         turned |= {name: frame.turned(getattr(state, name)) for name in ("angular_velocity", "angular_acceleration")}
     return State(**turned)
