@@ -27,7 +27,7 @@ def main() -> None:
     from cspr_jax.config.reading import checked
     from cspr_jax.config.robot import resolve_robot
     from cspr_jax.config.sweep import SweepFile
-    from cspr_jax.maps.poses import PoseMap
+    from cspr_jax.maps.poses import PosesMap
 
     here = Path(__file__)
     start = {"position": [1.2, -0.4, 1.5], "tilt_torsion": [0.5, 0.4, 0.2]} if options.from_pose else {"rest": True}
@@ -45,7 +45,7 @@ def main() -> None:
     }
     if not options.search:
         keys["trajectory"]["beta_hat"] = "preferred"
-    poses = PoseMap(resolve_robot("laval-mssm", here, here.parent), checked(SweepFile, keys, here), here)
+    poses = PosesMap(resolve_robot("laval-mssm", here, here.parent), checked(SweepFile, keys, here), here)
     rng, count = np.random.default_rng(0), options.count
     radius, azimuth = 3.0 * np.sqrt(rng.random(count)), rng.uniform(-np.pi, np.pi, count)
     cells = {

@@ -11,11 +11,24 @@ if TYPE_CHECKING:
     from cspr_jax.api.examples import list_examples as list_examples
     from cspr_jax.api.lists import list_quantities as list_quantities
     from cspr_jax.api.lists import list_robots as list_robots
+    from cspr_jax.api.motions import hypocycloid as hypocycloid
+    from cspr_jax.api.motions import make_problem as make_problem
+    from cspr_jax.api.motions import platform_motion as platform_motion
+    from cspr_jax.api.motions import sampled_margin as sampled_margin
+    from cspr_jax.api.motions import slacks as slacks
+    from cspr_jax.api.motions import tensions as tensions
+    from cspr_jax.api.motions import transition as transition
     from cspr_jax.api.pictures import plot as plot
     from cspr_jax.api.plans import plan as plan
+    from cspr_jax.api.platform_searches import accessible as accessible
+    from cspr_jax.api.platform_searches import attainable as attainable
+    from cspr_jax.api.platform_searches import minimum_pose_arcs as minimum_pose_arcs
+    from cspr_jax.api.robots import platform as platform
+    from cspr_jax.api.robots import point_mass as point_mass
     from cspr_jax.api.runs import status as status
     from cspr_jax.api.runs import verify as verify
     from cspr_jax.api.searches import minimum_arcs as minimum_arcs
+    from cspr_jax.api.searches import minimum_oscillations as minimum_oscillations
     from cspr_jax.api.speed import benchmark as benchmark
     from cspr_jax.api.sweeps import compute as compute
     from cspr_jax.api.sweeps import run as run
@@ -34,47 +47,73 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "Limits": ("cspr_jax.robots.limits", "Limits"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
+    "accessible": ("cspr_jax.api.platform_searches", "accessible"),
     "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
+    "attainable": ("cspr_jax.api.platform_searches", "attainable"),
     "benchmark": ("cspr_jax.api.speed", "benchmark"),
     "compute": ("cspr_jax.api.sweeps", "compute"),
     "copy_examples": ("cspr_jax.api.examples", "copy_examples"),
+    "hypocycloid": ("cspr_jax.api.motions", "hypocycloid"),
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
     "list_examples": ("cspr_jax.api.examples", "list_examples"),
     "list_quantities": ("cspr_jax.api.lists", "list_quantities"),
     "list_robots": ("cspr_jax.api.lists", "list_robots"),
     "load_robot": ("cspr_jax.problem", "load_robot"),
+    "make_problem": ("cspr_jax.api.motions", "make_problem"),
     "minimum_arcs": ("cspr_jax.api.searches", "minimum_arcs"),
+    "minimum_oscillations": ("cspr_jax.api.searches", "minimum_oscillations"),
+    "minimum_pose_arcs": ("cspr_jax.api.platform_searches", "minimum_pose_arcs"),
     "open_result": ("cspr_jax.store.result", "open_result"),
     "plan": ("cspr_jax.api.plans", "plan"),
+    "platform": ("cspr_jax.api.robots", "platform"),
+    "platform_motion": ("cspr_jax.api.motions", "platform_motion"),
     "plot": ("cspr_jax.api.pictures", "plot"),
+    "point_mass": ("cspr_jax.api.robots", "point_mass"),
     "point_mass_robot": ("cspr_jax.robots.point_mass", "point_mass_robot"),
     "run": ("cspr_jax.api.sweeps", "run"),
+    "sampled_margin": ("cspr_jax.api.motions", "sampled_margin"),
+    "slacks": ("cspr_jax.api.motions", "slacks"),
     "status": ("cspr_jax.api.runs", "status"),
     "table": ("cspr_jax.api.tables", "table"),
     "table_names": ("cspr_jax.api.tables", "table_names"),
+    "tensions": ("cspr_jax.api.motions", "tensions"),
+    "transition": ("cspr_jax.api.motions", "transition"),
     "verify": ("cspr_jax.api.runs", "verify"),
 }
-__all__ = [
+__all__ = [  # as `_PUBLIC`, for those that read it without running it
     "Limits",
     "Verdict",
+    "accessible",
     "amplitude",
+    "attainable",
     "benchmark",
     "compute",
     "copy_examples",
+    "hypocycloid",
     "keep_compiled_code",
     "list_examples",
     "list_quantities",
     "list_robots",
     "load_robot",
+    "make_problem",
     "minimum_arcs",
+    "minimum_oscillations",
+    "minimum_pose_arcs",
     "open_result",
     "plan",
+    "platform",
+    "platform_motion",
     "plot",
+    "point_mass",
     "point_mass_robot",
     "run",
+    "sampled_margin",
+    "slacks",
     "status",
     "table",
     "table_names",
+    "tensions",
+    "transition",
     "verify",
 ]
 

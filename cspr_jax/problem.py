@@ -1,15 +1,16 @@
 """From checked files to what the kernels take: robot, limits, amplitude function, axes."""
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
-from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, from_tilt_torsion
-from cspr_jax.config.plan import PlanFile
+from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
 from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
@@ -20,6 +21,7 @@ from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
 from cspr_jax.robots.reference_pose import aligned, reference_pose
 from cspr_jax.schema.families import FAMILIES
+from cspr_jax.schema.limits import LIMITS, Limit
 from cspr_jax.trajectories import amplitudes
 from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors
 from cspr_jax.trajectories.platform_segment import Kind
@@ -40,8 +42,21 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
     if isinstance(robot, PlatformRobot):
         changes["platform_points"] = leaf(frame.turned(robot.platform_points))
-        changes["inertia"] = leaf(np.asarray(robot.inertia) * np.outer(frame.signs, frame.signs))
+        changes["inertia"] = frame.turned_tensor(leaf(robot.inertia))
     return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
+
+
+def prepared(robot: RobotKind) -> tuple[RobotKind, Frame]:
+    """A robot as the kernels take it, a platform also in its reference axes.
+
+    Args:
+        robot: in its own axes.
+
+    Returns:
+        the robot, and the frame that takes points to it and back.
+    """
+    own, frame = centred(robot)
+    return (aligned(own)[0] if isinstance(own, PlatformRobot) else own), frame  # type: ignore[return-value]
 
 
 def gravity_of(spec: RobotFile, keys: TrajectoryKeys) -> float:
@@ -111,16 +126,15 @@ def point_mass_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointM
         the robot, centred.
 
     Raises:
-        ConfigError: its geometry cannot be used, or it is a rigid platform.
+        ConfigError: its geometry cannot be used, it has more cables than degrees of freedom, or is a rigid platform.
     """
-    robot = build_robot(spec, keys, file)
-    if isinstance(robot, PlatformRobot):
+    if spec.is_platform:
         raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass here')
-    return centred(robot)[0]
+    return _determined(spec, keys, file)
 
 
 def platform_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PlatformRobot:
-    """The six-cable robot of a file, as the kernels take it; its platform axes are still those of the file.
+    """The platform of a file, as the kernels take it; its platform axes are still those of the file.
 
     Args:
         spec: the robot file's content.
@@ -131,11 +145,23 @@ def platform_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Platform
         the robot, centred.
 
     Raises:
-        ConfigError: its geometry or inertia cannot be used, or it is a point mass.
+        ConfigError: its geometry or inertia cannot be used, it has more than six cables, or is a point mass.
     """
-    robot = build_robot(spec, keys, file)
-    if not isinstance(robot, PlatformRobot):
+    if not spec.is_platform:
         raise ConfigError(file, f'robot "{spec.name}" is a point mass: must be a platform on six cables here')
+    return _determined(spec, keys, file)
+
+
+def _determined(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Any:
+    # Centred; its tensions follow from its motion.
+    robot: Any = build_robot(spec, keys, file)
+    if robot.n_cables != robot.dof:
+        place, key = spec.placed("base_points", file)
+        raise ConfigError(
+            place,
+            f'{key}: {robot.n_cables} points: must be {robot.dof} for family "{keys.family}" '
+            "(plans and maps of more cables than degrees of freedom do not exist yet)",
+        )
     return centred(robot)[0]
 
 
@@ -148,6 +174,8 @@ def fault_at_rest(spec: RobotFile) -> str | None:
     Returns:
         the reason; None if it hangs with every cable taut.
     """
+    if len(spec.base_points) > spec.dof:
+        return "not known: more cables than degrees of freedom share the weight in many ways"
     try:
         if spec.is_platform:
             robot = platform_of(spec, TrajectoryKeys(), spec.name)
@@ -210,19 +238,10 @@ def build_limits(spec: RobotFile, keys: LimitKeys, floor: float | None, file: ob
     Raises:
         ConfigError: a smallest tension that is not below the largest, or a list of another length.
     """
-    found = {}
-    for name in LimitKeys.model_fields:
-        value = getattr(keys, name) if getattr(keys, name) is not None else getattr(spec, name)
-        if isinstance(value, list) and len(value) != len(spec.base_points):
-            raise ConfigError(
-                file, f"{name} = {shown(value)}: must be one number, or {len(spec.base_points)}: one a cable"
-            )
-        found[name] = None if value is None else leaf(np.broadcast_to(np.asarray(value, float), len(spec.base_points)))
-    low, high = found["tension_min"], found["tension_max"]
-    if low is not None and high is not None and not (np.asarray(low) < np.asarray(high)).all():
-        raise ConfigError(file, f"tension_min = {np.asarray(low).tolist()}: must be below tension_max for every cable")
-    depth = None if floor is None else leaf(frame_of(spec.base_points, spec.z_axis).depth(floor))
-    return Limits(floor=depth, **found)
+    try:
+        return _limits(spec, vars(keys) | {"floor": floor}, vars(spec), "")
+    except InputError as error:
+        raise ConfigError(file, str(error)) from error
 
 
 def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None) -> Limits:
@@ -239,33 +258,37 @@ def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None) ->
         InputError: numbers of another count, or no limits at all: not finite, a length or speed that is not positive,
             a smallest tension that is not below the largest.
     """
+    return _limits(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
+
+
+def _limits(robot, given: Mapping[str, Any], own: Mapping[str, Any], at: str) -> Limits:
+    # What is given over the robot's own; `robot` has base_points and z_axis of its file.
     n_cables, found = len(robot.base_points), dict[str, Any]()
-    for name in LimitKeys.model_fields:
-        value = getattr(limits or NO_LIMITS, name)
-        value = getattr(robot.limits, name) if value is None else value
-        if value is None:
-            found[name] = None
-            continue
-        numbers = np.asarray(value, float)
-        low = 0.0 if name == "tension_min" else np.nextafter(0.0, 1.0)
-        if numbers.shape not in ((), (n_cables,)) or not ((numbers >= low) & np.isfinite(numbers)).all():
-            sign = ">= 0" if name == "tension_min" else "> 0"
-            raise InputError(f"limits.{name}", value, f"a finite number {sign}, or {n_cables} of them: one a cable")
-        found[name] = leaf(np.broadcast_to(numbers, n_cables))
+    for row in LIMITS:
+        value = given.get(row.name)
+        value = own.get(row.name) if value is None else value
+        found[row.name] = None if value is None else _limit(row, value, n_cables, at)
     low, high = found["tension_min"], found["tension_max"]
     if low is not None and high is not None and not (low < high).all():
-        raise InputError("limits.tension_min", low.tolist(), "below tension_max for every cable")
-    floor = None if limits is None else limits.floor
-    if floor is not None and not (np.ndim(floor) == 0 and np.isfinite(floor)):
-        raise InputError("limits.floor", floor, "a finite number: z of the floor")
-    depth = None if floor is None else leaf(frame_of(robot.base_points, robot.z_axis).depth(floor))
-    return Limits(floor=depth, **found)
+        raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
+    if found["floor"] is not None:
+        found["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(found["floor"]))
+    return Limits(**found)
+
+
+def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
+    numbers = np.asarray(value, float)
+    least = -np.inf if not row.per_cable else 0.0 if row.from_zero else np.nextafter(0.0, 1.0)
+    shapes = [(), (n_cables,)] if row.per_cable else [()]
+    if numbers.shape not in shapes or not ((numbers >= least) & np.isfinite(numbers)).all():
+        raise InputError(f"{at}{row.name}", value, row.allowed + f", or {n_cables}: one a cable" * row.per_cable)
+    return leaf(np.broadcast_to(numbers, (n_cables,) if row.per_cable else ()))
 
 
 def build_problem(
     spec: RobotFile,
     keys: TrajectoryKeys,
-    limits: LimitTable | PlanFile,
+    limits: LimitTable,
     file: object,
     *,
     epsilon: float | None = None,
@@ -291,7 +314,7 @@ def build_problem(
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     given = build_limits(spec, limits, limits.floor, file)
-    robot, _ = centred(build_robot(spec, keys, file))
+    robot = _determined(spec, keys, file)
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
 
 
@@ -319,9 +342,7 @@ def orientations(frame: Frame, points: np.ndarray, angles: np.ndarray) -> np.nda
     Returns:
         (n, 4) unit quaternions.
     """
-    own = frame.turned(points)
-    towards = np.arctan2(own[:, 1], own[:, 0])
-    return frame.turned_quaternions(from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
+    return frame.turned_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.turned(points))))
 
 
 def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> np.ndarray:

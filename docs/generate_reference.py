@@ -9,6 +9,7 @@ from cspr_jax.config.robot import LimitTable, RobotFile
 from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepTrajectory
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.errors import ExitCode
+from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
 from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.verdicts import SENTENCES
 
@@ -52,6 +53,17 @@ lies at depth z0 below the centroid of the spools, along the vertical. Numbers a
 products stay finite: coordinates and lengths of the geometry to 1e6 m, masses, gravity, limits and coefficients to 1e9,
 parts of an inertia tensor to 1e18, angles to 100 rad.
 """
+MAPS = """## Kinds of maps
+
+All take x and y, or radius and azimuth, and z of the targets; keys that only other kinds name here are refused.
+Of its quantities those in **bold** are stored where `run.store` does not say.
+"""
+STARTS = {
+    "rest": "P0, at rest",
+    "point": "`trajectory.from`, or axes `from_x`, `from_y`, `from_z`",
+    "pose": "`trajectory.from`, or P0, at rest",
+}
+
 MOTION = """## Columns of a motion
 
 `cspr plan -o FILE.csv` writes `t`, then `_x _y _z`, `_w _x _y _z` or `_1 _2 _3` of each, `samples` rows a segment; with
@@ -79,6 +91,8 @@ def reference_text() -> str:
         for place, model in tables:
             parts.append((f"`{place}`: " if place else "") + (model.__doc__ or "").split("\n")[0] + "\n")
             parts.append(_keys(model))
+    parts.append(MAPS)
+    parts += [_kind(kind) for kind in MAP_KINDS.values()]
     parts.append("## Quantities of a result\n\n" + _quantities(QUANTITIES) + "\nAxes:\n\n" + _quantities(AXES))
     parts.append(MOTION)
     parts.append(_quantities(TRAJECTORY) + "\nOf each segment, in HDF5 files:\n\n" + _quantities(SEGMENTS))
@@ -95,6 +109,23 @@ def _keys(model: type[BaseModel]) -> str:
         required = "required" if field.is_required() else _default(field.default)
         rows += f"| `{field.alias or name}` | {required} | {_cell(field.description or '')} |\n"
     return f"| key | default | meaning |\n|---|---|---|\n{rows}"
+
+
+def _kind(kind: MapKind) -> str:
+    asked = {
+        "trajectory.family": " or ".join(f"`{name}`" for name in kind.families),
+        "starts from": STARTS[kind.start] if {*kind.quantities} > {*kind.motionless} else "",
+        "needs": _names(kind.needs),
+        "needs one of": _names(kind.one_of),
+        "takes": _names(kind.takes),
+        "quantities": ", ".join(f"**`{name}`**" if name in kind.stored else f"`{name}`" for name in kind.quantities),
+    }
+    lines = "".join(f"- {words}: {text}\n" for words, text in asked.items() if text)
+    return f"`{kind.name}`: {kind.description}\n\n{lines}"
+
+
+def _names(names: tuple[str, ...]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
 
 
 def _default(value: object) -> str:

@@ -85,7 +85,12 @@ PLANS = {
     "spools far away": (ROBOT, inline("[[0, 1e300, 0], [1, 0, 0], [0, 0, 1]]"), "robot.base_points"),
     "vertical spools": (ROBOT, inline(UPRIGHT), "robot.base_points", "plane is not vertical"),
     "tensions crossed": (Z0, f"{Z0}\ntension_min = 2.0\ntension_max = 2.0", "tension_min", "below tension_max"),
-    "two tensions": (Z0, f"{Z0}\ntension_min = [2.0, 1.0]", "tension_min = [2.0, 1.0]", "one number, or 3"),
+    "two tensions": (
+        Z0,
+        f"{Z0}\ntension_min = [2.0, 1.0]",
+        "tension_min = [2.0, 1.0]",
+        ">= 0, or 3: one a cable",
+    ),
     "A1": (Z0, f'{Z0}\namplitude = "A1"', 'amplitude = "A1"', "(2.49)", "A''(1) = -12, must be 0"),
     "amplitude": (Z0, f'{Z0}\namplitude = "A4"', 'amplitude = "A4"', "quintic"),
     "polynomial": (Z0, f"{Z0}\namplitude = {{ polynomial = [0, 1] }}", "amplitude", "(2.49)", "A'(0) = 1, must be 0"),

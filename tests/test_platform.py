@@ -196,7 +196,7 @@ def test_wrench_balance(robot):
         wanted = oracle.tensions(robot, position, rotation, ratios).reshape(6)
         np.testing.assert_allclose(tension, wanted, rtol=1e-8, atol=1e-8 * scale)
         wanted = np.sign(np.linalg.det(oracle.jacobian(robot, position, rotation)))
-        assert np.sign(wrench_balance.conditioning(found, pose.position, pose.rotation)) == wanted
+        assert np.sign(wrench_balance.normalised_determinant(found, pose.position, pose.rotation)) == wanted
 
 
 def test_work_of_the_cables_is_the_change_of_energy():
@@ -276,7 +276,7 @@ def test_the_catalogue_hangs_still(name):
         found = reference_pose(robot, depth * span)
         np.testing.assert_allclose(found.tensions, 1.0, atol=2e-3)
         np.testing.assert_allclose(found.rotation, np.eye(3), atol=2e-3)
-        assert np.sign(found.conditioning) == (1.0 if name == "nist-robocrane" else -1.0)
+        assert np.sign(found.determinant) == (1.0 if name == "nist-robocrane" else -1.0)
     assert len(pairs_apart(robot)) == (9 if name in ("laval-mssm", "nist-robocrane") else 12)
     assert "placeholder" in spec.source
 
@@ -291,7 +291,7 @@ def test_the_reference_orientation_is_found():
             MSSM, platform=MSSM.platform @ turn.T, inertia=turn @ MSSM.inertia @ turn.T, com=np.zeros(3)
         )
         found = reference_pose(ours(robot), Z0)
-        assert abs(found.conditioning) == pytest.approx(abs(plain.conditioning), rel=1e-9)
+        assert abs(found.determinant) == pytest.approx(abs(plain.determinant), rel=1e-9)
         np.testing.assert_allclose(found.tensions, 1.0, atol=1e-9)
         np.testing.assert_allclose(found.robot.inertia, MSSM.inertia, atol=1e-12)
 
@@ -343,7 +343,7 @@ def readable(package, poses):
     def one(*x):
         pose = State(*x)
         found = wrench_balance.tensions_per_length(package, pose)
-        return found, wrench_balance.conditioning(package, pose.position, pose.rotation)
+        return found, wrench_balance.normalised_determinant(package, pose.position, pose.rotation)
 
     return jax.vmap(one)(*poses)
 
@@ -371,7 +371,7 @@ def test_the_fast_kernel(robot, name, kind):
     """The smallest tension of many segments as the readable functions give it; -inf past a singularity."""
     package, rng, amplitude = ours(robot), np.random.default_rng(9), AMPLITUDES[name][0]
     rest = (jnp.array([0.0, 0.0, Z0]), jnp.eye(3))
-    reference = float(wrench_balance.conditioning(package, *rest))
+    reference = float(wrench_balance.normalised_determinant(package, *rest))
     for p in (1, 4, 7):
         tau = np.linspace(0.0, 1.0, 32)
         some = [

@@ -9,12 +9,22 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import platform as oracle
 
+import cspr_jax
+from cspr_jax.arithmetic import minima, rotations
+from cspr_jax.cli import main
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, read_robot
 from cspr_jax.errors import InputError
+from cspr_jax.feasibility.limits import Values, scales, slack, values
+from cspr_jax.feasibility.point_mass import proof_slacks
+from cspr_jax.problem import centred, fault_at_rest
 from cspr_jax.robots import force_balance, wrench_balance
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.point_mass import planar_robot, plane_normal, point_mass_robot
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
+from cspr_jax.schema.limits import LIMITS
 
 RNG = np.random.default_rng(5)
 RING = np.array([[np.cos(a), np.sin(a), 0.1 * np.sin(3.0 * a)] for a in np.arange(8) * 0.7])
@@ -118,7 +128,7 @@ UPRIGHT = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]
     [
         (point_mass_robot, equilateral(1.0)[:2], "base_points: 2 points: must be 3 or more, one a cable"),
         (planar_robot, [[1.0, 0.0, 0.0]], "base_points: 1 points: must be 2 or more, one a cable"),
-        (point_mass_robot, LINE, "not all on one line"),
+        (point_mass_robot, LINE, "not on one line"),
         (point_mass_robot, UPRIGHT, "plane is not vertical"),
         (point_mass_robot, np.zeros((3, 2)), "three coordinates"),
         (planar_robot, [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], "not on a vertical line"),
@@ -132,3 +142,145 @@ UPRIGHT = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]
 def test_geometry_that_is_none(make, points, line):
     with pytest.raises(InputError, match=line):
         make(points, mass=1.0)
+
+
+def test_what_is_singular():
+    """One rule: what is beyond a singularity, or no number, is not regular either; the reference pose is."""
+    found = wrench_balance.is_regular(np.array([1.0, 2e-6, 1e-7, -1e-7, -1.0, np.nan]))
+    assert found.tolist() == [True, True, False, False, False, False]
+    share = wrench_balance.determinant_share(ROBOTS["six"], jnp.array([0.0, 0.0, 1.2]), jnp.eye(3))
+    assert float(share) == pytest.approx(1.0)
+
+
+def test_cylindrical_frames_turn_with_their_place():
+    """(3.98): a tilt towards the vertical axis is one, wherever the place lies; a turn about it moves both alike."""
+    places, angle = np.array([[1.0, 0.2, 1.0], [-0.3, 0.8, 2.0], [-1.0, -1.0, 1.0]]), 0.7
+    turned = places @ rotations.about_vertical(angle).T
+    shift = rotations.cylindrical_frames(turned) - rotations.cylindrical_frames(places)
+    np.testing.assert_allclose(np.cos(shift[:, 0] - angle), 1.0, atol=1e-14)
+    assert (shift[:, 1:] == 0.0).all()
+
+
+def test_golden_sections_find_a_minimum():
+    def function(x):
+        return jnp.abs(x - 0.3) + 0.1 * x**2
+
+    left, right = minima.inner_points(jnp.asarray(0.0), jnp.asarray(1.0))
+    bracket = minima.Bracket(jnp.asarray(0.0), jnp.asarray(1.0), left, right, function(left), function(right))
+    for _ in range(40):
+        bracket, value = minima.golden_step(function, bracket)
+    assert float(bracket.low) <= 0.3 + 1e-9 and float(bracket.high) >= 0.3 - 1e-9
+    assert float(bracket.high - bracket.low) == pytest.approx(minima.GOLDEN**40, rel=1e-6, abs=1e-15)
+    assert float(value) == pytest.approx(0.009, abs=1e-7)
+
+
+SPOOLS = [[-2.0, -2.0, 3.0], [2.0, -2.0, 3.1], [2.0, 2.0, 3.0], [-2.0, 2.0, 2.9]]
+BOX = [*SPOOLS, *([x, y, 0.0] for x, y, _ in SPOOLS)]
+CORNERS = [[0.1 * x, 0.1 * y, 0.05 * z] for x, y, z in BOX]
+FILES = {
+    "four": ("3T", SPOOLS, ""),
+    "three planar": ("2T", [[-1, 0, 2], [1, 0, 2.5], [0, 0, 0]], "planar = true"),
+    "seven": ("3R3T", BOX[:7], f"platform_points = {CORNERS[:7]}"),
+    "eight": ("3R3T", BOX, f"platform_points = {CORNERS}"),
+    "eight on a mass": ("3T", BOX, ""),
+}
+PLAN = """schema = 1
+robot = "robot.toml"
+family = "{family}"
+z0 = 1.4
+[[pose]]
+rest = true
+[[pose]]
+position = [0.5, 0.0, 1.4]
+"""
+SWEEP = """schema = 1
+map = "{kind}"
+robot = "robot.toml"
+[axes]
+x = [0.5]
+y = [0.0]
+z = [1.4]
+z0 = [1.4]
+[trajectory]
+family = "{family}"
+from = {{ rest = true }}
+"""
+
+
+def written(folder, name):
+    pattern, points, more = FILES[name]
+    body = "inertia = [[0.02, 0, 0], [0, 0.03, 0], [0, 0, 0.04]]" if pattern == "3R3T" else ""
+    each = [round(0.1 * (k + 1), 1) for k in range(len(points))]
+    text = f"""name = "{name}"\nbase_points = {points}\nmass = 2.0\nz_axis = "up"\npattern = "{pattern}"\n{more}\n{body}
+tension_min = {each}\ntension_max = 90.0\ncable_speed_max = 3.0\n"""
+    (folder / "robot.toml").write_text(text)
+    return folder / "robot.toml", each
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_of_any_number_of_cables_load(tmp_path, name):
+    """With their limits, in the file's axes; what a plan or a map would need more for says so in one line."""
+    path, each = written(tmp_path, name)
+    robot, (pattern, points, _) = cspr_jax.load_robot(path), FILES[name]
+    assert (robot.n_cables, robot.z_axis, robot.dof) == (len(points), "up", {"2T": 2, "3T": 3, "3R3T": 6}[pattern])
+    np.testing.assert_array_equal(robot.base_points, points)
+    np.testing.assert_array_equal(robot.limits.tension_min, each)
+    np.testing.assert_array_equal(robot.limits.tension_max, [90.0] * len(points))
+    assert "more cables than degrees of freedom" in fault_at_rest(read_robot(path))
+    at, is_platform = state(robot, RNG), pattern == "3R3T"
+    own = centred(robot)[0]
+    assert np.asarray(own.wrench_matrix(at)).shape == (robot.dof, len(points))
+    if not is_platform and robot.dof != 2:
+        with pytest.raises(InputError, match=f"base_points: {len(points)} points: must be 3"):
+            cspr_jax.minimum_arcs(robot, np.array([[0.5, 0.1, 1.0]]), z0=1.4)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_plans_and_maps_of_more_cables_say_that_they_do_not_exist(tmp_path, name, capsys):
+    path, _ = written(tmp_path, name)
+    is_platform, count = FILES[name][0] == "3R3T", len(FILES[name][1])
+    family = "hypocycloid" if is_platform else "transition" if "planar" in name else "hypocycloid-standard"
+    kind = "poses" if is_platform else "minimum-oscillations" if "planar" in name else "minimum-arcs"
+    head = SWEEP.replace("from = {{ rest = true }}\n", "") if family == "transition" else SWEEP
+    (tmp_path / "plan.toml").write_text(PLAN.format(family=family))
+    (tmp_path / "sweep.toml").write_text(head.format(family=family, kind=kind))
+    freedoms = 6 if is_platform else 2 if "planar" in name else 3
+    for command in (["plan", "plan.toml"], ["run", "sweep.toml", "-o", str(tmp_path / "run")]):
+        code = main([command[0], str(tmp_path / command[1]), *command[2:]])
+        line = capsys.readouterr().err.strip()
+        wanted = f'{path}: base_points: {count} points: must be {freedoms} for family "{family}" (plans and maps'
+        assert code == 2 and wanted in line and len(line.splitlines()) == 1, line
+        assert not (tmp_path / "run").exists()
+
+
+def test_an_inline_robot_of_more_cables_is_named_where_it_stands(tmp_path, capsys):
+    inline = f'{{ name = "r", base_points = {SPOOLS}, mass = 1.0 }}'
+    text = PLAN.format(family="hypocycloid-standard").replace('"robot.toml"', inline)
+    (tmp_path / "plan.toml").write_text(text)
+    assert main(["plan", str(tmp_path / "plan.toml")]) == 2
+    assert "plan.toml: robot.base_points: 4 points: must be 3 for family" in capsys.readouterr().err
+
+
+def test_a_limit_is_one_row():
+    """Keys in files, fields of `Limits`, closed forms of point masses and values of a state: of each row one."""
+    names = [row.name for row in LIMITS]
+    assert {field.name for field in dataclasses.fields(Limits)} == set(names) == set(proof_slacks.CLOSED)
+    assert set(LimitTable.model_fields) == set(names) <= set(PlanFile.model_fields)
+    assert set(LimitKeys.model_fields) == {row.name for row in LIMITS if row.per_cable} <= set(RobotFile.model_fields)
+    assert {row.quantity for row in LIMITS} == set(Values._fields)
+    assert len({(row.quantity, row.sense) for row in LIMITS}) == len(names)
+
+
+@pytest.mark.parametrize("name", ["planar", "three", "six"])
+def test_slacks_of_limits_have_the_sign_of_the_limit(name):
+    """Of a value just inside of each limit, and just outside."""
+    robot, rng = ROBOTS[name], np.random.default_rng(7)
+    now = values(robot, state(robot, rng))
+    scale = scales(robot.n_cables, robot.mass * robot.gravity, jnp.asarray(1.3))
+    for row in LIMITS:
+        value = np.asarray(getattr(now, row.quantity))
+        least = row.sense == "least"
+        for share in (-0.1, 0.1):
+            limit = value - share * np.abs(value) * (1.0 if least else -1.0)
+            found = np.asarray(slack(row, limit, value, scale))
+            assert (np.sign(found) == np.sign(share)).all(), row.name

@@ -16,8 +16,8 @@ from oracles import point_mass
 import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import SelfCheckError
-from cspr_jax.maps.arcs import CellMap
-from cspr_jax.schema.quantities import OF_MAP
+from cspr_jax.maps.arcs import MinimumArcsMap
+from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES as EVERY
 from cspr_jax.sweep.definition import read_sweep
 
@@ -30,7 +30,7 @@ z = { start = 0.5, stop = 2.5, count = 3 }
 """
 FROM = "from = { position = [0.7, 0.7, 3.0] }"
 TILT = [[0.3, 0.05, -0.02], [-0.2, 0.25, 0.06], [-0.1, -0.3, 0.01]]
-QUANTITIES = {name: EVERY[name] for name in OF_MAP["minimum-arcs"]}
+QUANTITIES = {name: EVERY[name] for name in MAP_KINDS["minimum-arcs"].quantities}
 FLOATS = [name for name, quantity in QUANTITIES.items() if quantity.kind == "float"]
 COUNTS = [name for name in QUANTITIES if name not in FLOATS]
 
@@ -183,7 +183,7 @@ def test_a_second_run_computes_nothing_and_another_sweep_is_refused(tiny, tmp_pa
     for path in (tiny[0] / "run").glob("*.*"):
         (folder / path.name).write_bytes(path.read_bytes())
     before = tree(folder)
-    monkeypatch.setattr(CellMap, "__call__", None)
+    monkeypatch.setattr(MinimumArcsMap, "__call__", None)
     code, out, err = cspr("run", tmp_path / "tiny.toml", "-o", folder)
     assert (code, err, out.splitlines()[-1]) == (0, "", str(folder / "tiny.h5"))
     assert "finished" in out.splitlines()[0]
@@ -229,7 +229,7 @@ def test_xarray_sees_names_units_and_flags(tiny):
     ("failure", "code"), [(MemoryError(), 4), (SelfCheckError("tile 1"), 5), (ValueError("a mistake of ours"), 70)]
 )
 def test_a_failure_keeps_what_is_finished(tiny, tmp_path, monkeypatch, failure, code):
-    path, calls, whole = sweep_file(tmp_path, run="tile = [1, 4, 5, 3]"), [], CellMap.__call__
+    path, calls, whole = sweep_file(tmp_path, run="tile = [1, 4, 5, 3]"), [], MinimumArcsMap.__call__
 
     def fails_at_the_second_tile(self, cells):
         calls.append(len(cells["x"]))
@@ -238,7 +238,7 @@ def test_a_failure_keeps_what_is_finished(tiny, tmp_path, monkeypatch, failure, 
         return whole(self, cells)
 
     with monkeypatch.context() as patch:
-        patch.setattr(CellMap, "__call__", fails_at_the_second_tile)
+        patch.setattr(MinimumArcsMap, "__call__", fails_at_the_second_tile)
         found, out, err = cspr("run", path, "-o", tmp_path / "run")
         assert (found, out, calls) == (code, "", [60, 60])
         assert err.splitlines()[-1].startswith("cspr") and (code == 70 or len(err.splitlines()) == 1)
@@ -256,14 +256,14 @@ def test_a_failure_keeps_what_is_finished(tiny, tmp_path, monkeypatch, failure, 
 )
 def test_numbers_that_contradict_each_other_are_refused(tmp_path, monkeypatch, name, value):
     """A processor that miscalculates: nothing of the tile is kept, and the exit code says so."""
-    whole = CellMap.__call__
+    whole = MinimumArcsMap.__call__
 
     def broken(self, cells):
         answers = {key: array.copy() for key, array in whole(self, cells).items()}
         answers[name][np.flatnonzero(answers["arcs"] > 0)[3]] = value
         return answers
 
-    monkeypatch.setattr(CellMap, "__call__", broken)
+    monkeypatch.setattr(MinimumArcsMap, "__call__", broken)
     code, out, err = cspr("run", sweep_file(tmp_path), "-o", tmp_path / "run")
     assert (code, out, len(err.splitlines())) == (5, "", 1) and "1 of 120 cells" in err
     assert sorted(tree(tmp_path / "run")) == ["LOCK", "log.jsonl", "run.json"]
@@ -292,7 +292,7 @@ def test_the_reference_data_set_is_what_the_program_computes():
     places = np.random.default_rng(2).choice(sweep.grid.size, 60, replace=False)
     index = np.unravel_index(places, sweep.grid.shape)
     cells = {name: points[i] for (name, points), i in zip(sweep.grid.axes.items(), index, strict=True)}
-    answers = CellMap(sweep.robot, sweep.keys, sweep.file)(cells)
+    answers = MinimumArcsMap(sweep.robot, sweep.keys, sweep.file)(cells)
     assert set(sweep.store) == set(result.data) and len(np.unique(answers["arcs"])) > 5
     for name, stored in result.data.items():
         rtol = 1e-6 if name in FLOATS else 0.0

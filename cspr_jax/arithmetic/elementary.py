@@ -105,12 +105,12 @@ def leaf(value) -> Array:
     NumPy and not jax: jax would round it to float32 where 64 bits are off.
 
     Args:
-        value: number or nested sequence.
+        value: number or nested sequence; what jax is tracing stays as it is.
 
     Returns:
         the array.
     """
-    return cast(Array, np.asarray(value, float))
+    return value if isinstance(value, jax.core.Tracer) else cast(Array, np.asarray(value, float))
 
 
 def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:

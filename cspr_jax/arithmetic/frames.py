@@ -87,6 +87,28 @@ class Frame:
         """
         return _numbers(vectors) * self.signs
 
+    def turned_tensor(self, tensor):
+        """A tensor in the other axes, either way.
+
+        Args:
+            tensor: (3, 3), NumPy or jax.
+
+        Returns:
+            (3, 3).
+        """
+        return self.signs[:, None] * tensor * self.signs
+
+    def turned_angles(self, angles) -> np.ndarray:
+        """Angles of tilt and torsion in the other axes, either way.
+
+        Args:
+            angles: (..., 3) phi, theta, sigma.
+
+        Returns:
+            (..., 3).
+        """
+        return np.asarray(angles, float) * np.array([self.signs[1], 1.0, self.signs[2]])
+
     def turned_quaternions(self, quaternions) -> np.ndarray:
         """Orientations in the other axes, either way.
 
@@ -109,7 +131,10 @@ def frame_of(base_points, z_axis: str) -> Frame:
     Returns:
         the frame.
     """
-    points = np.asarray(base_points, float)
+    points, signs = _numbers(base_points), np.array(_TURN[z_axis])
+    if not isinstance(points, np.ndarray):
+        origin = points.mean(0)
+        return Frame(signs, origin, (points - origin).mean(0))
     origin = np.array([math.fsum(column) / len(points) for column in points.T])
     rest = np.array([math.fsum(column) / len(points) for column in (points - origin).T])
-    return Frame(np.array(_TURN[z_axis]), origin, rest)
+    return Frame(signs, origin, rest)

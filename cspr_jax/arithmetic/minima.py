@@ -1,11 +1,72 @@
-"""Smallest values of functions of normalised time that may have kinks, narrowed down around their smallest samples."""
+"""Smallest values: golden sections of one function, and of many that may have kinks around their smallest samples."""
 
+import math
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
+
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 # Places looked at for each function, points at each, and how often: each round is eight times as fine as the last.
 PLACES, POINTS, ROUNDS = 3, 17, 4
+
+
+class Bracket(NamedTuple):
+    """An interval in which a function falls and then rises, with two points that divide it by the golden section.
+
+    Fields:
+        low: (...).
+        high: (...).
+        left: (...) the point nearer to `low`.
+        right: (...) the other.
+        at_left: (...) value there.
+        at_right: (...).
+    """
+
+    low: Any
+    high: Any
+    left: Any
+    right: Any
+    at_left: Any
+    at_right: Any
+
+
+def inner_points(low, high) -> tuple[Any, Any]:
+    """Two points that divide an interval by the golden section.
+
+    Args:
+        low: (...) numbers, NumPy or jax.
+        high: (...).
+
+    Returns:
+        (...) each, the left and the right one.
+    """
+    step = GOLDEN * (high - low)
+    return high - step, low + step
+
+
+def golden_step(function: Callable, bracket: Bracket, *, left_if_equal: bool = True) -> tuple[Bracket, Any]:
+    """A bracket that is 0.618 times as wide, with one more value of the function.
+
+    Args:
+        function: (...) to (...), of jax.
+        bracket: the wider one.
+        left_if_equal: which side is kept where both points have one value.
+
+    Returns:
+        the bracket, and the new value, (...).
+    """
+    low, high, left, right, at_left, at_right = bracket
+    down = at_left <= at_right if left_if_equal else at_left < at_right
+    low, high = jnp.where(down, low, left), jnp.where(down, right, high)
+    points = inner_points(low, high)
+    fresh = jnp.where(down, *points)
+    value = function(fresh)
+    left, right = jnp.where(down, fresh, right), jnp.where(down, left, fresh)
+    at_left, at_right = jnp.where(down, value, at_right), jnp.where(down, at_left, value)
+    return Bracket(low, high, left, right, at_left, at_right), value
 
 
 def narrowed(function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Orientations as unit quaternions, scalar first."""
 
+import math
+
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -28,6 +30,32 @@ def from_tilt_torsion(angles: np.ndarray) -> np.ndarray:
         ],
         axis=-1,
     )
+
+
+def cylindrical_frames(places: np.ndarray) -> np.ndarray:
+    """Azimuths (3.98) of the cylindrical frames of places, to be added to tilt-and-torsion angles in them.
+
+    Args:
+        places: (..., 3) from a point of the vertical axis.
+
+    Returns:
+        (..., 3) the azimuth, 0, 0, rad.
+    """
+    azimuth = np.arctan2(places[..., 1], places[..., 0])
+    return np.stack([azimuth, np.zeros_like(azimuth), np.zeros_like(azimuth)], axis=-1)
+
+
+def about_vertical(angle: float) -> np.ndarray:
+    """The matrix of a rotation about the z axis.
+
+    Args:
+        angle: rad.
+
+    Returns:
+        (3, 3).
+    """
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def matrix(quaternion: Array) -> Array:

@@ -18,6 +18,7 @@ from cspr_jax.bench.timing import best, operations
 from cspr_jax.feasibility.platform.prefilter import smallest_tensions
 from cspr_jax.problem import load_robot
 from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.trajectories import amplitudes
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment, pose_segment
@@ -192,7 +193,7 @@ def _numpy_checks(given: Work) -> np.ndarray:
     speed, spin = turn * (a1 * beat + a * beat1)[..., None], turn * (a2 * beat + 2 * a1 * beat1 + a * beat2)[..., None]
     reach = (sign * (a * c - a1 * s / theta))[..., None]
     pull = (-sign * ((a * theta**2 + a2) * c + (a1 * theta + a3 / theta) * s) / squared)[..., None]
-    rest, far = np.array([0.0, 0.0, PLACE[2]]), np.array([*PLACE[:2], 0.0])
+    rest, far = rest_point(PLACE[2]), np.array([*PLACE[:2], 0.0])
     position, acceleration = rest + reach * far, pull * far - np.array([0.0, 0.0, gravity])
     e = given.axis[:, None, :]
     skew = np.cross(np.eye(3), given.axis[:, None, :])[:, None]

@@ -14,7 +14,7 @@ from cspr_jax.arithmetic.batches import in_threads
 from cspr_jax.bench.timing import best
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import point_mass_robot
+from cspr_jax.robots.point_mass import point_mass_robot, rest_point
 from cspr_jax.search import arc_sieve
 from cspr_jax.search.point_mass_arcs import segments_between
 from cspr_jax.trajectories import amplitudes
@@ -106,7 +106,7 @@ def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
     tau = (np.arange(arc_sieve.SAMPLES) + 0.5) / arc_sieve.SAMPLES
     amplitude = (10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4)
     bend = 60 * tau - 180 * tau**2 + 120 * tau**3
-    hub, start, g = np.array([0.0, 0.0, Z0]), np.array(START), 9.81
+    hub, start, g = rest_point(Z0), np.array(START), 9.81
     v1, v2 = start - hub, ends - hub
     r1, r2 = np.linalg.norm(v1), np.linalg.norm(v2, axis=1)[:, None]
     q1 = v1 / r1

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 
@@ -67,11 +68,9 @@ def forgotten_axis(spec: RobotFile, targets: Iterable[Sequence[float]]) -> str:
     Returns:
         what to look at, if every target is above every spool; else nothing.
     """
-    heights = [target[2] for target in targets]
-    spools = [point[2] for point in spec.base_points]
-    is_above = max(heights) <= min(spools) if spec.z_axis == "down" and heights else False
-    if spec.z_axis == "up" and heights:
-        is_above = min(heights) >= max(spools)
+    frame = frame_of(spec.base_points, spec.z_axis)
+    depths, spools = (frame.depth([point[2] for point in points]) for points in (targets, spec.base_points))
+    is_above = bool(len(depths)) and depths.max() <= spools.min()
     return f"every target is above every spool: {axis_question(spec.z_axis)}" if is_above else ""
 
 

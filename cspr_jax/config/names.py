@@ -6,6 +6,8 @@ from typing import Any
 from pydantic import PlainValidator
 from pydantic_core import PydanticCustomError
 
+from cspr_jax.config.wording import either
+
 
 def name_of(rows: Callable[[], Iterable[str]]) -> PlainValidator:
     """Validator of a key that names a row.
@@ -20,9 +22,7 @@ def name_of(rows: Callable[[], Iterable[str]]) -> PlainValidator:
     def check(value: Any) -> str:
         names = list(rows())
         if value not in names:
-            quoted = [f"'{name}'" for name in names]
-            expected = " or ".join([", ".join(quoted[:-1]), quoted[-1]] if len(quoted) > 1 else quoted)
-            raise PydanticCustomError("literal_error", "{expected}", {"expected": expected})
+            raise PydanticCustomError("literal_error", "{expected}", {"expected": either(names).replace('"', "'")})
         return value
 
     return PlainValidator(check)

@@ -7,7 +7,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import Table, checked, parse_toml
-from cspr_jax.config.robot import Coordinate, LimitKeys, LimitTable, Point, Positive
+from cspr_jax.config.robot import LimitTable, Point, Positive
 from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, FamilyName, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import shown
@@ -51,7 +51,7 @@ class Pose(Table):
     )
 
 
-class PlanFile(TrajectoryKeys, LimitKeys):
+class PlanFile(TrajectoryKeys, LimitTable):
     """A plan."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
@@ -62,7 +62,6 @@ class PlanFile(TrajectoryKeys, LimitKeys):
         "transitions may give the inclination instead",
     )
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
-    floor: Coordinate | None = Field(None, description="z of the floor, m")
     limits: LimitTable | None = Field(
         None, description="[limits], as in a sweep: the same keys as here, each in one of the two places"
     )

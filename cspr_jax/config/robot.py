@@ -1,72 +1,91 @@
 """Robot files and the catalogue."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import Discriminator, Field, PrivateAttr, Tag, create_model, model_validator
 
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import Table, checked, read_toml
 from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.schema.limits import LIMITS
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 # Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.point_mass`, with jax.
 LARGEST_LENGTH = 1e6
+MOST_CABLES = 1000
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Row = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 PerCable = Annotated[
-    Annotated[Positive, Tag("~one")] | Annotated[list[Positive], Field(min_length=2, max_length=6), Tag("~each")],
+    Annotated[Positive, Tag("~one")]
+    | Annotated[list[Positive], Field(min_length=2, max_length=MOST_CABLES), Tag("~each")],
     Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
 ]
 
 
 NotNegative = Annotated[float, Field(ge=0, le=1e9)]
 NotNegativePerCable = Annotated[
-    Annotated[NotNegative, Tag("~one")] | Annotated[list[NotNegative], Field(min_length=2, max_length=6), Tag("~each")],
+    Annotated[NotNegative, Tag("~one")]
+    | Annotated[list[NotNegative], Field(min_length=2, max_length=MOST_CABLES), Tag("~each")],
     Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
 ]
 
 
-class LimitKeys(Table):
+def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for row in LIMITS:
+        if row.per_cable == per_cable:
+            kind = (NotNegativePerCable if row.from_zero else PerCable) if per_cable else Coordinate
+            text = f"{row.description}{', one number or one a cable' * per_cable}, {row.unit}"
+            found[row.name] = (kind | None, Field(None, description=text))
+    return found
+
+
+# Their fields are rows of `schema.limits.LIMITS`; of a base that it does not know mypy asks nothing.
+_Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=True))
+
+
+class LimitKeys(_Cables):
     """Limits beyond taut cables; a plan's or a sweep's stand over those of the robot file."""
 
-    tension_min: NotNegativePerCable | None = Field(None, description="smallest tension, one number or one a cable, N")
-    tension_max: PerCable | None = Field(None, description="largest tension, one number or one a cable, N")
-    cable_length_max: PerCable | None = Field(None, description="largest cable length, one number or one a cable, m")
-    cable_speed_max: PerCable | None = Field(None, description="largest cable speed, one number or one a cable, m/s")
-    cable_acceleration_max: PerCable | None = Field(
-        None, description="largest cable acceleration, one number or one a cable, m/s^2"
-    )
+
+_Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(per_cable=False))
 
 
-class LimitTable(LimitKeys):
+class LimitTable(_Heights):
     """Limits of all motions of the file."""
 
-    floor: Coordinate | None = Field(None, description="z of the floor, m")
+    if TYPE_CHECKING:
+        floor: float | None = None
 
 
-# What is supported, by the number of spools.
-NUMBERS = {2: "2 (planar = true)", 3: "3 (a point mass)", 6: "6 (a rigid platform, with platform_points and inertia)"}
-SUPPORTED = "supported are " + ", ".join(NUMBERS.values())
+# Motions of the effector, R rotations and T translations, and how a file says which it makes.
+PATTERNS = {
+    "2T": "2 (planar = true)",
+    "3T": "3 (a point mass)",
+    "3R3T": "6 (a rigid platform, with platform_points and inertia)",
+}
+FREEDOMS = {"2T": 2, "3T": 3, "3R3T": 6}
+LEAST = "least numbers of cables are " + ", ".join(PATTERNS.values())
 # Two spools count as level if their heights differ by less than this part of their distance; as in `robots.point_mass`.
 LEVEL = 1e-9
 
 
 class RobotFile(LimitKeys):
-    """A point mass on three cables, or on two in the plane y = 0; or a rigid platform on six."""
+    """A point mass on three cables or more, on two or more in the plane y = 0, or a rigid platform on six or more."""
 
     name: str = Field(description="name of the robot, at most 200 characters", min_length=1, max_length=200)
-    base_points: list[Point] = Field(
-        description="where the cables leave their spools: three points [x, y, z] in cable order, m; two if planar, "
-        "six with a rigid platform"
+    base_points: Annotated[list[Point], Field(max_length=MOST_CABLES)] = Field(
+        description="where the cables leave their spools: points [x, y, z] in cable order, m; three or more, two or "
+        "more if planar, six or more with a rigid platform"
     )
-    platform_points: Annotated[list[Point], Field(min_length=6, max_length=6)] | None = Field(
-        None, description="rigid platform: where the cables are attached, six points in platform axes, m"
+    platform_points: Annotated[list[Point], Field(max_length=MOST_CABLES)] | None = Field(
+        None, description="rigid platform: where the cables are attached, as many points in platform axes, m"
     )
     inertia: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = Field(
         None,
@@ -75,33 +94,37 @@ class RobotFile(LimitKeys):
     centre_of_mass: Point | None = Field(
         None, description="rigid platform: mass centre in platform axes, m (default [0, 0, 0])"
     )
-    planar: bool = Field(False, description="true: two cables, everything in the plane y = 0")
+    planar: bool = Field(False, description="true: a point mass, everything in the plane y = 0")
+    pattern: Literal["1T", "2T", "3T", "1R2T", "2R3T", "3R3T", "3R"] | None = Field(
+        None,
+        description='motions of the effector, R rotations and T translations: "2T" of a planar robot, "3T" of a point '
+        'mass, "3R3T" of a rigid platform; the other keys tell which',
+    )
     mass: Positive = Field(description="mass of the effector, kg, at most 1e9")
     gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
     z_axis: Literal["down", "up"] = Field("down", description='direction of the z axis, "down" or "up"')
+    _file: Path | None = PrivateAttr(None)  # it was read from; None for a table of another file
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
 
     @property
     def is_platform(self) -> bool:
-        """Whether it is a rigid platform on six cables."""
+        """Whether it is a rigid platform."""
         return self.platform_points is not None
+
+    @property
+    def own_pattern(self) -> str:
+        """Motions of the effector, as the keys say."""
+        return "3R3T" if self.is_platform else "2T" if self.planar else "3T"
 
     @property
     def dof(self) -> int:
         """Degrees of freedom of the effector."""
-        return 6 if self.is_platform else 2 if self.planar else 3
+        return FREEDOMS[self.own_pattern]
 
     @property
     def kind(self) -> str:
         """What it is, for people."""
         return {2: "a planar robot", 3: "a point mass", 6: "a platform"}[self.dof]
-
-    @field_validator("base_points")
-    @classmethod
-    def _number(cls, points: list[Point]) -> list[Point]:
-        if len(points) not in NUMBERS:
-            raise fault("", f"{len(points)} points", f"a supported number of cables: {SUPPORTED}")
-        return points
 
     @model_validator(mode="after")
     def _kind(self) -> "RobotFile":
@@ -112,13 +135,37 @@ class RobotFile(LimitKeys):
             raise fault("centre_of_mass", self.centre_of_mass, "absent without platform_points and inertia")
         if self.is_platform and self.planar:
             raise fault("planar", True, "false, or absent, for a rigid platform (platform_points, inertia)")
-        wanted = 6 if self.is_platform else 2 if self.planar else 3
-        if len(self.base_points) != wanted:
-            allowed = f"{NUMBERS[wanted]}, as the other keys say; {SUPPORTED}"
-            raise fault("base_points", f"{len(self.base_points)} points", allowed)
-        if self.planar:
+        own, count = self.own_pattern, len(self.base_points)
+        if self.pattern not in (None, own):
+            raise fault("pattern", shown(self.pattern), f'"{own}", or absent: as the other keys say')
+        if count < self.dof:
+            raise fault("base_points", f"{count} points", f"at least {PATTERNS[own]}, as the other keys say; {LEAST}")
+        if self.platform_points is not None and len(self.platform_points) != count:
+            allowed = f"{count}, as many as base_points"
+            raise fault("platform_points", f"{len(self.platform_points)} points", allowed)
+        if self.planar and count == self.dof:
             _check_level(self.base_points)
         return self
+
+    @model_validator(mode="after")
+    def _one_a_cable(self) -> "RobotFile":
+        for row in LIMITS:
+            value, count = getattr(self, row.name, None), len(self.base_points)
+            if isinstance(value, list) and len(value) != count:
+                raise fault(row.name, value, f"{row.allowed}, or {count}: one a cable")
+        return self
+
+    def placed(self, key: str, file: object) -> tuple[object, str]:
+        """Where a key of the robot stands, for errors.
+
+        Args:
+            key: one of the robot's.
+            file: that names the robot, or holds it as a table.
+
+        Returns:
+            the file that has the key, and the key as it stands there.
+        """
+        return (file, f"robot.{key}") if self._file is None else (self._file, key)
 
     def typed(self, error: InputError) -> str:
         """The line of an error about this robot, with the numbers of the file instead of those of the kernels' axes.
@@ -195,4 +242,6 @@ def read_robot(path: Path) -> RobotFile:
     """
     data = read_toml(path)
     refuse_other_kinds(data, "robot", path)
-    return checked(RobotFile, data, path)
+    spec = checked(RobotFile, data, path)
+    spec._file = path
+    return spec

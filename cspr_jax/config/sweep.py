@@ -4,10 +4,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
+from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Coordinate, LimitTable, Point
 from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
-from cspr_jax.schema.quantities import STORABLE
+from cspr_jax.config.wording import either
+from cspr_jax.schema.map_kinds import MAP_KINDS
+from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
 
 LARGEST_COUNT = 10_000_000
@@ -129,8 +132,8 @@ class Run(Table):
     tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1, fail_fast=True)] | None = (
         Field(None, description="shape of the block computed at a time, one number an axis")
     )
-    store: Annotated[list[Literal[STORABLE]], Field(min_length=1, fail_fast=True)] | None = Field(  # type: ignore[valid-type]
-        None, description="quantities to store; see `cspr quantities`"
+    store: Annotated[list[Annotated[str, name_of(lambda: QUANTITIES)]], Field(min_length=1, fail_fast=True)] | None = (
+        Field(None, description="quantities to store; see `cspr quantities`")
     )
 
     @field_validator("store")
@@ -145,20 +148,7 @@ class SweepFile(Table):
     """A sweep."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
-    map: Literal[
-        "minimum-arcs",
-        "minimum-oscillations",
-        "transition-envelopes",
-        "poses",
-        "orientations",
-        "orientation-workspace",
-        "attainability",
-    ] = Field(
-        description='kind of map: "minimum-arcs"; of transitions "minimum-oscillations", or "transition-envelopes": '
-        'oscillations needed at each instant; of platforms "poses": smallest numbers of arcs, '
-        '"orientations": the same for all accessible orientations of places, '
-        '"orientation-workspace": accessible orientations of places, "attainability": which of them are attained'
-    )
+    map: Annotated[str, name_of(lambda: MAP_KINDS)] = Field(description=f"kind of map: {either(MAP_KINDS)}")
     robot: Any = Field(description="a catalogue name, a path to a robot file, or a [robot] table")
     axes: Axes = Field(
         description="[axes] x, y (or radius, azimuth), z and z0 (or inclination), each { start, stop, count } or a list"

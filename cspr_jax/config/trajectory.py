@@ -20,7 +20,6 @@ BetaHat = Annotated[float, Field(ge=-100, le=100)]
 
 
 Beat = Literal["beta_ff", "beta_f", "beta_0", "beta_1"]
-WITHOUT_BETA_HAT = ("beta_0", "beta_1")
 
 
 class NamedAmplitude(Table):

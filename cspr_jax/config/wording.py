@@ -2,6 +2,7 @@
 
 import datetime
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from pydantic import BaseModel
@@ -48,6 +49,19 @@ def fault(key: str, value: object, allowed: str) -> PydanticCustomError:
     """
     given = value if isinstance(value, str) else shown(value)
     return PydanticCustomError(FAULT, "{allowed}", {"key": key, "given": given, "allowed": allowed})
+
+
+def either(names: Iterable[str]) -> str:
+    """Names as alternatives.
+
+    Args:
+        names: at least one.
+
+    Returns:
+        such as '"a", "b" or "c"'.
+    """
+    *others, last = (f'"{name}"' for name in names)
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def rank(error: ErrorDetails) -> int:

@@ -1,38 +1,96 @@
-"""The table of limits: which verdict each one breaks, and how many slacks it has."""
+"""Limits of a state: which are given, the quantities that they bound, and the slacks that follow."""
 
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.limits import Limits
-from cspr_jax.schema.verdicts import Verdict
-
-FLAGS = {
-    "tension_min": Verdict.SLACK_CABLE,
-    "tension_max": Verdict.OVER_TENSION,
-    "floor": Verdict.BELOW_FLOOR,
-    "cable_length_max": Verdict.CABLE_TOO_LONG,
-    "cable_speed_max": Verdict.CABLE_TOO_FAST,
-    "cable_acceleration_max": Verdict.CABLE_OVER_ACCELERATION,
-}
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.state import State
+from cspr_jax.schema.limits import LIMITS, Limit
 
 
-def count(name: str, n_cables: int) -> int:
-    """How many smooth functions the slack of a limit is the smallest of.
-
-    Args:
-        name: of the limit.
-        n_cables: of the robot.
-
-    Returns:
-        one of the height, one a cable, or two a cable for an absolute value.
-    """
-    return {"floor": 1, "cable_acceleration_max": 2 * n_cables}.get(name, n_cables)
-
-
-def given(limits: Limits) -> tuple[str, ...]:
-    """Names of the limits that are given, in the order of their slacks.
+def given(limits: Limits) -> tuple[Limit, ...]:
+    """Rows of the limits that are given, in the order of their slacks.
 
     Args:
         limits: the limits.
 
     Returns:
-        the names.
+        the rows.
     """
-    return tuple(name for name in FLAGS if getattr(limits, name) is not None)
+    return tuple(row for row in LIMITS if getattr(limits, row.name) is not None)
+
+
+class Values(NamedTuple):
+    """Quantities of a state that limits bound.
+
+    Fields:
+        tension: (n_cables,) N.
+        depth: () z, z down, m.
+        length: (n_cables,) of the cables, m.
+        speed: (n_cables,) size of its rate, m/s.
+        acceleration: (n_cables,) size of the rate's rate, m/s^2.
+    """
+
+    tension: Array
+    depth: Array
+    length: Array
+    speed: Array
+    acceleration: Array
+
+
+def values(robot: PointMassRobot | PlatformRobot, state: State) -> Values:
+    """Quantities of a state that limits bound.
+
+    Args:
+        robot: with as many cables as degrees of freedom.
+        state: z down.
+
+    Returns:
+        the quantities.
+    """
+    if isinstance(robot, PlatformRobot):
+        force = wrench_balance.tensions(robot, state)
+        length, rate, bend = wrench_balance.cable_motion(robot, state)
+    else:
+        force = force_balance.tensions(robot, state.position, state.acceleration)
+        length, rate, bend = force_balance.cable_motion(robot, state.position, state.velocity, state.acceleration)
+    return Values(force, state.position[2], length, jnp.abs(rate), jnp.abs(bend))
+
+
+def scales(n_cables: int, weight: Array, z0: Array) -> dict[str, tuple[float, Array]]:
+    """Numbers over which slacks are taken; a quantity that has none is taken over its limit.
+
+    Args:
+        n_cables: of the robot.
+        weight: () N.
+        z0: (...) m.
+
+    Returns:
+        for each quantity a factor and a divisor: the weight a cable of tensions, z0 of depths.
+    """
+    return {"tension": (float(n_cables), weight), "depth": (1.0, z0)}
+
+
+def slack(row: Limit, limit: Array, value: Array, scale: Mapping[str, tuple[float, Array]]) -> Array:
+    """Slack of a limit: positive exactly while it is met, and free of units.
+
+    Args:
+        row: the limit's.
+        limit: (...) its value.
+        value: (...) of the quantity.
+        scale: of `scales`.
+
+    Returns:
+        (...).
+    """
+    if row.quantity not in scale:
+        share = value / limit
+        return 1.0 - share if row.sense == "most" else share - 1.0
+    factor, size = scale[row.quantity]
+    return (limit - value if row.sense == "most" else value - limit) * factor / size

@@ -1,11 +1,11 @@
-"""Cells of a sweep of smallest numbers of arcs: coordinates of a grid to the quantities of a result file."""
+"""Maps of smallest numbers of arcs of point masses."""
 
 import numpy as np
 
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.maps.grid_map import OF_TARGETS, PointMassMap
+from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.point_mass_arcs import minimum_arcs
@@ -13,8 +13,8 @@ from cspr_jax.search.point_mass_arcs import minimum_arcs
 _OF_STARTS = ("from_x", "from_y", "from_z", "z0")
 
 
-class CellMap(PointMassMap):
-    """The map of a sweep of smallest numbers of arcs; see `GridMap`."""
+class MinimumArcsMap(PointMassMap):
+    """The smallest number of arcs to each target; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a planar robot; build what all tiles share."""
@@ -46,7 +46,7 @@ class CellMap(PointMassMap):
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""
-        self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")
+        super().refuse_hopeless(grid)
         self._refuse_out_of_reach(self._starts(self._corners(grid, _OF_STARTS)), "trajectory.from")
         self._refuse_long(grid)
 

@@ -1,4 +1,4 @@
-"""Cells of a sweep of envelopes: what each instant of a transition asks for."""
+"""Maps of what each instant of a transition asks for."""
 
 from functools import partial
 
@@ -10,7 +10,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition.envelopes import lower_envelope
-from cspr_jax.maps.oscillations import OscillationMap
+from cspr_jax.maps.oscillations import MinimumOscillationsMap
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.answers import BATCH
 from cspr_jax.search.oscillations import transitions_to
@@ -41,8 +41,8 @@ def _instants(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
     return jax.vmap(one)(*arguments)
 
 
-class EnvelopeMap(OscillationMap):
-    """The map of instants of transitions; see `GridMap`."""
+class TransitionEnvelopesMap(MinimumOscillationsMap):
+    """Squared oscillations and envelopes of each instant; see `GridMap`."""
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -63,7 +63,7 @@ class EnvelopeMap(OscillationMap):
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse cables that the robot has not; see `GridMap.refuse_hopeless`."""
-        n_cables = self._problem.robot.base_points.shape[0]
+        n_cables = self._problem.robot.n_cables
         if "cable" in grid.axes and not np.isin(grid.axes["cable"], np.arange(1, n_cables + 1)).all():
             raise ConfigError(self._file, f"axes.cable: must be numbers of cables, from 1 to {n_cables}")
         super().refuse_hopeless(grid)

@@ -1,7 +1,6 @@
 """What all maps of a sweep share: robot, limits, amplitude function, and the targets of a grid."""
 
 import abc
-from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -21,12 +20,11 @@ from cspr_jax.trajectories.amplitudes import Amplitude
 
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
-SharedKind = TypeVar("SharedKind", Problem, Problem)
-OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
+_OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
 
-class GridMap(abc.ABC, Generic[SharedKind]):
-    """The map of a sweep, ready to compute tiles.
+class GridMap(abc.ABC):
+    """The map of a sweep, ready to compute tiles; its row in `schema.map_kinds` names its class.
 
     Args:
         spec: the robot.
@@ -41,13 +39,13 @@ class GridMap(abc.ABC, Generic[SharedKind]):
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Build what all tiles share."""
         self._keys, self._file = keys, file
-        self._frame = frame_of(spec.base_points, spec.z_axis)
+        self._frame, self._z_axis = frame_of(spec.base_points, spec.z_axis), spec.z_axis
         amplitude = build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=for_bounds)
         limits = build_limits(spec, keys.limits, keys.limits.floor, file)
-        self._problem: SharedKind = self._built(spec, limits, amplitude)
+        self._problem = self._built(spec, limits, amplitude)
 
     @abc.abstractmethod
-    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> SharedKind:
+    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
         # What the kernels take.
         ...
 
@@ -62,6 +60,7 @@ class GridMap(abc.ABC, Generic[SharedKind]):
             (n,) for each quantity.
         """
 
+    @abc.abstractmethod
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other, as a broken processor, driver or compiler gives them.
 
@@ -71,20 +70,9 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         Returns:
             for each kind of contradiction, (n,) where it is.
         """
-        found, margin, verdict = answers["arcs"] > 0, answers["margin"], answers["verdict"]
-        unsure = np.uint16(Verdict.FEWER_ARCS_UNDECIDED.value)
-        lasts = np.isfinite(answers["duration"]) & (answers["duration"] > 0.0)
-        return {
-            "a feasible cell with a margin below zero": found & ~(margin > -ROUNDING),
-            "a feasible cell whose verdict is not": found & ((verdict & ~unsure) != 0),
-            "an infeasible cell whose verdict is 0": ~found & (verdict == 0),
-            "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
-            "a feasible cell without a duration": found & ~lasts,
-        }
 
-    @abc.abstractmethod
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse a grid in which no cell can have an answer.
+        """Refuse a grid in which no cell can have an answer, as where all targets are out of reach.
 
         Args:
             grid: the grid.
@@ -92,14 +80,15 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         Raises:
             ConfigError: what is wrong with all of them.
         """
+        self._refuse_out_of_reach(self._targets(self._corners(grid, _OF_TARGETS)), "axes")
 
     def _targets(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates. Radius and azimuth are about the vertical through the centroid of the spools.
         if "radius" not in cells:
             return self._frame.inward(np.stack([cells["x"], cells["y"], cells["z"]], axis=1))
-        radius, azimuth, signs = cells["radius"], cells["azimuth"], self._frame.signs
-        level: list[np.ndarray] = [signs[0] * radius * np.cos(azimuth), signs[1] * radius * np.sin(azimuth)]
-        return np.stack([*level, self._frame.depth(cells["z"])], axis=1)
+        radius, azimuth = cells["radius"], cells["azimuth"]
+        level = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.zeros_like(radius)], axis=1)
+        return np.c_[self._frame.turned(level)[:, :2], self._frame.depth(cells["z"])]
 
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         # Cells among which depths and heights have their extremes. Of azimuths the one down the slope of the spool
@@ -117,7 +106,7 @@ class GridMap(abc.ABC, Generic[SharedKind]):
         depth = points @ np.asarray(plane_normal(self._problem.robot))
         floor = self._problem.limits.floor
         if not (depth > 0.0).any():
-            question = axis_question("down" if self._frame.signs[2] > 0.0 else "up")
+            question = axis_question(self._z_axis)
             raise ConfigError(
                 self._file, f"{key}: every point is above the spool plane: must be some below ({question})"
             )
@@ -125,7 +114,7 @@ class GridMap(abc.ABC, Generic[SharedKind]):
             raise ConfigError(self._file, f"{key}: every point is below the floor: must be some above it")
 
 
-class PlatformMap(GridMap[Problem]):
+class PlatformMap(GridMap):
     """The map of a sweep of a platform; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
@@ -140,9 +129,32 @@ class PlatformMap(GridMap[Problem]):
         robot = platform_of(spec, self._keys.trajectory, self._file)
         return Problem(aligned(robot)[0], limits, amplitude)
 
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        found = answers["arcs"] > 0
+        margins = np.minimum(np.minimum(answers["margin"], answers["limit_margin"]), answers["det_margin"])
+        return {
+            "a feasible cell with a margin below zero": found & ~(margins > 0.0),
+            "an infeasible cell whose verdict is 0": ~found & (answers["verdict"] == 0),
+            "a feasible cell without a duration": found & ~(answers["duration"] > 0.0),
+        }
 
-class PointMassMap(GridMap[Problem]):
+
+class PointMassMap(GridMap):
     """The map of a sweep of a point mass; see `GridMap`."""
 
     def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
         return Problem(point_mass_of(spec, self._keys.trajectory, self._file), limits, amplitude)
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        found, margin, verdict = answers["arcs"] > 0, answers["margin"], answers["verdict"]
+        unsure = np.uint16(Verdict.FEWER_ARCS_UNDECIDED.value)
+        lasts = np.isfinite(answers["duration"]) & (answers["duration"] > 0.0)
+        return {
+            "a feasible cell with a margin below zero": found & ~(margin > -ROUNDING),
+            "a feasible cell whose verdict is not": found & ((verdict & ~unsure) != 0),
+            "an infeasible cell whose verdict is 0": ~found & (verdict == 0),
+            "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
+            "a feasible cell without a duration": found & ~lasts,
+        }

@@ -1,137 +1,59 @@
-"""Cells of sweeps over places: which orientations a platform can take there, and which of them it attains from rest."""
+"""Maps of smallest numbers of arcs to all orientations of places."""
+
+import math
 
 import numpy as np
 
-from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import Orientations, SweepFile
-from cspr_jax.feasibility.limits import given
-from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
-from cspr_jax.maps.grid_map import OF_TARGETS, PlatformMap
-from cspr_jax.problem import motion_kind
-from cspr_jax.robots.symmetries import NONE, folded, symmetries
-from cspr_jax.schema.quantities import REFUSALS
-from cspr_jax.schema.tiles import Grid
-from cspr_jax.schema.verdicts import NO_REASON, SENTENCES, Verdict
-from cspr_jax.search.accessible import Accessible, accessible
-from cspr_jax.search.attainable import VALUES, attainable
-from cspr_jax.search.platform_answers import PoseAnswers
+from cspr_jax.maps.grid_map import PlatformMap
+from cspr_jax.maps.places import DIGITS, AttainabilityMap
+from cspr_jax.maps.poses import TILT_TORSION
+from cspr_jax.schema.map_kinds import MAP_KINDS
+from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.accessible import accessible
 
-# Digits of a place, m, up to which two cells are at the same one.
-DIGITS = 12
+# What has no value where nothing is accessible.
+FLOATS = tuple(name for name in MAP_KINDS["orientations"].quantities if QUANTITIES[name].kind == "float")
 
 
-class AccessibleMap(PlatformMap):
-    """The map of accessible orientations; see `GridMap`."""
-
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
-        """Find the robot's symmetries."""
-        super().__init__(spec, keys, file)
-        self._orientations = keys.orientations or Orientations()
-        # Limits may differ from cable to cable.
-        self._alike = NONE if given(self._problem.limits) else symmetries(self._problem.robot)
+class OrientationsMap(AttainabilityMap):
+    """The smallest number of arcs to each orientation of tilt and torsion; see `GridMap`."""
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Answers of the cells of a tile; see `GridMap.__call__`. Places that symmetries join are computed once."""
-        places, depths = self._targets(cells), self._depths(cells)
-        radius, azimuth = np.hypot(places[:, 0], places[:, 1]), np.arctan2(places[:, 1], places[:, 0])
-        azimuth = folded(self._alike, azimuth)
-        places = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), places[:, 2]], axis=1)
-        every, own = np.unique(np.round(np.c_[places, depths], DIGITS), axis=0, return_inverse=True)
-        found = self._places(every[:, :3], every[:, 3])
-        return {name: values[own.ravel()] for name, values in found.items()}
-
-    def _depths(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # z0 of horizontal transitions, where none is given; not needed for what is accessible.
-        depth = self._targets(cells)[:, 2]
-        return np.asarray(cells.get("z0", depth), float)
-
-    def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
-        return _of_sets(*(self._sets(places, k) for k in (1, 2)))
-
-    def _sets(self, places: np.ndarray, coarser: int) -> list[Accessible]:
-        definition, divisions = self._orientations.definition or "scan", self._orientations.divisions
-        return [accessible(self._problem.robot, place, definition, divisions // coarser) for place in places]
-
-    def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse places that are all out of reach; see `GridMap.refuse_hopeless`."""
-        self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")
-
-    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        volume = answers["accessible_volume"]
-        return {
-            "a volume outside of [0, 1]": ~((volume >= 0.0) & (volume <= 1.0)),
-            "orientations without a volume": (answers["accessible"] > 0) & ~(volume > 0.0),
-        }
-
-
-class AttainableMap(AccessibleMap):
-    """The map of attainable orientations; see `GridMap`."""
-
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
-        """Build the checker of motions from rest."""
-        super().__init__(spec, keys, file)
-        kind = motion_kind(keys.trajectory, from_rest=True)
-        self._checker = PoseChecker(self._problem, kind, batch=MANY)
-
-    def _attainable(self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray) -> PoseAnswers:
-        # Of (n, 3) angles at (n, 3) places, both in the kernels' axes.
-        values, most = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
-        return attainable(self._checker, places, angles, z0, max_arcs=most, values=values, found=self._alike)
-
-    def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
-        fine, coarse = (self._sets(places, k) for k in (1, 2))
-        # All places together, with both steps: full batches.
-        every = [*fine, *coarse]
-        counts = [len(inside.angles) for inside in every]
-        own = np.repeat(np.tile(np.arange(len(places)), 2), counts)
-        own = np.where((z0 > 0.0)[own], own, -1)
-        verdicts, arcs = np.full(len(own), Verdict.NO_ARCS.value), np.zeros(len(own), int)
-        some = np.flatnonzero(own >= 0)
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        places, z0 = self._targets(cells), self._depths(cells)
+        # An axis of the file turned over turns phi and sigma around.
+        angles = self._frame.turned_angles(np.stack([cells[name] for name in TILT_TORSION], axis=1))
+        some, count = np.flatnonzero(self._accessible(places, angles) & (z0 > 0.0)), len(z0)
+        every = {name: np.full(count, np.nan) for name in FLOATS}
+        every |= {"arcs": np.zeros(count, int), "tried_arcs": np.zeros(count, int)}
+        every["verdict"] = np.full(count, Verdict.NOT_ACCESSIBLE.value, np.uint16)
         if len(some):
-            angles = np.concatenate([inside.angles for inside in every])[some]
-            answers = self._attainable(places[own[some]], angles, z0[own[some]])
-            verdicts[some], arcs[some] = answers.verdict, answers.arcs
-        stops = np.cumsum(counts)[:-1]
-        pieces = zip(every, np.split(arcs, stops), np.split(verdicts, stops), strict=True)
-        rows = [_of_attained(*piece) for piece in pieces]
-        columns = {name: np.array([row[name] for row in rows[: len(places)]]) for name in rows[0]}
-        columns["main_reason"] = columns["main_reason"].astype(np.uint16)
-        rough = np.array([row["attainable_fraction"] for row in rows[len(places) :]])
-        error = np.abs(columns["attainable_fraction"] - rough)
-        return _of_sets(fine, coarse) | columns | {"attainable_error": error}
+            answers = self._attainable(places[some], angles[some], z0[some])
+            found = vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
+            for name, values in every.items():
+                values[some] = found[name]
+        return every
+
+    def _accessible(self, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        # (n,) whether each orientation is, on the grid of which the angles are points.
+        divisions = self._orientations.divisions
+        every, own = np.unique(np.round(places, DIGITS), axis=0, return_inverse=True)
+        index, inside = _index(angles, divisions), np.zeros(len(places), bool)
+        for k, place in enumerate(every):
+            free = np.zeros((2 * divisions, divisions, 2 * divisions), bool)
+            free[_index(accessible(self._problem.robot, place, "grid", divisions).angles, divisions)] = True
+            free[:, 0] = free[0, 0]  # without a tilt its azimuth says nothing
+            which = own.ravel() == k
+            inside[which] = free[tuple(i[which] for i in index)]
+        return inside
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        more = answers["attainable"] > answers["accessible"]
-        return super().contradictions(answers) | {"more orientations attainable than accessible": more}
+        return PlatformMap.contradictions(self, answers)
 
 
-def _of_sets(fine: list[Accessible], coarse: list[Accessible]) -> dict[str, np.ndarray]:
-    volume, rough = (np.array([inside.volume.sum() for inside in sets]) for sets in (fine, coarse))
-    return {
-        "accessible": np.array([len(inside.angles) for inside in fine], float),
-        "accessible_points": np.array([inside.of_points for inside in fine]),
-        "accessible_volume": volume,
-        "accessible_error": np.abs(volume - rough),
-        "largest_tilt": np.array([inside.angles[:, 1].max(initial=0.0) for inside in fine]),
-    }
-
-
-def _of_attained(inside: Accessible, arcs: np.ndarray, verdicts: np.ndarray) -> dict[str, float]:
-    # Of one place; NaN where nothing is accessible.
-    count, good = len(arcs), arcs > 0
-    if not count:
-        names = ("attainable_fraction", "attainable_volume", "mean_arcs", "undecided_fraction", *REFUSALS)
-        return {"attainable": 0.0, "main_reason": 0, **dict.fromkeys(names, np.nan)}
-    refused = {flag: float((~good & ((verdicts & flag) != 0)).mean()) for flag in SENTENCES if flag not in NO_REASON}
-    main = max(refused, key=lambda flag: refused[flag])
-    return {
-        "attainable": float(good.sum()),
-        "attainable_fraction": float(good.mean()),
-        "attainable_volume": float(inside.volume[good].sum() / inside.volume.sum()),
-        "mean_arcs": float(arcs[good].mean()) if good.any() else np.nan,
-        "undecided_fraction": float(((verdicts & Verdict.UNDECIDED.value) != 0).mean()),
-        "main_reason": main.value if refused[main] > 0.0 else 0,
-        **{name: refused[flag] for name, flag in REFUSALS.items()},
-    }
+def _index(angles: np.ndarray, divisions: int) -> tuple[np.ndarray, ...]:
+    # Places of (phi, theta, sigma) on the grid.
+    phi, theta, sigma = np.round(angles.T * (divisions / math.pi)).astype(int)
+    return phi % (2 * divisions), theta, sigma % (2 * divisions)

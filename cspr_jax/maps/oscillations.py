@@ -1,4 +1,4 @@
-"""Cells of a sweep of transitions: coordinates of a grid to the quantities of a result file."""
+"""Maps of smallest numbers of oscillations of transitions from rest."""
 
 from functools import partial
 
@@ -9,7 +9,7 @@ import numpy as np
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.maps.grid_map import OF_TARGETS, PointMassMap
+from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.robots.point_mass import is_planar
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.oscillations import best_inclinations, minimum_oscillations, transitions_to
@@ -19,8 +19,8 @@ from cspr_jax.trajectories.transition import depth_for
 _ANY_DEPTH = 1.0
 
 
-class OscillationMap(PointMassMap):
-    """The map of a sweep of transitions; see `GridMap`."""
+class MinimumOscillationsMap(PointMassMap):
+    """The smallest number of oscillations to each target; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Build what all tiles share; bounds may be asked for."""
@@ -51,4 +51,4 @@ class OscillationMap(PointMassMap):
         """Refuse targets that are all out of reach, or out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
         if is_planar(self._problem.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
             raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
-        self._refuse_out_of_reach(self._targets(self._corners(grid, OF_TARGETS)), "axes")
+        super().refuse_hopeless(grid)

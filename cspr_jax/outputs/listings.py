@@ -1,10 +1,12 @@
 """Lists of what there is: the catalogue of robots, the quantities of results. Plain values, and tables for people."""
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
-from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
+from cspr_jax.config.robot import catalogue_names, resolve_robot
 from cspr_jax.problem import fault_at_rest
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
 
 
@@ -14,7 +16,7 @@ def robots() -> list[dict[str, Any]]:
     Returns:
         the keys of each one's file, and why it cannot hang still, if it cannot.
     """
-    specs = [read_robot(CATALOGUE / f"{name}.toml") for name in catalogue_names()]
+    specs = [resolve_robot(name, "catalogue", Path()) for name in catalogue_names()]
     return [spec.model_dump(exclude_none=True) | {"fault": fault_at_rest(spec)} for spec in specs]
 
 
@@ -33,7 +35,7 @@ def robots_table(found: list[dict[str, Any]]):
             str(len(robot["base_points"])),
             f"{robot['mass']:g}",
             robot["z_axis"],
-            ", ".join(key for key in robot if key.startswith(("tension", "cable"))),
+            ", ".join(row.name for row in LIMITS if row.name in robot),
             robot["source"],
             robot["fault"] or "taut",
         )

@@ -13,7 +13,6 @@ from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import Pose
-from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.platform.checker import FEW, MANY, TOUCH, PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST, endpoint
@@ -23,9 +22,10 @@ from cspr_jax.plans.stops import Stops
 from cspr_jax.problem import given_quaternion, orientations
 from cspr_jax.robots.interference import contacts, gaps
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import plane_normal, rest_point
+from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.reference_pose import reference_pose
-from cspr_jax.robots.wrench_balance import conditioning
+from cspr_jax.robots.wrench_balance import determinant_share, is_regular
+from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.search.beta_hat import BEYOND, cheapest_path, options
 from cspr_jax.search.platform_answers import PoseAnswers, settled
 from cspr_jax.search.platform_arcs import Candidates, Found, smallest_arcs
@@ -36,8 +36,6 @@ from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, PoseSeg
 # A third derivative that changes more than this, relative to its largest value, just beside a knot makes tensions jump.
 JUMP, NEAR_KNOT = 1e-6, 1e-12
 _JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
-# Relative determinant below which a pose counts as singular.
-SINGULAR = 1e-9
 # Up to so many segments compiling for large batches takes longer than it saves.
 SOME = 1000
 
@@ -213,9 +211,8 @@ def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: A
     # distances between cables.
     where = (position, rotations.matrix(quaternion))
     depth = plane_normal(robot) @ position
-    middle = (rest_point(depth), jnp.eye(3))
     apart = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)
-    return depth, conditioning(robot, *where) / conditioning(robot, *middle), apart
+    return depth, determinant_share(robot, *where), apart
 
 
 def _check_pose(
@@ -224,7 +221,7 @@ def _check_pose(
     depth, share, apart = map(np.asarray, _standing(robot, position, quaternion, contacts(robot).pairs))
     if not depth > 0.0:
         raise ConfigError(path, f"{name}.position: must be below the spool plane{hint}")
-    if not abs(share) > SINGULAR:
+    if not is_regular(abs(share)):
         raise ConfigError(
             path, f"{name}: must be another orientation: singular there (relative determinant {share:.1g})"
         )

@@ -179,7 +179,7 @@ def checked_points(key: str, given, least: int) -> np.ndarray:
     if least > PLANAR:
         sizes = spread(points)
         if not sizes[1] > SMALLEST_AREA_RATIO * sizes[0]:
-            raise InputError(key, points.tolist(), "points that are not all on one line, or coincident")
+            raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
     return points
 
 
@@ -287,12 +287,13 @@ def plane_normal(robot: Robot) -> Array:
         (3,) the third component is 1; (0, 0, 1) for level spools.
     """
     a = robot.base_points
-    x, y, z = a.T
+    if robot.dof == robot.n_cables == PLANAR:  # level
+        return jnp.zeros_like(a[0]).at[2].set(1.0)
     if robot.dof == PLANAR:
-        if robot.n_cables == PLANAR:  # level
-            return jnp.zeros_like(a[0]).at[2].set(1.0)
+        x, _, z = a.T
         return jnp.stack([-jnp.dot(x, z) / jnp.dot(x, x), jnp.zeros_like(x[0]), jnp.ones_like(x[0])])
     if robot.n_cables > SPATIAL:
+        x, y, z = a.T
         xx, xy, yy, xz, yz = jnp.dot(x, x), jnp.dot(x, y), jnp.dot(y, y), jnp.dot(x, z), jnp.dot(y, z)
         slope = jnp.stack([xz * yy - yz * xy, yz * xx - xz * xy]) / (xx * yy - xy**2)
         return jnp.stack([-slope[0], -slope[1], jnp.ones_like(xx)])

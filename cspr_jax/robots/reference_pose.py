@@ -9,7 +9,7 @@ It is computed, not assumed, and so is the sign of det J.
 
 import dataclasses
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +17,8 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import double_precision, leaf
+from cspr_jax.arithmetic.lanes import about_axis
+from cspr_jax.arithmetic.rotations import about_vertical
 from cspr_jax.errors import InputError
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
@@ -24,8 +26,8 @@ from cspr_jax.robots.point_mass import rest_point
 
 # Axes that differ less from the reference ones are taken to be these.
 ALIGNED = 1e-6
-# Smallest conditioning, and smallest tension over the mean one, that count.
-SMALLEST_CONDITIONING, SMALLEST_TENSION = 1e-6, 1e-6
+# Smallest tension over the mean one that counts.
+SMALLEST_TENSION = 1e-6
 
 _CHANGE_LINES = (
     "must be held in all directions: cable i runs from base_points[i] to platform_points[i]; let two neighbouring "
@@ -43,13 +45,13 @@ class Reference(NamedTuple):
     Fields:
         robot: the robot, its platform axes parallel to the fixed ones in the reference orientation.
         rotation: (3, 3) from the axes of the robot file to these.
-        conditioning: of `robots.wrench_balance.conditioning` at P0; its sign is the one that must not change.
+        determinant: of `robots.wrench_balance.normalised_determinant` at P0; its sign is the one that must not change.
         tensions: (n_cables,) at rest in P0 over their mean.
     """
 
     robot: PlatformRobot
     rotation: np.ndarray
-    conditioning: float
+    determinant: float
     tensions: np.ndarray
 
 
@@ -57,15 +59,18 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
     """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
 
     Args:
-        robot: centred, in any platform axes.
+        robot: centred, in any platform axes; jax may be tracing its spools, but not its platform points.
 
     Returns:
         the robot, and the rotation (3, 3) from its former axes to these.
     """
-    rotation = _level_and_straight(robot)
-    if np.abs(rotation - np.eye(3)).max() < ALIGNED:
-        rotation = np.eye(3)
-    points, inertia = np.asarray(robot.platform_points) @ rotation.T, rotation @ np.asarray(robot.inertia) @ rotation.T
+    if isinstance(robot.base_points, jax.core.Tracer):
+        rotation = _traced(robot)
+    else:
+        rotation = _level_and_straight(robot)
+        if np.abs(rotation - np.eye(3)).max() < ALIGNED:
+            rotation = np.eye(3)
+    points, inertia = leaf(robot.platform_points) @ rotation.T, rotation @ leaf(robot.inertia) @ rotation.T
     return dataclasses.replace(robot, platform_points=leaf(points), inertia=leaf(inertia)), rotation
 
 
@@ -87,8 +92,8 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     with double_precision():
         size, still = (np.asarray(x) for x in _standing(turned, hub))
     place = f"the reference pose (platform level and at rest, z0 = {z0:g} m)"
-    if not abs(size) > SMALLEST_CONDITIONING:
-        fault = f"{place} is singular (determinant {size:.1g}, at least {SMALLEST_CONDITIONING:g} counts): "
+    if not wrench_balance.is_regular(abs(size)):
+        fault = f"{place} is singular (determinant {size:.1g}, at least {wrench_balance.SINGULAR:g} counts): "
         raise InputError("platform_points", None, _CHANGE_LINES, fault=fault + _free(turned, hub))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # of numbers near none at all
         share = still / np.abs(still).mean()
@@ -117,7 +122,7 @@ def _free(robot: PlatformRobot, hub: np.ndarray) -> str:
 
 @jax.jit
 def _standing(robot: PlatformRobot, hub: Array) -> tuple[Array, Array]:
-    return wrench_balance.conditioning(robot, hub, jnp.eye(3)), wrench_balance.tensions(
+    return wrench_balance.normalised_determinant(robot, hub, jnp.eye(3)), wrench_balance.tensions(
         robot, wrench_balance.at_rest(hub, jnp.eye(3))
     )
 
@@ -129,7 +134,25 @@ def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
     sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]
     found = [_straightest(points @ side.T, base) for side in sides]
     best = int(np.argmax([nearness for _, nearness in found]))
-    return _about_vertical(found[best][0]) @ sides[best]
+    return about_vertical(found[best][0]) @ sides[best]
+
+
+def _traced(robot: PlatformRobot) -> Any:
+    # The same, where jax is tracing the spools: on these depends the turn about the vertical alone.
+    points = np.asarray(robot.platform_points)
+    normal = np.linalg.svd(points - points.mean(0))[2][2]
+    found = []
+    for side in (_to_vertical(sign * normal) for sign in (1.0, -1.0)):
+        x, y, _ = (points @ side.T).T
+        along = x @ robot.base_points[:, 0] + y @ robot.base_points[:, 1]
+        across = x @ robot.base_points[:, 1] - y @ robot.base_points[:, 0]
+        nearness = jnp.hypot(along, across)
+        zero, one = jnp.zeros_like(along), jnp.ones_like(along)
+        turn = jnp.stack([along, -across, zero, across, along, zero, zero, zero, nearness]).reshape(3, 3) / nearness
+        found.append((nearness, jnp.where(nearness > ALIGNED * one, turn, jnp.eye(3)) @ side))
+    (first, rotation), (second, other) = found
+    chosen = jnp.where(first >= second, rotation, other)
+    return jnp.where(jnp.max(jnp.abs(chosen - jnp.eye(3))) < ALIGNED, jnp.eye(3), chosen)
 
 
 def _to_vertical(normal: np.ndarray) -> np.ndarray:
@@ -138,14 +161,7 @@ def _to_vertical(normal: np.ndarray) -> np.ndarray:
     sine, cosine = np.linalg.norm(axis), normal[2]
     if sine < ALIGNED:
         return np.diag([1.0, np.sign(cosine), np.sign(cosine)])
-    x, y, z = axis / sine
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross
-
-
-def _about_vertical(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return np.array(about_axis(axis / sine, leaf(sine), leaf(cosine)))
 
 
 def _straightest(points: np.ndarray, base: np.ndarray) -> tuple[float, float]:

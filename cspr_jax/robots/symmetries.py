@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.arithmetic.rotations import about_vertical
 from cspr_jax.robots.platform import PlatformRobot
 
 LARGEST_FOLD = 6
@@ -38,7 +39,7 @@ def symmetries(robot: PlatformRobot) -> Symmetries:
     Returns:
         those found.
     """
-    fold = next(k for k in range(LARGEST_FOLD, 0, -1) if _maps(robot, _turn(2.0 * math.pi / k)))
+    fold = next(k for k in range(LARGEST_FOLD, 0, -1) if _maps(robot, about_vertical(2.0 * math.pi / k)))
     # A mirror plane goes through a spool or halves the angle between two.
     base = np.asarray(robot.base_points)[:, :2]
     azimuth = np.arctan2(base[:, 1], base[:, 0])
@@ -91,13 +92,8 @@ def alike(found: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.ndarr
     return stands
 
 
-def _turn(angle: float) -> np.ndarray:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
 def _mirror(azimuth: float) -> np.ndarray:
-    return _turn(azimuth) @ np.diag([1.0, -1.0, 1.0]) @ _turn(-azimuth)
+    return about_vertical(azimuth) @ np.diag([1.0, -1.0, 1.0]) @ about_vertical(-azimuth)
 
 
 def _maps(robot: PlatformRobot, change: np.ndarray) -> bool:

@@ -5,8 +5,12 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.robots.platform import PlatformRobot, rays, wrench_per_mass
+from cspr_jax.robots.point_mass import plane_normal, rest_point
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
+
+# Normalised determinants up to this count as singular, of whichever sign rounding makes them.
+SINGULAR = 1e-6
 
 
 def at_rest(position: Array, rotation: Array) -> State:
@@ -38,7 +42,7 @@ def jacobian(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
     return jnp.concatenate([cables, jnp.cross(arms, cables)], axis=1)
 
 
-def conditioning(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
+def normalised_determinant(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
     """Determinant of J with cables of length 1 and the platform's size as the unit of length.
 
     It is zero where the cables cannot carry every wrench, (3.5); its sign is that of det J.
@@ -59,6 +63,34 @@ def conditioning(robot: PlatformRobot, position: Array, rotation: Array) -> Arra
     units = cables / jnp.linalg.norm(cables, axis=1, keepdims=True)
     size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
     return solved(jnp.concatenate([units, jnp.cross(arms / size, units)], axis=1), jnp.zeros((robot.n_cables, 0)))[1]
+
+
+def is_regular(determinant):
+    """Whether cables can carry every wrench: the rule of what is singular.
+
+    Args:
+        determinant: (...) of `normalised_determinant`, or over that of a pose from which no singularity may part it;
+            NumPy or jax.
+
+    Returns:
+        (...) whether it is above `SINGULAR`; False of NaN, and of other signs, beyond a singularity.
+    """
+    return determinant > SINGULAR
+
+
+def determinant_share(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
+    """Normalised determinant over that of the reference orientation at the same depth in the middle.
+
+    Args:
+        robot: centred, in its reference axes.
+        position: (3,) m.
+        rotation: (3, 3).
+
+    Returns:
+        () for `is_regular`.
+    """
+    middle = rest_point(plane_normal(robot) @ position)
+    return normalised_determinant(robot, position, rotation) / normalised_determinant(robot, middle, jnp.eye(3))
 
 
 def tensions_per_length(robot: PlatformRobot, state: State) -> Array:

@@ -143,8 +143,8 @@ def determinant(wires: Cables) -> Array:
     return found
 
 
-def conditioning(robot: PlatformRobot, wires: Cables) -> Array:
-    """Determinant of J with unit cables and the platform's size as unit; see `robots.wrench_balance.conditioning`.
+def normalised_determinant(robot: PlatformRobot, wires: Cables) -> Array:
+    """Determinant of J with unit cables and the platform's size as unit; see `wrench_balance.normalised_determinant`.
 
     Args:
         robot: the robot.

@@ -42,6 +42,8 @@ class Family:
         return getattr(importlib.import_module(module), name)
 
 
+# Time functions of a platform's rotation that take no beta-hat.
+WITHOUT_BETA_HAT = ("beta_0", "beta_1")
 _LEGS = "cspr_jax.plans.{}"
 _ROWS = (
     Family(

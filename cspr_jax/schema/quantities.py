@@ -1,10 +1,12 @@
 """The one table of everything that a result file can hold: it gives names, units, labels and docs."""
 
 import dataclasses
+from collections import ChainMap
 from typing import Literal
 
 import numpy as np
 
+from cspr_jax.errors import InputError
 from cspr_jax.schema.verdicts import SENTENCES, Verdict
 
 
@@ -18,6 +20,9 @@ class Quantity:
         long_name: a short phrase for labels.
         description: one sentence.
         kind: "float" (of the run's dtype) or the NumPy name of an integer type.
+        unflagged: of flags of a verdict: what pictures say where none is set; empty: it is no verdict.
+        signed: whether either sign is as good as the other, so that zero is in the middle of a picture's colours.
+        contoured: whether sections of it show where it is a whole number.
     """
 
     name: str
@@ -25,6 +30,9 @@ class Quantity:
     long_name: str
     description: str
     kind: Literal["float", "uint16", "int16"] = "float"
+    unflagged: str = ""
+    signed: bool = False
+    contoured: bool = False
 
 
 AXES = {
@@ -80,7 +88,7 @@ QUANTITIES = {
     q.name: q
     for q in (
         Quantity("arcs", "1", "smallest number of arcs", f"Smallest number of feasible arcs{_HOW}; 0: none.", "int16"),
-        Quantity("verdict", "1", "verdict", f"Bit flags{_HOW}; 0 is feasible.", "uint16"),
+        Quantity("verdict", "1", "verdict", f"Bit flags{_HOW}; 0 is feasible.", "uint16", unflagged="feasible"),
         Quantity(
             "duration",
             "s",
@@ -145,6 +153,7 @@ QUANTITIES = {
             "1",
             "number of oscillations n, a real number",
             "Number that the envelopes require, (1.48) and (1.94); NaN where no number will do (|v A| reaches 1).",
+            contoured=True,
         ),
         Quantity(
             "inclination_gain",
@@ -164,7 +173,7 @@ QUANTITIES = {
             "lower envelope of the normalised pseudotension",
             "(1.39) of the cable, or the lowest over the cables, with the real number `least_oscillations`.",
         ),
-        Quantity("used_inclination", "1", "inclination v", "Inclination of the transition, v of (1.31)."),
+        Quantity("used_inclination", "1", "inclination v", "Inclination of the transition, v of (1.31).", signed=True),
         Quantity(
             "det_margin",
             "1",
@@ -213,6 +222,7 @@ QUANTITIES = {
             "main reason",
             "Why most of the accessible orientations that are not attained are not: a verdict's flag; 0: all are.",
             "uint16",
+            unflagged="all attained",
         ),
         *(
             Quantity(
@@ -222,49 +232,6 @@ QUANTITIES = {
         ),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
-}
-_COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
-_OF_OSCILLATIONS = (
-    "oscillations",
-    "tried_oscillations",
-    "envelope_oscillations",
-    "least_oscillations",
-    "inclination_gain",
-    "used_inclination",
-    "used_z0",
-)
-_OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
-_OF_POSES = (
-    "arcs",
-    "tried_arcs",
-    "verdict",
-    "duration",
-    "margin",
-    "det_margin",
-    "cable_distance",
-    "limit_margin",
-    "beta_hat",
-)
-_OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
-_OF_ATTAINED = (
-    "attainable",
-    "attainable_fraction",
-    "attainable_volume",
-    "attainable_error",
-    "mean_arcs",
-    "undecided_fraction",
-    "main_reason",
-    *REFUSALS,
-)
-# What each kind of map can store.
-OF_MAP = {
-    "minimum-arcs": ("arcs", "tried_arcs", *_COMMON),
-    "minimum-oscillations": (*_OF_OSCILLATIONS, *_COMMON),
-    "transition-envelopes": _OF_INSTANTS,
-    "poses": _OF_POSES,
-    "orientations": _OF_POSES,
-    "orientation-workspace": _OF_PLACES,
-    "attainability": (*_OF_PLACES, *_OF_ATTAINED),
 }
 TRAJECTORY = {
     q.name: q
@@ -313,38 +280,35 @@ ACROSS = {
     **dict.fromkeys(("length", "rate", "tension"), "cable"),
 }
 PARTS = {"axis": tuple("xyz"), "component": tuple("wxyz")}
-EVERY = AXES | QUANTITIES | TRAJECTORY | SEGMENTS
+EVERY = ChainMap(AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
 # Those that only a rigid platform has.
 OF_PLATFORMS = ("quaternion", "omega", "omega_dot")
-STORABLE = tuple(QUANTITIES)
-DEFAULT_STORE = {
-    "minimum-arcs": ("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
-    "minimum-oscillations": (
-        "oscillations",
-        "envelope_oscillations",
-        "least_oscillations",
-        "verdict",
-        "duration",
-        "margin",
-        "inclination_gain",
-        "used_inclination",
-        "used_z0",
-    ),
-    "transition-envelopes": _OF_INSTANTS,
-    "poses": ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat"),
-    "orientations": ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat"),
-    "orientation-workspace": _OF_PLACES,
-    "attainability": (*_OF_PLACES, *_OF_ATTAINED),
-}
-TITLES = {
-    "minimum-arcs": "Smallest number of arcs",
-    "minimum-oscillations": "Smallest number of oscillations",
-    "transition-envelopes": "Envelopes of the pseudotensions along transitions",
-    "poses": "Smallest number of arcs to poses",
-    "orientations": "Smallest number of arcs to accessible orientations",
-    "orientation-workspace": "Accessible orientations",
-    "attainability": "Accessible and attainable orientations",
-}
+_OWN = frozenset(QUANTITIES)
+
+
+def register(quantity: Quantity) -> None:
+    """Add a quantity that maps can give, from outside of the package; a second time changes nothing.
+
+    Args:
+        quantity: its row.
+
+    Raises:
+        InputError: another quantity, or a coordinate, has that name.
+    """
+    tables = (AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
+    known = next((table[quantity.name] for table in tables if quantity.name in table), quantity)
+    if known != quantity:
+        raise InputError("quantity", quantity.name, "a name that no other quantity or axis has")
+    QUANTITIES[quantity.name] = quantity
+
+
+def from_outside() -> list[Quantity]:
+    """Quantities from outside of the package, which another process does not know.
+
+    Returns:
+        their rows.
+    """
+    return [quantity for name, quantity in QUANTITIES.items() if name not in _OWN]
 
 
 def flag_attributes() -> dict[str, object]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from cspr_jax.arithmetic.rotations import from_tilt_torsion
+from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
 from cspr_jax.feasibility.platform.orientation_steps import Watch
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
@@ -57,7 +57,7 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
     """
     stage("accessible orientations")
     watch = Watch(robot, place)
-    towards = np.array([math.atan2(place[1], place[0]), 0.0, 0.0])  # (3.98)
+    towards = cylindrical_frames(np.asarray(place, float))
     if definition == "scan":
         parts = list(_scan(watch, towards, divisions))
         angles, volume = (np.concatenate(x) for x in zip(*parts, strict=True))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_parts
-from cspr_jax.arithmetic.rotations import from_tilt_torsion
+from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.robots.point_mass import rest_point
@@ -109,8 +109,7 @@ def _motions(
 ) -> tuple[Candidates, np.ndarray]:
     # Transitions from rest, and (n, values) of beta-hat at their ends.
     robot, count = checker.problem.robot, len(angles)
-    towards = np.arctan2(*places.T[1::-1])  # (3.98)
-    ends = (places, from_tilt_torsion(angles + towards[:, None] * np.array([1.0, 0.0, 0.0])))
+    ends = (places, from_tilt_torsion(angles + cylindrical_frames(places)))
     bends, can_end = end_options(robot, *ends, z0, values)
     start = (rest_point(z0), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
     rest = np.full(count, AT_REST)

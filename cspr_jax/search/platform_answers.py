@@ -48,24 +48,6 @@ class PoseAnswers(Answers):
         return PoseAnswers(**{name: values[which] for name, values in vars(self).items()})
 
 
-def contradictions(answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Cells whose numbers contradict each other; see `GridMap.contradictions`.
-
-    Args:
-        answers: (n,) each.
-
-    Returns:
-        for each kind of contradiction, (n,) where it is.
-    """
-    found = answers["arcs"] > 0
-    margins = np.minimum(np.minimum(answers["margin"], answers["limit_margin"]), answers["det_margin"])
-    return {
-        "a feasible cell with a margin below zero": found & ~(margins > 0.0),
-        "an infeasible cell whose verdict is 0": ~found & (answers["verdict"] == 0),
-        "a feasible cell without a duration": found & ~(answers["duration"] > 0.0),
-    }
-
-
 def settled(
     checker: PoseChecker, candidates: Candidates, found: Found, *, max_arcs: int, fixed: np.ndarray | None = None
 ) -> tuple[PoseAnswers, PoseSegment]:

@@ -3,15 +3,14 @@
 from functools import partial
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.platform.end_acceleration import endpoint
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import plane_normal, rest_point
-from cspr_jax.robots.wrench_balance import conditioning
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.wrench_balance import determinant_share, is_regular
 from cspr_jax.search.beta_hat import options
 
 BATCH = 1024
@@ -22,8 +21,7 @@ def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
     # Of each pose (3.91), the interval (3.92), the determinant over that at the same depth in the middle, the depth.
     def one(position, quaternion, z0):
         found, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
-        here = conditioning(robot, position, rotations.matrix(quaternion))
-        share = here / conditioning(robot, rest_point(depth), jnp.eye(3))
+        share = determinant_share(robot, position, rotations.matrix(quaternion))
         return found.preferred, found.lowest, found.highest, share, depth
 
     return jax.vmap(one)(*poses)
@@ -48,4 +46,4 @@ def end_options(
     preferred, lowest, highest, share, depth = in_batches(
         partial(_ends, robot), (positions, quaternions, z0), size=BATCH
     )
-    return options(preferred, lowest, highest, count), (depth > 0.0) & (share > 0.0)
+    return options(preferred, lowest, highest, count), (depth > 0.0) & is_regular(share)

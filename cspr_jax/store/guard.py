@@ -20,6 +20,7 @@ LARGEST_CHUNKS, LARGEST_CHUNK = 100_000, 1 << 24
 # Settings are a sweep file of 1 MB and a robot file of 1 MB as JSON.
 LARGEST_TEXT = 8 << 20
 LARGEST_RANK = 16
+MOST_ROWS = 1000  # of an attribute with a row a cable
 # Deflate packs at most 1032 bytes into one.
 DENSEST = 1100
 _PLENTY = 64 << 20
@@ -164,7 +165,7 @@ def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None,
         item: a file or dataset.
         name: of the attribute.
         dtype: of NumPy.
-        shape: what it must be; None stands for 1 to 6.
+        shape: what it must be; None stands for any number up to `MOST_ROWS`.
 
     Returns:
         the numbers; None if there is no such attribute.
@@ -178,7 +179,7 @@ def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None,
     space = attribute.get_space()
     given = () if space.get_simple_extent_type() == h5s.NULL else tuple(int(n) for n in space.get_simple_extent_dims())
     fits = len(given) == len(shape) and space.get_simple_extent_type() != h5s.NULL
-    fits = fits and all(1 <= n <= 6 if m is None else n == m for n, m in zip(given, shape, strict=True))
+    fits = fits and all(1 <= n <= MOST_ROWS if m is None else n == m for n, m in zip(given, shape, strict=True))
     if not fits or _dtype(attribute.get_type()) != dtype:
         raise DamagedError(f"its {name} has another type or shape than cspr writes")
     array = np.empty(given, dtype)

@@ -5,6 +5,7 @@ as its standard input, and has a limit of memory and one of processor time that 
 """
 
 import contextlib
+import dataclasses
 import importlib.util
 import json
 import os
@@ -20,6 +21,7 @@ from typing import Any, cast
 import numpy as np
 
 from cspr_jax.errors import StoreError, one_line
+from cspr_jax.schema.quantities import from_outside
 from cspr_jax.store.seal import DamagedError, check_mark, check_open, open_regular
 
 # Hashing that many bytes takes a moment; of larger files it is asked before what they hold.
@@ -105,7 +107,8 @@ def _reading(path: Path, file: int, what: str) -> Iterator[RawIOBase]:
     places = {str(Path(spec.origin).parent.parent) for spec in specs if spec.origin is not None}
     home = str(Path(__file__).parents[2])
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::"}
-    command = [sys.executable, "-I", "-c", _CODE, what, "\n".join(sorted(places)), home]
+    rows = json.dumps([dataclasses.asdict(quantity) for quantity in from_outside()])
+    command = [sys.executable, "-I", "-c", _CODE, what, "\n".join(sorted(places)), home, rows]
     try:
         child = subprocess.Popen(
             command,

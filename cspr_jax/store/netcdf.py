@@ -88,7 +88,7 @@ def make_datasets(
     for name in store:
         data = new_dataset(file, name, shape, dtype_of(name, dtype), tile)
         describe(data, QUANTITIES[name])
-        if name == "verdict":
+        if QUANTITIES[name].unflagged:
             set_attributes(data, flag_attributes())
         for i, axis in enumerate(axes):
             data.dims[i].attach_scale(file[axis])

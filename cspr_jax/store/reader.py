@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import h5py
 
 from cspr_jax.errors import StoreError
-from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY, Quantity, register
 from cspr_jax.store import guard
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.netcdf import UNREADABLE, reason
@@ -37,7 +37,13 @@ _INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass
 
 
 def serve() -> None:
-    """Answer with what the file on standard input holds: what was found as JSON, then each array behind an answer."""
+    """Answer with what the file on standard input holds: what was found as JSON, then each array behind an answer.
+
+    The words of the command: what is asked for, two folders of `store.isolated`, and the quantities that the process
+    that asks has registered.
+    """
+    for row in json.loads(sys.argv[4]):
+        register(Quantity(**row))
     out = os.fdopen(os.dup(1), "wb")
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     _grant(_LOOK, 0)

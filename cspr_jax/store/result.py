@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.config.reading import checked
-from cspr_jax.config.robot import LARGEST_LENGTH, RobotFile
+from cspr_jax.config.robot import LARGEST_LENGTH, MOST_CABLES, RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, StoreError, one_line, shown
 from cspr_jax.schema import labelled
@@ -172,8 +172,8 @@ def _motion(
     time, tension = arrays.get("t"), arrays.get("tension")
     if time is None or tension is None or "position" not in arrays or time.ndim != 1 or tension.ndim != 2:
         raise DamagedError("it is not a result of cspr: it has no quantities with named axes")
-    if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= 6:
-        raise DamagedError("it is not a motion of two to six cables")
+    if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= MOST_CABLES:
+        raise DamagedError("it is not a motion of two cables or more")
     for name, most in (("z0", LARGEST_LENGTH), ("mass", LARGEST_MASS)):
         if not 1.0 / most <= attributes.get(name, 0.0) <= most:
             raise DamagedError(f"{name} = {shown(attributes.get(name))}: must be a number > 0")

@@ -1,38 +1,55 @@
-"""What each kind of map asks of its sweep file, beyond the schema."""
+"""What each kind of map asks of its sweep file, beyond the schema; its row in `schema.map_kinds` says it."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from cspr_jax.config.sweep import SweepFile
-from cspr_jax.config.trajectory import WITHOUT_BETA_HAT
+from cspr_jax.config.reading import Table
+from cspr_jax.config.sweep import Axes, SweepFile
+from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.schema.families import WITHOUT_BETA_HAT
+from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, kinds_with
 
+_TARGETS = ("x", "y", "radius", "azimuth", "z")
 _START = ("from_x", "from_y", "from_z")
-_INSTANTS = ("tau", "cable")
-_OF_ORIENTATIONS = ("orientations", "orientation-workspace", "attainability")
-_POSES = ("tilt_azimuth", "tilt", "torsion")
+# Keys that only some kinds of maps have.
+_SPECIAL = (
+    *(f"axes.{name}" for name in Axes.model_fields if name not in _TARGETS),
+    *("trajectory.inclination", "trajectory.beta_hat", "trajectory.beat"),
+    *("limits", "orientations", "orientations.values"),
+)
+# More kinds than these are no hint.
+_FEW = 3
 
 
-def check_map(keys: SweepFile, path: Path) -> None:
+def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
     """Refuse a sweep whose keys do not fit its map.
 
     Args:
+        kind: of the map.
         keys: the sweep.
         path: named in errors.
 
     Raises:
         ConfigError: which key, and what it must be.
     """
-    given = tuple(name for name in ("x", "y", "radius", "azimuth") if getattr(keys.axes, name) is not None)
+    given = tuple(name for name in _TARGETS[:-1] if getattr(keys.axes, name) is not None)
     if given not in (("x", "y"), ("radius", "azimuth")):
         raise ConfigError(path, f"axes: {', '.join(given) or 'no targets'}: must be x and y, or radius and azimuth")
-    if keys.map != "poses":
-        _refuse_poses(keys, path)
-    if keys.orientations is not None and keys.map not in _OF_ORIENTATIONS:
-        raise ConfigError(path, "orientations: must be absent in this map")
-    _CHECKS[keys.map](keys, path)
+    _check_choice(keys.trajectory.family, "trajectory.family", kind.families, path)
+    for name in _SPECIAL:
+        if name not in kind.keys and _missing(keys, name) is None:
+            raise ConfigError(path, f"{name}: must be absent in this map{_hint(kinds_with(name))}")
+    if keys.orientations is not None and keys.orientations.definition is not None:
+        _check_choice(keys.orientations.definition, "orientations.definition", kind.definitions, path)
+    for missing in filter(None, (_missing(keys, name) for name in kind.needs)):
+        raise ConfigError(path, missing)
+    if kind.one_of and sum(_missing(keys, name) is None for name in kind.one_of) != 1:
+        raise ConfigError(path, f"{', '.join(kind.one_of)}: must be one of them in this map")
+    _check_start(kind, keys, path)
+    if keys.trajectory.beat in WITHOUT_BETA_HAT and keys.trajectory.beta_hat is not None:
+        raise ConfigError(path, f'trajectory.beta_hat: must be absent with beat = "{keys.trajectory.beat}"')
 
 
 def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
@@ -58,111 +75,38 @@ def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
             raise ConfigError(path, f"axes.{name} = {shown(float(wrong[0]))}: must be {allowed}")
 
 
-def _check_transitions(keys: SweepFile, path: Path) -> None:
-    axes, trajectory = keys.axes, keys.trajectory
-    if trajectory.family != "transition":
-        raise ConfigError(path, f'trajectory.family = "{trajectory.family}": must be "transition" in this map')
-    if trajectory.start is not None and not trajectory.start.rest:
-        raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
-    for name in _START:
-        if getattr(axes, name) is not None:
-            raise ConfigError(path, f"axes.{name}: must be absent in this map: transitions start at rest")
-    given = [axes.z0, axes.inclination, trajectory.inclination]
-    if sum(key is not None for key in given) != 1:
-        raise ConfigError(path, "axes.z0, axes.inclination, trajectory.inclination: must be one of them in this map")
+def _missing(keys: SweepFile, name: str) -> str | None:
+    # What to say of a dotted key that is not given; None: it is.
+    table: Table = keys
+    for part in name.split("."):
+        inner = getattr(table, part)
+        if inner is None or part not in table.model_fields_set:
+            return f"{name} is missing: {type(table).model_fields[part].description}"
+        table = inner
+    return None
 
 
-def _check_oscillations(keys: SweepFile, path: Path) -> None:
-    _check_transitions(keys, path)
-    _refuse_instants(keys, path)
+def _hint(kinds: list[str]) -> str:
+    return f"; it is for map = {either(kinds)}" if 0 < len(kinds) <= _FEW else ""
 
 
-def _check_envelopes(keys: SweepFile, path: Path) -> None:
-    _check_transitions(keys, path)
-    if keys.axes.tau is None:
-        raise ConfigError(path, "axes.tau is missing: instants, as normalised time in [0, 1]")
+def _check_choice(value: str, name: str, allowed: tuple[str, ...], path: Path) -> None:
+    if value not in allowed:
+        raise ConfigError(path, f'{name} = "{value}": must be {either(allowed)} in this map')
 
 
-def _refuse_instants(keys: SweepFile, path: Path) -> None:
-    for name in _INSTANTS:
-        if getattr(keys.axes, name) is not None:
-            raise ConfigError(path, f'axes.{name}: must be absent in this map; it is for map = "transition-envelopes"')
-
-
-def _check_arcs(keys: SweepFile, path: Path) -> None:
-    if keys.trajectory.family != "hypocycloid-standard":
-        raise ConfigError(path, 'trajectory.family: must be "hypocycloid-standard" in this map')
-    if keys.axes.z0 is None:
-        raise ConfigError(path, "axes.z0 is missing: depth of P0 below the centroid of the spools, m")
-    if keys.axes.inclination is not None or keys.trajectory.inclination is not None:
-        raise ConfigError(path, 'inclination: must be absent in this map; it is for map = "minimum-oscillations"')
-    _refuse_instants(keys, path)
-    given = [name for name in _START if getattr(keys.axes, name) is not None]
+def _check_start(kind: MapKind, keys: SweepFile, path: Path) -> None:
     start = keys.trajectory.start
-    if start is None and len(given) < 3:
+    if kind.start == "rest" and start is not None and not start.rest:
+        raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
+    if kind.start != "pose" and start is not None and start.is_pose:
+        poses = either(other.name for other in MAP_KINDS.values() if other.start == "pose")
+        raise ConfigError(path, f"trajectory.from: must be without orientation and beta_hat but for map = {poses}")
+    given = [name for name in _START if getattr(keys.axes, name) is not None]
+    if kind.start == "point" and start is None and len(given) < len(_START):
         raise ConfigError(
             path,
             "trajectory.from is missing: { position = [x, y, z] }, { rest = true }, or axes from_x, from_y, from_z",
         )
     if start is not None and start.rest and given:
         raise ConfigError(path, f"axes.{given[0]}: must be absent where trajectory.from.rest = true")
-
-
-def _refuse_poses(keys: SweepFile, path: Path) -> None:
-    for name in _POSES:
-        if getattr(keys.axes, name) is not None:
-            raise ConfigError(path, f'axes.{name}: must be absent in this map; it is for map = "poses"')
-    for name in ("beta_hat", "beat"):
-        if getattr(keys.trajectory, name) is not None:
-            raise ConfigError(path, f'trajectory.{name}: must be absent in this map; it is for map = "poses"')
-    if keys.trajectory.start is not None and keys.trajectory.start.is_pose:
-        raise ConfigError(path, 'trajectory.from: must be without orientation and beta_hat but for map = "poses"')
-
-
-def _check_poses(keys: SweepFile, path: Path) -> None:
-    if keys.trajectory.family == "transition":
-        raise ConfigError(
-            path, 'trajectory.family = "transition": must be "hypocycloid" or "hypocycloid-standard" in this map'
-        )
-    for name in (*_START, *_INSTANTS, "inclination"):
-        if getattr(keys.axes, name) is not None:
-            raise ConfigError(path, f"axes.{name}: must be absent in this map")
-    if keys.trajectory.inclination is not None:
-        raise ConfigError(path, "trajectory.inclination: must be absent in this map")
-    if keys.axes.z0 is None:
-        raise ConfigError(path, "axes.z0 is missing: depth of P0 below the centroid of the spools, m")
-    if keys.trajectory.beat in WITHOUT_BETA_HAT and keys.trajectory.beta_hat is not None:
-        raise ConfigError(path, f'trajectory.beta_hat: must be absent with beat = "{keys.trajectory.beat}"')
-
-
-def _check_orientations(keys: SweepFile, path: Path) -> None:
-    if keys.trajectory.family == "transition":
-        raise ConfigError(
-            path, 'trajectory.family = "transition": must be "hypocycloid" or "hypocycloid-standard" in this map'
-        )
-    for name in (*_START, *_INSTANTS, "inclination", *(["z0"] if keys.map == "orientation-workspace" else [])):
-        if getattr(keys.axes, name) is not None:
-            raise ConfigError(path, f"axes.{name}: must be absent in this map")
-    if keys.trajectory.inclination is not None:
-        raise ConfigError(path, "trajectory.inclination: must be absent in this map")
-    if keys.trajectory.start is not None and not keys.trajectory.start.rest:
-        raise ConfigError(path, "trajectory.from: must be { rest = true }, or absent, in this map")
-    given = keys.orientations
-    if keys.map == "orientations" and given is not None and given.definition not in (None, "grid"):
-        raise ConfigError(path, f'orientations.definition = "{given.definition}": must be "grid" in this map')
-    if keys.map == "orientation-workspace":
-        if keys.limits.model_fields_set:
-            raise ConfigError(path, 'limits: must be absent in this map; they are for map = "attainability"')
-        if given is not None and given.values is not None:
-            raise ConfigError(path, 'orientations.values: must be absent in this map; it is for map = "attainability"')
-
-
-_CHECKS: dict[str, Callable[[SweepFile, Path], None]] = {
-    "minimum-arcs": _check_arcs,
-    "minimum-oscillations": _check_oscillations,
-    "transition-envelopes": _check_envelopes,
-    "poses": _check_poses,
-    "orientations": _check_orientations,
-    "orientation-workspace": _check_orientations,
-    "attainability": _check_orientations,
-}

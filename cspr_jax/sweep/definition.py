@@ -17,7 +17,7 @@ from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.identity import FORMAT_VERSION, canonical_json, identity
-from cspr_jax.schema.quantities import DEFAULT_STORE, OF_MAP, TITLES
+from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
 from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 from cspr_jax.store.netcdf import bytes_needed
 from cspr_jax.store.shards import Layout
@@ -26,8 +26,6 @@ from cspr_jax.sweep.checks import check_map, check_points
 # Each tile is a file.
 LARGEST_TILES = 100_000
 LARGEST_RESULT = 1 << 46  # bytes; what is free on the disk is looked at when a run starts
-# Cells of a tile of maps whose cells take long.
-LONG_CELLS = {"orientation-workspace": 64, "attainability": 16}
 LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
 
 
@@ -37,6 +35,7 @@ class Sweep:
 
     Fields:
         file: where it was read.
+        kind: of its map.
         keys: its content.
         robot: its robot.
         grid: its axes and tiles.
@@ -46,6 +45,7 @@ class Sweep:
     """
 
     file: Path
+    kind: MapKind
     keys: SweepFile
     robot: RobotFile
     grid: Grid
@@ -104,17 +104,19 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     refuse_other_kinds(data, "sweep", path)
     keys = checked(SweepFile, data, path)
     robot = resolve_robot(keys.robot, path, path.parent)
-    check_map(keys, path)
-    # All orientations are this map's own axes.
-    own = _orientation_axes(keys) if keys.map == "orientations" else {}
+    kind = MAP_KINDS[keys.map]
+    check_map(kind, keys, path)
+    own = _orientation_axes(keys) if kind.is_over_orientations else {}
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
     counts |= {name: len(points) for name, points in own.items()}
-    store = list(keys.run.store or DEFAULT_STORE[keys.map])
+    store = list(keys.run.store or kind.stored)
     for name in store:
-        if name not in OF_MAP[keys.map]:
-            raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(OF_MAP[keys.map])} in this map")
-    tile = _tile(keys, tuple(counts.values()), path)
-    _check_size(counts, tile, keys, store, path)
+        if name not in kind.quantities:
+            raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(kind.quantities)} in this map")
+    shape = tuple(counts.values())
+    usual = tile_shape(shape, kind.cells)
+    tile = usual if keys.run.tile is None else _tile(keys.run.tile, shape, path)
+    _check_size(counts, tile, usual, bytes_needed(shape, store, keys.run.dtype), path)
     axes = {name: _points(getattr(keys.axes, name)) for name in data["axes"]}
     check_points(axes, path)
     axes |= own
@@ -122,7 +124,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     settings = keys.model_dump(mode="json", by_alias=True, exclude_none=True)
     settings |= {"robot": robot.model_dump(mode="json", exclude_none=True), "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
-    return Sweep(path, keys, robot, Grid(axes, tile), store, settings, text)
+    return Sweep(path, kind, keys, robot, Grid(axes, tile), store, settings, text)
 
 
 def _count(axis: AxisRange | list[float]) -> int:
@@ -145,10 +147,7 @@ def _orientation_axes(keys: SweepFile) -> dict[str, np.ndarray]:
     }
 
 
-def _tile(keys: SweepFile, shape: tuple[int, ...], path: Path) -> tuple[int, ...]:
-    tile = keys.run.tile
-    if tile is None:
-        return _usual_tile(keys, shape)
+def _tile(tile: list[int], shape: tuple[int, ...], path: Path) -> tuple[int, ...]:
     if len(tile) != len(shape) or float(np.prod(tile, dtype=float)) > LARGEST_TILE:
         raise ConfigError(
             path, f"run.tile = {shown(tile)}: must be {len(shape)} integers whose product is at most {LARGEST_TILE}"
@@ -156,17 +155,12 @@ def _tile(keys: SweepFile, shape: tuple[int, ...], path: Path) -> tuple[int, ...
     return tuple(min(t, n) for t, n in zip(tile, shape, strict=True))
 
 
-def _usual_tile(keys: SweepFile, shape: tuple[int, ...]) -> tuple[int, ...]:
-    return tile_shape(shape, LONG_CELLS.get(keys.map, LARGEST_TILE))
-
-
-def _check_size(counts: dict[str, int], tile: tuple[int, ...], keys: SweepFile, store: list[str], path: Path) -> None:
+def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int, ...], needed: int, path: Path) -> None:
     # Before any memory is taken; `check_room` looks at what is free when the run starts.
     shape, place = tuple(counts.values()), f"axes: {_cells_of(counts)}"
-    needed = bytes_needed(shape, store, keys.run.dtype)
     if needed > LARGEST_RESULT:
         raise ConfigError(path, f"{place} needs {needed / 1e9:.3g} GB: must be at most {LARGEST_RESULT / 1e9:.3g} GB")
-    tiles, usual = len(Tiling(shape, tile)), _usual_tile(keys, shape)
+    tiles = len(Tiling(shape, tile))
     if tiles <= LARGEST_TILES:
         return
     if len(Tiling(shape, usual)) <= LARGEST_TILES:
@@ -230,12 +224,12 @@ def attributes(sweep: Sweep) -> dict[str, Any]:
         attributes of the whole file.
     """
     robot = sweep.robot
-    title = f"{TITLES[sweep.keys.map]}, robot {robot.name}, amplitude {sweep.settings['trajectory']['amplitude']}"
+    title = f"{sweep.kind.title}, robot {robot.name}, amplitude {sweep.settings['trajectory']['amplitude']}"
     return {
         "Conventions": "CF-1.11",
         "title": title,
         "schema": FORMAT_VERSION,
-        "map": sweep.keys.map,
+        "map": sweep.kind.name,
         "identity": sweep.identity,
         "settings": canonical_json(sweep.settings),
         "z_axis": robot.z_axis,

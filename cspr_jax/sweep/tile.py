@@ -2,37 +2,19 @@
 
 import functools
 import pickle
-from collections.abc import Callable
 
 import jax
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ResourceError, SelfCheckError
-from cspr_jax.maps.arcs import CellMap
-from cspr_jax.maps.envelopes import EnvelopeMap
 from cspr_jax.maps.grid_map import GridMap
-from cspr_jax.maps.orientations import AccessibleMap, AttainableMap
-from cspr_jax.maps.oscillations import OscillationMap
-from cspr_jax.maps.places import EachOrientationMap
-from cspr_jax.maps.poses import PoseMap
 from cspr_jax.schema.identity import digest
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
 from cspr_jax.sweep.work import Computed
 
-MAPS: dict[str, Callable[[RobotFile, SweepFile, object], GridMap]] = {
-    "minimum-arcs": CellMap,
-    "minimum-oscillations": OscillationMap,
-    "transition-envelopes": EnvelopeMap,
-    "poses": PoseMap,
-    "orientations": EachOrientationMap,
-    "orientation-workspace": AccessibleMap,
-    "attainability": AttainableMap,
-}
 # Margins so near zero can change sign with the processor; how many there are stands in the result.
 NEAR_ZERO = 1e-9
 
@@ -51,7 +33,7 @@ class TileMap:
         """Refuse what cannot be computed."""
         self._sweep = sweep
         with double_precision():
-            self._cells = MAPS[sweep.keys.map](sweep.robot, sweep.keys, sweep.file)
+            self._cells: GridMap = sweep.kind.load()(sweep.robot, sweep.keys, sweep.file)
             self._cells.refuse_hopeless(sweep.grid)
 
     def __call__(self, index: int) -> Computed:

@@ -21,6 +21,10 @@ jax.tree_util.register_dataclass(Frame, ["signs", "origin", "rest"], [])
 class Motion(Protocol):
     """Motion over normalised time."""
 
+    @property
+    def z0(self) -> Array:
+        """Depth of P0, at which slacks are normalised, below the centroid of the spools, () m."""
+
     def duration(self) -> Array:
         """Duration T.
 
@@ -63,6 +67,11 @@ class Backwards(Generic[Kind]):
 
     motion: Kind
 
+    @property
+    def z0(self) -> Array:
+        """Depth of P0; see `Motion.z0`."""
+        return self.motion.z0
+
     def duration(self) -> Array:
         """Duration; see `Motion.duration`."""
         return self.motion.duration()
@@ -89,6 +98,11 @@ class Placed(Generic[Kind]):
     motion: Kind
     frame: Frame
 
+    @property
+    def z0(self) -> Array:
+        """Depth of P0; see `Motion.z0`."""
+        return self.motion.z0
+
     def duration(self) -> Array:
         """Duration; see `Motion.duration`."""
         return self.motion.duration()
@@ -100,6 +114,21 @@ class Placed(Generic[Kind]):
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
         return self.motion.breaks()
+
+
+def inward(frame: Frame, state: State) -> State:
+    """State of the axes of a robot file in those of the kernels.
+
+    Args:
+        frame: of the robot.
+        state: in the axes of the file; leaves (..., 3), (..., 4) or (..., 3, 3).
+
+    Returns:
+        the state, from the centroid of the spools, z down.
+    """
+    # Turning is its own inverse.
+    place: Any = frame.inward(state.position)
+    return outward(frame, state)._replace(position=place)
 
 
 def outward(frame: Frame, state: State) -> State:
@@ -115,7 +144,7 @@ def outward(frame: Frame, state: State) -> State:
     turned: dict[str, Any] = {"position": frame.outward(state.position)}
     turned |= {name: frame.turned(getattr(state, name)) for name in ("velocity", "acceleration")}
     if state.rotation is not None:
-        turned["quaternion"] = frame.turned_quaternions(state.quaternion)
+        turned["quaternion"] = None if state.quaternion is None else frame.turned_quaternions(state.quaternion)
         turned["rotation"] = frame.signs[:, None] * state.rotation * frame.signs
         turned |= {name: frame.turned(getattr(state, name)) for name in ("angular_velocity", "angular_acceleration")}
     return State(**turned)

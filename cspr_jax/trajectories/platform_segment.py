@@ -23,7 +23,7 @@ from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point, spool_radius
 from cspr_jax.robots.state import State
-from cspr_jax.robots.wrench_balance import conditioning
+from cspr_jax.robots.wrench_balance import normalised_determinant
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn
 from cspr_jax.trajectories.swing_plane import swing_plane
@@ -60,7 +60,7 @@ class PoseSegment:
         sense: () +1 (p odd) or -1 (p even).
         rate: () lambda of (3.50), 1/s^2.
         turn: of the orientation.
-        regular: () determinant (`robots.wrench_balance.conditioning`) at rest in P0, whose sign must not change.
+        regular: () determinant (`wrench_balance.normalised_determinant`) at rest in P0, whose sign must not change.
     """
 
     plane: Array
@@ -101,7 +101,7 @@ def pose_segment(
     plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, spool_radius(robot), upright, odd)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
     how = turn(start[1], end[1], *bends, odd=odd)
-    regular = conditioning(robot, hub, jnp.eye(3, dtype=hub.dtype))
+    regular = normalised_determinant(robot, hub, jnp.eye(3, dtype=hub.dtype))
     return PoseSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, how, regular)
 
 

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from cspr_jax.arithmetic.lanes import dot, smallest, stored
+from cspr_jax.arithmetic.minima import Bracket, golden_step, inner_points
 from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, still_slacks
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import contact_lanes
@@ -19,8 +20,8 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 LEAST_COSINE = 0.8
 # Arcs of a call from which on a loop is unrolled.
 UNROLLED = 1024
-# The golden section, and how often: the bracket shrinks to a 500th.
-_GOLDEN, SECTIONS = 0.6180339887498949, 13
+# Golden sections: the bracket shrinks to a 500th.
+SECTIONS = 13
 
 
 class Look(NamedTuple):
@@ -143,26 +144,15 @@ def narrowed(problem: Problem, items, *, pairs: tuple | None, kind: Kind, sectio
         return jnp.where(jnp.isnan(found), jnp.inf, found)
 
     low, high = jnp.maximum(tau - width, 0.0), jnp.minimum(tau + width, 1.0)
-    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    left, right = inner_points(low, high)
     at_left, at_right = lax.map(at, jnp.stack([left, right]))
 
     def section(_, carry):
-        (low, high, left, right, at_left, at_right), least = carry
-        go_left = at_left < at_right
-        low, high = jnp.where(go_left, low, left), jnp.where(go_left, right, high)
-        fresh = jnp.where(go_left, high - _GOLDEN * (high - low), low + _GOLDEN * (high - low))
-        value = at(fresh)
-        new = (
-            low,
-            high,
-            jnp.where(go_left, fresh, right),
-            jnp.where(go_left, left, fresh),
-            jnp.where(go_left, value, at_right),
-            jnp.where(go_left, at_left, value),
-        )
-        return new, jnp.minimum(least, value)
+        bracket, least = carry
+        bracket, value = golden_step(at, bracket, left_if_equal=False)
+        return bracket, jnp.minimum(least, value)
 
-    start = (low, high, left, right, at_left, at_right), jnp.minimum(at_left, at_right)
+    start = Bracket(low, high, left, right, at_left, at_right), jnp.minimum(at_left, at_right)
     return lax.fori_loop(0, sections, section, start)[1]
 
 

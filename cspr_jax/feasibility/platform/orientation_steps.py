@@ -13,14 +13,11 @@ from cspr_jax.arithmetic.lanes import rotation, stored
 from cspr_jax.robots import contact_lanes, wrench_lanes
 from cspr_jax.robots.interference import Contacts, cables_cross, contacts, platform_hit
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import plane_normal, rest_point
-from cspr_jax.robots.wrench_balance import conditioning
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.wrench_balance import determinant_share, is_regular, normalised_determinant
 from cspr_jax.robots.wrench_lanes import cables
 
 BATCH = 4096
-# Determinants below this part of that of the reference orientation count as singular, of whichever sign rounding makes
-# them.
-SINGULAR = 1e-6
 # Gaps between cables below this part of the platform's size are none. A cable that makes a smaller angle with the
 # platform lies in it, and counts as being where it is in the reference orientation: it has not yet swept over.
 TOUCHING = 1e-9
@@ -51,7 +48,7 @@ def _sights(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) -
     wires = cables(robot, [places[:, i] for i in range(3)], turn)
     wires = wires._replace(rays=stored(wires.rays, one))
     apart, seen = contact_lanes.gaps(robot.base_points, pairs, wires), contact_lanes.views(wires, turn)
-    return wrench_lanes.conditioning(robot, wires), *contact_lanes.as_arrays(apart, seen)
+    return wrench_lanes.normalised_determinant(robot, wires), *contact_lanes.as_arrays(apart, seen)
 
 
 def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
@@ -62,12 +59,12 @@ def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
         place: (3,) m.
 
     Returns:
-        of `robots.wrench_balance.conditioning`; NaN if it has not, or the place is not below the spools.
+        of `robots.wrench_balance.normalised_determinant`; NaN if it has not, or the place is not below the spools.
     """
     upright, depth = jnp.eye(3), plane_normal(robot) @ jnp.asarray(place)
-    here = float(conditioning(robot, jnp.asarray(place), upright))
-    middle = float(conditioning(robot, rest_point(depth), upright))
-    return here if float(depth) > 0.0 and here / middle > SINGULAR else np.nan
+    here = float(normalised_determinant(robot, jnp.asarray(place), upright))
+    is_free = is_regular(determinant_share(robot, jnp.asarray(place), upright))
+    return here if float(depth) > 0.0 and bool(is_free) else np.nan
 
 
 class Watch:
@@ -118,7 +115,7 @@ class Watch:
         Returns:
             (n,).
         """
-        return sights.share > SINGULAR
+        return is_regular(sights.share)
 
     def passable(self, sights: Sights, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         """Which steps from one orientation to a neighbouring one can be made.

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import dot, smallest
-from cspr_jax.feasibility.limits import given
+from cspr_jax.feasibility.limits import given, scales, slack
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
@@ -16,15 +16,13 @@ from cspr_jax.robots.wrench_lanes import (
     balance,
     cable_rates,
     cables,
-    conditioning,
     inertial_wrench,
+    normalised_determinant,
 )
+from cspr_jax.schema.limits import Limit
 from cspr_jax.trajectories.platform_lanes import Instant, State, squared_duration, state
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
-# Limits on what depends on the motion, beside the tensions, and on the pose alone, beside regularity and depth.
-MOVING = ("tension_min", "tension_max", "cable_speed_max", "cable_acceleration_max")
-STILL = ("floor", "cable_length_max")
 # Where three of the cables are nearly in one plane the fast balance has no digits, whatever the platform does.
 FLAT = 1e-7
 
@@ -97,7 +95,7 @@ def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Inst
         kind: of the motions.
 
     Returns:
-        (n,) each, in the order of `MOVING`; infinite where the fast balance has no digits.
+        (n,) each: the taut cables', then those of limits on the motion; infinite where the fast balance has no digits.
     """
     robot, limits = problem.robot, problem.limits
     here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
@@ -105,21 +103,19 @@ def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Inst
     found = _balanced(robot, here, wires, squared)
     is_flat = _is_flat(wires, found)
     values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment.rate, found))]
-    names = _given(limits, MOVING)
-    if not names:
+    rows = _given(limits, of_motion=True)
+    if not rows:
         return values
     lengths, rates, bends = cable_rates(wires, here.velocity, here.acceleration, here.omega, here.spin)
-    pace, weight = jnp.sqrt(squared), robot.mass * robot.gravity
-    force = [robot.mass * x / found.denominator * y for x, y in zip(found.numerators, lengths, strict=True)]
-    slacks = {
-        "tension_min": lambda x, k: (force[k] - x) * CABLES / weight,
-        "tension_max": lambda x, k: (x - force[k]) * CABLES / weight,
-        "cable_speed_max": lambda x, k: 1.0 - jnp.abs(rates[k]) / pace / x,
-        "cable_acceleration_max": lambda x, k: 1.0 - jnp.abs(bends[k]) / squared / x,
+    pace, scale = jnp.sqrt(squared), scales(CABLES, robot.mass * robot.gravity, robot.gravity / segment.rate)
+    each = {
+        "tension": [robot.mass * x / found.denominator * y for x, y in zip(found.numerators, lengths, strict=True)],
+        "speed": [jnp.abs(rate) / pace for rate in rates],
+        "acceleration": [jnp.abs(bend) / squared for bend in bends],
     }
-    for name in names:
-        least = smallest([slacks[name](getattr(limits, name)[k], k) for k in range(CABLES)])
-        values.append(jnp.where(is_flat, jnp.inf, least) if name.startswith("tension") else least)
+    for row in rows:
+        least = _least(row, limits, each[row.quantity], scale)
+        values.append(jnp.where(is_flat, jnp.inf, least) if row.quantity == "tension" else least)
     return values
 
 
@@ -133,22 +129,26 @@ def still_slacks(problem: Problem, segment: PoseSegment, here: State, wires: Cab
         wires: the cables there.
 
     Returns:
-        (n,) each, in the order of `STILL`.
+        (n,) each: regular, below the spools, then those of limits on the pose.
     """
     robot, limits, z0 = problem.robot, problem.limits, problem.robot.gravity / segment.rate
     normal = plane_normal(robot)
     below = dot([normal[i] for i in range(3)], here.position) / z0
-    values = [conditioning(robot, wires) / segment.regular, below]
-    if limits.floor is not None:
-        values.append((limits.floor - here.position[2]) / z0)
-    if limits.cable_length_max is not None:
-        lengths = [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]
-        values.append(smallest([1.0 - length / limits.cable_length_max[k] for k, length in enumerate(lengths)]))
-    return values
+    values = [normalised_determinant(robot, wires) / segment.regular, below]
+    scale = scales(CABLES, robot.mass * robot.gravity, z0)
+    each = {"depth": [here.position[2]], "length": [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]}
+    return values + [_least(row, limits, each[row.quantity], scale) for row in _given(limits, of_motion=False)]
 
 
-def _given(limits: Limits, names: tuple[str, ...]) -> list[str]:
-    return [name for name in given(limits) if name in names]
+def _given(limits: Limits, *, of_motion: bool) -> list[Limit]:
+    return [row for row in given(limits) if row.of_motion == of_motion]
+
+
+def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
+    # Smallest slack of a limit, of a quantity of each cable or of one alone.
+    limit = getattr(limits, row.name)
+    own = [limit[k] for k in range(len(each))] if row.per_cable else [limit]
+    return smallest([slack(row, x, value, scale) for x, value in zip(own, each, strict=True)])
 
 
 def order(limits: Limits) -> list[int]:
@@ -160,5 +160,6 @@ def order(limits: Limits) -> list[int]:
     Returns:
         n_criteria indices.
     """
-    names = ["taut", *_given(limits, MOVING), "regular", "below", *_given(limits, STILL)]
-    return [names.index(name) for name in ("taut", "regular", "below", *given(limits))]
+    moving, still = _given(limits, of_motion=True), _given(limits, of_motion=False)
+    every = ["taut", *moving, "regular", "below", *still]
+    return [every.index(which) for which in ("taut", "regular", "below", *given(limits))]

@@ -3,7 +3,7 @@
 With n the number of cables, f the tensions, m the mass:
 
     taut           n z0 mu / g, the tension over its value at rest in P0 if all were equal
-    regular        determinant (`robots.wrench_balance.conditioning`) over its value at rest in P0
+    regular        determinant (`robots.wrench_balance.normalised_determinant`) over its value at rest in P0
     below          depth of the mass centre below the spool plane, over z0
     tension        (f - f_min) n / (m g),  (f_max - f) n / (m g)
     floor          (floor - z) / z0
@@ -13,7 +13,7 @@ With n the number of cables, f the tensions, m the mass:
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.feasibility.limits import FLAGS, given
+from cspr_jax.feasibility.limits import given, scales, slack, values
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.limits import Limits
@@ -31,7 +31,7 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
     Returns:
         n_criteria flags.
     """
-    return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(FLAGS[name] for name in given(limits)))
+    return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(row.flag for row in given(limits)))
 
 
 def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Array:
@@ -50,20 +50,12 @@ def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Ar
     per_length = wrench_balance.tensions_per_length(robot, state)
     found = [
         robot.n_cables * z0 / robot.gravity * jnp.min(per_length),
-        wrench_balance.conditioning(robot, state.position, state.rotation) / regular,
+        wrench_balance.normalised_determinant(robot, state.position, state.rotation) / regular,
         plane_normal(robot) @ state.position / z0,
     ]
-    names = given(limits)
-    if not names:
+    rows = given(limits)
+    if not rows:
         return jnp.stack(found)
-    lengths, rates, bends = wrench_balance.cable_motion(robot, state)
-    force, weight = robot.mass * per_length * lengths, robot.mass * robot.gravity / robot.n_cables
-    slacks = {
-        "tension_min": lambda limit: jnp.min(force - limit) / weight,
-        "tension_max": lambda limit: jnp.min(limit - force) / weight,
-        "floor": lambda limit: (limit - state.position[2]) / z0,
-        "cable_length_max": lambda limit: jnp.min(1.0 - lengths / limit),
-        "cable_speed_max": lambda limit: jnp.min(1.0 - jnp.abs(rates) / limit),
-        "cable_acceleration_max": lambda limit: jnp.min(1.0 - jnp.abs(bends) / limit),
-    }
-    return jnp.stack([*found, *(slacks[name](getattr(limits, name)) for name in names)])
+    now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
+    every = (slack(row, getattr(limits, row.name), getattr(now, row.quantity), scale) for row in rows)
+    return jnp.stack([*found, *(jnp.min(x) for x in every)])

@@ -6,8 +6,8 @@ import itertools
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.feasibility.limits import FLAGS, count, given
-from cspr_jax.feasibility.point_mass.proof_slacks import limit_curvatures, limit_slacks
+from cspr_jax.feasibility.limits import given
+from cspr_jax.feasibility.point_mass.proof_slacks import count, limit_curvatures, limit_slacks
 from cspr_jax.feasibility.point_mass.slacks import instant, row_bounds, stretch, taut_bounds
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
@@ -25,7 +25,7 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
     Returns:
         n_criteria flags.
     """
-    return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(FLAGS[name] for name in given(limits)))
+    return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in given(limits)))
 
 
 def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
@@ -38,7 +38,7 @@ def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
     Returns:
         n_criteria numbers.
     """
-    return (robot.n_cables, 1, *(count(name, robot.n_cables) for name in given(limits)))
+    return (robot.n_cables, 1, *(count(row, robot.n_cables) for row in given(limits)))
 
 
 def smooth_slacks(

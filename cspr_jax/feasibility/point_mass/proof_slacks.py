@@ -13,6 +13,8 @@ Each is dimensionless and free of a division that could blow up.
 """
 
 import math
+from collections.abc import Callable
+from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
@@ -23,7 +25,94 @@ from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.slacks import Instant, Stretch, row_bounds
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
+from cspr_jax.schema.limits import Limit
 from cspr_jax.trajectories.hypocycloid import Segment, duration, oscillation
+
+
+class _Now(NamedTuple):
+    # A segment at one instant: numbers, and (n_cables,) of the cables; derivatives in tau.
+    z0: Array
+    time: Array
+    weight: Array
+    eta: Array
+    lift: Array
+    depth: Array
+    length: Array
+    rate: Array
+    rate_slope: Array
+
+
+class _Over(NamedTuple):
+    # Bounds over an interval; `square` of (rho^2)'', without rho's own division.
+    n_cables: int
+    z0: Array
+    time: Array
+    weight: Array
+    kappa: Bounds
+    eta: Bounds
+    depth: Bounds
+    length: Bounds
+    pace: Bounds
+    pull: Bounds
+    square: Array
+
+
+class _Closed(NamedTuple):
+    # A limit's slacks, how many a cable (or one of a height), and the bound of their second derivatives.
+    slack: Callable[[_Now, Array], Array]
+    curvature: Callable[[_Over, Array], Array]
+    sides: int = 1
+
+
+def _bends(now: _Now, limit: Array) -> Array:
+    bend = (now.length**2 * now.rate_slope - now.rate**2) / (limit * now.time**2)
+    return jnp.concatenate([now.length**3 - bend, now.length**3 + bend]) / now.z0**3
+
+
+def _lifted(over: _Over, limit: Array) -> Array:
+    whole = over.kappa._replace(value=1.0 + over.kappa.value)
+    lift = (whole * over.length).times(1.0 / (over.n_cables * over.z0))
+    return (lift + over.eta.times(limit / over.weight)).curvature
+
+
+def _rated(over: _Over, limit: Array) -> Array:
+    rate = _rate(over.length, over.pace, over.pull)
+    return 0.5 * (over.square + (rate * rate).curvature / (over.time * limit) ** 2) / over.z0**2
+
+
+def _bent(over: _Over, limit: Array) -> Array:
+    length, bend = over.length, _bend(over.length, over.pace, over.pull, over.square)
+    cube = 6.0 * length.value * over.pace.slope**2 + 3.0 * length.value**2 * over.pace.curvature
+    return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
+
+
+# One of each row of `schema.limits.LIMITS`.
+CLOSED = {
+    "tension_min": _Closed(lambda now, limit: now.lift - limit / now.weight * now.eta, _lifted),
+    "tension_max": _Closed(lambda now, limit: limit / now.weight * now.eta - now.lift, _lifted),
+    "floor": _Closed(lambda now, limit: (limit - now.depth) / now.z0, lambda over, _: over.depth.curvature / over.z0),
+    "cable_length_max": _Closed(
+        lambda now, limit: (limit**2 - now.length**2) / (2.0 * now.z0**2),
+        lambda over, _: 0.5 * over.square / over.z0**2,
+    ),
+    "cable_speed_max": _Closed(
+        lambda now, limit: (now.length**2 - (now.rate / (now.time * limit)) ** 2) / (2.0 * now.z0**2), _rated
+    ),
+    "cable_acceleration_max": _Closed(_bends, _bent, 2),
+}
+
+
+def count(row: Limit, n_cables: int) -> int:
+    """How many smooth functions the slack of a limit is the smallest of.
+
+    Args:
+        row: the limit's.
+        n_cables: of the robot.
+
+    Returns:
+        one of a height, one a cable, or two a cable for either sign.
+    """
+    return CLOSED[row.name].sides * (n_cables if row.per_cable else 1)
 
 
 def limit_slacks(
@@ -51,24 +140,9 @@ def limit_slacks(
     rate_slope = jnp.dot(slope, slope) + rays @ curvature
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
     lift = jnp.stack(now.kappa) * length / (len(now.kappa) * z0)
-    found = []
-    for name in given(limits):
-        limit = getattr(limits, name)
-        if name == "tension_min":
-            slack = lift - limit / weight * now.eta
-        elif name == "tension_max":
-            slack = limit / weight * now.eta - lift
-        elif name == "floor":
-            slack = (limit - position[2]) / z0
-        elif name == "cable_length_max":
-            slack = (limit**2 - length**2) / (2.0 * z0**2)
-        elif name == "cable_speed_max":
-            slack = (length**2 - (rate / (time * limit)) ** 2) / (2.0 * z0**2)
-        else:
-            bend = (length**2 * rate_slope - rate**2) / (limit * time**2)
-            slack = jnp.concatenate([length**3 - bend, length**3 + bend]) / z0**3
-        found.append([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])])
-    return tuple(found)
+    here = _Now(z0, time, weight, now.eta, lift, position[2], length, rate, rate_slope)
+    found = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in given(limits))
+    return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in found)
 
 
 def _path(segment: Segment, arcs: Array, tau: Array, now: Instant) -> tuple[Array, Array, Array]:
@@ -106,25 +180,10 @@ def limit_curvatures(
     pace, pull = _pace(segment, arcs, over)
     eta = row_bounds(segment, arcs, over, segment.tilt)
     length = _length(robot, segment, over, pace, eta)
-    square = 2.0 * (pace.slope**2 + length.value * pace.curvature)  # of rho^2, without rho's own division
-    found = []
-    for name in given(limits):
-        limit = getattr(limits, name)
-        if name in ("tension_min", "tension_max"):
-            whole = kappa._replace(value=1.0 + kappa.value)
-            bound = ((whole * length).times(1.0 / (robot.n_cables * z0)) + eta.times(limit / weight)).curvature
-        elif name == "floor":
-            bound = row_bounds(segment, arcs, over, segment.plane[2]).curvature / z0
-        elif name == "cable_length_max":
-            bound = 0.5 * square / z0**2
-        elif name == "cable_speed_max":
-            rate = _rate(length, pace, pull)
-            bound = 0.5 * (square + (rate * rate).curvature / (time * limit) ** 2) / z0**2
-        else:
-            cube = 6.0 * length.value * pace.slope**2 + 3.0 * length.value**2 * pace.curvature
-            bound = (cube + _bend(length, pace, pull, square).curvature / (limit * time**2)) / z0**3
-        found.append(jnp.max(bound))
-    return tuple(found)
+    depth = row_bounds(segment, arcs, over, segment.plane[2])
+    square = 2.0 * (pace.slope**2 + length.value * pace.curvature)
+    here = _Over(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
+    return tuple(jnp.max(CLOSED[row.name].curvature(here, getattr(limits, row.name))) for row in given(limits))
 
 
 def _pace(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]:

@@ -19,17 +19,18 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.arithmetic.elementary import vertex
+from cspr_jax.arithmetic.minima import GOLDEN, Bracket, golden_step, inner_points
 from cspr_jax.trajectories.amplitudes import SMALLEST_EPSILON, Amplitude, derivatives, named
 
 # Samples of each piece of the amplitude function; between them the maximum is refined.
 SAMPLES = 64
 UNROLL = 4
 # Golden section narrows the bracket to a three-hundredth, parabolas then find the place to rounding.
-GOLDEN, STEPS = (math.sqrt(5.0) - 1.0) / 2.0, 12
+STEPS = 12
 PARABOLAS, SMALLEST_SHARE, TINY = 2, 1e-3, 1e-100
 # Of a best inclination: the bracket ends at 4e-9 of where it began.
 INCLINATION_STEPS = 40
-EPSILONS = 50
+EPSILONS, SMALLEST_WIDTH = 50, 1e-9
 LARGEST_INCLINATION = 1.0 - 1e-9
 
 
@@ -81,21 +82,10 @@ def _samples(amplitude: Amplitude) -> Array:
 
 def _golden(function: Callable[[Array], Array], low: Array, high: Array, steps: int) -> Array:
     # Where a function that falls and then rises is smallest, by golden section.
-    def narrow(_, state):
-        low, high, left, right, at_left, at_right = state
-        down = at_left <= at_right
-        low, high = jnp.where(down, low, left), jnp.where(down, right, high)
-        step = GOLDEN * (high - low)
-        fresh = jnp.where(down, high - step, low + step)
-        at_fresh = function(fresh)
-        left, right = jnp.where(down, fresh, right), jnp.where(down, left, fresh)
-        at_left, at_right = jnp.where(down, at_fresh, at_right), jnp.where(down, at_left, at_fresh)
-        return low, high, left, right, at_left, at_right
-
-    step = GOLDEN * (high - low)
-    first = (low, high, high - step, low + step, function(high - step), function(low + step))
-    low, high, *_ = lax.fori_loop(0, steps, narrow, first)
-    return 0.5 * (low + high)
+    left, right = inner_points(low, high)
+    start = Bracket(low, high, left, right, function(left), function(right))
+    last = lax.fori_loop(0, steps, lambda _, bracket: golden_step(function, bracket)[0], start)
+    return 0.5 * (last.low + last.high)
 
 
 @jax.jit
@@ -228,8 +218,8 @@ def best_epsilon(weights: Array) -> tuple[float, float]:
     trial = np.linspace(SMALLEST_EPSILON, 0.5, EPSILONS)
     place = int(np.argmin([needed(float(epsilon)) for epsilon in trial]))
     low, high = float(trial[max(place - 1, 0)]), float(trial[min(place + 1, EPSILONS - 1)])
-    while high - low > 1e-9:
-        left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    while high - low > SMALLEST_WIDTH:
+        left, right = inner_points(low, high)
         low, high = (low, right) if needed(left) <= needed(right) else (left, high)
     return 0.5 * (low + high), needed(0.5 * (low + high))
 

@@ -14,10 +14,9 @@ from cspr_jax.outputs.plots.motion import motion_figure
 from cspr_jax.outputs.plots.notes import notes
 from cspr_jax.outputs.plots.sections import AROUND, POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
+from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
 
-# What a map is asked for first.
-FIRST = ("arcs", "oscillations", "lower_envelope", "attainable_fraction", "accessible_volume")
 # Pairs of axes that belong into one plane, the second upward or, in polar coordinates, outward: the first of these that
 # vary, or the one of the others that has the most cells.
 PLANES = (("x", "y"), POLAR, ("from_x", "from_y"))
@@ -56,7 +55,7 @@ def drawn(
     Args:
         results: of `cspr run`, or one motion of `cspr plan -o`.
         names: of their files.
-        quantity: which one of a map; None: "arcs", or the first there is.
+        quantity: which one of a map; None: the one that its kind of map is about.
         at: fixed values of axes, within their ranges; the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
@@ -187,8 +186,8 @@ def _panelled(result: Result, view: View, order: list[str]) -> View:
 
 
 def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
-    first = [name for name in FIRST if name in result.data]
-    name = quantity or (first[0] if first else next(iter(result.data)))
+    pictured = MAP_KINDS[result.attributes["map"]].pictured
+    name = quantity or next(name for name in (*pictured, *result.data) if name in result.data)
     if name not in result.data:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
     data, fixed, place = result.data[name], [], {}

@@ -21,7 +21,8 @@ from cspr_jax.outputs.plots.labels import (
 )
 from cspr_jax.outputs.plots.layout import in_degrees, in_whole_numbers, panels
 from cspr_jax.outputs.plots.notes import table
-from cspr_jax.outputs.plots.reasons import VERDICTS, reasons
+from cspr_jax.outputs.plots.reasons import reasons
+from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.store.result import Result
 
 LINES = len(COLOURS)
@@ -64,7 +65,7 @@ def line_figure(
     every, bottom, left = panels(figure, count)
     drawn = [[_as_drawn(result, name, across, line) for line in lines] for lines in groups.values()]
     words: list[str] = []
-    if name in VERDICTS:
+    if QUANTITIES[name].unflagged:
         drawn, words = _as_reasons(drawn, name)
     for panel, heading, lines in zip(every, groups, drawn, strict=True):
         _draw(panel, lines)

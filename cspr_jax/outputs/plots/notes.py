@@ -2,11 +2,8 @@
 
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import value
+from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
-
-# Maps whose segments all start at rest, and those of their quantities that are not of a motion.
-OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
-FROM_REST = {"minimum-oscillations": (), "orientations": (), "attainability": OF_PLACES}
 
 
 def table(settings: object, key: str) -> dict:
@@ -47,10 +44,10 @@ def starts_at_rest(result: Result, name: str) -> bool:
     Returns:
         whether it does.
     """
-    kind = result.attributes.get("map")
-    if kind in FROM_REST:
-        return name not in FROM_REST[kind]
-    return bool(table(table(result.settings, "trajectory"), "from").get("rest"))
+    kind = MAP_KINDS[result.attributes["map"]]
+    if name in kind.motionless:
+        return False
+    return kind.start == "rest" or bool(table(table(result.settings, "trajectory"), "from").get("rest"))
 
 
 def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[str]:

@@ -4,10 +4,8 @@ import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from cspr_jax.outputs.plots.colours import Scale
+from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
-
-# Quantities that are flags of a verdict, and what it is called where none is set.
-VERDICTS = {"verdict": "feasible", "main_reason": "all attained"}
 
 # In this order: what lies deeper comes first. The colours are Okabe and Ito's, and greys.
 REASONS = {
@@ -33,7 +31,7 @@ def reasons(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, list[str], lis
 
     Args:
         verdicts: (...) flags.
-        name: of the quantity, one of VERDICTS.
+        name: of the quantity.
 
     Returns:
         (...) number of the reason, from 0 on; the words of those that occur; their colours.
@@ -43,7 +41,7 @@ def reasons(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, list[str], lis
     for number, flag in reversed(list(enumerate(REASONS, start=1))):
         found = np.where(flags & flag.value, number, found)
     used = np.unique(found)
-    every = [(VERDICTS[name], FEASIBLE_COLOUR), *REASONS.values()]
+    every = [(QUANTITIES[name].unflagged, FEASIBLE_COLOUR), *REASONS.values()]
     words, colours = zip(*(every[number] for number in used), strict=True)
     return np.searchsorted(used, found), list(words), list(colours)
 
@@ -53,7 +51,7 @@ def reason_scale(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, Scale]:
 
     Args:
         verdicts: (...) flags.
-        name: of the quantity, one of VERDICTS.
+        name: of the quantity.
 
     Returns:
         (...) number of the reason, and the scale of those that occur.

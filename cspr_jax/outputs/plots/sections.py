@@ -13,12 +13,11 @@ from cspr_jax.outputs.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar,
 from cspr_jax.outputs.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
 from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
 from cspr_jax.outputs.plots.marks import mark, marked
-from cspr_jax.outputs.plots.reasons import VERDICTS, reason_scale
+from cspr_jax.outputs.plots.reasons import reason_scale
+from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
 
-# Quantities of which either sign is as good as the other.
-SIGNED = ("used_inclination",)
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
 # A top view: straight from above, in true shape.
@@ -70,12 +69,13 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
     orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in across]
     points = [as_drawn(result, axis, result.axes[axis][order]) for axis, order in zip(across, orders, strict=True)]
     data = as_drawn(result, name, data[np.ix_(*orders, shown)])
-    cells, scale = reason_scale(data, name) if name in VERDICTS else (data, scale_of(data, signed=name in SIGNED))
+    quantity = QUANTITIES[name]
+    cells, scale = reason_scale(data, name) if quantity.unflagged else (data, scale_of(data, signed=quantity.signed))
     titles = values(result, over, result.axes[over][shown]) if over is not None else []
     legend: dict[str, Artist] = {"no value": Patch(color=NONE_COLOUR)} if scale.missing else {}
     for k, panel in enumerate(every):
         image = _section(panel, result, cells[:, :, k], across, points, scale)
-        if name == "least_oscillations" and not polar:
+        if quantity.contoured and not polar:
             _loci(panel, cells[:, :, k], points)
         place = alone | ({over: float(result.axes[over][shown[k]])} if over is not None else {})
         legend |= mark(panel, result, name, across, {a: p for a, p in place.items() if a not in across})
@@ -143,7 +143,7 @@ def tells(name: str, data: np.ndarray) -> np.ndarray:
     Returns:
         of data's shape.
     """
-    if name in VERDICTS:
+    if QUANTITIES[name].unflagged:
         return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0
     return data > 0 if data.dtype.kind == "i" else np.isfinite(data)
 

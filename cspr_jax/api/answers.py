@@ -1,0 +1,38 @@
+"""Answers of searches from Python, which know their motions."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+from cspr_jax.search.answers import Answers
+from cspr_jax.search.oscillations import OscillationAnswers
+from cspr_jax.search.platform_answers import PoseAnswers
+from cspr_jax.trajectories.motion import Placed
+
+
+@dataclasses.dataclass(frozen=True)
+class _WithMotions:
+    make: Callable[[], Placed] = dataclasses.field(kw_only=True, repr=False, compare=False)
+
+    def motions(self) -> Any:
+        """Motions that the answers belong to: of the number of arcs found, else of the best candidate.
+
+        Returns:
+            one motion whose leaves have a leading dimension (n,), in the robot's axes: `jax.vmap` takes it apart.
+        """
+        return self.make()
+
+
+@dataclasses.dataclass(frozen=True)
+class ArcsAnswers(Answers, _WithMotions):
+    """Answers of `minimum_arcs`; see `search.answers.Answers`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TransitionAnswers(OscillationAnswers, _WithMotions):
+    """Answers of `minimum_oscillations`; see `search.oscillations.OscillationAnswers`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PlatformAnswers(PoseAnswers, _WithMotions):
+    """Answers of `minimum_pose_arcs`; see `search.platform_answers.PoseAnswers`."""

@@ -1,0 +1,151 @@
+"""Arguments of the functions from Python, checked, and motions of many answers."""
+
+from typing import Any
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
+from cspr_jax.errors import InputError
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.problem import limits_over, prepared
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import LARGEST_LENGTH
+from cspr_jax.robots.robot import check_determined
+from cspr_jax.search.answers import Answers
+from cspr_jax.search.pose_targets import REFERENCE
+from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors, named
+from cspr_jax.trajectories.motion import Placed
+
+
+def amplitude_of(given: str | Amplitude, *, free_end: bool | None = None) -> Amplitude:
+    """Amplitude function that is given by its name, or itself.
+
+    Args:
+        given: name or function.
+        free_end: whether it must meet (1.27) and (1.28), or (2.49); None: neither. What jax is tracing is not checked.
+
+    Returns:
+        the function.
+
+    Raises:
+        InputError: an unknown name, or conditions that it breaks.
+    """
+    found = named(given) if isinstance(given, str) else given
+    if free_end is not None and isinstance(found.coefficients, np.ndarray):
+        broken = boundary_errors(found, free_end=free_end)
+        if broken:
+            conditions = "(1.27) and (1.28)" if free_end else "(2.49)"
+            raise InputError(
+                "amplitude", found.name, f"an amplitude function that meets {conditions}: " + "; ".join(broken)
+            )
+    return found
+
+
+def kernel_problem(
+    robot: Any, amplitude: str | Amplitude, limits: Limits | None, *, free_end: bool | None = False
+) -> tuple[Problem, Frame]:
+    """Robot, limits and amplitude function, as the kernels take them.
+
+    Args:
+        robot: in its own axes.
+        amplitude: its name, or the function.
+        limits: over those of the robot; None: those.
+        free_end: as in `amplitude_of`.
+
+    Returns:
+        the problem, and the frame of the robot.
+
+    Raises:
+        InputError: more cables than degrees of freedom, or what `amplitude_of` and `limits_over` refuse.
+    """
+    function = amplitude_of(amplitude, free_end=free_end)
+    check_determined(robot)
+    own, frame = prepared(robot)
+    return Problem(own, limits_over(robot, limits), function), frame
+
+
+def batched(kind, segments, problem: Problem, answers: Answers, frame: Frame, *more) -> Any:
+    """Motions of answers, as one whose leaves all have a leading dimension, so that `jax.vmap` takes it.
+
+    Args:
+        kind: class of the motions.
+        segments: leaves (n, ...).
+        problem: gives the amplitude function.
+        answers: of n motions.
+        frame: of the robot.
+        *more: further fields of the class.
+
+    Returns:
+        the motions, in the robot's axes.
+    """
+    count = len(answers.tried_arcs)
+    shared = jax.tree.map(lambda x: np.broadcast_to(x, (count, *np.shape(x))), (problem.amplitude, frame))
+    return Placed(kind(segments, shared[0], answers.tried_arcs.astype(float), *more), shared[1])
+
+
+def depths(z0, count: int) -> np.ndarray:
+    """Depths of P0.
+
+    Args:
+        z0: () or (count,) m.
+        count: how many are wanted.
+
+    Returns:
+        (count,) m.
+
+    Raises:
+        InputError: another shape, or not positive.
+    """
+    if np.shape(z0) not in ((), (count,)):
+        raise InputError("z0", f"shape {np.shape(z0)}", f"a number > 0, or ({count},) of them")
+    depth = np.broadcast_to(np.asarray(z0, float), (count,)).copy()
+    fits = (depth > 0.0) & (depth <= LARGEST_LENGTH)
+    if not fits.all():
+        raise InputError("z0", float(depth[~fits][0]), "a number > 0, at most 1e6 m")
+    return depth
+
+
+def quaternions(key: str, given, count: int) -> np.ndarray:
+    """Orientations.
+
+    Args:
+        key: named in errors.
+        given: (count, 4) unit quaternions, scalar first; None: the reference orientation.
+        count: how many are wanted.
+
+    Returns:
+        (count, 4).
+
+    Raises:
+        InputError: another shape, or not of unit length.
+    """
+    if given is None:
+        return np.tile(REFERENCE, (count, 1))
+    turns = np.asarray(given, float)
+    if turns.shape != (count, 4) or not np.abs(np.linalg.norm(turns, axis=1) - 1.0).max() <= UNIT_TOLERANCE:
+        raise InputError(key, f"shape {turns.shape}", f"({count}, 4) unit quaternions, scalar first")
+    return turns / np.linalg.norm(turns, axis=1, keepdims=True)
+
+
+def points_of(key: str, given) -> np.ndarray:
+    """Points.
+
+    Args:
+        key: named in errors.
+        given: (n, 3) m, n >= 1.
+
+    Returns:
+        (n, 3) m.
+
+    Raises:
+        InputError: another shape, not finite, or beyond 1e6 m.
+    """
+    points = np.asarray(given, float)
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points):
+        raise InputError(key, f"shape {points.shape}", "finite numbers of shape (n, 3), n >= 1")
+    fits = (np.abs(points) <= LARGEST_LENGTH).all(1)
+    if not fits.all():
+        raise InputError(key, points[~fits][0].tolist(), "finite numbers, at most 1e6 m")
+    return points

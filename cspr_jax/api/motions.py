@@ -1,0 +1,205 @@
+"""One motion from Python: pure jax, in the axes of the robot, to be jitted, vmapped and differentiated.
+
+Motions and margins here have the precision that jax is set to: call `jax.config.update("jax_enable_x64", True)` for
+float64, as searches use whatever jax is set to.
+"""
+
+from typing import Any
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.api.arguments import amplitude_of, kernel_problem
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.errors import InputError
+from cspr_jax.feasibility import slacks as feasibility
+from cspr_jax.feasibility.platform.end_acceleration import AT_REST
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.problem import prepared
+from cspr_jax.robots import cables
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import PointMassRobot, rest_point
+from cspr_jax.robots.state import State
+from cspr_jax.search.pose_targets import REFERENCE
+from cspr_jax.trajectories import transition as transitions
+from cspr_jax.trajectories.amplitudes import Amplitude
+from cspr_jax.trajectories.hypocycloid import Hypocycloid, segment
+from cspr_jax.trajectories.motion import Motion, Placed, inward
+from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, pose_segment
+
+
+def make_problem(
+    robot: AnyRobot, *, amplitude: str | Amplitude = "quintic", limits: Limits | None = None
+) -> Problem[Any]:
+    """Robot, limits and amplitude function of a question, as searches and margins take them.
+
+    Args:
+        robot: with as many cables as degrees of freedom.
+        amplitude: its name, or the function.
+        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+
+    Returns:
+        the problem.
+
+    Raises:
+        InputError: limits that contradict each other, an unknown amplitude function, or too many cables.
+    """
+    return kernel_problem(robot, amplitude, limits, free_end=None)[0]
+
+
+def hypocycloid(
+    robot: PointMassRobot, start, end, *, z0, arcs, amplitude: str | Amplitude = "quintic"
+) -> Placed[Hypocycloid]:
+    """Standard hypocycloid of a point mass between two points, thesis chapter 2.
+
+    Args:
+        robot: a point mass on three cables.
+        start: (3,) in the robot's axes, m; None: at rest in P0.
+        end: (3,) likewise.
+        z0: () depth of P0 below the centroid of the spools, m.
+        arcs: () number of arcs.
+        amplitude: its name, or the function; it must meet (2.49).
+
+    Returns:
+        the motion, in the robot's axes.
+
+    Raises:
+        InputError: another kind of robot, or an amplitude function that breaks (2.49).
+    """
+    own, frame = _prepared(robot, PointMassRobot, (3,), "a point mass on three cables")
+    function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
+    first, last = _places(frame, start, end, z0)
+    found = segment(own, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
+    return Placed(Hypocycloid(found, function, p), frame)
+
+
+def transition(
+    robot: PointMassRobot, target, *, z0, oscillations, amplitude: str | Amplitude = "quintic"
+) -> Placed[Hypocycloid]:
+    """Transition of a point mass from rest in P0 to a target, thesis chapter 1.
+
+    Args:
+        robot: a point mass on three cables, or on two in a plane.
+        target: (3,) in the robot's axes, m.
+        z0: () depth of P0 below the centroid of the spools, m.
+        oscillations: () their number n.
+        amplitude: its name, or the function; it must meet (1.27) and (1.28).
+
+    Returns:
+        the motion, in the robot's axes.
+
+    Raises:
+        InputError: another kind of robot, or an amplitude function that breaks (1.27) or (1.28).
+    """
+    own, frame = _prepared(robot, PointMassRobot, (2, 3), "a point mass")
+    function = amplitude_of(amplitude, free_end=True)
+    end = jnp.asarray(frame.inward(target), float)
+    found = transitions.transition(own, function, end, jnp.asarray(z0, float))
+    return Placed(Hypocycloid(found, function, 2.0 * jnp.asarray(oscillations, float)), frame)
+
+
+def platform_motion(
+    robot: PlatformRobot,
+    start,
+    end,
+    *,
+    z0,
+    arcs,
+    orientations=(REFERENCE, REFERENCE),
+    beta_hat=(AT_REST, AT_REST),
+    amplitude: str | Amplitude = "quintic",
+    variable: bool = True,
+) -> Placed[PlatformMotion]:
+    """Motion of a platform between two poses, thesis chapter 3.
+
+    Args:
+        robot: a platform on six cables; jax may trace its spools, but not its platform points.
+        start: (3,) position of the mass centre in the robot's axes, m; None: P0.
+        end: (3,) likewise.
+        z0: () depth of P0 below the centroid of the spools, m.
+        arcs: () number of arcs.
+        orientations: (2, 4) unit quaternions at start and end, scalar first, from the reference orientation.
+        beta_hat: (2,) at start and end, (3.81); -1 at rest.
+        amplitude: its name, or the function; it must meet (2.49).
+        variable: whether the position is a hypocycloid of variable amplitude (3.44), or a standard one.
+
+    Returns:
+        the motion, in the robot's axes.
+
+    Raises:
+        InputError: another kind of robot, or an amplitude function that breaks (2.49).
+    """
+    own, frame = _prepared(robot, PlatformRobot, (6,), "a platform on six cables")
+    function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
+    places = _places(frame, start, end, z0)
+    turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
+    bends = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
+    first, last = zip(places, turns, strict=True)
+    found = pose_segment(own, first, last, jnp.asarray(z0, float), bends, odd=jnp.mod(p, 2.0) == 1.0)
+    return Placed(PlatformMotion(found, function, p, Kind(variable)), frame)
+
+
+def tensions(robot: AnyRobot, state: State) -> Array:
+    """Tensions of the cables in a state.
+
+    Args:
+        robot: with as many cables as degrees of freedom.
+        state: in the robot's axes, as motions give it.
+
+    Returns:
+        (n_cables,) in cable order, N; negative where a cable would have to push.
+
+    Raises:
+        InputError: more cables than degrees of freedom.
+    """
+    own, frame = prepared(robot)
+    return cables.tensions(own, inward(frame, state))
+
+
+def slacks(problem: Problem, motion: Motion, tau) -> Array:
+    """Slacks of all criteria at one instant of a motion: taut cables, determinant, depth, limits.
+
+    Args:
+        problem: of `make_problem`, with the motion's robot.
+        motion: of `hypocycloid`, `transition`, `platform_motion`, a plan or answers.
+        tau: () normalised time in [0, 1].
+
+    Returns:
+        (n_slacks,) without a unit, in the order of `feasibility.slacks`; all positive while the motion is feasible.
+    """
+    return feasibility.slacks(problem, _inner(motion), jnp.asarray(tau, float))
+
+
+def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array:
+    """Smallest slack at equidistant instants of a motion; it can be differentiated.
+
+    A positive one says that no sample refutes the motion, not that it is feasible: searches prove that, or look closer.
+
+    Args:
+        problem: of `make_problem`, with the motion's robot.
+        motion: as in `slacks`.
+        samples: number of intervals between instants, ends included.
+
+    Returns:
+        () without a unit.
+    """
+    return feasibility.sampled_margin(problem, _inner(motion), samples)
+
+
+def _places(frame: Frame, start, end, z0) -> tuple[Array, Array]:
+    # In the kernels' axes.
+    first = rest_point(jnp.asarray(z0, float)) if start is None else jnp.asarray(frame.inward(start), float)
+    return first, jnp.asarray(frame.inward(end), float)
+
+
+def _inner(motion: Motion) -> Motion:
+    return motion.motion if isinstance(motion, Placed) else motion
+
+
+def _prepared(robot: Any, kind: type, dofs: tuple[int, ...], allowed: str) -> tuple[Any, Any]:
+    if not isinstance(robot, kind) or robot.dof not in dofs or robot.n_cables != robot.dof:  # type: ignore[attr-defined]
+        raise InputError("robot", getattr(robot, "name", robot), allowed)
+    return prepared(robot)

@@ -1,0 +1,166 @@
+"""Searches of platforms from Python: poses and orientations in, answers out; see `api.searches`."""
+
+from typing import Any, Literal
+
+import numpy as np
+
+from cspr_jax.api.answers import PlatformAnswers
+from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, quaternions
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.errors import InputError
+from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
+from cspr_jax.feasibility.platform.end_acceleration import AT_REST
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.reference_pose import reference_pose
+from cspr_jax.search.accessible import DEFINITIONS, Accessible
+from cspr_jax.search.accessible import accessible as search_accessible
+from cspr_jax.search.attainable import attainable as search_attainable
+from cspr_jax.search.platform_answers import PoseAnswers
+from cspr_jax.search.platform_arcs import Candidates, segments_with
+from cspr_jax.search.pose_targets import pose_arcs, rest_poses, start_beta_hat
+from cspr_jax.trajectories.amplitudes import Amplitude
+from cspr_jax.trajectories.motion import Placed
+from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion
+
+
+def minimum_pose_arcs(  # noqa: PLR0913
+    robot: PlatformRobot,
+    positions: np.ndarray,
+    orientations: np.ndarray | None = None,
+    *,
+    start: tuple[np.ndarray, np.ndarray] | None = None,
+    z0: np.ndarray | float,
+    beta_hat: float | Literal["preferred"] | None = None,
+    amplitude: str | Amplitude = "quintic",
+    limits: Limits | None = None,
+    max_arcs: int = 30,
+    variable: bool = True,
+) -> PlatformAnswers:
+    """Smallest number of arcs of a platform to each of many poses, thesis chapter 3.
+
+    Args:
+        robot: a platform on six cables.
+        positions: (n, 3) of the mass centre in the robot's axes, m.
+        orientations: (n, 4) unit quaternions in these axes, scalar first, from the reference orientation; None: that.
+        start: position (3,) and quaternion (4,) of the first pose, with the preferred beta-hat; None: at rest in P0.
+        z0: () or (n,) depth of P0 below the centroid of the spools, m.
+        beta_hat: at the poses: a number, "preferred" (3.91), or None: several are tried, the preferred one first.
+        amplitude: its name, or the function; it must meet (2.49).
+        limits: as in `minimum_arcs`.
+        max_arcs: largest number of arcs tried.
+        variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
+
+    Returns:
+        the answers, (n,) each; sampled with care, not proved.
+
+    Raises:
+        InputError: as `minimum_arcs` does; quaternions that are not of unit length; a robot that is singular or slack
+            at rest.
+    """
+    if not isinstance(robot, PlatformRobot):
+        raise InputError("robot", getattr(robot, "name", robot), "a platform on six cables")
+    places = points_of("positions", positions)
+    depth, turns = depths(z0, len(places)), quaternions("orientations", orientations, len(places))
+    with double_precision():
+        problem, frame = kernel_problem(robot, amplitude, limits)
+        for each in np.unique(depth):
+            reference_pose(problem.robot, float(each))
+        checker = PoseChecker(problem, Kind(variable, from_rest=start is None), batch=MANY)
+        ends = (frame.inward(places), frame.turned_quaternions(turns))
+        if start is None:
+            first, bends = rest_poses(depth), np.full(len(depth), AT_REST)
+        else:
+            place, turn = points_of("start", [start[0]]), quaternions("start", [start[1]], 1)
+            rows = np.zeros(len(depth), int)
+            first = (frame.inward(place)[rows], frame.turned_quaternions(turn)[rows])
+            bends = start_beta_hat(checker, first, depth)
+        trial = Candidates(first, ends, depth, np.arange(len(depth)), (bends, bends))
+        value = float(beta_hat) if isinstance(beta_hat, int) else beta_hat
+        answers = pose_arcs(checker, trial, beta_hat=value, max_arcs=max_arcs)
+
+    def motions() -> Placed[PlatformMotion]:
+        chosen = trial._replace(bends=tuple(answers.beta_hat.T))
+        segments = segments_with(problem.robot, chosen, answers.tried_arcs)
+        return batched(PlatformMotion, segments, problem, answers, frame, Kind(variable))
+
+    return PlatformAnswers(**vars(answers), make=motions)
+
+
+def accessible(
+    robot: PlatformRobot, place, *, definition: Literal["grid", "scan", "equal-volume"] = "scan", divisions: int = 32
+) -> Accessible:
+    """Accessible orientations of a place: those that free ways join with the reference orientation, section 3.11.
+
+    Args:
+        robot: a platform on six cables.
+        place: (3,) of the mass centre in the robot's axes, m.
+        definition: of the set, as in [orientations] of a sweep file.
+        divisions: of pi; the step of the angles is pi over it. Even, 4 to 128.
+
+    Returns:
+        `angles` (n, 3) of tilt and torsion in the cylindrical frame of the place, rad; `volume` (n,), the part of SO(3)
+        that each stands for.
+
+    Raises:
+        InputError: another kind of robot, a place that is not finite, another definition, or divisions.
+    """
+    problem, where = _of_place(robot, place, definition, divisions)
+    with double_precision():
+        return search_accessible(problem.robot, where, definition, divisions)
+
+
+def attainable(
+    robot: PlatformRobot,
+    place,
+    *,
+    z0: float | None = None,
+    definition: Literal["grid", "scan", "equal-volume"] = "scan",
+    divisions: int = 32,
+    amplitude: str | Amplitude = "quintic",
+    limits: Limits | None = None,
+    max_arcs: int = 30,
+) -> tuple[Accessible, PoseAnswers]:
+    """Which accessible orientations of a place a motion from rest attains, section 3.12.3.
+
+    Args:
+        robot: a platform on six cables.
+        place: (3,) of the mass centre in the robot's axes, m.
+        z0: depth of P0 below the centroid of the spools, m; None: that of the place.
+        definition: as in `accessible`.
+        divisions: as in `accessible`.
+        amplitude: its name, or the function; it must meet (2.49).
+        limits: as in `minimum_arcs`.
+        max_arcs: largest number of arcs tried.
+
+    Returns:
+        the accessible orientations, and the answers (n,) of the motions to them.
+
+    Raises:
+        InputError: as `accessible` and `minimum_arcs` do; nothing is accessible.
+    """
+    problem, where = _of_place(robot, place, definition, divisions, amplitude, limits)
+    with double_precision():
+        inside = search_accessible(problem.robot, where, definition, divisions)
+        count = len(inside.angles)
+        if not count:
+            raise InputError("place", np.asarray(place).tolist(), "a place where some orientation is accessible")
+        checker = PoseChecker(problem, Kind(from_rest=True), batch=MANY)
+        depth = depths(where[2] if z0 is None else z0, count)
+        places = np.tile(where, (count, 1))
+        return inside, search_attainable(checker, places, inside.angles, depth, max_arcs=max_arcs)
+
+
+def _of_place(
+    robot: Any, place, definition: str, divisions: int, amplitude: str | Amplitude = "quintic", limits=None
+) -> tuple[Problem, np.ndarray]:
+    if not isinstance(robot, PlatformRobot):
+        raise InputError("robot", getattr(robot, "name", robot), "a platform on six cables")
+    if definition not in DEFINITIONS:
+        raise InputError("definition", definition, f"one of {', '.join(DEFINITIONS)}")
+    if divisions % 2 or not 4 <= divisions <= 128:
+        raise InputError("divisions", divisions, "an even number from 4 to 128")
+    where = points_of("place", [place])
+    problem, frame = kernel_problem(robot, amplitude, limits)
+    return problem, frame.inward(where)[0]

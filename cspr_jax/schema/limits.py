@@ -1,0 +1,53 @@
+"""Limits beyond taut cables: one row each. No jax here: files and tables use them too."""
+
+import dataclasses
+from typing import Literal
+
+from cspr_jax.schema.verdicts import Verdict
+
+
+@dataclasses.dataclass(frozen=True)
+class Limit:
+    """A limit of a quantity of the robot's state.
+
+    Fields:
+        name: key in files, and field of `robots.limits.Limits`.
+        flag: the verdict where it is broken.
+        sense: whether the quantity must be at least or at most so large.
+        quantity: of `feasibility.limits.Values`.
+        unit: of both.
+        per_cable: whether each cable has a value of its own.
+        of_motion: whether the quantity depends on how the effector moves, and not on where it is alone.
+        from_zero: whether 0 is allowed, and not only what is greater; of no account for coordinates.
+        description: for the reference.
+    """
+
+    name: str
+    flag: Verdict
+    sense: Literal["least", "most"]
+    quantity: str
+    unit: str
+    per_cable: bool
+    of_motion: bool
+    from_zero: bool
+    description: str
+
+    @property
+    def allowed(self) -> str:
+        """What a value must be, in words."""
+        return "a number: z of the floor" if not self.per_cable else f"a number {'>=' if self.from_zero else '>'} 0"
+
+
+def _of_cables(name: str, flag: Verdict, quantity: str, unit: str, *, of_motion: bool) -> Limit:
+    return Limit(name, flag, "most", quantity, unit, True, of_motion, False, f"largest cable {quantity}")
+
+
+# In the order of their slacks. The floor is z in the axes of a file, and a depth in the kernels': at most so deep.
+LIMITS = (
+    Limit("tension_min", Verdict.SLACK_CABLE, "least", "tension", "N", True, True, True, "smallest tension"),
+    Limit("tension_max", Verdict.OVER_TENSION, "most", "tension", "N", True, True, False, "largest tension"),
+    Limit("floor", Verdict.BELOW_FLOOR, "most", "depth", "m", False, False, True, "z of the floor"),
+    _of_cables("cable_length_max", Verdict.CABLE_TOO_LONG, "length", "m", of_motion=False),
+    _of_cables("cable_speed_max", Verdict.CABLE_TOO_FAST, "speed", "m/s", of_motion=True),
+    _of_cables("cable_acceleration_max", Verdict.CABLE_OVER_ACCELERATION, "acceleration", "m/s^2", of_motion=True),
+)

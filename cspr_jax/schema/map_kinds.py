@@ -1,0 +1,252 @@
+"""The one table of the kinds of maps: what each asks of a sweep file, what it gives, and the class that computes it.
+
+A kind from outside of the package is a subclass of `maps.grid_map.GridMap`, its row, and the rows of its own
+quantities; the module that holds them gives the rows to `register`. They hold in the process that has imported that
+module, and then in all that `cspr_jax.cli.main` does there. Other processes that compute tiles, and workers of a
+scheduler, get the row with the sweep and import the class by its name, "module:Class": they must find that module.
+"""
+
+import contextlib
+import dataclasses
+import importlib
+from collections.abc import Iterator
+from typing import Any, Literal
+
+from cspr_jax.errors import InputError
+from cspr_jax.schema.quantities import QUANTITIES, REFUSALS, Quantity
+from cspr_jax.schema.quantities import register as register_quantity
+from cspr_jax.schema.tiles import LARGEST_TILE
+
+
+@dataclasses.dataclass(frozen=True)
+class MapKind:
+    """A kind of map. Keys of sweep files are dotted, such as "axes.tau".
+
+    Fields:
+        name: as sweep files give it.
+        title: of its results.
+        description: a phrase for the reference.
+        implementation: "module:Class" of its `maps.grid_map.GridMap`.
+        quantities: what it gives, all rows of `schema.quantities.QUANTITIES`.
+        stored: those that are stored where the sweep file does not say.
+        pictured: those of which a picture shows the first that there is, where nobody says which.
+        motionless: those that belong to a place or an instant, not to a motion.
+        families: trajectory families that it takes.
+        start: where its motions may start. "rest": at rest in P0, `trajectory.from` says so or is absent; "point": as
+            `trajectory.from` or the axes from_x, from_y and from_z say; "pose": as `trajectory.from` says, with an
+            orientation or without, at rest in P0 where it is absent.
+        needs: keys that must be given.
+        takes: further keys that may be given, of those that only some kinds have.
+        one_of: keys of which exactly one must be given.
+        definitions: of the accessible set that it takes.
+        is_over_orientations: whether its grid has axes over all orientations besides those of the sweep file.
+        cells: of a tile, at most, where the sweep file does not say.
+    """
+
+    name: str
+    title: str
+    description: str
+    implementation: str
+    quantities: tuple[str, ...]
+    stored: tuple[str, ...]
+    families: tuple[str, ...]
+    start: Literal["rest", "point", "pose"] = "rest"
+    pictured: tuple[str, ...] = ()
+    motionless: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    takes: tuple[str, ...] = ()
+    one_of: tuple[str, ...] = ()
+    definitions: tuple[str, ...] = ("grid", "scan", "equal-volume")
+    is_over_orientations: bool = False
+    cells: int = LARGEST_TILE
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys that may be given, of those that only some kinds have."""
+        return (*self.needs, *self.takes, *self.one_of)
+
+    def load(self) -> Any:
+        """The class that computes it, imported now.
+
+        Returns:
+            a class, called as `maps.grid_map.GridMap` is.
+        """
+        module, _, name = self.implementation.partition(":")
+        return getattr(importlib.import_module(module), name)
+
+
+_COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
+_OF_TRANSITIONS = ("least_oscillations", "inclination_gain", "used_inclination", "used_z0")
+_OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
+_OF_POSES = (
+    *("arcs", "tried_arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "limit_margin"),
+    "beta_hat",
+)
+_POSES_STORED = ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat")
+_OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
+_OF_ATTAINED = (
+    *("attainable", "attainable_fraction", "attainable_volume", "attainable_error", "mean_arcs"),
+    *("undecided_fraction", "main_reason", *REFUSALS),
+)
+_DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
+_OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
+
+MAP_KINDS: dict[str, MapKind] = {
+    kind.name: kind
+    for kind in (
+        MapKind(
+            name="minimum-arcs",
+            title="Smallest number of arcs",
+            description="smallest number of arcs to each target",
+            implementation="cspr_jax.maps.arcs:MinimumArcsMap",
+            quantities=("arcs", "tried_arcs", *_COMMON),
+            stored=("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
+            pictured=("arcs",),
+            families=("hypocycloid-standard",),
+            start="point",
+            needs=("axes.z0",),
+            takes=("axes.from_x", "axes.from_y", "axes.from_z", "limits"),
+        ),
+        MapKind(
+            name="minimum-oscillations",
+            title="Smallest number of oscillations",
+            description="smallest number of oscillations of a transition from rest to each target",
+            implementation="cspr_jax.maps.oscillations:MinimumOscillationsMap",
+            quantities=("oscillations", "tried_oscillations", "envelope_oscillations", *_OF_TRANSITIONS, *_COMMON),
+            stored=(
+                *("oscillations", "envelope_oscillations", "least_oscillations", "verdict", "duration", "margin"),
+                *("inclination_gain", "used_inclination", "used_z0"),
+            ),
+            pictured=("oscillations",),
+            families=("transition",),
+            takes=("limits",),
+            one_of=_DEPTHS,
+        ),
+        MapKind(
+            name="transition-envelopes",
+            title="Envelopes of the pseudotensions along transitions",
+            description="what each instant of a transition from rest to each target asks for",
+            implementation="cspr_jax.maps.envelopes:TransitionEnvelopesMap",
+            quantities=_OF_INSTANTS,
+            stored=_OF_INSTANTS,
+            pictured=("lower_envelope",),
+            motionless=_OF_INSTANTS,
+            families=("transition",),
+            needs=("axes.tau",),
+            takes=("axes.cable", "limits"),
+            one_of=_DEPTHS,
+        ),
+        MapKind(
+            name="poses",
+            title="Smallest number of arcs to poses",
+            description="smallest number of arcs of a platform to each pose",
+            implementation="cspr_jax.maps.poses:PosesMap",
+            quantities=_OF_POSES,
+            stored=_POSES_STORED,
+            pictured=("arcs",),
+            families=_OF_PLATFORMS,
+            start="pose",
+            needs=("axes.z0",),
+            takes=(
+                *("axes.tilt_azimuth", "axes.tilt", "axes.torsion", "trajectory.beta_hat", "trajectory.beat"),
+                "limits",
+            ),
+        ),
+        MapKind(
+            name="orientations",
+            title="Smallest number of arcs to accessible orientations",
+            description="smallest number of arcs of a platform from rest to each orientation accessible at each place",
+            implementation="cspr_jax.maps.orientations:OrientationsMap",
+            quantities=_OF_POSES,
+            stored=_POSES_STORED,
+            pictured=("arcs",),
+            families=_OF_PLATFORMS,
+            takes=("axes.z0", "orientations", "orientations.values", "limits"),
+            definitions=("grid",),
+            is_over_orientations=True,
+        ),
+        MapKind(
+            name="orientation-workspace",
+            title="Accessible orientations",
+            description="orientations of a platform that are accessible at each place",
+            implementation="cspr_jax.maps.places:OrientationWorkspaceMap",
+            quantities=_OF_PLACES,
+            stored=_OF_PLACES,
+            pictured=("accessible_volume",),
+            motionless=_OF_PLACES,
+            families=_OF_PLATFORMS,
+            takes=("orientations",),
+            cells=64,  # a cell takes long
+        ),
+        MapKind(
+            name="attainability",
+            title="Accessible and attainable orientations",
+            description="orientations of a platform that are accessible at each place, and attained from rest",
+            implementation="cspr_jax.maps.places:AttainabilityMap",
+            quantities=(*_OF_PLACES, *_OF_ATTAINED),
+            stored=(*_OF_PLACES, *_OF_ATTAINED),
+            pictured=("attainable_fraction", "accessible_volume"),
+            motionless=_OF_PLACES,
+            families=_OF_PLATFORMS,
+            takes=("axes.z0", "orientations", "orientations.values", "limits"),
+            cells=16,
+        ),
+    )
+}
+
+
+def register(kind: MapKind, *own: Quantity) -> None:
+    """Add a kind of map from outside of the package; a second time changes nothing.
+
+    Args:
+        kind: its row.
+        own: rows of those of its quantities that are not in the table yet.
+
+    Raises:
+        InputError: another kind, quantity or axis has such a name, or the row names quantities that it does not give,
+            or that nobody knows.
+    """
+    if MAP_KINDS.get(kind.name, kind) != kind:
+        raise InputError("map", kind.name, "a name that no other kind of map has")
+    for name in kind.quantities:
+        if name not in QUANTITIES and name not in [quantity.name for quantity in own]:
+            raise InputError("quantities", name, "a row of schema.quantities.QUANTITIES")
+    for key, names in (("stored", kind.stored), ("pictured", kind.pictured), ("motionless", kind.motionless)):
+        for name in names:
+            if name not in kind.quantities:
+                raise InputError(key, name, "one of the quantities of the map")
+    for quantity in own:
+        register_quantity(quantity)
+    MAP_KINDS[kind.name] = kind
+
+
+@contextlib.contextmanager
+def registered(kind: MapKind, *own: Quantity) -> Iterator[None]:
+    """Add a kind of map for as long as a block lasts; see `register`.
+
+    Args:
+        kind: its row.
+        own: rows of its own quantities.
+
+    Yields:
+        nothing.
+    """
+    register(kind, *own)
+    try:
+        yield
+    finally:
+        del MAP_KINDS[kind.name]
+        for quantity in own:
+            del QUANTITIES[quantity.name]
+
+
+def kinds_with(key: str) -> list[str]:
+    """Kinds that take a key which only some have.
+
+    Args:
+        key: dotted.
+
+    Returns:
+        their names.
+    """
+    return [kind.name for kind in MAP_KINDS.values() if key in kind.keys]

@@ -1,0 +1,152 @@
+"""One motion from Python: states, margins and gradients, in the axes of the robot."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import cspr_jax
+from cspr_jax.api.motions import (
+    hypocycloid,
+    make_problem,
+    platform_motion,
+    sampled_margin,
+    slacks,
+    tensions,
+    transition,
+)
+from cspr_jax.errors import InputError
+
+FAR = np.array([120.0, -40.0, 7.0])
+TARGET = np.array([-0.6, 0.4, 1.8])
+STEP = 1e-6
+
+
+def point_mass(z_axis="down", offset=FAR):
+    signs = np.array([1.0, 1.0, 1.0]) if z_axis == "down" else np.array([1.0, -1.0, -1.0])
+    points = np.array([[1.3, 0.2, -0.1], [-0.4, 1.1, 0.25], [-0.9, -0.8, 0.05]])
+    return cspr_jax.point_mass_robot(points * signs + offset, mass=1.7, z_axis=z_axis), signs
+
+
+def of_point_mass(base_points, z0, target):
+    """Sampled margin of a hypocycloid of four arcs, as a function of what it depends on."""
+    robot = dataclasses.replace(point_mass()[0], base_points=base_points)
+    problem = make_problem(robot, limits=cspr_jax.Limits(cable_length_max=np.full(3, 4.0)))
+    motion = hypocycloid(robot, FAR + np.array([0.7, 0.3, 1.6]), FAR + target, z0=z0, arcs=4)
+    return sampled_margin(problem, motion)
+
+
+def of_platform(base_points, z0, target):
+    """Sampled margin of a motion of four arcs of the MSSM, from rest to a tilted pose."""
+    robot = dataclasses.replace(cspr_jax.load_robot("laval-mssm"), base_points=base_points)
+    turned = (np.array([1.0, 0.0, 0.0, 0.0]), np.array([np.cos(0.1), np.sin(0.1), 0.0, 0.0]))
+    motion = platform_motion(robot, None, target, z0=z0, arcs=4, orientations=turned, beta_hat=(-1.0, -1.3))
+    return sampled_margin(make_problem(robot), motion)
+
+
+CASES = {
+    "point mass": (of_point_mass, lambda: np.asarray(point_mass()[0].base_points), 1.7, TARGET),
+    "platform": (
+        of_platform,
+        lambda: np.asarray(cspr_jax.load_robot("laval-mssm").base_points),
+        1.4,
+        np.array([0.5, 0.3, 1.35]),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_gradients_are_those_of_finite_differences(case):
+    """With respect to every coordinate of the spools and of the target, and to z0."""
+    function, spools, z0, target = CASES[case]
+    given = [jnp.asarray(x) for x in (spools(), z0, target)]
+    found = jax.jit(jax.grad(function, argnums=(0, 1, 2)))(*given)
+    value = jax.jit(function)
+    for i, (gradient, argument) in enumerate(zip(found, given, strict=True)):
+        for place in np.ndindex(argument.shape):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = list(given)
+                moved[i] = argument.at[place].add(sign * STEP)
+                ends.append(float(value(*moved)))
+            slope = (ends[0] - ends[1]) / (2.0 * STEP)
+            assert float(gradient[place]) == pytest.approx(slope, rel=1e-5, abs=1e-6), (i, place)
+        assert np.abs(np.asarray(gradient)).max() > 1e-3
+
+
+@pytest.mark.parametrize("z_axis", ["down", "up"])
+def test_margin_and_state_of_answers(z_axis):
+    """The motion of the number of arcs found has the margin, duration and ends of the answers."""
+    robot, signs = point_mass(z_axis)
+    start, target = FAR + np.array([0.2, -0.1, 1.5]) * signs, FAR + TARGET * signs
+    answers = cspr_jax.minimum_arcs(robot, [target], start=start, z0=1.7)
+    motion = hypocycloid(robot, start, target, z0=1.7, arcs=int(answers.arcs[0]))
+    assert float(motion.duration()) == pytest.approx(answers.duration[0], rel=1e-12)
+    assert float(sampled_margin(make_problem(robot), motion, 20_000)) == pytest.approx(answers.margin[0], abs=1e-6)
+    for tau, place in ((0.0, start), (1.0, target)):
+        state = motion.state(tau)
+        np.testing.assert_allclose(state.position, place, atol=1e-12)
+        np.testing.assert_allclose(state.velocity, 0.0, atol=1e-12)
+
+
+def test_derivatives_of_states():
+    """Velocity and acceleration are the derivatives of the position in time, in axes that point up."""
+    robot, signs = point_mass("up")
+    motion = hypocycloid(robot, FAR + np.array([0.2, -0.1, 1.5]) * signs, FAR + TARGET * signs, z0=1.7, arcs=5)
+    tau, time = jnp.asarray(0.37), motion.duration()
+    position = lambda t: motion.state(t).position  # noqa: E731
+    state = motion.state(tau)
+    np.testing.assert_allclose(jax.jacfwd(position)(tau) / time, state.velocity, rtol=1e-9)
+    np.testing.assert_allclose(jax.jacfwd(jax.jacfwd(position))(tau) / time**2, state.acceleration, rtol=1e-8)
+
+
+def test_tensions_balance_the_motion():
+    """The pulls along the cables and the weight give the mass its acceleration, z up or down."""
+    for z_axis in ("down", "up"):
+        robot, signs = point_mass(z_axis)
+        motion = transition(robot, FAR + np.array([0.7, 0.2, 1.6]) * signs, z0=1.6, oscillations=3)
+        state = motion.state(0.61)
+        rays = np.asarray(robot.base_points) - np.asarray(state.position)
+        pull = np.asarray(tensions(robot, state)) @ (rays / np.linalg.norm(rays, axis=1)[:, None])
+        weight = 1.7 * 9.81 * np.array([0.0, 0.0, signs[2]])
+        np.testing.assert_allclose(pull + weight, 1.7 * np.asarray(state.acceleration), rtol=1e-9)
+
+
+def test_margin_of_a_platform():
+    """Of a plan's segment: its samples do not lie below the refined margin, and come near it."""
+    plan = cspr_jax.plan("sweeps/table_3_2.toml")
+    smallest = np.minimum(plan.answers.margin[0], plan.answers.det_margin[0])
+    found = float(sampled_margin(plan.problem, plan.motions[0], 4000))
+    assert smallest - 1e-9 <= found <= smallest + 1e-3
+
+
+def test_slacks_are_mapped_and_compiled():
+    robot = cspr_jax.load_robot("prototype")
+    problem, z0 = make_problem(robot), np.array([1.4, 1.7, 2.0])
+    targets = jnp.asarray(TARGET) + jnp.arange(3.0)[:, None] * 0.1
+
+    @jax.jit
+    @jax.vmap
+    def lowest(target, depth):
+        motion = hypocycloid(robot, None, target, z0=depth, arcs=5)
+        return jnp.min(slacks(problem, motion, 0.4))
+
+    found = lowest(targets, jnp.asarray(z0))
+    for value, target, depth in zip(found, targets, z0, strict=True):
+        motion = hypocycloid(robot, None, target, z0=depth, arcs=5)
+        assert float(jnp.min(slacks(problem, motion, 0.4))) == pytest.approx(float(value), abs=1e-12)
+
+
+def test_what_is_no_motion_is_refused():
+    robot, platform = cspr_jax.load_robot("prototype"), cspr_jax.load_robot("laval-mssm")
+    for refused in (
+        lambda: hypocycloid(platform, TARGET, TARGET, z0=1.0, arcs=2),
+        lambda: platform_motion(robot, TARGET, TARGET, z0=1.0, arcs=2),
+        lambda: hypocycloid(robot, TARGET, TARGET, z0=1.0, arcs=2, amplitude="A1"),
+        lambda: transition(robot, TARGET, z0=1.0, oscillations=2, amplitude="ideal"),
+        lambda: make_problem(robot, amplitude="quartic"),
+    ):
+        with pytest.raises(InputError):
+            refused()
