@@ -55,14 +55,14 @@ def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[A
     return jnp.stack(estimates), jnp.stack(places)
 
 
-def refined_minimum(function, tau: Array, step: Array) -> Array:
+def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array) -> Array:
     """Smallest value of a continuous function near an estimated minimum, by ever narrower parabolas.
 
     A parabola is believed only where its middle is the lowest of its three points; else they move to the lowest. So a
     minimum that is steep on one side, or a kink beside it, is found too.
 
     Args:
-        function: () -> ().
+        function: of one instant, () to ().
         tau: () the estimate.
         step: () distance of the samples that it came from.
 
