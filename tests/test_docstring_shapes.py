@@ -37,7 +37,7 @@ ROOMS = ("robots", "trajectories", "feasibility")
 # Of "..." in arguments, and of letters. What else is named has the size that it is met with first.
 ANY, LETTERS = (2, 4), {"n": 7, "m": 5}
 DIM = r"(?:\.\.\.|[a-z]\w*(?: [+-] 1)?|[1-9]\d*)"
-SHAPE = re.compile(rf"(?:leaves )?\((?:|\.\.\.|{DIM},|{DIM}(?:, {DIM})+)\)")
+SHAPE = re.compile(rf"(?:leaves (?=\(.*\.\.\.\)))?\((?:|\.\.\.|{DIM},|{DIM}(?:, {DIM})+)\)")
 ENTRY = re.compile(r"^    (\w+): (.*(?:\n     .*)*)", re.MULTILINE)
 AT_LEAST = 50  # functions that are checked
 

@@ -21,7 +21,7 @@ def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) 
         (n_cables,) in cable order, m^3/s^2 (planar: m^2/s^2); positive pulls, as long as the mass is below the spools.
     """
     if is_planar(robot):
-        adjugate = _planar_adjugate(robot.base_points - position)
+        adjugate = _planar_adjugate(robot.base_points - position[None])
         side = jnp.sign(robot.base_points[1, 0] - robot.base_points[0, 0])
         return side * (adjugate @ _relative_acceleration(robot, acceleration))
     a = robot.base_points
@@ -43,7 +43,7 @@ def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Arr
         (n_cables,) in cable order, N. Not clipped: a negative entry is the push that a cable cannot give.
         Infinite or NaN in the spool plane, where M is singular.
     """
-    rays = robot.base_points - position  # (2.6)
+    rays = robot.base_points - position[None]  # (2.6)
     if is_planar(robot):
         adjugate = _planar_adjugate(rays)
         determinant = jnp.dot(adjugate[1], rays[1])
@@ -66,7 +66,7 @@ def cable_motion(robot: PointMassRobot, position: Array, velocity: Array, accele
     Returns:
         lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2.
     """
-    rays = position - robot.base_points
+    rays = position[None] - robot.base_points
     lengths = jnp.linalg.norm(rays, axis=1)
     rates = rays @ velocity / lengths
     return lengths, rates, (jnp.dot(velocity, velocity) + rays @ acceleration - rates**2) / lengths

@@ -55,7 +55,7 @@ def rays(robot: PlatformRobot, position: Array, rotation: Array) -> tuple[Array,
         (6, 3) each, fixed axes, m.
     """
     arms = robot.platform_points @ rotation.T
-    return position + arms - robot.base_points, arms
+    return position[None] + arms - robot.base_points, arms
 
 
 def jacobian(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
@@ -148,7 +148,7 @@ def cable_motion(robot: PlatformRobot, pose: Pose) -> tuple[Array, Array, Array]
     cables, arms = rays(robot, pose.position, pose.rotation)
     lengths = jnp.linalg.norm(cables, axis=1)
     swing = jnp.cross(pose.angular_velocity, arms)
-    velocity = pose.velocity + swing
-    pull = pose.acceleration + jnp.cross(pose.angular_acceleration, arms) + jnp.cross(pose.angular_velocity, swing)
+    velocity = pose.velocity[None] + swing
+    pull = pose.acceleration[None] + jnp.cross(pose.angular_acceleration, arms) + jnp.cross(pose.angular_velocity, swing)
     rates = jnp.sum(cables * velocity, axis=1) / lengths
     return lengths, rates, (jnp.sum(velocity**2 + cables * pull, axis=1) - rates**2) / lengths

@@ -69,7 +69,7 @@ def smallest_tensions(
     # One number a loop: XLA would compute the tension once for each of several.
     values = lax.map(at, table)
     lowest = values.min(0)
-    return lowest, jnp.where(values == lowest, jnp.arange(len(tau))[:, None], len(tau)).min(0)
+    return lowest, jnp.where(values == lowest[None], jnp.arange(len(tau))[:, None], len(tau)).min(0)
 
 
 def _of_one_size(robot: PlatformRobot, segments: PoseSegment) -> tuple[PlatformRobot, PoseSegment]:
