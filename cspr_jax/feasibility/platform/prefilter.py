@@ -61,7 +61,7 @@ def smallest_tensions(
     if kind.from_rest:
         at, table = _from_rest(robot, segments), kept(rest_table(amplitude, arcs, tau, kind))
     else:
-        table = kept(jax.vmap(lambda t: instant(amplitude, segments.sense[0], arcs, t))(tau))
+        table = kept(jax.vmap(lambda t: instant(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
 
         def at(now):
             return lowest_tension(robot, segments, number, now, kind)
