@@ -1,7 +1,8 @@
-"""Settings for every test: 64 bits, repeatable examples; robots that many tests share."""
+"""Settings for every test: 64 bits, strict promotion, repeatable examples, compiled code; robots that many tests share."""
 
+import gc
 import os
-import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -10,16 +11,33 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
+from cspr_jax.arithmetic import elementary
 from cspr_jax.robots import point_mass
 
-# What one process has compiled, those beside it and those that tests start need not; it goes with the run.
-COMPILED = Path(os.environ.setdefault("CSPR_TESTS_COMPILED", f"{tempfile.gettempdir()}/cspr-tests-{os.getpid()}"))
+# Compiled code is kept from run to run beside the packages that it belongs to; XLA's key is the program. What tests
+# start finds it by the environment.
+BESIDE = sys.prefix if sys.prefix != sys.base_prefix else tempfile.gettempdir()
+COMPILED = Path(os.environ.setdefault("CSPR_TESTS_COMPILED", f"{BESIDE}/cspr-tests-compiled")).absolute()
+LARGEST = 1_000_000_000  # bytes; beyond that all of it is taken away
+# Most of a test is compiling: these take a third of the time for it, and the code is slower. The soak runs with what
+# users run with, and so does what test_xla starts.
+CHEAP = (
+    "--xla_backend_optimization_level=0",
+    "--xla_cpu_use_fusion_emitters=false",
+    "--xla_cpu_parallel_codegen_split_count=1",
+)
+# Compiled code of finished files goes where a process has more than so many bytes.
+ROOM = 1_000_000_000
 os.environ["CSPR_CACHE_DIR"] = str(COMPILED)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_compilation_cache_dir", str(COMPILED / "tests"))
-jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
 jax.config.update("jax_persistent_cache_enable_xla_caches", "none")
+# The package is lenient to its users, and here as strict as what it is called from.
+elementary.PROMOTION = ("strict", "raise")
+jax.config.update("jax_numpy_dtype_promotion", "strict")
+jax.config.update("jax_numpy_rank_promotion", "raise")
 settings.register_profile("default", deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 settings.load_profile("default")
 
@@ -28,15 +46,31 @@ settings.load_profile("default")
 _LONG = ("test_platform", "test_transition_plans", "test_pose_plans", "test_pose_maps", "test_workers", "test_crashes")
 
 
-def pytest_sessionfinish(session):
-    """The process that began takes the compiled code away; those that work for it know the folder from it."""
-    if not hasattr(session.config, "workerinput"):
-        shutil.rmtree(COMPILED, ignore_errors=True)
+def pytest_configure(config):
+    """Before jax compiles anything."""
+    if config.option.markexpr == "not soak":
+        os.environ["XLA_FLAGS"] = " ".join([*CHEAP, os.environ.get("XLA_FLAGS", "")]).strip()
+    is_first = not hasattr(config, "workerinput")
+    if is_first and sum(path.stat().st_size for path in COMPILED.rglob("*") if path.is_file()) > LARGEST:
+        for path in COMPILED.rglob("*"):
+            if path.is_file():
+                path.unlink()
 
 
 def pytest_collection_modifyitems(items):
     """Long files first."""
     items.sort(key=lambda item: item.path.stem not in _LONG)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def room():
+    """No process keeps the compiled code of all files."""
+    yield
+    with open("/proc/self/statm") if os.path.exists("/proc/self/statm") else open(os.devnull) as file:
+        pages = (file.read().split() or ["0", "0"])[1]
+    if int(pages) * os.sysconf("SC_PAGE_SIZE") > ROOM:
+        jax.clear_caches()
+        gc.collect()
 
 
 def equilateral(radius: float) -> np.ndarray:

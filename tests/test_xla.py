@@ -34,7 +34,7 @@ def told(folder, code, **settings):
 
 SEEN = """
 import json, os
-from cspr_jax import xla
+from cspr_jax.runtime import xla
 xla.prepare({device})
 print(json.dumps({{k: os.environ.get(k) for k in ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS",
     "TF_CPP_MIN_LOG_LEVEL")}}))
@@ -76,7 +76,9 @@ def test_a_flag_is_tried_once_and_refused_ones_are_left_out(tmp_path, monkeypatc
 
 def test_the_library_sets_nothing(tmp_path):
     """Where jax has been imported, somebody else has decided."""
-    code = 'import os, jax, cspr_jax; from cspr_jax import xla; xla.prepare(); print(os.environ.get("XLA_FLAGS"))'
+    code = (
+        'import os, jax, cspr_jax; from cspr_jax.runtime import xla; xla.prepare(); print(os.environ.get("XLA_FLAGS"))'
+    )
     assert told(tmp_path, code).strip() == "None" and not list(tmp_path.iterdir())
 
 
@@ -91,7 +93,7 @@ def test_commands_set_it_before_they_import_jax(tmp_path, words):
 def test_the_second_run_compiles_nothing(tmp_path):
     """A run hands its compiled code over when it ends; one that was killed leaves nothing that is read."""
     code = """
-from cspr_jax import xla
+from cspr_jax.runtime import xla
 xla.prepare()
 import jax, jax.numpy as jnp
 print(jax.jit(lambda x: jnp.sin(x @ x.T).sum())(jnp.ones((20, 20))))
@@ -107,7 +109,8 @@ print(jax.jit(lambda x: jnp.sin(x @ x.T).sum())(jnp.ones((20, 20))))
 
 KEEP = """
 import resource, sys
-from cspr_jax import cli, xla
+from cspr_jax import cli
+from cspr_jax.runtime import xla
 {before}
 xla.prepare(None, cli._warn)
 import jax, jax.numpy as jnp
@@ -177,7 +180,7 @@ def test_xla_does_not_complain_of_slow_compiling(tmp_path):
     code = """
 import os
 os.dup2(1, 2)
-from cspr_jax import xla
+from cspr_jax.runtime import xla
 xla.prepare({device!r})
 import jax, jax.numpy as jnp
 def slow(x):
@@ -244,7 +247,7 @@ def test_few_arenas_of_memory(tmp_path):
     """For this process (glibc tells by its statistics) and for those started from it; a user's setting stays."""
     code = """
 import ctypes, os, threading
-from cspr_jax import xla
+from cspr_jax.runtime import xla
 xla.prepare()
 hold = threading.Barrier(9)
 def work():

@@ -13,6 +13,8 @@ from jax import Array, lax
 # Terms that keep the truncation below half a unit in the last place on |x| <= pi / 2.
 _SINE_TERMS = {"float64": 11, "float32": 7}
 _COSINE_TERMS = {"float64": 12, "float32": 7}
+# Of dtypes and of ranks, as jax names it, whatever the caller's is. Tests set what is strictest.
+PROMOTION = ("standard", "allow")
 
 
 def polynomial(coefficients, x: Array) -> Array:
@@ -89,8 +91,8 @@ def double_precision() -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         for setting in (
             jax.enable_x64(True),
-            jax.numpy_dtype_promotion("standard"),
-            jax.numpy_rank_promotion("allow"),
+            jax.numpy_dtype_promotion(PROMOTION[0]),
+            jax.numpy_rank_promotion(PROMOTION[1]),
             jax.default_matmul_precision("highest"),
             jax.debug_nans(False),
             jax.debug_infs(False),
@@ -158,7 +160,7 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
         rows, column = jnp.where(is_pivot[:, None], row, rows), jnp.where(is_pivot, column[k], column)
         determinant = determinant * pivot * jnp.where(place == k, 1.0, -1.0)
         pivot_row = pivot_row / pivot
-        return (jnp.where(is_next[:, None], pivot_row, rows - column[:, None] * pivot_row), determinant), None
+        return (jnp.where(is_next[:, None], pivot_row, rows - column[:, None] * pivot_row[None]), determinant), None
 
     start = jnp.concatenate([matrix, right], axis=1), jnp.ones((), matrix.dtype)
     rows, determinant = lax.scan(eliminate, start, index)[0]

@@ -26,7 +26,7 @@ def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) 
     """
     check_determined(robot)
     if is_planar(robot):
-        adjugate = _planar_adjugate(robot.base_points - position)
+        adjugate = _planar_adjugate(robot.base_points - position[None])
         side = jnp.sign(robot.base_points[1, 0] - robot.base_points[0, 0])
         return side * (adjugate @ relative_acceleration(robot, acceleration))
     a = robot.base_points
@@ -52,7 +52,7 @@ def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Arr
         InputError: more cables.
     """
     check_determined(robot)
-    rays = robot.base_points - position  # (2.6)
+    rays = robot.base_points - position[None]  # (2.6)
     if is_planar(robot):
         adjugate = _planar_adjugate(rays)
         determinant = jnp.dot(adjugate[1], rays[1])
@@ -77,7 +77,7 @@ def cable_motion(
     Returns:
         lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2.
     """
-    rays = position - robot.base_points
+    rays = position[None] - robot.base_points
     lengths = jnp.linalg.norm(rays, axis=1)
     rates = rays @ velocity / lengths
     return lengths, rates, (jnp.dot(velocity, velocity) + rays @ acceleration - rates**2) / lengths

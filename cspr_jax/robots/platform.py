@@ -172,7 +172,7 @@ def rays(robot: PlatformRobot, position: Array, rotation: Array) -> tuple[Array,
         (n_cables, 3) each, fixed axes, m.
     """
     arms = robot.platform_points @ rotation.T
-    return position + arms - robot.base_points, arms
+    return position[None] + arms - robot.base_points, arms
 
 
 def wrench_per_mass(robot: PlatformRobot, state: State) -> Array:

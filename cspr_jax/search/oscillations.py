@@ -139,8 +139,8 @@ def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.A
         period = omega**2 - end
         cosine, sine = jnp.cos(omega * tau), jnp.sin(omega * tau)
         h = ((bend - size * end) * cosine - 2.0 * omega * slope * sine) / period
-        worst = jnp.maximum(high[:, None] * h, low[:, None] * h)
-        found = jnp.min(1.0 + v[:, None] * size * cosine - worst, axis=1)
+        worst = jnp.maximum(high[:, None] * h[None], low[:, None] * h[None])
+        found = jnp.min(1.0 + v[:, None] * size[None] * cosine[None] - worst, axis=1)
         guard = ROUNDING * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * jnp.max(jnp.abs(h)))
         return jnp.where(period > 0.0, found + guard, -jnp.inf)
 

@@ -29,12 +29,12 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
     if point_mass.is_planar(robot):
         half = robot.base_points[:, 0]
         tilt = axes[2] / hub[2]
-        return tilt, axes[0] / half[:, None] - tilt, jnp.zeros_like(half)  # (1.15), (1.16)
+        return tilt, axes[:1] / half[:, None] - tilt[None], jnp.zeros_like(half)  # (1.15), (1.16)
     a = robot.base_points
     area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
     scale = 3.0 / (area[2] * hub[2])
     opposite = jnp.roll(a, -1, axis=0) - jnp.roll(a, -2, axis=0)  # a2 - a3, a3 - a1, a1 - a2
     tilt = point_mass.plane_normal(robot) @ axes / hub[2]
-    pull = -scale * (jnp.cross(hub, opposite) + area / 3.0) @ axes
+    pull = -scale * (jnp.cross(hub, opposite) + area[None] / 3.0) @ axes
     twist = scale * (opposite @ jnp.cross(axes[:, 0], axes[:, -1]))
     return tilt, pull, twist

@@ -105,8 +105,8 @@ def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Arr
 
     Args:
         how: the turn.
-        amplitude_values: A, A', A''.
-        beats: beta, beta', beta''.
+        amplitude_values: A, A', A'', () each.
+        beats: beta, beta', beta'', () each.
 
     Returns:
         q, q', q'', (4,) each.

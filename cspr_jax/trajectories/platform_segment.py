@@ -88,7 +88,7 @@ def pose_segment(
     Args:
         robot: the robot, centred.
         start: position (3,) m and orientation (4,) of the first pose.
-        end: of the last.
+        end: position (3,) m and orientation (4,) of the last.
         z0: () depth of p0 below the centroid of the spools, m.
         bends: beta-hat of the first and of the last pose, () each.
         odd: () whether the number of arcs is odd.

@@ -26,7 +26,7 @@ def swing_plane(v1: Array, v2: Array, size: Array, normal: Array, odd: Array) ->
         odd: () whether the number of arcs is odd.
 
     Returns:
-        plane (3, 2): q_h1 and q_h2 of (2.30) as columns; r1 and r2 of (2.39), m; precession, in half turns.
+        plane (3, 2): q_h1 and q_h2 of (2.30) as columns; r1 () and r2 () of (2.39), m; precession (), in half turns.
     """
     r1, r2 = length(v1), length(v2)  # (2.39)
     from_rest, to_rest = r1 < AT_P0 * size, r2 < AT_P0 * size

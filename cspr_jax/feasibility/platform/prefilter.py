@@ -61,7 +61,7 @@ def smallest_tensions(
     if kind.from_rest:
         at, table = _from_rest(robot, segments), kept(rest_table(amplitude, arcs, tau, kind))
     else:
-        table = kept(jax.vmap(lambda t: instant(amplitude, segments.sense[0], arcs, t))(tau))
+        table = kept(jax.vmap(lambda t: instant(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
 
         def at(now):
             return lowest_tension(robot, segments, number, now, kind)
@@ -69,7 +69,7 @@ def smallest_tensions(
     # One number a loop: XLA would compute the tension once for each of several.
     values = lax.map(at, table)
     lowest = values.min(0)
-    return lowest, jnp.where(values == lowest, jnp.arange(len(tau))[:, None], len(tau)).min(0)
+    return lowest, jnp.where(values == lowest[None], jnp.arange(len(tau))[:, None], len(tau)).min(0)
 
 
 def _of_one_size(robot: PlatformRobot, segments: PoseSegment) -> tuple[PlatformRobot, PoseSegment]:

@@ -84,11 +84,11 @@ def block_bounds(problem: Problem, segments: Segment, arcs: Array, start: Array,
         sampled (n_criteria, n) and proved (n_criteria, n).
     """
     weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
-    tau = start * (1.0 - weight) + stop * weight
+    tau = start[None] * (1.0 - weight) + stop[None] * weight
     values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
     sampled = jnp.stack([jnp.min(v, axis=0) for v in values])
     bound = jnp.stack(jax.vmap(partial(curvatures, *problem))(segments, arcs, start, stop))
-    return sampled, sampled - bound * ((stop - start) / INTERVALS) ** 2 / 8.0
+    return sampled, sampled - bound * (((stop - start) / INTERVALS) ** 2)[None] / 8.0
 
 
 @jax.jit

@@ -33,7 +33,7 @@ def _block_estimates(function, problem: Problem, segment: Segment, arcs: Array, 
     values = jnp.stack(jax.vmap(partial(function, *problem, segment, arcs))(tau))
     # A parabola through every three neighbours: the lowest sample may be of the valley of another block.
     moves, vertices = vertex(values[:, :-2], values[:, 1:-1], values[:, 2:])
-    return _lowest(vertices, tau[1:-1] + moves * (tau[1] - tau[0]))
+    return _lowest(vertices, tau[None, 1:-1] + moves * (tau[1] - tau[0]))
 
 
 def _lowest(estimates: Array, places: Array) -> tuple[Array, Array]:
@@ -45,7 +45,7 @@ def _lowest(estimates: Array, places: Array) -> tuple[Array, Array]:
 def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[Array, Array]:
     # Keep the candidates in order, the new one in its place; leaves (CANDIDATES, n_values, n). A segment with fewer
     # blocks than others sees its last block again: what is known is not new.
-    estimate = jnp.where((best[1] == place).any(0), jnp.inf, estimate)
+    estimate = jnp.where((best[1] == place[None]).any(0), jnp.inf, estimate)
     estimates, places = [], []
     for old_estimate, old_place in zip(*best, strict=True):
         first = estimate < old_estimate
@@ -55,14 +55,14 @@ def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[A
     return jnp.stack(estimates), jnp.stack(places)
 
 
-def refined_minimum(function, tau: Array, step: Array) -> Array:
+def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array) -> Array:
     """Smallest value of a continuous function near an estimated minimum, by ever narrower parabolas.
 
     A parabola is believed only where its middle is the lowest of its three points; else they move to the lowest. So a
     minimum that is steep on one side, or a kink beside it, is found too.
 
     Args:
-        function: () -> ().
+        function: of one instant, () to ().
         tau: () the estimate.
         step: () distance of the samples that it came from.
 
@@ -108,8 +108,9 @@ def _best_of_groups(groups: tuple[int, ...], estimates: Array, places: Array) ->
         values, where = (x[:, mine].reshape(CANDIDATES * size, -1) for x in (estimates, places))
         number = jnp.broadcast_to(jnp.arange(CANDIDATES * size)[:, None], values.shape)
         for _ in range(CANDIDATES):
-            chosen = jnp.min(jnp.where(values == jnp.min(values, axis=0), number, CANDIDATES * size), axis=0)
-            is_chosen = number == chosen
+            is_lowest = values == jnp.min(values, axis=0, keepdims=True)
+            chosen = jnp.min(jnp.where(is_lowest, number, CANDIDATES * size), axis=0)
+            is_chosen = number == chosen[None]
             functions.append(first + chosen % size)
             taus.append(jnp.sum(jnp.where(is_chosen, where, 0.0), axis=0))
             values = jnp.where(is_chosen, jnp.inf, values)
@@ -131,7 +132,7 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
     nowhere = jnp.full_like(nothing, -1.0)
     estimates, places = over_blocks(edges, counts, arcs, (nothing, nowhere), step)
     which, where = _best_of_groups(groups, estimates, places)
-    steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)])
+    steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)]).astype(arcs.dtype)
 
     def refine(segment, p, which, where, width):
         # which, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.

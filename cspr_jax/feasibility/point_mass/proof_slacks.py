@@ -134,7 +134,7 @@ def limit_slacks(
     if not given(limits):
         return ()
     position, slope, curvature = _path(segment, arcs, tau, now)
-    rays = position - robot.base_points
+    rays = position[None] - robot.base_points
     length = jnp.linalg.norm(rays, axis=1)
     rate = rays @ slope
     rate_slope = jnp.dot(slope, slope) + rays @ curvature
@@ -203,7 +203,7 @@ def _pace(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]
 def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Bounds:
     # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (n_cables,). No cable is shorter than
     # the distance from the spool plane.
-    at_middle = jnp.linalg.norm(segment.hub + segment.plane @ over.place - robot.base_points, axis=1)
+    at_middle = jnp.linalg.norm((segment.hub + segment.plane @ over.place)[None] - robot.base_points, axis=1)
     change = over.radius * pace.slope
     depth = (1.0 + segment.tilt @ over.place - over.radius * eta.slope) * segment.hub[2]
     nearest = jnp.maximum(jnp.maximum(at_middle - change, depth / jnp.linalg.norm(plane_normal(robot))), 0.0)

@@ -76,7 +76,7 @@ def _samples(amplitude: Amplitude) -> Array:
     # Every knot among them; dense towards the ends of each piece, where steep inclinations have their maximum.
     ends = jnp.concatenate([jnp.zeros(1), jnp.asarray(amplitude.knots), jnp.ones(1)])
     part = 0.5 * (1.0 - np.cos(math.pi * np.arange(SAMPLES) / SAMPLES))
-    inside = ends[:-1, None] + (ends[1:] - ends[:-1])[:, None] * part
+    inside = ends[:-1, None] + (ends[1:] - ends[:-1])[:, None] * part[None]
     return jnp.concatenate([inside.ravel(), jnp.ones(1)])
 
 
