@@ -1,5 +1,6 @@
 """Write docs/reference.md from the schema, the table of quantities and the verdicts."""
 
+import textwrap
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -120,7 +121,8 @@ def _kind(kind: MapKind) -> str:
         "takes": _names(kind.takes),
         "quantities": ", ".join(f"**`{name}`**" if name in kind.stored else f"`{name}`" for name in kind.quantities),
     }
-    lines = "".join(f"- {words}: {text}\n" for words, text in asked.items() if text)
+    items = [f"- {words}: {text}" for words, text in asked.items() if text]
+    lines = "".join(textwrap.fill(item, 120, subsequent_indent="  ", break_on_hyphens=False) + "\n" for item in items)
     return f"`{kind.name}`: {kind.description}\n\n{lines}"
 
 

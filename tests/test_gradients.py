@@ -125,7 +125,7 @@ def test_margin_of_a_platform():
 def test_slacks_are_mapped_and_compiled():
     robot = cspr_jax.load_robot("prototype")
     problem, z0 = make_problem(robot), np.array([1.4, 1.7, 2.0])
-    targets = jnp.asarray(TARGET) + jnp.arange(3.0)[:, None] * 0.1
+    targets = jnp.asarray(TARGET)[None] + jnp.arange(3.0)[:, None] * 0.1
 
     @jax.jit
     @jax.vmap

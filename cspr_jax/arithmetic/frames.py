@@ -18,6 +18,11 @@ def _numbers(given):
     return given if hasattr(given, "at") else np.asarray(given, float)
 
 
+def _beside(vector, given):
+    # Of the same rank, for those who have jax raise where ranks differ.
+    return vector.reshape((1,) * (given.ndim - 1) + vector.shape)
+
+
 @dataclasses.dataclass(frozen=True)
 class Frame:
     """Axes and origin of a robot file, as the kernels' see them.
@@ -41,7 +46,9 @@ class Frame:
         Returns:
             (..., 3) from the centroid of the spools, z down, m.
         """
-        return ((_numbers(points) - self.origin) - self.rest) * self.signs
+        given = _numbers(points)
+        origin, rest, signs = (_beside(x, given) for x in (self.origin, self.rest, self.signs))
+        return ((given - origin) - rest) * signs
 
     def outward(self, points) -> np.ndarray:
         """Points of the kernels in the file's coordinates.
@@ -52,7 +59,9 @@ class Frame:
         Returns:
             (..., 3) m.
         """
-        return self.origin + (_numbers(points) * self.signs + self.rest)
+        given = _numbers(points)
+        origin, rest, signs = (_beside(x, given) for x in (self.origin, self.rest, self.signs))
+        return origin + (given * signs + rest)
 
     def depth(self, height) -> np.ndarray:
         """Depth below the centroid of the spools of a z of the file.
@@ -85,7 +94,8 @@ class Frame:
         Returns:
             (..., 3).
         """
-        return _numbers(vectors) * self.signs
+        given = _numbers(vectors)
+        return given * _beside(self.signs, given)
 
     def turned_tensor(self, tensor):
         """A tensor in the other axes, either way.
@@ -96,7 +106,7 @@ class Frame:
         Returns:
             (3, 3).
         """
-        return self.signs[:, None] * tensor * self.signs
+        return self.signs[:, None] * tensor * self.signs[None]
 
     def turned_angles(self, angles) -> np.ndarray:
         """Angles of tilt and torsion in the other axes, either way.
@@ -119,7 +129,8 @@ class Frame:
             (..., 4).
         """
         # The first sign is always +1, as that of the scalar part is.
-        return _numbers(quaternions) * self.signs[np.array([0, 0, 1, 2])]
+        given = _numbers(quaternions)
+        return given * _beside(self.signs[np.array([0, 0, 1, 2])], given)
 
 
 def frame_of(base_points, z_axis: str) -> Frame:
@@ -135,7 +146,7 @@ def frame_of(base_points, z_axis: str) -> Frame:
     points, signs = _numbers(base_points), np.array(_TURN[z_axis])
     if not isinstance(points, np.ndarray):
         origin = points.mean(0)
-        return Frame(signs, origin, (points - origin).mean(0))
+        return Frame(signs, origin, (points - origin[None]).mean(0))
     origin = np.array([math.fsum(column) / len(points) for column in points.T])
     rest = np.array([math.fsum(column) / len(points) for column in (points - origin).T])
     return Frame(signs, origin, rest)

@@ -62,7 +62,7 @@ class PointMassRobot:
 
     def wrench_matrix(self, state: State) -> Array:
         """Wrenches of unit tensions; see `Robot.wrench_matrix`."""
-        rays = self.base_points - state.position
+        rays = self.base_points - state.position[None]
         return (rays / jnp.linalg.norm(rays, axis=1, keepdims=True)).T[self._directions]
 
     def inertial_wrench(self, state: State) -> Array:
