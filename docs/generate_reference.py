@@ -1,5 +1,6 @@
 """Write docs/reference.md from the schema, the table of quantities and the verdicts."""
 
+import textwrap
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -120,8 +121,8 @@ def _kind(kind: MapKind) -> str:
         "takes": _names(kind.takes),
         "quantities": ", ".join(f"**`{name}`**" if name in kind.stored else f"`{name}`" for name in kind.quantities),
     }
-    lines = "".join(f"- {words}: {text}\n" for words, text in asked.items() if text)
-    return f"`{kind.name}`: {kind.description}\n\n{lines}"
+    lines = [textwrap.fill(f"- {words}: {text}", 120, subsequent_indent="  ") for words, text in asked.items() if text]
+    return f"`{kind.name}`: {kind.description}\n\n" + "".join(f"{line}\n" for line in lines)
 
 
 def _names(names: tuple[str, ...]) -> str:

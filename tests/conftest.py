@@ -1,4 +1,4 @@
-"""Settings for every test: 64 bits, strict promotion, repeatable examples, compiled code; robots that many tests share."""
+"""Settings for every test: 64 bits, strict promotion, repeatable examples, compiled code; robots of many tests."""
 
 import gc
 import os
