@@ -1,4 +1,4 @@
-"""Settings for every test: 64 bits, strict promotion, repeatable examples, compiled code; robots of many tests."""
+"""Settings for every test: 64 bits, strict promotion, repeatable examples, compiled code; robots that many tests share."""
 
 import gc
 import os
