@@ -121,9 +121,8 @@ def _kind(kind: MapKind) -> str:
         "takes": _names(kind.takes),
         "quantities": ", ".join(f"**`{name}`**" if name in kind.stored else f"`{name}`" for name in kind.quantities),
     }
-    items = [f"- {words}: {text}" for words, text in asked.items() if text]
-    lines = "".join(textwrap.fill(item, 120, subsequent_indent="  ", break_on_hyphens=False) + "\n" for item in items)
-    return f"`{kind.name}`: {kind.description}\n\n{lines}"
+    lines = [textwrap.fill(f"- {words}: {text}", 120, subsequent_indent="  ") for words, text in asked.items() if text]
+    return f"`{kind.name}`: {kind.description}\n\n" + "".join(f"{line}\n" for line in lines)
 
 
 def _names(names: tuple[str, ...]) -> str:
