@@ -79,7 +79,7 @@ def test_wrenches(name):
         else:
             pull = np.linalg.lstsq(matrix, wrench, rcond=None)[0]
         np.testing.assert_allclose(matrix @ pull, wrench, atol=1e-11 * (1.0 + np.abs(pull).sum()))
-        rays = np.asarray(robot.base_points - at.position)
+        rays = np.asarray(robot.base_points - at.position[None])
         if robot.dof == 6:
             rays = rays - np.asarray(robot.platform_points) @ np.asarray(at.rotation).T
         units = rays / np.linalg.norm(rays, axis=1, keepdims=True)
