@@ -114,8 +114,8 @@ def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
     return build_robot(spec, TrajectoryKeys(), reference)
 
 
-def point_mass_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot:
-    """The point mass of a file, as the kernels take it.
+def kernel_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Any:
+    """The robot of a file, as the kernels take it; a platform's axes are still those of the file.
 
     Args:
         spec: the robot file's content.
@@ -126,34 +126,8 @@ def point_mass_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointM
         the robot, centred.
 
     Raises:
-        ConfigError: its geometry cannot be used, it has more cables than degrees of freedom, or is a rigid platform.
+        ConfigError: its geometry or inertia cannot be used, or it has more cables than degrees of freedom.
     """
-    if spec.is_platform:
-        raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass here')
-    return _determined(spec, keys, file)
-
-
-def platform_of(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PlatformRobot:
-    """The platform of a file, as the kernels take it; its platform axes are still those of the file.
-
-    Args:
-        spec: the robot file's content.
-        keys: of the plan or sweep.
-        file: named in errors.
-
-    Returns:
-        the robot, centred.
-
-    Raises:
-        ConfigError: its geometry or inertia cannot be used, it has more than six cables, or is a point mass.
-    """
-    if not spec.is_platform:
-        raise ConfigError(file, f'robot "{spec.name}" is a point mass: must be a platform on six cables here')
-    return _determined(spec, keys, file)
-
-
-def _determined(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Any:
-    # Centred; its tensions follow from its motion.
     robot: Any = build_robot(spec, keys, file)
     if robot.n_cables != robot.dof:
         place, key = spec.placed("base_points", file)
@@ -178,7 +152,7 @@ def fault_at_rest(spec: RobotFile) -> str | None:
         return "not known: more cables than degrees of freedom share the weight in many ways"
     try:
         if spec.is_platform:
-            robot = platform_of(spec, TrajectoryKeys(), spec.name)
+            robot = kernel_robot(spec, TrajectoryKeys(), spec.name)
             reference_pose(robot, float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean()))
         else:
             build_robot(spec, TrajectoryKeys(), spec.name)
@@ -314,7 +288,7 @@ def build_problem(
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     given = build_limits(spec, limits, limits.floor, file)
-    robot = _determined(spec, keys, file)
+    robot = kernel_robot(spec, keys, file)
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
 
 

@@ -18,7 +18,7 @@ from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.platform.end_acceleration import endpoint
 from cspr_jax.feasibility.platform.prefilter import smallest_tensions
-from cspr_jax.problem import platform_of
+from cspr_jax.problem import kernel_robot
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import pairs_apart, platform_robot
 from cspr_jax.robots.reference_pose import reference_pose
@@ -270,7 +270,7 @@ def test_the_catalogue_hangs_still(name):
     """Every six-cable robot of the catalogue is in equilibrium in its reference orientation, with equal tensions."""
     path = CATALOGUE / f"{name}.toml"
     spec = read_robot(path)
-    robot = platform_of(spec, TrajectoryKeys(), path)
+    robot = kernel_robot(spec, TrajectoryKeys(), path)
     span = np.linalg.norm(robot.base_points, axis=1).max()
     for depth in (1.0, 3.0):
         found = reference_pose(robot, depth * span)

@@ -9,14 +9,10 @@ from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.problem import build_amplitude, build_limits, platform_of, point_mass_of
-from cspr_jax.robots.limits import Limits
+from cspr_jax.problem import build_problem
 from cspr_jax.robots.point_mass import plane_normal
-from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.trajectories.amplitudes import Amplitude
 
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
@@ -40,14 +36,7 @@ class GridMap(abc.ABC):
         """Build what all tiles share."""
         self._keys, self._file = keys, file
         self._frame, self._z_axis = frame_of(spec.base_points, spec.z_axis), spec.z_axis
-        amplitude = build_amplitude(keys.trajectory, file, at="trajectory.", for_bounds=for_bounds)
-        limits = build_limits(spec, keys.limits, keys.limits.floor, file)
-        self._problem = self._built(spec, limits, amplitude)
-
-    @abc.abstractmethod
-    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
-        # What the kernels take.
-        ...
+        self._problem = build_problem(spec, keys.trajectory, keys.limits, file, at="trajectory.", for_bounds=for_bounds)
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -125,10 +114,6 @@ class PlatformMap(GridMap):
             )
         super().__init__(spec, keys, file)
 
-    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
-        robot = platform_of(spec, self._keys.trajectory, self._file)
-        return Problem(aligned(robot)[0], limits, amplitude)
-
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         found = answers["arcs"] > 0
@@ -143,8 +128,11 @@ class PlatformMap(GridMap):
 class PointMassMap(GridMap):
     """The map of a sweep of a point mass; see `GridMap`."""
 
-    def _built(self, spec: RobotFile, limits: Limits, amplitude: Amplitude) -> Problem:
-        return Problem(point_mass_of(spec, self._keys.trajectory, self._file), limits, amplitude)
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
+        """Refuse a platform."""
+        if spec.is_platform:
+            raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass in this map')
+        super().__init__(spec, keys, file, for_bounds=for_bounds)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

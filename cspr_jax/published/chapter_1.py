@@ -16,7 +16,7 @@ from cspr_jax.feasibility.transition.oscillations import (
     least_oscillations,
     many_oscillations,
 )
-from cspr_jax.problem import point_mass_of
+from cspr_jax.problem import kernel_robot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories.amplitudes import Amplitude, named
 from cspr_jax.trajectories.transition import transition, weights
@@ -33,7 +33,7 @@ def _horizontal(amplitude: Amplitude, w: Array) -> float:
 def _weights(name: str, direction: list[float]) -> Array:
     # Of a robot of the catalogue, for a target on the level of p0, whatever z0.
     path = CATALOGUE / f"{name}.toml"
-    robot = point_mass_of(read_robot(path), TrajectoryKeys(), path)
+    robot = kernel_robot(read_robot(path), TrajectoryKeys(), path)
     radius = np.linalg.norm(np.asarray(robot.base_points)[0, :2])
     z0 = jnp.asarray(2.0)
     target = jnp.asarray([DISTANCE * radius * direction[0], DISTANCE * radius * direction[1], 2.0])

@@ -10,7 +10,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.problem import platform_of
+from cspr_jax.problem import kernel_robot
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.reference_pose import aligned
@@ -74,7 +74,7 @@ def checker_of(amplitude: str) -> PoseChecker:
         the checker, of motions of the MSSM from rest.
     """
     here = Path(__file__)
-    robot = platform_of(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
+    robot = kernel_robot(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
     problem = Problem(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
     return PoseChecker(problem, Kind(from_rest=True), batch=MANY)
 

@@ -6,7 +6,6 @@ import warnings
 
 import jax
 import pytest
-from cspr_jax.plans.platform_sequence import Poses
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -14,11 +13,10 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import CATALOGUE, resolve_robot
 from cspr_jax.errors import ConfigError, CsprError, InputError
-from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.choices import chosen_depth
-from cspr_jax.plans.sequence import sequence_of
-from cspr_jax.problem import build_amplitude, build_limits, platform_of, point_mass_of
-from cspr_jax.robots.reference_pose import aligned, reference_pose
+from cspr_jax.plans.sequence import Sequence
+from cspr_jax.problem import build_problem
+from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.tile import TileMap
 
@@ -129,15 +127,13 @@ def ready(path):
         return TileMap(read_sweep(path))
     keys = checked(PlanFile, read_toml(path), path)
     spec = resolve_robot(keys.robot, path, path.parent)
-    sequence = (Poses if spec.is_platform else sequence_of)(spec, keys, path)
-    robot = (platform_of if spec.is_platform else point_mass_of)(spec, keys, path)
-    rest = build_limits(spec, keys, keys.floor, path), build_amplitude(keys, path, epsilon=0.2)
+    sequence, problem = Sequence(spec, keys, path), build_problem(spec, keys, keys, path, epsilon=0.2)
     if not spec.is_platform:
-        return sequence.points(chosen_depth(Problem(robot, *rest), sequence))
-    problem = Problem(aligned(robot)[0], *rest)
-    sequence.check_poses(problem)
+        return sequence.stops.points(chosen_depth(problem, sequence))
+    for leg in sequence.legs:
+        leg.check(problem)
     try:
-        return reference_pose(robot, chosen_depth(problem, sequence))
+        return reference_pose(problem.robot, chosen_depth(problem, sequence))
     except InputError as error:
         raise ConfigError(path, f"robot.{error}") from error
 
