@@ -43,7 +43,24 @@ settings.load_profile("default")
 
 
 # Files that take long go first, so that both processes end together.
-_LONG = ("test_platform", "test_transition_plans", "test_pose_plans", "test_pose_maps", "test_workers", "test_crashes")
+_LONG = (
+    "test_workers",
+    "test_pose_plans",
+    "test_crashes",
+    "test_xla",
+    "test_orientation_maps",
+    "test_platform",
+    "test_random_segments",
+    "test_pose_maps",
+    "test_certificate",
+    "test_transition",
+    "test_first_look",
+    "test_envelopes",
+    "test_python",
+    "test_minimum_arcs",
+    "test_transition_plans",
+    "test_minimum_oscillations",
+)
 
 
 def pytest_configure(config):
@@ -58,8 +75,9 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(items):
-    """Long files first."""
-    items.sort(key=lambda item: item.path.stem not in _LONG)
+    """Long files first, the longest before all."""
+    rank = {name: place for place, name in enumerate(_LONG)}
+    items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
 
 
 @pytest.fixture(autouse=True, scope="module")
