@@ -1,4 +1,4 @@
-"""Settings for every test: 64 bits, strict promotion, repeatable examples, compiled code; robots that many tests share."""
+"""Settings for every test: 64 bits, strict promotion, repeatable examples, kept code; robots that many tests share."""
 
 import gc
 import os
@@ -84,9 +84,9 @@ def pytest_collection_modifyitems(items):
 def room():
     """No process keeps the compiled code of all files."""
     yield
-    with open("/proc/self/statm") if os.path.exists("/proc/self/statm") else open(os.devnull) as file:
-        pages = (file.read().split() or ["0", "0"])[1]
-    if int(pages) * os.sysconf("SC_PAGE_SIZE") > ROOM:
+    statistics = Path("/proc/self/statm")
+    pages = int(statistics.read_text().split()[1]) if statistics.exists() else 0
+    if pages * os.sysconf("SC_PAGE_SIZE") > ROOM:
         jax.clear_caches()
         gc.collect()
 

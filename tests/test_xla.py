@@ -76,7 +76,9 @@ def test_a_flag_is_tried_once_and_refused_ones_are_left_out(tmp_path, monkeypatc
 
 def test_the_library_sets_nothing(tmp_path):
     """Where jax has been imported, somebody else has decided."""
-    code = 'import os, jax, cspr_jax; from cspr_jax.runtime import xla; xla.prepare(); print(os.environ.get("XLA_FLAGS"))'
+    code = (
+        'import os, jax, cspr_jax; from cspr_jax.runtime import xla; xla.prepare(); print(os.environ.get("XLA_FLAGS"))'
+    )
     assert told(tmp_path, code).strip() == "None" and not list(tmp_path.iterdir())
 
 

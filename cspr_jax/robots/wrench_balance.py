@@ -149,6 +149,7 @@ def cable_motion(robot: PlatformRobot, pose: Pose) -> tuple[Array, Array, Array]
     lengths = jnp.linalg.norm(cables, axis=1)
     swing = jnp.cross(pose.angular_velocity, arms)
     velocity = pose.velocity[None] + swing
-    pull = pose.acceleration[None] + jnp.cross(pose.angular_acceleration, arms) + jnp.cross(pose.angular_velocity, swing)
+    inward = jnp.cross(pose.angular_velocity, swing)
+    pull = pose.acceleration[None] + jnp.cross(pose.angular_acceleration, arms) + inward
     rates = jnp.sum(cables * velocity, axis=1) / lengths
     return lengths, rates, (jnp.sum(velocity**2 + cables * pull, axis=1) - rates**2) / lengths
