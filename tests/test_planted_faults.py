@@ -32,7 +32,11 @@ FAULTS = {
         "itertools.pairwise([0.0, 1.0])",
         "test_certificate.py",
     ),
-    "a swapped axis of the z-up frame": ('"up": (1.0, -1.0, -1.0)', '"up": (-1.0, 1.0, -1.0)', "test_python.py"),
+    "a swapped axis of the z-up frame": (
+        '"up": (1.0, -1.0, -1.0)',
+        '"up": (-1.0, -1.0, 1.0)',
+        "test_plan.py::test_an_upward_z_axis_mirrors_a_downward_one",
+    ),
     "a wrong factor in a duration": (
         "return jnp.sqrt(oscillation(segment, arcs).period / segment.rate)",
         "return 2.0 * jnp.sqrt(oscillation(segment, arcs).period / segment.rate)",
