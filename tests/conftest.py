@@ -19,8 +19,8 @@ from cspr_jax.robots import point_mass
 BESIDE = sys.prefix if sys.prefix != sys.base_prefix else tempfile.gettempdir()
 COMPILED = Path(os.environ.setdefault("CSPR_TESTS_COMPILED", f"{BESIDE}/cspr-tests-compiled")).absolute()
 LARGEST = 1_000_000_000  # bytes; beyond that all of it is taken away
-# Most of a test is compiling: these take half of the time for it, and the code is slower. Level 0 would take a third, but moves a verdict. The soak runs with what
-# users run with, and so does what test_xla starts.
+# Most of a test is compiling: these take half of the time for it, and the code is slower. Level 0 would take a third,
+# but moves a verdict. The soak runs with what users run with, and so does what test_xla starts.
 CHEAP = (
     "--xla_backend_optimization_level=1",
     "--xla_cpu_use_fusion_emitters=false",
