@@ -1,4 +1,4 @@
-"""Settings for every test: 64 bits, strict promotion, repeatable examples, compiled code; robots that many share."""
+"""Settings for every test: 64 bits, strict promotion, repeatable examples, kept code; robots that many tests share."""
 
 import gc
 import os
@@ -19,10 +19,10 @@ from cspr_jax.robots import point_mass
 BESIDE = sys.prefix if sys.prefix != sys.base_prefix else tempfile.gettempdir()
 COMPILED = Path(os.environ.setdefault("CSPR_TESTS_COMPILED", f"{BESIDE}/cspr-tests-compiled")).absolute()
 LARGEST = 1_000_000_000  # bytes; beyond that all of it is taken away
-# Most of a test is compiling: these take a third of the time for it, and the code is slower. The soak runs with what
-# users run with, and so does what test_xla starts.
+# Most of a test is compiling: these take half of the time for it, and the code is slower. Level 0 would take a third,
+# but moves a verdict. The soak runs with what users run with, and so does what test_xla starts.
 CHEAP = (
-    "--xla_backend_optimization_level=0",
+    "--xla_backend_optimization_level=1",
     "--xla_cpu_use_fusion_emitters=false",
     "--xla_cpu_parallel_codegen_split_count=1",
 )
@@ -43,7 +43,24 @@ settings.load_profile("default")
 
 
 # Files that take long go first, so that both processes end together.
-_LONG = ("test_platform", "test_transition_plans", "test_pose_plans", "test_pose_maps", "test_workers", "test_crashes")
+_LONG = (
+    "test_workers",
+    "test_pose_plans",
+    "test_crashes",
+    "test_xla",
+    "test_orientation_maps",
+    "test_platform",
+    "test_random_segments",
+    "test_pose_maps",
+    "test_certificate",
+    "test_transition",
+    "test_first_look",
+    "test_envelopes",
+    "test_python",
+    "test_minimum_arcs",
+    "test_transition_plans",
+    "test_minimum_oscillations",
+)
 
 
 def pytest_configure(config):
@@ -58,17 +75,18 @@ def pytest_configure(config):
 
 
 def pytest_collection_modifyitems(items):
-    """Long files first."""
-    items.sort(key=lambda item: item.path.stem not in _LONG)
+    """Long files first, the longest before all."""
+    rank = {name: place for place, name in enumerate(_LONG)}
+    items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
 
 
 @pytest.fixture(autouse=True, scope="module")
 def room():
     """No process keeps the compiled code of all files."""
     yield
-    with open("/proc/self/statm") if os.path.exists("/proc/self/statm") else open(os.devnull) as file:
-        pages = (file.read().split() or ["0", "0"])[1]
-    if int(pages) * os.sysconf("SC_PAGE_SIZE") > ROOM:
+    statistics = Path("/proc/self/statm")
+    pages = int(statistics.read_text().split()[1]) if statistics.exists() else 0
+    if pages * os.sysconf("SC_PAGE_SIZE") > ROOM:
         jax.clear_caches()
         gc.collect()
 
@@ -102,18 +120,3 @@ def figures(monkeypatch):
     drawn = []
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, *args, **kwargs: drawn.append(self))
     return drawn
-
-
-@pytest.fixture
-def small_bench(monkeypatch):
-    """Sizes with which `cspr bench` takes seconds."""
-    from cspr_jax.bench import six_cables, three_cables, timing
-
-    monkeypatch.setattr(timing, "REPEATS", 1)
-    monkeypatch.setattr(timing, "SIDE", 8)
-    monkeypatch.setattr(timing, "COPIED", 4096)
-    monkeypatch.setattr(three_cables, "BATCHES", 1)
-    monkeypatch.setattr(three_cables, "NUMPY_SEGMENTS", 2)
-    monkeypatch.setattr(six_cables, "NUMPY_TRAJECTORIES", 2)
-    monkeypatch.setattr(six_cables, "TRAJECTORIES", 400)
-    monkeypatch.setattr(six_cables, "LANES", 64)

@@ -31,13 +31,6 @@ def motions(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def figures(monkeypatch):
-    drawn = []
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, *args, **kwargs: drawn.append(self))
-    return drawn
-
-
 def test_a_motion_says_what_it_is(motions):
     good, hard = (cspr_jax.open_result(motions / f"{name}.h5") for name in ("good", "hard"))
     known = good.attributes

@@ -139,10 +139,7 @@ def cable_motion(robot: PlatformRobot, state: State) -> tuple[Array, Array, Arra
     lengths = jnp.linalg.norm(cables, axis=1)
     swing = jnp.cross(state.angular_velocity, arms)
     velocity = state.velocity[None] + swing
-    pull = (
-        state.acceleration[None]
-        + jnp.cross(state.angular_acceleration, arms)
-        + jnp.cross(state.angular_velocity, swing)
-    )
+    inward = jnp.cross(state.angular_velocity, swing)
+    pull = state.acceleration[None] + jnp.cross(state.angular_acceleration, arms) + inward
     rates = jnp.sum(cables * velocity, axis=1) / lengths
     return lengths, rates, (jnp.sum(velocity**2 + cables * pull, axis=1) - rates**2) / lengths
