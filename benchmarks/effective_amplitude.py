@@ -59,8 +59,8 @@ def candidates(robot, rng: np.random.Generator, count: int) -> Candidates:
     values, can_end = end_options(robot, *end, depth, OPTIONS)
     can_start = end_options(robot, *start, depth, 1)[1]
     motion, option = np.nonzero(~np.isnan(values) & (can_end & can_start & ~np.isnan(first))[:, None])
-    bends = (np.where(at_rest, -1.0, first)[motion], values[motion, option])
-    return Candidates(start, end, depth, motion, bends)
+    beta_hats = (np.where(at_rest, -1.0, first)[motion], values[motion, option])
+    return Candidates(start, end, depth, motion, beta_hats)
 
 
 def main() -> None:

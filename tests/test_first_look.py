@@ -32,8 +32,8 @@ def candidates(robot, rng, count):
     end = place, np.stack([oracle.pose_quaternion(*pair) for pair in zip(place, turns, strict=True)])
     rest = np.tile(oracle.rest_point(robot, Z0), (count, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
     motion = np.repeat(np.arange(count), BENDS)
-    bends = np.full(len(motion), -1.0), rng.uniform(-8.0, 1.0, len(motion))
-    return Candidates(rest, end, np.full(count, Z0), motion, bends)
+    beta_hats = np.full(len(motion), -1.0), rng.uniform(-8.0, 1.0, len(motion))
+    return Candidates(rest, end, np.full(count, Z0), motion, beta_hats)
 
 
 def test_the_search_is_the_full_search():

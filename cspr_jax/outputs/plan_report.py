@@ -121,7 +121,7 @@ def plan_table(plan: Plan):
         table.add_column(head, justify="left" if head in ("position (m)", "verdict") else "right")
     for i, segment in enumerate(segments):
         position = ", ".join(f"{round(value, 9) + 0.0:.4g}" for value in plan.points[i + 1])
-        bends = " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
+        beta_hats = " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
         found = segment["oscillations" if swings else "arcs"]
         tried = segment["tried_arcs"] // (2 if swings else 1)
         table.add_row(
@@ -132,7 +132,7 @@ def plan_table(plan: Plan):
             _number(segment["duration"], ".2f"),
             _number(segment["margin"], ".4f"),
             f"{_number(segment['tension_min'], '.3f')} .. {_number(segment['tension_max'], '.3f')}",
-            bends or _number(segment["feasible_at_infinity"], ".4f"),
+            beta_hats or _number(segment["feasible_at_infinity"], ".4f"),
             segment["verdict"],
         )
     return table

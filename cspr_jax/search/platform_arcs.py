@@ -49,8 +49,8 @@ class Candidates(NamedTuple):
 
     def motions(self, which: np.ndarray) -> "Candidates":
         """Some of the motions of one candidate each: indices."""
-        start, end, bends = ((a[which], b[which]) for a, b in (self.start, self.end, self.bends))
-        return Candidates(start, end, self.z0[which], np.arange(len(which)), bends)
+        start, end, beta_hats = ((a[which], b[which]) for a, b in (self.start, self.end, self.bends))
+        return Candidates(start, end, self.z0[which], np.arange(len(which)), beta_hats)
 
 
 class Found(NamedTuple):
@@ -88,7 +88,9 @@ class _Segments:
         # (k,) indices of candidates.
         motion, (first, last) = self._candidates.motion[which], self._candidates.bends
         found = rows(self._of_motions[arcs % 2], motion)
-        return dataclasses.replace(found, turn=found.turn._replace(start_bend=first[which], end_bend=last[which]))
+        return dataclasses.replace(
+            found, turn=found.turn._replace(start_beta_hat=first[which], end_beta_hat=last[which])
+        )
 
 
 def smallest_arcs(

@@ -40,7 +40,7 @@ def end_options(
         count: how many values for each.
 
     Returns:
-        (n, count) of `bends.options`; (n,) whether a motion can end there: below the spools, and not beyond a
+        (n, count) of `beta_hat.options`; (n,) whether a motion can end there: below the spools, and not beyond a
         singularity.
     """
     preferred, lowest, highest, share, depth = in_batches(
