@@ -22,7 +22,7 @@ from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.slacks import pose_slacks
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.published import table_3_2
-from cspr_jax.robots.interference import cables_cross, contacts, gaps, platform_hit, views
+from cspr_jax.robots.interference import cable_directions, cables_cross, contacts, gaps, platform_hit
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.beta_hat import LARGEST, cheapest_path, options
@@ -107,13 +107,13 @@ def test_verdicts_do_not_change_with_more_samples(checker, monkeypatch):
 
 @jax.jit
 def everything(problem, pairs, segment, arcs, tau):
-    """All criteria, the vectors between cables, and the views of cables, by the readable functions."""
+    """All criteria, the vectors between cables, and the directions of cables, by the readable functions."""
 
     def one(t):
         pose = motion(segment, problem.amplitude, arcs, t)
         where = (problem.robot, pose.position, pose.rotation)
         slack = pose_slacks(problem, pose, problem.robot.gravity / segment.rate, segment.regular)
-        return slack, gaps(problem.robot, pairs, *where[1:]), views(*where)
+        return slack, gaps(problem.robot, pairs, *where[1:]), cable_directions(*where)
 
     return jax.vmap(one)(tau)
 
@@ -135,9 +135,9 @@ def test_verdicts_against_dense_samples(checker):
         if verdict & Verdict.UNDECIDED:
             continue
         found = everything(checker.problem, jnp.asarray(near.pairs), segment, float(p), tau)
-        slack, gap, view = (np.asarray(x) for x in found)
+        slack, gap, direction = (np.asarray(x) for x in found)
         dense = (slack > 0.0).all() and not cables_cross(gap[:-1], gap[1:]).any()
-        dense = dense and not platform_hit(near.sides, near.normal, view[:-1], view[1:]).any()
+        dense = dense and not platform_hit(near.sides, near.normal, direction[:-1], direction[1:]).any()
         assert (verdict == 0) == dense, (i, Verdict(int(verdict)).text, slack.min(0))
         good += dense
     assert ((verdicts & Verdict.UNDECIDED) != 0).sum() < 5 and good > 500, good
@@ -243,7 +243,7 @@ def test_vectors_between_cables_and_hits():
     np.testing.assert_allclose(np.linalg.norm(found, axis=2), lengths, atol=1e-9)
     step = np.array([np.cos(0.1), *(np.sin(0.1) * np.array([0.6, 0.0, 0.8]))])
     after = np.array([oracle.matrix(oracle.product(q, step)) for _, q in poses])
-    seen = [np.asarray(jax.vmap(lambda p, r: views(robot, p, r))(position, r)) for r in (rotation, after)]
+    seen = [np.asarray(jax.vmap(lambda p, r: cable_directions(robot, p, r))(position, r)) for r in (rotation, after)]
     hits = platform_hit(near.sides, near.normal, *seen).any(1)
     wanted = [
         bool(np.any(oracle.platform_hit(MSSM, np.stack([p, p]), np.stack([a, b]))))

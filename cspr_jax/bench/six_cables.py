@@ -142,7 +142,7 @@ def tensions(robot: PlatformRobot, batch: Batch, *, rough: bool) -> Array:
         rough: whether in float32.
 
     Returns:
-        (LANES,) of `first_look.smallest_tensions`.
+        (LANES,) of `prefilter.smallest_tensions`.
     """
     tau, arcs = np.linspace(0.0, 1.0, SAMPLES), float(batch.arcs)
     return smallest_tensions(robot, QUINTIC, arcs, tau, batch.segments, kind=FROM_REST, rough=rough)[0]

@@ -145,7 +145,7 @@ def _sieved(checker: PoseChecker, segments: _Segments, arcs: int, alive: np.ndar
     # Those that some instants do not refute.
     if not len(alive):
         return alive
-    return alive[~checker.look.refuted(segments(arcs, alive), arcs, tau)]
+    return alive[~checker.prefilter.refuted(segments(arcs, alive), arcs, tau)]
 
 
 def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:
@@ -167,7 +167,7 @@ def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: i
     for arcs in range(1, max_arcs + 1):
         stage(f"best of what fails, arcs {arcs} of {max_arcs}")
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
-        lowest = checker.look.lowest(segments(arcs, every), arcs, tau)
+        lowest = checker.prefilter.lowest(segments(arcs, every), arcs, tau)
         best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)
     return best
 

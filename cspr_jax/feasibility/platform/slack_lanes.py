@@ -152,7 +152,7 @@ def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
 
 
 def order(limits: Limits) -> list[int]:
-    """Where the criteria of `pose_slacks.flags` stand among moving slacks and still ones, one after the other.
+    """Where the criteria of `slacks.flags` stand among moving slacks and still ones, one after the other.
 
     Args:
         limits: which limits are given.
