@@ -1,4 +1,4 @@
-"""What the amplitude function "effective-c3" saves: smallest numbers of arcs of 1,000 segments, for several epsilon.
+"""Savings by the amplitude function "effective-c3": smallest numbers of arcs of 1,000 segments, for several epsilon.
 
 Half of the segments start at rest, half at a pose; those that interfere or are singular at an end, which no amplitude
 function can mend, fail with all of them.

@@ -155,7 +155,7 @@ def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
 
 
 def attributes(plan: Plan) -> dict[str, Any]:
-    """What a motion file says of its plan.
+    """Attributes of a motion file, from its plan.
 
     Args:
         plan: the plan.
@@ -182,7 +182,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
 
 
 def segments(plan: Plan) -> dict[str, np.ndarray]:
-    """What a motion file holds of each segment.
+    """Quantities of each segment in a motion file.
 
     Args:
         plan: the plan.

@@ -83,7 +83,7 @@ class Plan:
         return joined([Answers(**{name: getattr(leg.answers, name) for name in names}) for leg in self.legs])
 
     def details(self, i: int) -> dict[str, Any]:
-        """What only its family says of a segment.
+        """Details of a segment that only its family has.
 
         Args:
             i: number of the segment.

@@ -51,7 +51,7 @@ def cable_directions(wires: Cables, turn: Matrix) -> list[Vector]:
 
 
 def as_arrays(between: Sequence[Vector], directions: Sequence[Vector]) -> tuple[Array, Array]:
-    """What `interference` takes.
+    """Vectors as the arrays that `interference` takes.
 
     Args:
         between: of `gaps`, (n,) each.

@@ -14,7 +14,7 @@ PARALLEL = 1e-14
 
 
 class Contacts(NamedTuple):
-    """What can meet.
+    """Cables and platform sides that can meet.
 
     Fields:
         pairs: (n_pairs, 2) indices of cables.
@@ -29,7 +29,7 @@ class Contacts(NamedTuple):
 
 
 def contacts(robot: PlatformRobot) -> Contacts:
-    """What can meet on a robot: pairs of cables without a common point; the platform is the polygon of its points.
+    """Contacts possible on a robot: pairs of cables without a common point; the platform is the polygon of its points.
 
     Args:
         robot: the robot.

@@ -1,4 +1,4 @@
-"""From upper bounds of the margin, one for each number of arcs, to answers: proofs first, margins after.
+"""Answers from upper bounds of the margin, one for each number of arcs: proofs first, margins after.
 
 The candidates that the bounds leave are proved or refuted in increasing order, until one is proved
 feasible. Never by bisection: more arcs can lose margin (tests). Where none is feasible, the
@@ -58,7 +58,7 @@ class Answers:
     feasible_at_infinity: np.ndarray
 
     def details(self, i: int) -> dict[str, Any]:
-        """What only this kind of answers says of a segment, by its name in a plan's JSON.
+        """Details of a segment that only this kind of answers has, by their names in a plan's JSON.
 
         Args:
             i: number of the segment.

@@ -1,4 +1,4 @@
-"""Which accessible orientations of a place a horizontal transition from rest attains, thesis section 3.12.3."""
+"""Accessible orientations of a place that a horizontal transition from rest attains, thesis section 3.12.3."""
 
 import numpy as np
 
@@ -63,7 +63,7 @@ def attained(
     values: int = VALUES,
     found: Symmetries = NONE,
 ) -> np.ndarray:
-    """Which orientations of places some number of arcs and some value of beta-hat attains.
+    """Orientations of places that some number of arcs and some value of beta-hat attains.
 
     What `attainable` says too, which tells how, and why not; with half of the work.
 

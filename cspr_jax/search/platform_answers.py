@@ -1,4 +1,4 @@
-"""What is said of motions between poses, once their numbers of arcs are known."""
+"""Answers about motions between poses, once their numbers of arcs are known."""
 
 import dataclasses
 import math
@@ -44,7 +44,7 @@ class PoseAnswers(Answers):
         }
 
     def rows(self, which: np.ndarray) -> "PoseAnswers":
-        """Some of them: indices, or (n,) a mask."""
+        """Answers chosen by indices, or by a mask (n,)."""
         return PoseAnswers(**{name: values[which] for name, values in vars(self).items()})
 
 

@@ -44,11 +44,11 @@ class Candidates(NamedTuple):
     bends: tuple[np.ndarray, np.ndarray]
 
     def rows(self, which: np.ndarray) -> "Candidates":
-        """Some of them: indices, or (n,) a mask."""
+        """Candidates chosen by indices, or by a mask (n,)."""
         return self._replace(motion=self.motion[which], bends=(self.bends[0][which], self.bends[1][which]))
 
     def motions(self, which: np.ndarray) -> "Candidates":
-        """Some of the motions of one candidate each: indices."""
+        """Motions of one candidate each, chosen by indices."""
         start, end, beta_hats = ((a[which], b[which]) for a, b in (self.start, self.end, self.bends))
         return Candidates(start, end, self.z0[which], np.arange(len(which)), beta_hats)
 

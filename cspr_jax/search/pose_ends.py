@@ -1,4 +1,4 @@
-"""What many poses allow at the end of a segment: values of beta-hat to try, and whether any motion can end there."""
+"""Ends of segments in many poses: values of beta-hat to try, and whether any motion can end there."""
 
 from functools import partial
 

@@ -58,7 +58,7 @@ class Swing(NamedTuple):
 
 
 def swings(segments: PoseSegment) -> Swings:
-    """What is needed of segments from rest.
+    """Swings of segments from rest.
 
     Args:
         segments: leaves (n, ...).
@@ -79,7 +79,7 @@ def swings(segments: PoseSegment) -> Swings:
 
 
 def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: Kind) -> Array:
-    """What segments of one number of arcs have in common.
+    """Table that segments from rest of one number of arcs share.
 
     Args:
         amplitude: A.

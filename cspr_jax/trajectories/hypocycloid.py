@@ -35,7 +35,7 @@ from cspr_jax.trajectories.swing_plane import swing_plane
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Segment:
-    """What one segment is, for one parity of the number of arcs.
+    """Parameters of one segment, for one parity of the number of arcs.
 
     With c the position in the plane of the trajectory and d = c + c'' / lambda, the normalised
     pseudotension of cable k is 1 + tilt . c + pull_k . d + twist_k (c x d).

@@ -26,7 +26,7 @@ _STILL = 1e-12
 
 
 class Turn(NamedTuple):
-    """How the orientation goes from one pose to another, for one parity of the number of arcs.
+    """Rotation from one pose to another, for one parity of the number of arcs.
 
     Fields:
         start: (4,) q_1.

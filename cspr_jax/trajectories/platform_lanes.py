@@ -63,7 +63,7 @@ class State(NamedTuple):
 
 
 def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> Instant:
-    """What is common to segments of the same number of arcs.
+    """Instant common to segments of the same number of arcs.
 
     Args:
         amplitude: A.
@@ -79,7 +79,7 @@ def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> Inst
 
 
 def instant_of_arc(amplitude: Amplitude, sense: Array, arcs: Array, arc: Array, within: Array) -> Instant:
-    """What is common to segments at the same place within one of their arcs, of which they may have any number.
+    """Instant common to segments at the same place within one of their arcs, of which they may have any number.
 
     Args:
         amplitude: A.

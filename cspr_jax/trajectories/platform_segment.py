@@ -30,7 +30,7 @@ from cspr_jax.trajectories.swing_plane import swing_plane
 
 
 class Kind(NamedTuple):
-    """What motions are; known when a function is compiled.
+    """Kind of motions; known when a function is compiled.
 
     Fields:
         variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
@@ -49,7 +49,7 @@ USUAL = Kind()
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class PoseSegment:
-    """What one segment between two poses is, for one parity of the number of arcs.
+    """Parameters of one segment between two poses, for one parity of the number of arcs.
 
     Fields:
         plane: (3, 2) q_h1 and q_h2 of (3.42), as columns.

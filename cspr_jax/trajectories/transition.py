@@ -52,7 +52,7 @@ def steady(segment: Segment) -> Segment:
 
 
 def inclination(segment: Segment) -> Array:
-    """How much deeper below the spools the target is than p0, over z0: v of (1.31).
+    """Extra depth of the target below the spools, against p0, over z0: v of (1.31).
 
     Args:
         segment: a transition; leaves (...).

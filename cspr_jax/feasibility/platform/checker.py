@@ -1,4 +1,4 @@
-"""Whether a platform's motions are feasible, with margins: samples, finer where it matters, and what happens between.
+"""Feasibility of a platform's motions, with margins: samples, finer where it matters, and cables in between.
 
 A first look takes a few instants. A check takes 64 samples an arc, and a sample on either side of each knot of the
 amplitude function; around the smallest samples of every criterion, and of the distance between cables, the smallest
@@ -39,7 +39,7 @@ BESIDE_KNOT = 1e-12
 
 @dataclasses.dataclass(frozen=True)
 class PoseChecks:
-    """What was found of n motions.
+    """Verdicts, slacks and gaps of n motions.
 
     Fields:
         verdict: (n,) `Verdict` flags; 0 is feasible.
@@ -61,7 +61,7 @@ class PoseChecks:
         self.verdict[which], self.slack[which], self.gap[which] = others.verdict, others.slack, others.gap
 
     def rows(self, which: np.ndarray) -> "PoseChecks":
-        """Some of them.
+        """Checks of some of the motions.
 
         Args:
             which: (m,) indices.
@@ -78,7 +78,7 @@ def _durations(arguments) -> jax.Array:
 
 
 class PoseChecker:
-    """Checks motions of one robot.
+    """Checker of motions of one robot.
 
     Args:
         problem: robot, limits, amplitude.

@@ -19,7 +19,7 @@ def swept(
     ends: tuple[np.ndarray, np.ndarray],
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Whether cables cross, and whether one sweeps over the platform, within steps.
+    """Motions in whose steps cables cross, and those in which one sweeps over the platform.
 
     Args:
         cable_vectors: of motions (k,) at instants (k,).

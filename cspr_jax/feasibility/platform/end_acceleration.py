@@ -39,7 +39,7 @@ class Endpoint(NamedTuple):
 
 
 def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array) -> Endpoint:
-    """What beta-hat does at one end of a segment.
+    """Tensions at one end of a segment as functions of beta-hat.
 
     Args:
         robot: the robot.

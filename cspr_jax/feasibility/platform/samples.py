@@ -18,7 +18,7 @@ LEVEL = 1e-9
 
 
 def rows(segments: PoseSegment, which: np.ndarray) -> PoseSegment:
-    """Some of many segments.
+    """Segments chosen from many.
 
     Args:
         segments: leaves (n, ...).
@@ -42,11 +42,11 @@ class Motions(NamedTuple):
     arcs: np.ndarray
 
     def rows(self, which: np.ndarray) -> "Motions":
-        """Some of them: indices, or (n,) a mask."""
+        """Motions chosen by indices, or by a mask (n,)."""
         return Motions(rows(self.segments, which), self.arcs[which])
 
     def steps(self, which: np.ndarray) -> np.ndarray:
-        """How far samples of some of them lie apart.
+        """Distance in tau between samples of chosen motions.
 
         Args:
             which: (m,) indices.
@@ -57,7 +57,7 @@ class Motions(NamedTuple):
         return 1.0 / (SAMPLES * self.arcs[which])
 
     def items(self, which: np.ndarray) -> tuple[PoseSegment, np.ndarray]:
-        """Some of them as kernels take them.
+        """Chosen motions as kernels take them.
 
         Args:
             which: (m,) indices.
@@ -103,7 +103,7 @@ class Samples(NamedTuple):
         return Samples((np.cumsum(which) - 1)[self.row[some]], self.arc[some], values)
 
     def instants(self, motions: Motions, item: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """When arcs are at places.
+        """Instants at which arcs are at places.
 
         Args:
             motions: n of them.
@@ -117,7 +117,7 @@ class Samples(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where values are narrowed down.
+    """Instants around which values are narrowed down.
 
     Fields:
         which: (k,) the value.

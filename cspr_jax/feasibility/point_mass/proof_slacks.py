@@ -103,7 +103,7 @@ CLOSED = {
 
 
 def count(row: Limit, n_cables: int) -> int:
-    """How many smooth functions the slack of a limit is the smallest of.
+    """Number of smooth functions of which the slack of a limit is the smallest.
 
     Args:
         row: the limit's.
