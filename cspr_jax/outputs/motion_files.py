@@ -106,7 +106,7 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
 
 
 def _feasible_rows(plan: Plan, t: np.ndarray) -> np.ndarray:
-    # Of each row, whether its segment is proved feasible; a row at a boundary belongs to both.
+    # Of each row, whether its segment is feasible; a row at a boundary belongs to both.
     ends = np.cumsum(plan.answers.duration)
     before, after = (np.searchsorted(ends, t, side).clip(max=len(ends) - 1) for side in ("left", "right"))
     good = plan.answers.arcs > 0

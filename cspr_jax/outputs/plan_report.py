@@ -42,7 +42,8 @@ def verdict_text(verdict: int, arcs: int) -> str:
         arcs: number of arcs found, 0 if none.
 
     Returns:
-        "feasible", "undecided", or the flags joined by "+".
+        "feasible" (proved for point masses, found at refined samples for platforms), "undecided", or the flags joined
+        by "+".
     """
     return "feasible" if arcs > 0 else Verdict(int(verdict)).text
 

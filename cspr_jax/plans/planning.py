@@ -104,7 +104,7 @@ class Plan:
 
     @property
     def feasible(self) -> bool:
-        """Whether every segment is feasible."""
+        """Whether every segment is feasible: proved for point masses, found at refined samples for platforms."""
         return bool((self.answers.arcs > 0).all())
 
 

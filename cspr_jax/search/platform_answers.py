@@ -61,7 +61,8 @@ def settled(
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
 
     Returns:
-        the answers; nothing is proved, and (2.55) does not apply: NaN. The segments that they belong to.
+        the answers, found at refined samples; nothing is proved, and (2.55) does not apply: NaN. The
+        segments that they belong to.
     """
     tried = found.arcs if fixed is None else np.where(found.arcs > 0, found.arcs, fixed)
     none = np.flatnonzero(tried == 0)
