@@ -1,4 +1,4 @@
-"""What the amplitude function "effective-c3" saves: smallest numbers of arcs of 1,000 segments, for several epsilon.
+"""Savings by the amplitude function "effective-c3": smallest numbers of arcs of 1,000 segments, for several epsilon.
 
 Half of the segments start at rest, half at a pose; those that interfere or are singular at an end, which no amplitude
 function can mend, fail with all of them.
@@ -59,8 +59,8 @@ def candidates(robot, rng: np.random.Generator, count: int) -> Candidates:
     values, can_end = end_options(robot, *end, depth, OPTIONS)
     can_start = end_options(robot, *start, depth, 1)[1]
     motion, option = np.nonzero(~np.isnan(values) & (can_end & can_start & ~np.isnan(first))[:, None])
-    bends = (np.where(at_rest, -1.0, first)[motion], values[motion, option])
-    return Candidates(start, end, depth, motion, bends)
+    beta_hats = (np.where(at_rest, -1.0, first)[motion], values[motion, option])
+    return Candidates(start, end, depth, motion, beta_hats)
 
 
 def main() -> None:

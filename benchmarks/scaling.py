@@ -1,4 +1,4 @@
-"""How rate and memory grow with the number of cases, and with a second core; every line is a process of its own."""
+"""Growth of rate and memory with the number of cases, and with a second core; every line is a process of its own."""
 
 import argparse
 import json

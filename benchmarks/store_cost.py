@@ -1,4 +1,4 @@
-"""What safety costs: the store's share of a sweep's wall time, and going on with a finished run.
+"""Cost of safety: the store's share of a sweep's wall time, and going on with a finished run.
 
 Usage: python benchmarks/store_cost.py [SWEEP.toml]
 """

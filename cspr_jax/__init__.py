@@ -1,4 +1,4 @@
-"""What a cable-suspended parallel robot can reach when it swings, and how.
+"""Reach of cable-suspended parallel robots in motion: feasible trajectories, maps, margins.
 
 Importing the package loads nothing heavy: each public name is loaded when it is first used.
 """

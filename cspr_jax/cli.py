@@ -87,7 +87,7 @@ def _mend_streams() -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="cspr", description="What a cable-suspended robot can reach when it swings.", epilog=EPILOGUE)
+    parser = _Parser(prog="cspr", description="Reach of cable-suspended parallel robots in motion.", epilog=EPILOGUE)
     parser.add_argument("--version", action="version", version=f"cspr {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
 

@@ -1,4 +1,4 @@
-"""What can go wrong on the host, and the exit code that says so."""
+"""Errors on the host, and the exit code of each."""
 
 import datetime
 import enum

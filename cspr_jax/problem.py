@@ -1,4 +1,4 @@
-"""From checked files to what the kernels take: robot, limits, amplitude function, axes."""
+"""Problems for the kernels, built from checked files: robot, limits, amplitude function, axes."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -140,7 +140,7 @@ def kernel_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Any:
 
 
 def fault_at_rest(spec: RobotFile) -> str | None:
-    """Why a robot cannot hang still in its reference orientation, if it cannot.
+    """Reason why a robot cannot hang still in its reference orientation, if it cannot.
 
     Args:
         spec: the robot; a platform is tried as deep below the centroid of its spools as these are away from it.
@@ -293,7 +293,7 @@ def build_problem(
 
 
 def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> Kind:
-    """What the motions of a platform are.
+    """Kind of the motions of a platform.
 
     Args:
         keys: of the plan or sweep.

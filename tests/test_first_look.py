@@ -32,8 +32,8 @@ def candidates(robot, rng, count):
     end = place, np.stack([oracle.pose_quaternion(*pair) for pair in zip(place, turns, strict=True)])
     rest = np.tile(oracle.rest_point(robot, Z0), (count, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
     motion = np.repeat(np.arange(count), BENDS)
-    bends = np.full(len(motion), -1.0), rng.uniform(-8.0, 1.0, len(motion))
-    return Candidates(rest, end, np.full(count, Z0), motion, bends)
+    beta_hats = np.full(len(motion), -1.0), rng.uniform(-8.0, 1.0, len(motion))
+    return Candidates(rest, end, np.full(count, Z0), motion, beta_hats)
 
 
 def test_the_search_is_the_full_search():
@@ -54,7 +54,7 @@ def test_the_search_is_the_full_search():
     np.testing.assert_array_equal(arcs, wanted)
     assert passes[found.arcs[some], some].all()
     assert 0 < (wanted > 0).sum() < motions
-    work, brute = (sum(c.done[name] for name in ("first look", "checks")) for c in (checker, full))
+    work, brute = (sum(c.done[name] for name in ("prefilter", "checks")) for c in (checker, full))
     assert checker.done["motions"] < 0.2 * motions * BENDS * ARCS and work < 0.25 * brute
 
 
@@ -65,12 +65,12 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     checker = PoseChecker(checker.problem, kind, batch=64)
     segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 60))(6, np.arange(300))
     tau = np.linspace(1.0, 0.0, 37)
-    lowest = checker.look.lowest(segments, 6, tau)
+    lowest = checker.prefilter.lowest(segments, 6, tau)
     wanted = lowest <= -1e-7
     assert 30 < wanted.sum() < 270
-    np.testing.assert_array_equal(checker.look.refuted(segments, 6, tau), wanted)
+    np.testing.assert_array_equal(checker.prefilter.refuted(segments, 6, tau), wanted)
     few = jax.tree.map(lambda x: x[:16], segments)
-    np.testing.assert_array_equal(checker.look.refuted(few, 6, tau), wanted[:16])
+    np.testing.assert_array_equal(checker.prefilter.refuted(few, 6, tau), wanted[:16])
     exact = prefilter.smallest_tensions
     for wrong in (lambda x: x - 0.3, lambda x: np.inf * x, lambda x: np.nan * x):
 
@@ -79,7 +79,7 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
             return (wrong(value), when) if rough else (value, when)
 
         monkeypatch.setattr(prefilter, "smallest_tensions", spoiled)
-        refuted = checker.look.refuted(segments, 6, tau)
+        refuted = checker.prefilter.refuted(segments, 6, tau)
         assert not (refuted & ~wanted).any()
 
 
@@ -100,7 +100,7 @@ def test_segments_of_candidates():
 def test_more_instants_refute_more():
     checker, rng = checker_of(MSSM, batch=64), np.random.default_rng(5)
     segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 40))(5, np.arange(200))
-    found = [checker.look.refuted(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
+    found = [checker.prefilter.refuted(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
     assert all(not (a & ~b).any() for a, b in pairwise(found))
 
 
@@ -114,7 +114,7 @@ def test_the_size_of_the_robot_changes_nothing(scale):
         start, end = ((place * unit, turn) for place, turn in (given.start, given.end))
         given = given._replace(start=start, end=end, z0=given.z0 * unit)
         segments = _Segments(checker.problem.robot, given)(5, np.arange(300))
-        sizes.append(checker.look.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
+        sizes.append(checker.prefilter.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
         rough, _ = prefilter.smallest_tensions(
             checker.problem.robot,
             named("quintic"),

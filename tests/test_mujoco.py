@@ -139,14 +139,15 @@ def played(motion, stride):
     """Errors of position, m, and of orientation, rad: our tensions alone move MuJoCo's platform, by Runge and Kutta."""
     # A step is 2 * stride samples long, and takes the tensions of its start, its middle and its end as they are.
     model, columns = model_of(motion.robot), motion.columns
-    data, spin = mujoco.MjData(model), np.zeros(4)
+    data, quaternion_rate = mujoco.MjData(model), np.zeros(4)
 
     def slope(state, tension):
         data.qpos[:], data.qvel[:], data.ctrl[:] = state[:7], state[7:], tension
         data.qpos[3:] /= np.linalg.norm(state[3:7])
         mujoco.mj_forward(model, data)
-        mujoco.mju_mulQuat(spin, state[3:7], np.array([0.0, *state[10:]]))  # angular velocity in platform axes
-        return np.concatenate([state[7:10], 0.5 * spin, data.qacc])
+        omega = np.array([0.0, *state[10:]])  # in platform axes
+        mujoco.mju_mulQuat(quaternion_rate, state[3:7], omega)
+        return np.concatenate([state[7:10], 0.5 * quaternion_rate, data.qacc])
 
     first = {name: columns[name][0, 0] for name in ("position", "quaternion", "velocity", "omega")}
     assert not np.any(first["velocity"]) and np.abs(first["omega"]).max() < 1e-12

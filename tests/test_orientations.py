@@ -15,7 +15,7 @@ from test_platform import MSSM, ours
 
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.platform.orientation_steps import Watch
+from cspr_jax.feasibility.platform.orientation_steps import OrientationSteps
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
@@ -92,9 +92,9 @@ def test_steps_between_neighbours():
     rng, there = np.random.default_rng(3), place(1.5, 0.4)
     angles = np.stack([rng.uniform(-3, 3, 400), rng.uniform(0, 2.2, 400), rng.uniform(-2, 2, 400)], axis=1)
     other = angles + rng.normal(size=angles.shape) * 0.15
-    watch = Watch(ours(MSSM), there)
-    sights = watch.at(from_tilt_torsion(np.concatenate([angles, other])))
-    found = watch.passable(sights, np.arange(400), np.arange(400, 800))
+    steps = OrientationSteps(ours(MSSM), there)
+    samples = steps.at(from_tilt_torsion(np.concatenate([angles, other])))
+    found = steps.passable(samples, np.arange(400), np.arange(400, 800))
     seen = {True: 0, False: 0}
     for i, (a, b) in enumerate(zip(angles, other, strict=True)):
         position = np.stack([there, there])
@@ -163,12 +163,12 @@ def test_the_accessible_volume_beside_random_orientations():
     pairs = tree.query_pairs(2.0 * math.sin(0.25 * 1.5 * step), output_type="ndarray") % count
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     for there in (place(1.5, 0.0), place(3.0, 1.2)):
-        watch = Watch(robot, there)
-        sights = watch.at(every)
-        way = pairs[watch.passable(sights, *pairs.T)]
+        steps = OrientationSteps(robot, there)
+        samples = steps.at(every)
+        way = pairs[steps.passable(samples, *pairs.T)]
         links = coo_matrix((np.ones(len(way), bool), way.T), shape=(count, count))
         part = connected_components(links, directed=False)[1]
-        share = ((part == part[0]) & watch.regular(sights)).mean()
+        share = ((part == part[0]) & steps.regular(samples)).mean()
         error = math.sqrt(share * (1.0 - share) / count)
         volume = accessible(robot, there, "equal-volume", 32).volume.sum()
         assert share == pytest.approx(volume, abs=3.0 * error)

@@ -68,22 +68,22 @@ def states(robot, segment, amplitude, arcs, tau, *, kind=USUAL):
 
 
 @jax.jit
-def _made(robot, start, end, z0, bends, odd):
-    return segments.pose_segment(robot, start, end, z0, bends, odd=odd)
+def _made(robot, start, end, z0, beta_hats, odd):
+    return segments.pose_segment(robot, start, end, z0, beta_hats, odd=odd)
 
 
-def made(robot, start, end, z0, bends, p):
+def made(robot, start, end, z0, beta_hats, p):
     """A segment of the package."""
     as_arrays = [tuple(jnp.asarray(x) for x in pose) for pose in (start, end)]
     odd = jnp.asarray(p % 2 == 1)
-    return _made(robot, *as_arrays, jnp.asarray(z0), tuple(jnp.asarray(float(b)) for b in bends), odd)
+    return _made(robot, *as_arrays, jnp.asarray(z0), tuple(jnp.asarray(float(b)) for b in beta_hats), odd)
 
 
 def _lowest(chosen, robot, amplitude, poses, p):
-    z0, *bends = chosen
+    z0, *beta_hats = chosen
     # A rest pose moves with z0.
     poses = [(jnp.where(jnp.isnan(x), jnp.stack([z0 * 0.0, z0 * 0.0, z0]), x), q) for x, q in poses]
-    one = _made(robot, *poses, z0, tuple(bends), p % 2.0 == 1.0)
+    one = _made(robot, *poses, z0, tuple(beta_hats), p % 2.0 == 1.0)
     at = jax.vmap(lambda t: segments.motion(one, amplitude, p, t))(jnp.linspace(0.0, 1.0, 201))
     return jnp.min(jax.vmap(lambda *leaves: wrench_balance.tensions(robot, State(*leaves)))(*at))
 
@@ -101,17 +101,17 @@ def test_motions_are_the_oracle_s(name, which):
     for i in range(12):
         p = int(rng.integers(2, 12))
         start, end = random_pose(rng, rest=i % 4 == 0), random_pose(rng, rest=i % 4 == 1)
-        bends = tuple(rng.uniform(-6.0, 2.0, 2))
+        beta_hats = tuple(rng.uniform(-6.0, 2.0, 2))
         wanted = oracle.motion(
             MSSM,
             oracle.Segment(
                 start[0], end[0], Z0, start[1], end[1], amplitude=amplitude[1], standard=which == "standard"
             ),
             p,
-            bends,
+            beta_hats,
             tau,
         )
-        segment = made(robot, start, end, Z0, bends, p)
+        segment = made(robot, start, end, Z0, beta_hats, p)
         found = states(robot, segment, amplitude[0], float(p), tau, kind=Kind(which == "variable"))
         assert float(segments.duration(segment, float(p))) == pytest.approx(wanted.duration, rel=1e-12)
         np.testing.assert_allclose(found.position, wanted.position, atol=1e-11)
@@ -146,8 +146,8 @@ def test_angles_near_zero_and_half_a_turn(start):
         step, time = 1e-6, float(segments.duration(segment, float(p)))
         before, after = (states(robot, segment, amplitude, float(p), tau[1:-1] + d) for d in (-step, step))
         slope = (np.asarray(after.rotation) - np.asarray(before.rotation)) / (2.0 * step * time)
-        spin = np.einsum("nij,nkj->nik", slope, np.asarray(found.rotation)[1:-1])
-        omega = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        omega_cross = np.einsum("nij,nkj->nik", slope, np.asarray(found.rotation)[1:-1])
+        omega = np.stack([omega_cross[:, 2, 1], omega_cross[:, 0, 2], omega_cross[:, 1, 0]], axis=1)
         np.testing.assert_allclose(found.angular_velocity[1:-1], omega, atol=2e-7)
         bend = (np.asarray(after.angular_velocity) - np.asarray(before.angular_velocity)) / (2.0 * step * time)
         np.testing.assert_allclose(found.angular_acceleration[1:-1], bend, atol=2e-5)

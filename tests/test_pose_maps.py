@@ -116,7 +116,7 @@ def test_lanes_are_the_readable_slacks(robot):
         )
         found = np.stack(found)[order(limits)]
         gaps = np.stack([np.stack(v, -1) for v in contact_lanes.gaps(package.base_points, near.pairs, wires)], 1)
-        views = np.stack([np.stack(v, -1) for v in contact_lanes.views(wires, here.turn)], 1)
+        directions = np.stack([np.stack(v, -1) for v in contact_lanes.cable_directions(wires, here.turn)], 1)
         for i, segment in enumerate(some):
             at = jax.tree.map(lambda x: x[0], states(package, segment, amplitude, float(p), np.array([t])))
             pose = State(*at)
@@ -127,13 +127,13 @@ def test_lanes_are_the_readable_slacks(robot):
             where = (package, pose.position, pose.rotation)
             wanted_gaps = np.asarray(interference.gaps(package, jnp.asarray(near.pairs), *where[1:]))
             np.testing.assert_allclose(gaps[i], wanted_gaps, atol=1e-9)
-            own = views[i] / np.linalg.norm(views[i], axis=1, keepdims=True)
-            np.testing.assert_allclose(own, np.asarray(interference.views(*where)), atol=1e-9)
+            own = directions[i] / np.linalg.norm(directions[i], axis=1, keepdims=True)
+            np.testing.assert_allclose(own, np.asarray(interference.cable_directions(*where)), atol=1e-9)
     assert seen > 40
 
 
 def test_hits_of_lanes():
-    """As `interference.platform_hit`, cable by cable, on random pairs of views."""
+    """As `interference.platform_hit`, cable by cable, on random pairs of directions."""
     near, rng = interference.contacts(ours(MSSM)), np.random.default_rng(4)
     before, after = rng.normal(size=(2, 500, 6, 3))
     wanted = interference.platform_hit(near.sides, near.normal, before, after).any(1)

@@ -22,7 +22,7 @@ from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.slacks import pose_slacks
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.published import table_3_2
-from cspr_jax.robots.interference import cables_cross, contacts, gaps, platform_hit, views
+from cspr_jax.robots.interference import cable_directions, cables_cross, contacts, gaps, platform_hit
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.beta_hat import LARGEST, cheapest_path, options
@@ -58,8 +58,8 @@ def checker_with(amplitude, limits=None):
     return PoseChecker(Problem(ours(MSSM), limits or Limits(), amplitude))
 
 
-def checked(checker, start, end, bends, p):
-    segment = made(checker.problem.robot, start, end, Z0, bends, p)
+def checked(checker, start, end, beta_hats, p):
+    segment = made(checker.problem.robot, start, end, Z0, beta_hats, p)
     return checker.check(jax.tree.map(lambda x: np.asarray(x)[None], segment), np.array([p]))
 
 
@@ -74,10 +74,10 @@ def test_verdicts_are_the_oracle_s(checker):
     for i in range(48):
         p = int(rng.integers(2, 10))
         start, end = random_pose(rng, rest=True) if i % 2 else near_pose(rng), near_pose(rng)
-        bends = (-1.0 if i % 2 else rng.uniform(-6.0, 1.0), rng.uniform(-6.0, 1.0))
-        found = checked(checker, start, end, bends, p)
+        beta_hats = (-1.0 if i % 2 else rng.uniform(-6.0, 1.0), rng.uniform(-6.0, 1.0))
+        found = checked(checker, start, end, beta_hats, p)
         segment = oracle.Segment(start[0], end[0], Z0, start[1], end[1], amplitude=oracle.effective_c3(0.1))
-        wanted = oracle.check_motion(MSSM, segment, p, bends, 4001)
+        wanted = oracle.check_motion(MSSM, segment, p, beta_hats, 4001)
         verdict = Verdict(int(found.verdict[0]))
         seen |= {flag for flag in Verdict if flag & verdict} | ({None} if verdict == 0 else set())
         assert (verdict == 0) == wanted["feasible"], (i, verdict.text)
@@ -107,13 +107,13 @@ def test_verdicts_do_not_change_with_more_samples(checker, monkeypatch):
 
 @jax.jit
 def everything(problem, pairs, segment, arcs, tau):
-    """All criteria, the vectors between cables, and the views of cables, by the readable functions."""
+    """All criteria, the vectors between cables, and the directions of cables, by the readable functions."""
 
     def one(t):
         pose = motion(segment, problem.amplitude, arcs, t)
         where = (problem.robot, pose.position, pose.rotation)
         slack = pose_slacks(problem, pose, problem.robot.gravity / segment.rate, segment.regular)
-        return slack, gaps(problem.robot, pairs, *where[1:]), views(*where)
+        return slack, gaps(problem.robot, pairs, *where[1:]), cable_directions(*where)
 
     return jax.vmap(one)(tau)
 
@@ -127,7 +127,7 @@ def test_verdicts_against_dense_samples(checker):
         start = random_pose(rng, rest=True) if i % 2 else near_pose(rng)
         cases.append((start, near_pose(rng), (-1.0 if i % 2 else rng.uniform(-8.0, 2.0), rng.uniform(-8.0, 2.0)), p))
     robot, near = checker.problem.robot, contacts(checker.problem.robot)
-    some = [made(robot, start, end, Z0, bends, p) for start, end, bends, p in cases]
+    some = [made(robot, start, end, Z0, beta_hats, p) for start, end, beta_hats, p in cases]
     batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
     verdicts = checker.check(batch, np.array([p for *_, p in cases])).verdict
     tau, good = np.linspace(0.0, 1.0, 20_001), 0
@@ -135,9 +135,9 @@ def test_verdicts_against_dense_samples(checker):
         if verdict & Verdict.UNDECIDED:
             continue
         found = everything(checker.problem, jnp.asarray(near.pairs), segment, float(p), tau)
-        slack, gap, view = (np.asarray(x) for x in found)
+        slack, gap, direction = (np.asarray(x) for x in found)
         dense = (slack > 0.0).all() and not cables_cross(gap[:-1], gap[1:]).any()
-        dense = dense and not platform_hit(near.sides, near.normal, view[:-1], view[1:]).any()
+        dense = dense and not platform_hit(near.sides, near.normal, direction[:-1], direction[1:]).any()
         assert (verdict == 0) == dense, (i, Verdict(int(verdict)).text, slack.min(0))
         good += dense
     assert ((verdicts & Verdict.UNDECIDED) != 0).sum() < 5 and good > 500, good
@@ -195,12 +195,13 @@ def test_symmetries_of_the_mssm():
     """A third of a turn, the mirror x -> -x, and time reversed change no verdict and no margin."""
     checker, rng = checker_with(named("quintic")), np.random.default_rng(13)
     for _ in range(12):
-        start, end, bends, p = near_pose(rng), near_pose(rng), tuple(rng.uniform(-5.0, 0.0, 2)), int(rng.integers(3, 9))
-        plain = checked(checker, start, end, bends, p)
+        start, end = near_pose(rng), near_pose(rng)
+        beta_hats, p = tuple(rng.uniform(-5.0, 0.0, 2)), int(rng.integers(3, 9))
+        plain = checked(checker, start, end, beta_hats, p)
         for other in (
-            checked(checker, turned(start, 2.0 * np.pi / 3.0), turned(end, 2.0 * np.pi / 3.0), bends, p),
-            checked(checker, mirrored(start), mirrored(end), bends, p),
-            checked(checker, end, start, bends[::-1], p),
+            checked(checker, turned(start, 2.0 * np.pi / 3.0), turned(end, 2.0 * np.pi / 3.0), beta_hats, p),
+            checked(checker, mirrored(start), mirrored(end), beta_hats, p),
+            checked(checker, end, start, beta_hats[::-1], p),
         ):
             assert other.verdict[0] == plain.verdict[0]
             if plain.slack[0, 1] > 0.0:
@@ -242,7 +243,7 @@ def test_vectors_between_cables_and_hits():
     np.testing.assert_allclose(np.linalg.norm(found, axis=2), lengths, atol=1e-9)
     step = np.array([np.cos(0.1), *(np.sin(0.1) * np.array([0.6, 0.0, 0.8]))])
     after = np.array([oracle.matrix(oracle.product(q, step)) for _, q in poses])
-    seen = [np.asarray(jax.vmap(lambda p, r: views(robot, p, r))(position, r)) for r in (rotation, after)]
+    seen = [np.asarray(jax.vmap(lambda p, r: cable_directions(robot, p, r))(position, r)) for r in (rotation, after)]
     hits = platform_hit(near.sides, near.normal, *seen).any(1)
     wanted = [
         bool(np.any(oracle.platform_hit(MSSM, np.stack([p, p]), np.stack([a, b]))))
@@ -340,8 +341,8 @@ def test_the_motion(tmp_path):
     assert (code, err) == (0, "") and [s["cable_interference"] for s in found["segments"]] == [False, False]
     heads, *rows = csv.reader((tmp_path / "motion.csv").read_text().splitlines())
     vectors = [f"{n}_{k}" for n in ("position", "velocity", "acceleration") for k in "xyz"]
-    spins = [*(f"quaternion_{k}" for k in "wxyz"), *(f"{n}_{k}" for n in ("omega", "omega_dot") for k in "xyz")]
-    assert heads == ["t", *vectors, *spins, *(f"{n}_{k}" for n in ("length", "rate", "tension") for k in range(1, 7))]
+    turns = [*(f"quaternion_{k}" for k in "wxyz"), *(f"{n}_{k}" for n in ("omega", "omega_dot") for k in "xyz")]
+    assert heads == ["t", *vectors, *turns, *(f"{n}_{k}" for n in ("length", "rate", "tension") for k in range(1, 7))]
     table = dict(zip(heads, np.array(rows, float).T, strict=True))
     tau, target = np.linspace(0.0, 1.0, 400), np.array([0.0, 1.732, 1.7])
     orientation = oracle.pose_quaternion(target, (np.pi / 2, -np.pi / 6, 0.0))

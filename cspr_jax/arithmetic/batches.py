@@ -43,7 +43,7 @@ def in_threads(function: Callable, items: Sequence) -> list:
 
 
 def in_parts(function: Callable[[slice], Found], count: int, size: int) -> list[Found]:
-    """What is found of many cases, so many at a time.
+    """Results of many cases, so many at a time.
 
     Two threads work: what one does outside of XLA, and what XLA does on one core, goes beside the other's.
 

@@ -116,7 +116,7 @@ def leaf(value) -> Array:
 
 
 def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
-    """Where the parabola through three equidistant values is smallest, and its value there.
+    """Vertex of the parabola through three equidistant values: its place, and the value there.
 
     Args:
         left: () value one step before.

@@ -61,7 +61,7 @@ def _ratios(rates: dict[str, dict[str, float]], to: dict[str, float]) -> dict[st
 
 
 def lines(found: dict[str, Any]) -> list[str]:
-    """What `cspr bench` prints for people.
+    """Lines that `cspr bench` prints for people.
 
     Args:
         found: by `bench`.

@@ -145,7 +145,7 @@ def _six_cables(kernel: Callable, work: six_cables.Work) -> float:
     for batch in six_cables.batches(work):
         which = swings(batch.segments)
         inertia = np.asarray(robot.inertia / robot.mass) @ _stacked(which.axis)
-        fields = [_stacked(which.reach), _stacked(which.axis), inertia, np.stack([which.angle, which.end_bend])]
+        fields = [_stacked(which.reach), _stacked(which.axis), inertia, np.stack([which.angle, which.end_beta_hat])]
         table = rest_table(six_cables.QUINTIC, jnp.asarray(float(batch.arcs)), jnp.asarray(tau), six_cables.FROM_REST)
         given = [_lined(np.concatenate(fields)), _lined(table)]
         found = _lined(np.zeros(six_cables.LANES))

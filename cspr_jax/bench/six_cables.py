@@ -38,14 +38,14 @@ class Work(NamedTuple):
         axis: (n, 3) unit vectors of the rotation.
         angle: (n,) rad.
         arcs: (n,).
-        bend: (n,) beta-hat.
+        beta_hat: (n,) of the target.
     """
 
     robot: PlatformRobot
     axis: np.ndarray
     angle: np.ndarray
     arcs: np.ndarray
-    bend: np.ndarray
+    beta_hat: np.ndarray
 
 
 def work(count: int) -> Work:
@@ -94,7 +94,7 @@ def batches(given: Work) -> list[Batch]:
     for arcs in np.unique(given.arcs):
         which = np.flatnonzero(given.arcs == arcs)
         kernel = partial(_segments, given.robot, np.asarray(arcs % 2 == 1))
-        every = in_batches(kernel, (quaternions[which], given.bend[which]), size=LANES)
+        every = in_batches(kernel, (quaternions[which], given.beta_hat[which]), size=LANES)
         for start in range(0, len(which), LANES):
             some = jax.tree.map(lambda x, s=start: x[s : s + LANES], every)
             found.append(Batch(int(arcs), len(some.rate), jax.device_put(padded(some, LANES))))
@@ -106,8 +106,8 @@ def _segments(robot: PlatformRobot, odd, items) -> PoseSegment:
     depth = jnp.asarray(PLACE[2])
     rest = jnp.stack([0.0 * depth, 0.0 * depth, depth]), jnp.array([1.0, 0.0, 0.0, 0.0])
 
-    def one(quaternion, bend):
-        return pose_segment(robot, rest, (jnp.asarray(PLACE), quaternion), depth, (bend, bend), odd=odd)
+    def one(quaternion, beta_hat):
+        return pose_segment(robot, rest, (jnp.asarray(PLACE), quaternion), depth, (beta_hat, beta_hat), odd=odd)
 
     return jax.vmap(one)(*items)
 
@@ -142,7 +142,7 @@ def tensions(robot: PlatformRobot, batch: Batch, *, rough: bool) -> Array:
         rough: whether in float32.
 
     Returns:
-        (LANES,) of `first_look.smallest_tensions`.
+        (LANES,) of `prefilter.smallest_tensions`.
     """
     tau, arcs = np.linspace(0.0, 1.0, SAMPLES), float(batch.arcs)
     return smallest_tensions(robot, QUINTIC, arcs, tau, batch.segments, kind=FROM_REST, rough=rough)[0]
@@ -185,7 +185,7 @@ def _numpy_checks(given: Work) -> np.ndarray:
     gravity, sign = float(given.robot.gravity), (-1.0) ** given.arcs[:, None]
     squared = theta**2 * PLACE[2] / gravity
     c, s, c3, s3 = np.cos(theta * tau), np.sin(theta * tau), np.cos(3 * theta * tau), np.sin(3 * theta * tau)
-    h = given.bend[:, None]
+    h = given.beta_hat[:, None]
     beat = ((9 + h) * c - (1 + h) * c3) / 8
     beat1, beat2 = theta * (3 * (1 + h) * s3 - (9 + h) * s) / 8, theta**2 * (9 * (1 + h) * c3 - (9 + h) * c) / 8
     turn = (sign * given.angle[:, None])[..., None]

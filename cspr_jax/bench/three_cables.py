@@ -29,7 +29,7 @@ START = (0.7, 0.7, 3.0)
 
 
 class Work(NamedTuple):
-    """What is measured.
+    """Measured work.
 
     Fields:
         problem: robot and amplitude function.
@@ -77,7 +77,7 @@ def rate(given: Work, dtype: str) -> float:
 
 
 def checks(count: int) -> int:
-    """How many checks segments are.
+    """Number of checks of segments.
 
     Args:
         count: of segments.

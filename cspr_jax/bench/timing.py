@@ -1,4 +1,4 @@
-"""How long work takes, and what the machine can do at most."""
+"""Durations of work, and the most that the machine can do."""
 
 import os
 import time
@@ -33,7 +33,7 @@ def best(work: Callable[[], object], repeats: int | None = None) -> float:
 
 
 def cores() -> int:
-    """How many processors this process may use.
+    """Number of processors that this process may use.
 
     Returns:
         their number.
@@ -42,7 +42,7 @@ def cores() -> int:
 
 
 def peak() -> dict[str, float]:
-    """What the processor does at most: NumPy's products of large matrices, and copies of large arrays.
+    """Peak rates of the processor: NumPy's products of large matrices, and copies of large arrays.
 
     Returns:
         "float32" and "float64" operations a second, "bytes" read and written a second.

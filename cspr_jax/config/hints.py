@@ -1,4 +1,4 @@
-"""What a file may have got wrong although it can be computed: hints, which change neither results nor exit codes."""
+"""Hints of likely mistakes in files that can be computed; they change neither results nor exit codes."""
 
 from collections.abc import Iterable, Sequence
 
@@ -16,7 +16,7 @@ INERTIA_RATIOS = (1e-5, 1e3)
 
 
 def robot_hints(spec: RobotFile) -> list[str]:
-    """What may be wrong with the units of a robot.
+    """Likely mistakes in the units of a robot.
 
     Args:
         spec: the robot.
@@ -44,7 +44,7 @@ def robot_hints(spec: RobotFile) -> list[str]:
 
 
 def plan_hints(keys: PlanFile, spec: RobotFile) -> list[str]:
-    """What may be wrong with a plan that is not feasible.
+    """Likely mistakes in a plan that is not feasible.
 
     Args:
         keys: the plan.
@@ -75,7 +75,7 @@ def forgotten_axis(spec: RobotFile, targets: Iterable[Sequence[float]]) -> str:
 
 
 def axis_question(z_axis: str) -> str:
-    """What to ask where everything is above the spools.
+    """Question to the user where everything is above the spools.
 
     Args:
         z_axis: "down" or "up", as the robot file has it.

@@ -14,7 +14,7 @@ from cspr_jax.errors import shown
 
 
 class Choice(Table):
-    """How z0 is chosen."""
+    """Rule that chooses z0."""
 
     choose: Literal["mean", "conservative", "fastest"] = Field(
         description='"mean" height of the targets, "conservative" (2.58), or "fastest" by search'

@@ -123,7 +123,7 @@ class RobotFile(LimitKeys):
 
     @property
     def kind(self) -> str:
-        """What it is, for people."""
+        """Kind of robot, for people."""
         return {2: "a planar robot", 3: "a point mass", 6: "a platform"}[self.dof]
 
     @model_validator(mode="after")
@@ -156,7 +156,7 @@ class RobotFile(LimitKeys):
         return self
 
     def placed(self, key: str, file: object) -> tuple[object, str]:
-        """Where a key of the robot stands, for errors.
+        """Place of a key of the robot, for errors.
 
         Args:
             key: one of the robot's.

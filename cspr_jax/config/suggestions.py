@@ -1,4 +1,4 @@
-"""What a user probably meant by a key that does not exist: by its words first, then by its letters."""
+"""Keys that a user probably meant by one that does not exist: by its words first, then by its letters."""
 
 import difflib
 import re

@@ -70,7 +70,7 @@ BetaHatChoice = Annotated[
 
 
 class From(Table):
-    """Where every segment starts."""
+    """Start of every segment."""
 
     position: Point | None = Field(None, description="start point [x, y, z], m")
     rest: bool = Field(False, description="true: at rest in P0")
@@ -124,7 +124,7 @@ class Orientations(Table):
 
 
 class Run(Table):
-    """How to compute and what to keep."""
+    """Settings of the computation, and the quantities to keep."""
 
     dtype: Literal["float64", "float32"] = Field(
         "float64", description="type of stored numbers and of the sieve; verdicts use float64 either way"

@@ -68,7 +68,7 @@ FamilyName = Annotated[str, name_of(lambda: FAMILIES)]
 
 
 class TrajectoryKeys(Table):
-    """What both a plan and a sweep say of the trajectory."""
+    """Keys of the trajectory that plans and sweeps share."""
 
     family: FamilyName = Field(
         "hypocycloid-standard",

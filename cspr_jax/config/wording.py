@@ -1,4 +1,4 @@
-"""What is wrong with a file, as one line in the words of TOML: no word of the library that checks it."""
+"""Faults of a file, one line each in the words of TOML: no word of the library that checks it."""
 
 import datetime
 import math
@@ -37,7 +37,7 @@ _BOUNDS = {
 
 
 def fault(key: str, value: object, allowed: str) -> PydanticCustomError:
-    """What a validator of a table raises about one of its keys, or about several together.
+    """Error that a validator of a table raises about one of its keys, or about several together.
 
     Args:
         key: of the table; "" for the table itself.

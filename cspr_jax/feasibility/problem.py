@@ -1,4 +1,4 @@
-"""What all motions of a question share: robot, limits, amplitude function."""
+"""Problem that all motions of a question share: robot, limits, amplitude function."""
 
 from typing import Generic, NamedTuple, TypeVar
 

@@ -1,4 +1,4 @@
-"""What all maps of a sweep share: robot, limits, amplitude function, and the targets of a grid."""
+"""Base of all maps of a sweep: robot, limits, amplitude function, and the targets of a grid."""
 
 import abc
 

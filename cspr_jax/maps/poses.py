@@ -34,12 +34,12 @@ class PosesMap(PlatformMap):
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         z0, targets = np.asarray(cells["z0"], float), self._targets(cells)
         angles = np.stack([cells.get(name, np.zeros(len(z0))) for name in TILT_TORSION], axis=1)
-        starts, bends = self._starts(z0)
+        starts, beta_hats = self._starts(z0)
         ends = (targets, orientations(self._frame, targets, angles))
         trajectory = self._keys.trajectory
         found = pose_arcs(
             self._checker,
-            Candidates(starts, ends, z0, np.arange(len(z0)), (bends, bends)),
+            Candidates(starts, ends, z0, np.arange(len(z0)), (beta_hats, beta_hats)),
             beta_hat=trajectory.beta_hat,
             beat=trajectory.beat,
             max_arcs=trajectory.max_arcs,
@@ -56,8 +56,8 @@ class PosesMap(PlatformMap):
         if start.tilt_torsion is not None:
             turned = orientations(self._frame, place, np.tile(start.tilt_torsion, (count, 1)))
         own = start.beta_hat
-        bends = start_beta_hat(self._checker, (place, turned), z0) if own is None else np.full(count, own)
-        return (place, turned), bends
+        beta_hats = start_beta_hat(self._checker, (place, turned), z0) if own is None else np.full(count, own)
+        return (place, turned), beta_hats
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""

@@ -1,1 +1,1 @@
-"""What people and other programs read: reports, motion files, lists, pictures."""
+"""Outputs that people and other programs read: reports, motion files, lists, pictures."""

@@ -11,7 +11,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def folder() -> Path:
-    """Where they are: in the package where it was installed from a wheel, in the checkout beside it else.
+    """Folder of the examples: in the package where it was installed from a wheel, in the checkout beside it else.
 
     Returns:
         the folder.
@@ -26,7 +26,7 @@ def folder() -> Path:
 
 
 def examples() -> dict[str, str]:
-    """What there is.
+    """Names and purposes of the examples.
 
     Returns:
         for each name what it is for: the first line of the file.

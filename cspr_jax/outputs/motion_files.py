@@ -106,7 +106,7 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
 
 
 def _feasible_rows(plan: Plan, t: np.ndarray) -> np.ndarray:
-    # Of each row, whether its segment is proved feasible; a row at a boundary belongs to both.
+    # Of each row, whether its segment is feasible; a row at a boundary belongs to both.
     ends = np.cumsum(plan.answers.duration)
     before, after = (np.searchsorted(ends, t, side).clip(max=len(ends) - 1) for side in ("left", "right"))
     good = plan.answers.arcs > 0
@@ -155,7 +155,7 @@ def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
 
 
 def attributes(plan: Plan) -> dict[str, Any]:
-    """What a motion file says of its plan.
+    """Attributes of a motion file, from its plan.
 
     Args:
         plan: the plan.
@@ -182,7 +182,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
 
 
 def segments(plan: Plan) -> dict[str, np.ndarray]:
-    """What a motion file holds of each segment.
+    """Quantities of each segment in a motion file.
 
     Args:
         plan: the plan.

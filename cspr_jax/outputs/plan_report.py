@@ -42,7 +42,8 @@ def verdict_text(verdict: int, arcs: int) -> str:
         arcs: number of arcs found, 0 if none.
 
     Returns:
-        "feasible", "undecided", or the flags joined by "+".
+        "feasible" (proved for point masses, found at refined samples for platforms), "undecided", or the flags joined
+        by "+".
     """
     return "feasible" if arcs > 0 else Verdict(int(verdict)).text
 
@@ -121,7 +122,7 @@ def plan_table(plan: Plan):
         table.add_column(head, justify="left" if head in ("position (m)", "verdict") else "right")
     for i, segment in enumerate(segments):
         position = ", ".join(f"{round(value, 9) + 0.0:.4g}" for value in plan.points[i + 1])
-        bends = " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
+        beta_hats = " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
         found = segment["oscillations" if swings else "arcs"]
         tried = segment["tried_arcs"] // (2 if swings else 1)
         table.add_row(
@@ -132,7 +133,7 @@ def plan_table(plan: Plan):
             _number(segment["duration"], ".2f"),
             _number(segment["margin"], ".4f"),
             f"{_number(segment['tension_min'], '.3f')} .. {_number(segment['tension_max'], '.3f')}",
-            bends or _number(segment["feasible_at_infinity"], ".4f"),
+            beta_hats or _number(segment["feasible_at_infinity"], ".4f"),
             segment["verdict"],
         )
     return table

@@ -1,4 +1,4 @@
-"""What a plan leaves open: z0, by a rule or from an inclination, and the epsilon of its amplitude function."""
+"""Choices that a plan leaves open: z0, by a rule or from an inclination, and the epsilon of its amplitude function."""
 
 from typing import Any
 

@@ -63,7 +63,7 @@ class Leg(abc.ABC):
         return joined([self.join(problem, float(z0))[0] for z0 in depths])
 
     def warnings(self, problem: Problem) -> list[str]:
-        """What the user of the plan should know.
+        """Warnings for the user of the plan.
 
         Args:
             problem: robot, limits and amplitude.

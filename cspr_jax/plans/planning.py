@@ -83,7 +83,7 @@ class Plan:
         return joined([Answers(**{name: getattr(leg.answers, name) for name in names}) for leg in self.legs])
 
     def details(self, i: int) -> dict[str, Any]:
-        """What only its family says of a segment.
+        """Details of a segment that only its family has.
 
         Args:
             i: number of the segment.
@@ -104,7 +104,7 @@ class Plan:
 
     @property
     def feasible(self) -> bool:
-        """Whether every segment is feasible."""
+        """Whether every segment is feasible: proved for point masses, found at refined samples for platforms."""
         return bool((self.answers.arcs > 0).all())
 
 

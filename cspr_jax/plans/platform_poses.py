@@ -98,13 +98,13 @@ class _Poses(Leg):
         points = self.stops.points(depths)
         quaternions = self._quaternions(points[0])
         checker = PoseChecker(problem, self._kind, batch=FEW if len(z0) <= SOME else MANY)
-        bends = [
-            self._bends(problem, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)
+        beta_hats = [
+            self._beta_hats(problem, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)
         ]
         if len(depths) == 1:
-            self._refuse_slack(bends[0])
+            self._refuse_slack(beta_hats[0])
         # Every pair of values at the ends of every segment, for every depth.
-        pairs = [[self._pairs(i, own[i], own[i + 1]) for i in range(count)] for own in bends]
+        pairs = [[self._pairs(i, own[i], own[i + 1]) for i in range(count)] for own in beta_hats]
         motion = np.repeat(np.arange(len(z0)), [pair[0].size for own in pairs for pair in own])
         first, last = (np.concatenate([pair[k].ravel() for own in pairs for pair in own]) for k in (0, 1))
         trial = self._candidates(points, quaternions, z0, motion, (first, last))
@@ -122,14 +122,14 @@ class _Poses(Leg):
         return starts, ends
 
     def _candidates(
-        self, points: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, motion: np.ndarray, bends: tuple
+        self, points: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, motion: np.ndarray, beta_hats: tuple
     ) -> Candidates:
         # The motions are the segments, counted over all depths.
         depth, i = np.divmod(np.arange(len(z0)), len(self))
         start, end = ((points[depth, i + k], quaternions[i + k]) for k in (0, 1))
-        return Candidates(start, end, z0, motion, bends)
+        return Candidates(start, end, z0, motion, beta_hats)
 
-    def _bends(self, problem: Problem, points: np.ndarray, quaternions: np.ndarray, z0: float) -> list[np.ndarray]:
+    def _beta_hats(self, problem: Problem, points: np.ndarray, quaternions: np.ndarray, z0: float) -> list[np.ndarray]:
         # Values of beta-hat to try at each pose; NaN where none keeps every cable taut.
         found: list[np.ndarray] = []
         stops, changes = self.stops, self._changes()
@@ -151,8 +151,8 @@ class _Poses(Leg):
         ends = {0: self.stops.first > 0, len(self): self.stops.last < len(self.stops.keys.pose) - 1}
         return {i for i, changes in ends.items() if changes}
 
-    def _refuse_slack(self, bends: list[np.ndarray]) -> None:
-        for i, values in enumerate(bends):
+    def _refuse_slack(self, beta_hats: list[np.ndarray]) -> None:
+        for i, values in enumerate(beta_hats):
             if np.isnan(values).any():
                 name = self.stops.name(i)
                 raise ConfigError(

@@ -37,7 +37,7 @@ _RADII, _AZIMUTHS = (1.5, 2.0, 2.5, 3.0), np.radians(np.arange(0.0, 61.0, 10.0))
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """What a table of orientations is computed with.
+    """Settings of a table of orientations.
 
     Fields:
         definitions: of the accessible set, of `search.accessible.DEFINITIONS`.
@@ -51,7 +51,7 @@ class Choice:
 
 
 def variant(definition: str, amplitude: str) -> str:
-    """How a cell was computed.
+    """Settings with which a cell was computed.
 
     Args:
         definition: of the accessible set.
@@ -65,7 +65,7 @@ def variant(definition: str, amplitude: str) -> str:
 
 
 def checker_of(amplitude: str) -> PoseChecker:
-    """What checks the tables' motions.
+    """Checker of the tables' motions.
 
     Args:
         amplitude: key of `AMPLITUDES`.
@@ -80,7 +80,7 @@ def checker_of(amplitude: str) -> PoseChecker:
 
 
 def attained(checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
-    """Which orientations horizontal transitions attain; the centroid of the spools is the origin.
+    """Orientations that horizontal transitions attain; the centroid of the spools is the origin.
 
     Args:
         checker: of `checker_of`.

@@ -158,7 +158,7 @@ def table_for_people(name: str, cells: list[Cell]) -> Any:
 
 
 def chosen(name: str, given: dict[str, Any]) -> Choice | None:
-    """What a table is computed with, from the options of the command line.
+    """Settings of a table, from the options of the command line.
 
     Args:
         name: of the table.

@@ -37,8 +37,8 @@ def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: Cables) ->
     return found
 
 
-def views(wires: Cables, turn: Matrix) -> list[Vector]:
-    """The cables from the platform to the spools, seen from the platform; not of unit length.
+def cable_directions(wires: Cables, turn: Matrix) -> list[Vector]:
+    """The cables from the platform to the spools, in the platform's axes; not of unit length.
 
     Args:
         wires: the cables.
@@ -50,17 +50,17 @@ def views(wires: Cables, turn: Matrix) -> list[Vector]:
     return [turned_back(turn, tuple(-x for x in ray)) for ray in wires.rays]
 
 
-def as_arrays(between: Sequence[Vector], seen: Sequence[Vector]) -> tuple[Array, Array]:
-    """What `interference` takes.
+def as_arrays(between: Sequence[Vector], directions: Sequence[Vector]) -> tuple[Array, Array]:
+    """Vectors as the arrays that `interference` takes.
 
     Args:
         between: of `gaps`, (n,) each.
-        seen: of `views`.
+        directions: of `cable_directions`.
 
     Returns:
         (n, n_pairs, 3) and (n, n_cables, 3).
     """
-    arrays = [jnp.stack([jnp.stack(v, -1) for v in vectors], 1) for vectors in (between, seen) if vectors]
+    arrays = [jnp.stack([jnp.stack(v, -1) for v in vectors], 1) for vectors in (between, directions) if vectors]
     return arrays[0] if between else jnp.zeros((len(arrays[-1]), 0, 3)), arrays[-1]
 
 
@@ -88,8 +88,8 @@ def platform_hit(sides: Array, normal: Array, before: Sequence[Vector], after: S
     Args:
         sides: (n_cables, 2, 3) of `interference.contacts`.
         normal: (3,) of it.
-        before: of `views`.
-        after: of `views`.
+        before: of `cable_directions`.
+        after: of `cable_directions`.
 
     Returns:
         (n,).

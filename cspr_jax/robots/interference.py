@@ -14,7 +14,7 @@ PARALLEL = 1e-14
 
 
 class Contacts(NamedTuple):
-    """What can meet.
+    """Cables and platform sides that can meet.
 
     Fields:
         pairs: (n_pairs, 2) indices of cables.
@@ -29,7 +29,7 @@ class Contacts(NamedTuple):
 
 
 def contacts(robot: PlatformRobot) -> Contacts:
-    """What can meet on a robot: pairs of cables without a common point; the platform is the polygon of its points.
+    """Contacts possible on a robot: pairs of cables without a common point; the platform is the polygon of its points.
 
     Args:
         robot: the robot.
@@ -86,8 +86,8 @@ def _between(a: Array, u: Array, b: Array, v: Array) -> Array:
     return apart + t[..., None] * v - s[..., None] * u
 
 
-def views(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
-    """The cables as unit vectors from the platform to the spools, seen from the platform.
+def cable_directions(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
+    """The cables as unit vectors from the platform to the spools, in the platform's axes.
 
     Args:
         robot: the robot.
@@ -120,7 +120,7 @@ def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, afte
     Args:
         sides: (n_cables, 2, 3) of `contacts`.
         normal: (3,) of `contacts`.
-        before: (..., n_cables, 3) of `views`.
+        before: (..., n_cables, 3) of `cable_directions`.
         after: (..., n_cables, 3).
 
     Returns:
@@ -128,7 +128,7 @@ def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, afte
     """
     high, low = before @ normal, after @ normal
     through = high * low <= 0.0
-    # The direction within the platform's plane: a combination of both views with positive weights.
+    # The direction within the platform's plane: a combination of both directions with positive weights.
     weight = np.abs(low)[..., None] * before + np.abs(high)[..., None] * after
     across = np.cross(sides[:, 0], sides[:, 1]) @ normal
     first = np.cross(weight, sides[:, 1]) @ normal / across

@@ -16,7 +16,7 @@ KEY_DIGITS = 9
 
 
 class Symmetries(NamedTuple):
-    """What leaves a robot unchanged, but for the order of its cables.
+    """Symmetries that leave a robot unchanged, but for the order of its cables.
 
     Fields:
         fold: largest k for which a turn by 2 pi / k about the vertical through the centroid does.

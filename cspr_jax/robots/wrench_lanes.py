@@ -18,7 +18,7 @@ CABLES = 6  # what the adjugates and Laplace's expansion here are written for
 
 
 class Cables(NamedTuple):
-    """Where the cables are, one entry a cable.
+    """Positions of the cables, one entry a cable.
 
     Fields:
         arms: from the mass centre to the attachment points, fixed axes, m.

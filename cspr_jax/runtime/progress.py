@@ -1,4 +1,4 @@
-"""What people see at a terminal while they wait: how far a sweep is, or what is being done. Elsewhere nothing."""
+"""Progress at a terminal: how far a sweep is, or what is being done. Elsewhere nothing."""
 
 import contextlib
 import datetime
@@ -10,7 +10,7 @@ from cspr_jax.runtime import stages
 
 
 class Pace:
-    """How fast a sweep goes, and how long it will still take.
+    """Rate of a sweep, and the time that it will still take.
 
     Args:
         clock: gives seconds.
@@ -70,7 +70,7 @@ def progress() -> Iterator[Callable[[int, int], None]]:
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn
 
     class Words(TextColumn):
-        """What is being done until the first tile is there; then how fast it goes and how long it takes."""
+        """Words for the stage until the first tile is there; then for the rate and the time that is left."""
 
         def render(self, task):
             """The text of this moment; see `rich.progress.TextColumn`."""

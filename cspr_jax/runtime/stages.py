@@ -1,4 +1,4 @@
-"""What is being done, for people who wait. It is said here, and shown by whoever listens; nothing is printed."""
+"""Stages of the work, for people who wait. They are said here, and shown by whoever listens; nothing is printed."""
 
 import contextlib
 import threading

@@ -1,4 +1,4 @@
-"""What the command line sets before jax starts: vector width, where compiled code is kept, device, arenas of memory.
+"""Settings that the command line makes before jax starts: vector width, place of compiled code, device, memory arenas.
 
 It is in environment variables, which processes that are started from here inherit; arenas are set for this one too.
 What the user has set wins. The library itself comes here only where its user asks it to keep compiled code.

@@ -1,1 +1,1 @@
-"""What results are made of: verdicts, quantities, tiles, identities. No jax."""
+"""Parts of results: verdicts, quantities, tiles, identities. No jax."""

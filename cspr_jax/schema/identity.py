@@ -1,4 +1,4 @@
-"""What a result is: the hash of everything that decides its numbers."""
+"""Identity of a result: the hash of everything that decides its numbers."""
 
 import hashlib
 import json
@@ -46,7 +46,7 @@ def identity(settings: dict[str, Any]) -> str:
 
 
 def differences(here: dict[str, Any], there: dict[str, Any]) -> list[str]:
-    """What differs between two sets of settings, one phrase a key.
+    """Differences between two sets of settings, one phrase a key.
 
     Args:
         here: nested settings.

@@ -34,7 +34,7 @@ class Limit:
 
     @property
     def allowed(self) -> str:
-        """What a value must be, in words."""
+        """Allowed values, in words."""
         return "a number: z of the floor" if not self.per_cable else f"a number {'>=' if self.from_zero else '>'} 0"
 
 

@@ -50,7 +50,7 @@ class Tiling:
         return (self.place(index) for index in range(len(self)))
 
     def place(self, index: int) -> tuple[slice, ...]:
-        """Where a tile lies.
+        """Place of a tile.
 
         Args:
             index: of the tile.

@@ -4,7 +4,7 @@ import enum
 
 
 class Verdict(enum.IntFlag):
-    """Why a trajectory is not, or not provably, feasible; 0 is feasible."""
+    """Flags of the reasons why a trajectory is not, or not certainly, feasible; 0 is feasible."""
 
     FEASIBLE = 0
     SLACK_CABLE = 1

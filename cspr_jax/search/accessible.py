@@ -15,7 +15,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
-from cspr_jax.feasibility.platform.orientation_steps import Watch
+from cspr_jax.feasibility.platform.orientation_steps import OrientationSteps
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.search.orientation_grids import OrientationGrid, equal_volume_grid, tilt_torsion_grid
@@ -56,41 +56,41 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
         the orientations; none where the reference orientation itself is singular, or the place above the spools.
     """
     stage("accessible orientations")
-    watch = Watch(robot, place)
+    steps = OrientationSteps(robot, place)
     towards = cylindrical_frames(np.asarray(place, float))
     if definition == "scan":
-        parts = list(_scan(watch, towards, divisions))
+        parts = list(_scan(steps, towards, divisions))
         angles, volume = (np.concatenate(x) for x in zip(*parts, strict=True))
         return Accessible(angles, volume, np.nan)
     grid = _grid(definition, divisions)
-    sights = watch.at(from_tilt_torsion(grid.angles + towards))
-    first, last = grid.neighbours[watch.passable(sights, *grid.neighbours.T)].T
+    samples = steps.at(from_tilt_torsion(grid.angles + towards))
+    first, last = grid.neighbours[steps.passable(samples, *grid.neighbours.T)].T
     count = len(grid.angles)
     links = coo_matrix((np.ones(len(first), bool), (first, last)), shape=(count, count))
     part = connected_components(links, directed=False)[1]
-    inside = (part == part[grid.start]) & watch.regular(sights)
+    inside = (part == part[grid.start]) & steps.regular(samples)
     return Accessible(grid.angles[inside], grid.volume[inside], float(inside.mean()))
 
 
-def _scan(watch: Watch, towards: np.ndarray, divisions: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _scan(steps: OrientationSteps, towards: np.ndarray, divisions: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     # Sections of constant torsion, from 0 up and from 0 down; each starts at the centre of the one before.
     step = math.pi / divisions
-    part, first = _section(watch, towards, np.zeros(2), 0.0, divisions)
+    part, first = _section(steps, towards, np.zeros(2), 0.0, divisions)
     yield part
     for sign in (1.0, -1.0):
         centre = first
         for k in range(1, divisions + 1):
             torsion = sign * k * step
             there = _angles(np.stack([centre, centre]), np.array([torsion - sign * step, torsion]))
-            sights = watch.at(from_tilt_torsion(there + towards))
-            if not watch.passable(sights, np.array([0]), np.array([1]))[0]:
+            samples = steps.at(from_tilt_torsion(there + towards))
+            if not steps.passable(samples, np.array([0]), np.array([1]))[0]:
                 break
-            part, centre = _section(watch, towards, centre, torsion, divisions)
+            part, centre = _section(steps, towards, centre, torsion, divisions)
             yield part
 
 
 def _section(
-    watch: Watch, towards: np.ndarray, centre: np.ndarray, torsion: float, divisions: int
+    steps: OrientationSteps, towards: np.ndarray, centre: np.ndarray, torsion: float, divisions: int
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     # Along rays in the polar plane (theta cos phi, theta sin phi), up to the first step that cannot be made.
     step, count = math.pi / divisions, 2 * divisions
@@ -98,9 +98,9 @@ def _section(
     rays = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
     far = np.arange(count + 1) * step
     angles = _angles(centre + far[None, :, None] * rays[:, None, :], np.asarray(torsion))
-    sights = watch.at(from_tilt_torsion(angles.reshape(-1, 3) + towards))
+    samples = steps.at(from_tilt_torsion(angles.reshape(-1, 3) + towards))
     index = np.arange(angles[..., 0].size).reshape(count, -1)
-    free = watch.passable(sights, index[:, :-1].ravel(), index[:, 1:].ravel()).reshape(count, -1)
+    free = steps.passable(samples, index[:, :-1].ravel(), index[:, 1:].ravel()).reshape(count, -1)
     free &= angles[:, 1:, 1] < math.pi
     free = np.cumprod(free, axis=1).astype(bool)
     ends = centre + (free.sum(1) * step)[:, None] * rays

@@ -1,8 +1,8 @@
-"""From upper bounds of the margin, one for each number of arcs, to answers: proofs first, margins after.
+"""Answers from upper bounds of the margin, one for each number of arcs: proofs first, margins after.
 
-The candidates that the bounds leave are proved or refuted in increasing order, until one is proved
-feasible. Never by bisection: more arcs can lose margin (tests). Where none is feasible, the
-candidate with the largest margin is reported.
+The candidates of a point mass that the bounds leave are proved or refuted in increasing order, until one is proved
+feasible. Never by bisection: more arcs can lose margin (tests). Where none is feasible, the candidate with the largest
+margin is reported. Answers of platforms (`search.platform_answers`) rest on refined samples instead.
 """
 
 import dataclasses
@@ -38,12 +38,12 @@ class Answers:
     """One answer a segment.
 
     Fields:
-        arcs: (n,) smallest number of arcs proved feasible; 0: none.
+        arcs: (n,) smallest number of arcs proved feasible, of platforms found feasible at refined samples; 0: none.
         tried_arcs: (n,) the number of arcs that duration and margins belong to: `arcs`, else the best candidate.
         verdict: (n,) `Verdict` flags; 0 is feasible.
         duration: (n,) s.
         margin: (n,) smallest normalised pseudotension, or depth below the spools over z0.
-        margin_bound: (n,) proved lower bound of the same.
+        margin_bound: (n,) proved lower bound of the same; NaN where nothing is proved, as of platforms.
         limit_margin: (n,) smallest slack of the limits; inf where none is given.
         feasible_at_infinity: (n,) left-hand side of (2.55).
     """
@@ -58,7 +58,7 @@ class Answers:
     feasible_at_infinity: np.ndarray
 
     def details(self, i: int) -> dict[str, Any]:
-        """What only this kind of answers says of a segment, by its name in a plan's JSON.
+        """Details of a segment that only this kind of answers has, by their names in a plan's JSON.
 
         Args:
             i: number of the segment.

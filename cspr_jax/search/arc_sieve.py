@@ -33,7 +33,7 @@ ROUNDING = 256.0
 
 
 def sample_table(amplitude: Amplitude, arcs: np.ndarray, tau: np.ndarray, dtype) -> Array:
-    """What a check needs that does not depend on the points: of the phase pi p tau and of A.
+    """Table of what a check needs that does not depend on the points: of the phase pi p tau and of A.
 
     Args:
         amplitude: A.

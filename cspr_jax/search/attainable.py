@@ -1,4 +1,4 @@
-"""Which accessible orientations of a place a horizontal transition from rest attains, thesis section 3.12.3."""
+"""Accessible orientations of a place that a horizontal transition from rest attains, thesis section 3.12.3."""
 
 import numpy as np
 
@@ -47,8 +47,8 @@ def attainable(
 
     def part(which):
         which = some[which]
-        motions, bends = _motions(checker, places[which], angles[which], z0[which], values)
-        return reached(checker, motions, bends, max_arcs=max_arcs)
+        motions, beta_hats = _motions(checker, places[which], angles[which], z0[which], values)
+        return reached(checker, motions, beta_hats, max_arcs=max_arcs)
 
     return joined(in_parts(part, len(some), CANDIDATES // values)).rows(own)
 
@@ -63,7 +63,7 @@ def attained(
     values: int = VALUES,
     found: Symmetries = NONE,
 ) -> np.ndarray:
-    """Which orientations of places some number of arcs and some value of beta-hat attains.
+    """Orientations of places that some number of arcs and some value of beta-hat attains.
 
     What `attainable` says too, which tells how, and why not; with half of the work.
 
@@ -83,10 +83,10 @@ def attained(
 
     def part(which):
         which = some[which]
-        motions, bends = _motions(checker, places[which], angles[which], z0[which], values)
+        motions, beta_hats = _motions(checker, places[which], angles[which], z0[which], values)
         is_attained = np.zeros(len(which), bool)
         # The preferred value with every number of arcs, then the others where it fails.
-        for options in (bends[:, :1], bends[:, 1:]):
+        for options in (beta_hats[:, :1], beta_hats[:, 1:]):
             left = np.flatnonzero(~is_attained)
             size = max(CANDIDATES // max(options.shape[1], 1), 1)
             for piece in (left[k : k + size] for k in range(0, len(left), size)):
@@ -110,7 +110,7 @@ def _motions(
     # Transitions from rest, and (n, values) of beta-hat at their ends.
     robot, count = checker.problem.robot, len(angles)
     ends = (places, from_tilt_torsion(angles + cylindrical_frames(places)))
-    bends, can_end = end_options(robot, *ends, z0, values)
+    beta_hats, can_end = end_options(robot, *ends, z0, values)
     start = (rest_point(z0), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
     rest = np.full(count, AT_REST)
-    return Candidates(start, ends, z0, np.arange(count), (rest, rest)), np.where(can_end[:, None], bends, np.nan)
+    return Candidates(start, ends, z0, np.arange(count), (rest, rest)), np.where(can_end[:, None], beta_hats, np.nan)

@@ -1,4 +1,4 @@
-"""What is said of motions between poses, once their numbers of arcs are known."""
+"""Answers about motions between poses, once their numbers of arcs are known."""
 
 import dataclasses
 import math
@@ -44,7 +44,7 @@ class PoseAnswers(Answers):
         }
 
     def rows(self, which: np.ndarray) -> "PoseAnswers":
-        """Some of them: indices, or (n,) a mask."""
+        """Answers chosen by indices, or by a mask (n,)."""
         return PoseAnswers(**{name: values[which] for name, values in vars(self).items()})
 
 
@@ -61,7 +61,8 @@ def settled(
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
 
     Returns:
-        the answers; nothing is proved, and (2.55) does not apply: NaN. The segments that they belong to.
+        the answers, found at refined samples; nothing is proved, and (2.55) does not apply: NaN. The
+        segments that they belong to.
     """
     tried = found.arcs if fixed is None else np.where(found.arcs > 0, found.arcs, fixed)
     none = np.flatnonzero(tried == 0)
@@ -71,9 +72,9 @@ def settled(
     others = np.flatnonzero(found.arcs == 0)
     checks.put(others, checker.check(rows(segments, others), tried[others]))
     duration = checker.durations(segments, tried)
-    bends = np.stack(candidates.bends, axis=1)
+    beta_hats = np.stack(candidates.bends, axis=1)
     if checker.kind.plain:  # (3.66) has the one that its cosine has
-        bends = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
+        beta_hats = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
     doubtful = (found.undecided > 0) & ((found.arcs == 0) | (found.undecided < found.arcs))
     refused = np.where(doubtful, Verdict.UNDECIDED.value, checks.verdict | Verdict.NO_ARCS.value)
     less = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
@@ -87,7 +88,7 @@ def settled(
         margin_bound=nothing,
         limit_margin=checks.slack[:, 3:].min(1, initial=np.inf),
         feasible_at_infinity=nothing,
-        beta_hat=bends,
+        beta_hat=beta_hats,
         det_margin=checks.slack[:, 1],
         cable_distance=checks.gap,
     )
@@ -127,15 +128,15 @@ def reached(
     cell, trial = trials(motions, values, same=same)
     found = smallest_arcs(checker, trial, max_arcs=max_arcs)
     arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
-    bends = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
+    beta_hats = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
     # Several values of one motion may have passed: the one tried first is last here.
     best = np.flatnonzero(found.arcs > 0)[::-1]
-    arcs[cell[best]], bends[cell[best]] = found.arcs[best], trial.bends[1][best]
+    arcs[cell[best]], beta_hats[cell[best]] = found.arcs[best], trial.bends[1][best]
     checks.put(cell[best], found.checks.rows(best))
     np.minimum.at(undecided, cell, np.where(found.undecided > 0, found.undecided, NEVER))
     best_found = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
-    return settled(checker, _with_ends(motions, bends, same=same), best_found, max_arcs=max_arcs)[0]
+    return settled(checker, _with_ends(motions, beta_hats, same=same), best_found, max_arcs=max_arcs)[0]
 
 
-def _with_ends(motions: Candidates, bends: np.ndarray, *, same: bool) -> Candidates:
-    return motions._replace(bends=(bends if same else motions.bends[0], bends))
+def _with_ends(motions: Candidates, beta_hats: np.ndarray, *, same: bool) -> Candidates:
+    return motions._replace(bends=(beta_hats if same else motions.bends[0], beta_hats))

@@ -44,13 +44,13 @@ class Candidates(NamedTuple):
     bends: tuple[np.ndarray, np.ndarray]
 
     def rows(self, which: np.ndarray) -> "Candidates":
-        """Some of them: indices, or (n,) a mask."""
+        """Candidates chosen by indices, or by a mask (n,)."""
         return self._replace(motion=self.motion[which], bends=(self.bends[0][which], self.bends[1][which]))
 
     def motions(self, which: np.ndarray) -> "Candidates":
-        """Some of the motions of one candidate each: indices."""
-        start, end, bends = ((a[which], b[which]) for a, b in (self.start, self.end, self.bends))
-        return Candidates(start, end, self.z0[which], np.arange(len(which)), bends)
+        """Motions of one candidate each, chosen by indices."""
+        start, end, beta_hats = ((a[which], b[which]) for a, b in (self.start, self.end, self.bends))
+        return Candidates(start, end, self.z0[which], np.arange(len(which)), beta_hats)
 
 
 class Found(NamedTuple):
@@ -88,7 +88,9 @@ class _Segments:
         # (k,) indices of candidates.
         motion, (first, last) = self._candidates.motion[which], self._candidates.bends
         found = rows(self._of_motions[arcs % 2], motion)
-        return dataclasses.replace(found, turn=found.turn._replace(start_bend=first[which], end_bend=last[which]))
+        return dataclasses.replace(
+            found, turn=found.turn._replace(start_beta_hat=first[which], end_beta_hat=last[which])
+        )
 
 
 def smallest_arcs(
@@ -143,7 +145,7 @@ def _sieved(checker: PoseChecker, segments: _Segments, arcs: int, alive: np.ndar
     # Those that some instants do not refute.
     if not len(alive):
         return alive
-    return alive[~checker.look.refuted(segments(arcs, alive), arcs, tau)]
+    return alive[~checker.prefilter.refuted(segments(arcs, alive), arcs, tau)]
 
 
 def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:
@@ -165,7 +167,7 @@ def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: i
     for arcs in range(1, max_arcs + 1):
         stage(f"best of what fails, arcs {arcs} of {max_arcs}")
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
-        lowest = checker.look.lowest(segments(arcs, every), arcs, tau)
+        lowest = checker.prefilter.lowest(segments(arcs, every), arcs, tau)
         best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)
     return best
 

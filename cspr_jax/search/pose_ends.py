@@ -1,4 +1,4 @@
-"""What many poses allow at the end of a segment: values of beta-hat to try, and whether any motion can end there."""
+"""Ends of segments in many poses: values of beta-hat to try, and whether any motion can end there."""
 
 from functools import partial
 
@@ -40,7 +40,7 @@ def end_options(
         count: how many values for each.
 
     Returns:
-        (n, count) of `bends.options`; (n,) whether a motion can end there: below the spools, and not beyond a
+        (n, count) of `beta_hat.options`; (n,) whether a motion can end there: below the spools, and not beyond a
         singularity.
     """
     preferred, lowest, highest, share, depth = in_batches(

@@ -36,7 +36,7 @@ LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES, LARGEST_TILES = 1 << 24, 1 << 28, 100_00
 
 @dataclasses.dataclass(frozen=True)
 class Content:
-    """What a result holds, as found by reading all of it.
+    """Content of a result, as found by reading all of it.
 
     Fields:
         identity: of the sweep.

@@ -41,7 +41,7 @@ class RunFolder:
         self.lock = path / "LOCK"
 
     def shard(self, index: int) -> Path:
-        """Where the shard of a tile lies.
+        """Path of the shard of a tile.
 
         Args:
             index: of the tile.
@@ -52,7 +52,7 @@ class RunFolder:
         return self.shards / f"{index:05d}.h5"
 
     def shard_names(self) -> dict[Path, int]:
-        """What lies under names of shards; other names in their folder are nobody's business.
+        """Names of shards that are present; other names in their folder are nobody's business.
 
         Returns:
             the index that each name says, sorted.

@@ -1,4 +1,4 @@
-"""What is read of an HDF5 file that anybody may have made: plain numbers and short texts, in this file, of known sizes.
+"""Guarded reading of HDF5 files that anybody may have made: plain numbers and short texts, in one file, of known sizes.
 
 A file can be sealed by anybody. HDF5 follows links into other files (a pipe keeps it waiting for ever), unpacks
 any amount of memory from a few bytes, and builds whatever type a file describes. So every object is asked

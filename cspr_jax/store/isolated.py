@@ -45,7 +45,7 @@ _ENDS = {
 
 
 def fetch(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """What a sealed file holds of the attributes, axes and quantities that this program writes.
+    """Attributes, axes and quantities of a sealed file, as far as this program writes them.
 
     Args:
         path: the file, or a link to one.
@@ -68,7 +68,7 @@ def fetch(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
 
 def content(path: Path) -> dict[str, Any] | None:
-    """What `store.consolidation.read_content` finds in a result.
+    """Content of a result, from `store.consolidation.read_content`.
 
     Args:
         path: the file, or a link to one.

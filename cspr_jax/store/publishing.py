@@ -104,7 +104,7 @@ def make_folders(disk: Disk, path: Path) -> None:
 
 
 def refusal(path: Path, error: OSError) -> StoreError:
-    """What to tell when a file cannot be written.
+    """Error for a file that cannot be written.
 
     Args:
         path: the file.

@@ -1,4 +1,4 @@
-"""What the process does that reads one file for another one: see `store.isolated`."""
+"""Work of the process that reads one file for another one: see `store.isolated`."""
 
 import dataclasses
 import json

@@ -17,7 +17,7 @@ _KEYS = {"identity", "settings", "environment", "source"}
 
 @dataclasses.dataclass(frozen=True)
 class Record:
-    """What run.json holds.
+    """Content of run.json.
 
     Fields:
         identity: of the sweep.

@@ -28,7 +28,7 @@ class DamagedError(Exception):
 
 
 def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
-    """What a file is that cannot be read.
+    """Error for a file that cannot be read.
 
     Args:
         path: the file.

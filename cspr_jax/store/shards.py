@@ -21,7 +21,7 @@ LARGEST_SHARD = 64 << 20
 
 @dataclasses.dataclass(frozen=True)
 class Layout:
-    """What the shards of a run have in common.
+    """Layout that the shards of a run share.
 
     Fields:
         identity: of the sweep.

@@ -46,7 +46,7 @@ class DiskFile(io.RawIOBase):
         return self._at
 
     def tell(self) -> int:
-        """Where reading and writing goes on.
+        """Position at which reading and writing goes on.
 
         Returns:
             the offset.

@@ -1,4 +1,4 @@
-"""What each kind of map asks of its sweep file, beyond the schema; its row in `schema.map_kinds` says it."""
+"""Checks that each kind of map makes of its sweep file, beyond the schema; its row in `schema.map_kinds` says it."""
 
 from pathlib import Path
 

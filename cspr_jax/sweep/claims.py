@@ -60,7 +60,7 @@ def refuse_strangers(folder: RunFolder) -> None:
 
 
 def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> str:
-    """What differs between a sweep and the one that a directory belongs to.
+    """Differences between a sweep and the one that a directory belongs to.
 
     Args:
         sweep: the sweep.
@@ -115,7 +115,7 @@ def refuse_worker(expected: dict[str, Any], found: dict[str, Any]) -> None:
 
 
 def damage(path: Path) -> str | None:
-    """What is wrong with a run.json.
+    """Damage of a run.json, in words.
 
     Args:
         path: its name.

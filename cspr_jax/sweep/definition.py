@@ -65,7 +65,7 @@ class Sweep:
 
     @functools.cached_property
     def layout(self) -> Layout:
-        """What its shards have in common."""
+        """Layout that its shards share."""
         return Layout(self.identity, self.store, self.keys.run.dtype)
 
 
@@ -203,7 +203,7 @@ def _cells_of(counts: dict[str, int]) -> str:
 
 
 def run_directory(sweep: Sweep) -> Path:
-    """Where a sweep's result goes without -o.
+    """Directory of a sweep's result without -o.
 
     Args:
         sweep: the sweep.
@@ -215,7 +215,7 @@ def run_directory(sweep: Sweep) -> Path:
 
 
 def attributes(sweep: Sweep) -> dict[str, Any]:
-    """What a result file says of its sweep.
+    """Attributes of a result file, from its sweep.
 
     Args:
         sweep: the sweep.

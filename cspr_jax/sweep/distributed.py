@@ -94,7 +94,7 @@ class Scheduler:
             time.sleep(POLL_SECONDS)
 
     def environment(self) -> dict[str, Any]:
-        """What all workers have in common.
+        """Environment that all workers share.
 
         Returns:
             the environment of a worker.

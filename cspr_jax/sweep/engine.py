@@ -28,7 +28,7 @@ from cspr_jax.sweep.work import Computed, Executor
 
 @dataclasses.dataclass(frozen=True)
 class Options:
-    """How a run goes on.
+    """Options of a run.
 
     Fields:
         accept_environment_change: whether shards of another environment may be mixed in.
@@ -43,7 +43,7 @@ class Options:
 
 @dataclasses.dataclass(frozen=True)
 class Outcome:
-    """What a run did.
+    """Outcome of a run.
 
     Fields:
         result: path of the finished file.
@@ -58,7 +58,7 @@ class Outcome:
 
 @dataclasses.dataclass
 class Hooks:
-    """What a run tells and asks while it goes.
+    """Hooks by which a run tells and asks while it goes.
 
     Fields:
         stop: set when it shall end after the tile in progress.

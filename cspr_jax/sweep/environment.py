@@ -1,4 +1,4 @@
-"""What computes: the code, the libraries and the machine, as far as they can change the bits of a result."""
+"""Environment of a computation: code, libraries and machine, as far as they can change the bits of a result."""
 
 import functools
 import hashlib

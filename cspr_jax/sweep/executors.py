@@ -1,4 +1,4 @@
-"""Who computes the tiles: this process, or several on this machine. One process publishes."""
+"""Executors that compute the tiles: this process, or several on this machine. One process publishes."""
 
 import collections
 import concurrent.futures
@@ -39,7 +39,7 @@ class ThisProcess:
         self._tile_map = tile_map
 
     def environment(self) -> dict[str, Any]:
-        """What computes.
+        """Environment of the computation.
 
         Returns:
             the environment of this process.
@@ -97,7 +97,7 @@ class Processes:
         self._pickled, self._count = pickle.dumps(sweep), count
 
     def environment(self) -> dict[str, Any]:
-        """What computes: workers are the same program on the same machine.
+        """Environment of the computation: workers are the same program on the same machine.
 
         Returns:
             the environment of this process.

@@ -1,4 +1,4 @@
-"""What a run directory holds: looked at without the lock, and without writing anything."""
+"""Content of a run directory: looked at without the lock, and without writing anything."""
 
 import json
 from pathlib import Path
@@ -21,7 +21,7 @@ LOG_TAIL = 1 << 16
 
 
 def status(directory: Path) -> dict[str, Any]:
-    """How far a run has come, from the names in its directory.
+    """Progress of a run, from the names in its directory.
 
     Args:
         directory: of the run.

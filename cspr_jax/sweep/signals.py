@@ -23,7 +23,7 @@ _TIDY = b"\r\x1b[2K\x1b[?25h"
 
 
 class Stop:
-    """Whether a run was asked to stop.
+    """Request that a run stops.
 
     Fields:
         code: exit code of the signal, or None.
@@ -101,7 +101,7 @@ def stop_signals(tell: Callable[[str], None] = lambda line: None) -> Iterator[St
 
 
 class Prompt:
-    """Whether Ctrl-C was pressed while nothing had to be finished.
+    """Answer to Ctrl-C while nothing has to be finished.
 
     Fields:
         told: whether people know that it was noticed.

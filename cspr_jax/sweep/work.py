@@ -1,4 +1,4 @@
-"""What a run asks of those who compute its tiles."""
+"""Protocol between a run and those who compute its tiles."""
 
 import dataclasses
 from collections.abc import Iterable, Iterator
@@ -25,7 +25,7 @@ class Executor(Protocol):
     """Computes tiles, in any order."""
 
     def environment(self) -> dict[str, Any]:
-        """What computes.
+        """Environment of the computation.
 
         Returns:
             the environment of the process, or of the workers.

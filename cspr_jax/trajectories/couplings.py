@@ -1,4 +1,4 @@
-"""How position and acceleration within a plane, or on a line, through p0 enter the pseudotensions."""
+"""Couplings of position and acceleration within a plane, or on a line, through p0 to the pseudotensions."""
 
 import jax.numpy as jnp
 from jax import Array

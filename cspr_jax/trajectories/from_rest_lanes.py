@@ -25,8 +25,8 @@ class Swings(NamedTuple):
         reach: from p0 to the end, along the first arc; m.
         axis: unit vector of the rotation.
         angle: whole angle of the envelope, in half turns; (n,).
-        start_bend: beta-hat in p0, (n,).
-        end_bend: beta-hat at the end, (n,).
+        start_beta_hat: beta-hat in p0, (n,).
+        end_beta_hat: beta-hat at the end, (n,).
         rate: lambda of (3.50), 1/s^2; (n,).
     """
 
@@ -34,8 +34,8 @@ class Swings(NamedTuple):
     reach: Vector
     axis: Vector
     angle: Array
-    start_bend: Array
-    end_bend: Array
+    start_beta_hat: Array
+    end_beta_hat: Array
     rate: Array
 
 
@@ -58,7 +58,7 @@ class Swing(NamedTuple):
 
 
 def swings(segments: PoseSegment) -> Swings:
-    """What is needed of segments from rest.
+    """Swings of segments from rest.
 
     Args:
         segments: leaves (n, ...).
@@ -72,14 +72,14 @@ def swings(segments: PoseSegment) -> Swings:
         tuple(segments.plane[:, i, 0] * segments.end_radius for i in range(3)),
         tuple(how.across[:, i] for i in range(1, 4)),
         how.angle * (2.0 / math.pi),
-        how.start_bend,
-        how.end_bend,
+        how.start_beta_hat,
+        how.end_beta_hat,
         segments.rate,
     )
 
 
 def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: Kind) -> Array:
-    """What segments of one number of arcs have in common.
+    """Table that segments from rest of one number of arcs share.
 
     Args:
         amplitude: A.
@@ -100,7 +100,7 @@ def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: Kind) -> Arr
     else:
         place = a * cosine
         bend = (a2 - a) * cosine - 2.0 * a1 * sine
-    beat = _plain(sine, cosine) if kind.plain else _with_bends(sine, cosine, tau, theta)
+    beat = _plain(sine, cosine) if kind.plain else _with_beta_hats(sine, cosine, tau, theta)
     turns = []
     for b, b1, b2 in beat:
         turns.append((a * b, math.pi * (a1 * b + a * b1), math.pi * (a2 * b + 2.0 * a1 * b1 + a * b2)))
@@ -113,7 +113,7 @@ def _plain(sine: Array, cosine: Array) -> list[tuple[Array, ...]]:
     return [(cosine, -sine, -cosine), (nothing,) * 3, (nothing,) * 3]
 
 
-def _with_bends(sine: Array, cosine: Array, tau: Array, theta: Array) -> list[tuple[Array, ...]]:
+def _with_beta_hats(sine: Array, cosine: Array, tau: Array, theta: Array) -> list[tuple[Array, ...]]:
     # beta_ff of (3.93): (9 c - c3) / 8 + h (c - c3) / 8, where h goes from one beta-hat to the other.
     sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
     steady = ((9.0 * cosine - cosine3) / 8.0, (3.0 * sine3 - 9.0 * sine) / 8.0, 9.0 * (cosine3 - cosine) / 8.0)
@@ -137,7 +137,7 @@ def swing(which: Swings, row: Array) -> Swing:
     """
 
     def blended(k):
-        return row[k] + which.start_bend * row[k + 1] + which.end_bend * row[k + 2]
+        return row[k] + which.start_beta_hat * row[k + 1] + which.end_beta_hat * row[k + 2]
 
     speed, spin = which.angle * blended(5), which.angle * blended(8)
     sine, cosine = sincospi(which.angle * blended(2))

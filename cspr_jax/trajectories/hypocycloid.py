@@ -35,7 +35,7 @@ from cspr_jax.trajectories.swing_plane import swing_plane
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Segment:
-    """What one segment is, for one parity of the number of arcs.
+    """Parameters of one segment, for one parity of the number of arcs.
 
     With c the position in the plane of the trajectory and d = c + c'' / lambda, the normalised
     pseudotension of cable k is 1 + tilt . c + pull_k . d + twist_k (c x d).
@@ -48,7 +48,7 @@ class Segment:
         precession: () delta, in half turns, in [0, 1].
         sense: () +1 (p odd) or -1 (p even): sign of theta_h, (2.34).
         rate: () lambda of (2.26), 1/s^2.
-        end_bend: () A''(1) of a transition of chapter 1; 0 for the functions of chapter 2, which meet (2.49).
+        end_curvature: () A''(1) of a transition of chapter 1; 0 for the functions of chapter 2, which meet (2.49).
         tilt: (2,) slope of the plane: depth below the spools over z0 is 1 + tilt . c; 1/m.
         pull: (n_cables, 2) one row a cable, 1/m.
         twist: (n_cables,) one a cable, 1/m^2.
@@ -61,7 +61,7 @@ class Segment:
     precession: Array
     sense: Array
     rate: Array
-    end_bend: Array
+    end_curvature: Array
     tilt: Array
     pull: Array
     twist: Array
@@ -114,7 +114,7 @@ def oscillation(segment: Segment, arcs: Array) -> Oscillation:
     ratio = segment.precession / arcs
     # 1 - ratio first: it is what vanishes for p = 1 and psi -> 0.
     steady = (math.pi * arcs) ** 2 * (1.0 - ratio) * (1.0 + ratio)
-    return Oscillation(ratio, steady, steady - segment.end_bend)
+    return Oscillation(ratio, steady, steady - segment.end_curvature)
 
 
 def duration(segment: Segment, arcs: Array) -> Array:
@@ -154,7 +154,7 @@ def swing(segment: Segment, amplitude_values: tuple[Array, ...], arcs: Array, ta
     span = segment.end_radius - segment.start_radius
     r = segment.start_radius + span * amplitude_values[0]  # (2.48)
     ratio, steady, period = oscillation(segment, arcs)
-    rho, gain = (span * amplitude_values[2] - segment.end_bend * r) / period, steady / period
+    rho, gain = (span * amplitude_values[2] - segment.end_curvature * r) / period, steady / period
     sine, cosine = sincospi(segment.sense * arcs * tau)
     lateral, axial = sincospi(segment.sense * segment.precession * tau)
     c_r, c_t = r * cosine, ratio * r * sine

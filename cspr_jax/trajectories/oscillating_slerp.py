@@ -26,31 +26,31 @@ _STILL = 1e-12
 
 
 class Turn(NamedTuple):
-    """How the orientation goes from one pose to another, for one parity of the number of arcs.
+    """Rotation from one pose to another, for one parity of the number of arcs.
 
     Fields:
         start: (4,) q_1.
         across: (4,) unit quaternion at a right angle to q_1 toward the envelope's end; zero if it does not turn.
         angle: () Theta_env of (3.60), rad.
-        start_bend: () beta-hat of the first pose, (3.81).
-        end_bend: () of the last.
+        start_beta_hat: () beta-hat of the first pose, (3.81).
+        end_beta_hat: () of the last.
     """
 
     start: Array
     across: Array
     angle: Array
-    start_bend: Array
-    end_bend: Array
+    start_beta_hat: Array
+    end_beta_hat: Array
 
 
-def turn(start: Array, end: Array, start_bend: Array, end_bend: Array, *, odd: Array) -> Turn:
+def turn(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *, odd: Array) -> Turn:
     """The turn between two orientations.
 
     Args:
         start: (4,) unit quaternion.
         end: (4,) unit quaternion.
-        start_bend: () beta-hat of the first pose.
-        end_bend: () beta-hat of the last pose.
+        start_beta_hat: () beta-hat of the first pose.
+        end_beta_hat: () beta-hat of the last pose.
         odd: () whether the number of arcs is odd.
 
     Returns:
@@ -68,18 +68,20 @@ def turn(start: Array, end: Array, start_bend: Array, end_bend: Array, *, odd: A
     is_opposite = (size < _STILL) & (along < 0.0)
     across = jnp.where(size < _STILL, 0.0, beside / jnp.where(size < _STILL, 1.0, size))
     across = jnp.where(is_opposite, identity, across)
-    return Turn(first, across, jnp.where((size < _STILL) & ~is_opposite, 0.0, angle), start_bend, end_bend)
+    return Turn(first, across, jnp.where((size < _STILL) & ~is_opposite, 0.0, angle), start_beta_hat, end_beta_hat)
 
 
-def beat(start_bend: Array, end_bend: Array, share: Array, arcs: Array, tau: Array) -> tuple[Array, Array, Array]:
+def beat(
+    start_beta_hat: Array, end_beta_hat: Array, share: Array, arcs: Array, tau: Array
+) -> tuple[Array, Array, Array]:
     """beta_ff of (3.93) and its first two derivatives in tau.
 
-    It is linear in the bend, so that the mean of two beta_f is the beta_f of the mean bend. A bend of -1 / share is
+    It is linear in beta-hat, so that the mean of two beta_f is the beta_f of the mean beta-hat. That of -1 / share is
     beta_1 of (3.66), and 0 is beta_0 of (3.67).
 
     Args:
-        start_bend: () beta-hat of the first pose.
-        end_bend: () of the last.
+        start_beta_hat: () beta-hat of the first pose.
+        end_beta_hat: () of the last.
         share: () theta_h^2 (n_h - 1) / (pi p)^2.
         arcs: () number of arcs p, a float.
         tau: () normalised time.
@@ -88,8 +90,8 @@ def beat(start_bend: Array, end_bend: Array, share: Array, arcs: Array, tau: Arr
         beta, beta', beta'', () each.
     """
     omega = math.pi * arcs
-    slope = (end_bend - start_bend) * share
-    h = start_bend * share + slope * tau  # beta'' over (pi p)^2
+    slope = (end_beta_hat - start_beta_hat) * share
+    h = start_beta_hat * share + slope * tau  # beta'' over (pi p)^2
     sine, cosine = sincospi(arcs * tau)
     sine3, cosine3 = sine * (3.0 - 4.0 * sine**2), cosine * (4.0 * cosine**2 - 3.0)
     value = ((9.0 + h) * cosine - (1.0 + h) * cosine3) / 8.0  # (3.68)

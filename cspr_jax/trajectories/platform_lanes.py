@@ -63,7 +63,7 @@ class State(NamedTuple):
 
 
 def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> Instant:
-    """What is common to segments of the same number of arcs.
+    """Instant common to segments of the same number of arcs.
 
     Args:
         amplitude: A.
@@ -79,7 +79,7 @@ def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> Inst
 
 
 def instant_of_arc(amplitude: Amplitude, sense: Array, arcs: Array, arc: Array, within: Array) -> Instant:
-    """What is common to segments at the same place within one of their arcs, of which they may have any number.
+    """Instant common to segments at the same place within one of their arcs, of which they may have any number.
 
     Args:
         amplitude: A.
@@ -184,8 +184,8 @@ def _beat(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> tuple[
     if kind.plain:  # beta_1
         return cosine, -omega * sine, -omega * omega * cosine
     sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
-    slope = (how.end_bend - how.start_bend) * share
-    h = how.start_bend * share + slope * now.tau
+    slope = (how.end_beta_hat - how.start_beta_hat) * share
+    h = how.start_beta_hat * share + slope * now.tau
     value = ((9.0 + h) * cosine - (1.0 + h) * cosine3) * 0.125
     rate = (slope * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) * 0.125
     bend = 2.0 * slope * omega * (3.0 * sine3 - sine) + omega * omega * (9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine)

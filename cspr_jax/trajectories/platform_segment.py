@@ -30,11 +30,11 @@ from cspr_jax.trajectories.swing_plane import swing_plane
 
 
 class Kind(NamedTuple):
-    """What motions are; known when a function is compiled.
+    """Kind of motions; known when a function is compiled.
 
     Fields:
         variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
-        plain: whether orientations beat with beta_1 of (3.66), whatever the bends, or with beta_ff of (3.93).
+        plain: whether orientations beat with beta_1 of (3.66), whatever beta-hat is, or with beta_ff of (3.93).
         from_rest: whether all segments start at rest in P0.
     """
 
@@ -49,7 +49,7 @@ USUAL = Kind()
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class PoseSegment:
-    """What one segment between two poses is, for one parity of the number of arcs.
+    """Parameters of one segment between two poses, for one parity of the number of arcs.
 
     Fields:
         plane: (3, 2) q_h1 and q_h2 of (3.42), as columns.
@@ -79,7 +79,7 @@ def pose_segment(
     start: tuple[Array, Array],
     end: tuple[Array, Array],
     z0: Array,
-    bends: tuple[Array, Array],
+    beta_hats: tuple[Array, Array],
     *,
     odd: Array,
 ) -> PoseSegment:
@@ -90,7 +90,7 @@ def pose_segment(
         start: position (3,) m and orientation (4,) of the first pose.
         end: position (3,) m and orientation (4,) of the last.
         z0: () depth of p0 below the centroid of the spools, m.
-        bends: beta-hat of the first and of the last pose, () each.
+        beta_hats: beta-hat of the first and of the last pose, () each.
         odd: () whether the number of arcs is odd.
 
     Returns:
@@ -100,7 +100,7 @@ def pose_segment(
     upright = jnp.zeros_like(hub).at[2].set(1.0)
     plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, spool_radius(robot), upright, odd)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
-    how = turn(start[1], end[1], *bends, odd=odd)
+    how = turn(start[1], end[1], *beta_hats, odd=odd)
     regular = normalised_determinant(robot, hub, jnp.eye(3, dtype=hub.dtype))
     return PoseSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, how, regular)
 
@@ -172,8 +172,8 @@ def _quaternions(
     segment: PoseSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: Kind
 ) -> tuple[Array, Array, Array]:
     share = _share(segment, arcs)
-    bends = (-1.0 / share, -1.0 / share) if kind.plain else (segment.turn.start_bend, segment.turn.end_bend)
-    beats = beat(*bends, share, arcs, tau)
+    beta_hats = (-1.0 / share, -1.0 / share) if kind.plain else (segment.turn.start_beta_hat, segment.turn.end_beta_hat)
+    beats = beat(*beta_hats, share, arcs, tau)
     return orientation(segment.turn, values, beats)
 
 

@@ -34,7 +34,7 @@ def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: A
     """
     segment = hypocycloid.segment(robot, rest_point(z0), target, z0, odd=jnp.asarray(False))
     bend = derivatives(amplitude, jnp.ones_like(z0), order=2)[2]
-    return dataclasses.replace(segment, end_bend=bend)
+    return dataclasses.replace(segment, end_curvature=bend)
 
 
 def steady(segment: Segment) -> Segment:
@@ -47,12 +47,12 @@ def steady(segment: Segment) -> Segment:
         the segment between the target and itself, for even numbers of arcs.
     """
     return dataclasses.replace(
-        segment, start_radius=segment.end_radius, end_bend=jnp.zeros_like(jnp.asarray(segment.end_bend))
+        segment, start_radius=segment.end_radius, end_curvature=jnp.zeros_like(jnp.asarray(segment.end_curvature))
     )
 
 
 def inclination(segment: Segment) -> Array:
-    """How much deeper below the spools the target is than p0, over z0: v of (1.31).
+    """Extra depth of the target below the spools, against p0, over z0: v of (1.31).
 
     Args:
         segment: a transition; leaves (...).

@@ -301,8 +301,8 @@ def motion(robot: Robot, segment: Segment, arcs: int, beta_hat: Betas, tau: Vec,
         places = np.array([translation(robot, segment, arcs, x)[0] for x in near])
         once, twice = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60, np.array([2, -27, 270, -490, 270, -27, 2]) / 180
         dp, ddp = np.tensordot(once / step, places, 1), np.tensordot(twice / step**2, places, 1)
-        spins = [np.tensordot(c, turns, 1) @ np.swapaxes(turns[3], 1, 2) for c in (once / step, twice / step**2)]
-        skews = [(x - np.swapaxes(x, 1, 2)) / 2 for x in spins]
+        products = [np.tensordot(c, turns, 1) @ np.swapaxes(turns[3], 1, 2) for c in (once / step, twice / step**2)]
+        skews = [(x - np.swapaxes(x, 1, 2)) / 2 for x in products]
         omega, omega_dot = (np.stack([x[:, 2, 1], x[:, 0, 2], x[:, 1, 0]], axis=-1) for x in skews)
     first, second = 1 / duration, 1 / duration**2
     return Motion(duration, p, dp * first, ddp * second, q, matrix(q), omega * first, omega_dot * second)

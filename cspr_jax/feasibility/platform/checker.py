@@ -1,4 +1,4 @@
-"""Whether a platform's motions are feasible, with margins: samples, finer where it matters, and what happens between.
+"""Feasibility of a platform's motions, with margins: samples, finer where it matters, and cables in between.
 
 A first look takes a few instants. A check takes 64 samples an arc, and a sample on either side of each knot of the
 amplitude function; around the smallest samples of every criterion, and of the distance between cables, the smallest
@@ -16,9 +16,9 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, room
 from cspr_jax.feasibility.platform.crossings import swept
-from cspr_jax.feasibility.platform.kernels import glances, look_along, moving_along
-from cspr_jax.feasibility.platform.prefilter import FIRST, FirstLook
-from cspr_jax.feasibility.platform.samples import Motions, Narrowing, Places, Seen, along, low_points
+from cspr_jax.feasibility.platform.kernels import cable_vectors, moving_along, still_along
+from cspr_jax.feasibility.platform.prefilter import FIRST, Prefilter
+from cspr_jax.feasibility.platform.samples import Motions, Narrowing, Places, Samples, along, low_points
 from cspr_jax.feasibility.platform.slack_lanes import order
 from cspr_jax.feasibility.platform.slacks import flags
 from cspr_jax.feasibility.problem import Problem
@@ -39,11 +39,11 @@ BESIDE_KNOT = 1e-12
 
 @dataclasses.dataclass(frozen=True)
 class PoseChecks:
-    """What was found of n motions.
+    """Verdicts, slacks and gaps of n motions.
 
     Fields:
         verdict: (n,) `Verdict` flags; 0 is feasible.
-        slack: (n, n_criteria) smallest of each criterion of `pose_slacks.flags`; NaN where unknown.
+        slack: (n, n_criteria) smallest of each criterion of `slacks.flags`; NaN where unknown.
         gap: (n,) smallest distance between cables that can meet, m; infinite where none can.
     """
 
@@ -61,7 +61,7 @@ class PoseChecks:
         self.verdict[which], self.slack[which], self.gap[which] = others.verdict, others.slack, others.gap
 
     def rows(self, which: np.ndarray) -> "PoseChecks":
-        """Some of them.
+        """Checks of some of the motions.
 
         Args:
             which: (m,) indices.
@@ -78,7 +78,7 @@ def _durations(arguments) -> jax.Array:
 
 
 class PoseChecker:
-    """Checks motions of one robot.
+    """Checker of motions of one robot.
 
     Args:
         problem: robot, limits, amplitude.
@@ -86,7 +86,7 @@ class PoseChecker:
         batch: how many are computed at a time.
 
     Fields:
-        look: the first look, which comes before checks.
+        prefilter: the first look, which comes before checks.
         done: how many instants of motions were looked at so far, in the first look and in checks, and how many motions
             were checked.
     """
@@ -94,14 +94,14 @@ class PoseChecker:
     def __init__(self, problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> None:
         """Find what can meet."""
         self.problem, self.kind, self.batch = problem, kind, batch
-        self.done, self._lock = {"first look": 0, "checks": 0, "motions": 0}, threading.Lock()
+        self.done, self._lock = {"prefilter": 0, "checks": 0, "motions": 0}, threading.Lock()
         found = contacts(problem.robot)
         self._platform, self._pairs = (found.sides, found.normal), tuple((int(i), int(j)) for i, j in found.pairs)
         self._flags = flags(problem.limits)
         self._size = float(np.linalg.norm(np.asarray(problem.robot.platform_points), axis=1).max())
         knots = np.asarray(problem.amplitude.knots)
-        count = partial(self._count, "first look")
-        self.look = FirstLook(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
+        count = partial(self._count, "prefilter")
+        self.prefilter = Prefilter(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
         self._of_motion = Narrowing(problem, kind, None, batch)
         self._of_pose = self._of_motion._replace(pairs=self._pairs)
         self._knots = np.sort(np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT]))
@@ -143,14 +143,14 @@ class PoseChecker:
 
     def _checked(self, motions: Motions, whole: bool) -> PoseChecks:
         found = self.nothing(len(motions.arcs))
-        seen = self._along(moving_along, motions)
+        samples = self._along(moving_along, motions)
         # Samples refute most of what is not feasible; what is narrowed down around them, some of the others.
-        is_open = np.logical_or(whole, (seen.least() > -TOLERANCE).all(0))
+        is_open = np.logical_or(whole, (samples.least() > -TOLERANCE).all(0))
         rest, motions = np.flatnonzero(is_open), motions.rows(is_open)
         found.verdict[~is_open] = Verdict.SLACK_CABLE.value
         if not len(rest):
             return found
-        moving = self._moving(motions, seen.of(is_open))
+        moving = self._moving(motions, samples.of(is_open))
         is_open = np.logical_or(whole, (moving > -TOLERANCE).all(0))
         found.verdict[rest[~is_open]] = Verdict.SLACK_CABLE.value
         if is_open.any():
@@ -168,14 +168,14 @@ class PoseChecker:
         """
         return PoseChecks(np.zeros(count, int), np.full((count, len(self._flags)), np.nan), np.full(count, np.nan))
 
-    def _along(self, kernel: Callable, motions: Motions) -> Seen:
-        seen = along(partial(kernel, self.problem, kind=self.kind), motions, size=self.batch)
-        self._count("checks", len(jax.tree.leaves(seen.values)[0]) * len(seen.row))
-        return seen
+    def _along(self, kernel: Callable, motions: Motions) -> Samples:
+        samples = along(partial(kernel, self.problem, kind=self.kind), motions, size=self.batch)
+        self._count("checks", len(jax.tree.leaves(samples.values)[0]) * len(samples.row))
+        return samples
 
-    def _moving(self, motions: Motions, seen: Seen) -> np.ndarray:
+    def _moving(self, motions: Motions, samples: Samples) -> np.ndarray:
         # (n_values, n) smallest values of the criteria that depend on the motion.
-        least = self._of_motion.around(motions, seen)
+        least = self._of_motion.around(motions, samples)
         # The motion may jump at a knot.
         places = np.meshgrid(np.arange(len(least)), np.arange(len(motions.arcs)), self._knots, indexing="ij")
         which, row, tau = (x.ravel() for x in places)
@@ -184,16 +184,19 @@ class PoseChecker:
 
     def _still(self, motions: Motions, moving: np.ndarray) -> PoseChecks:
         # With what depends on the pose alone; `moving` is of `_moving`.
-        looks = self._along(partial(look_along, platform=self._platform, pairs=self._pairs), motions)
-        look, seen = looks.values, looks._replace(values=looks.values.values)
-        still = self._of_pose.around(motions, seen)
-        self._beside_singularities(motions, seen, moving)
+        along_arcs = self._along(partial(still_along, platform=self._platform, pairs=self._pairs), motions)
+        still_samples = along_arcs.values
+        samples = along_arcs._replace(values=still_samples.values)
+        still = self._of_pose.around(motions, samples)
+        self._beside_singularities(motions, samples, moving)
         nearest, least = still[-1], np.concatenate([moving, still[:-1]])[order(self.problem.limits)]
         is_finite = np.isfinite(least).all(0) & ~np.isnan(nearest) & (self.durations(*motions) > 0.0)
-        step, item = np.nonzero(look.wide)
-        ends = seen.instants(motions, item, step), seen.instants(motions, item, step + 1)
-        met, hit = swept(partial(self._glances, motions), self._platform, seen.row[item], ends, len(motions.arcs))
-        hit[seen.row[look.hit]] = True
+        step, item = np.nonzero(still_samples.wide)
+        ends = samples.instants(motions, item, step), samples.instants(motions, item, step + 1)
+        met, hit = swept(
+            partial(self._cable_vectors, motions), self._platform, samples.row[item], ends, len(motions.arcs)
+        )
+        hit[samples.row[still_samples.hit]] = True
         return PoseChecks(
             np.where(is_finite, self._verdict(least, nearest, met, hit), Verdict.NOT_FINITE.value),
             np.where(is_finite, least, np.nan).T,
@@ -210,24 +213,24 @@ class PoseChecker:
         reasons = verdict & ~Verdict.UNDECIDED.value
         return np.where(reasons != 0, reasons, verdict)
 
-    def _beside_singularities(self, motions: Motions, seen: Seen, moving: np.ndarray) -> None:
+    def _beside_singularities(self, motions: Motions, samples: Samples, moving: np.ndarray) -> None:
         # Tensions have the determinant below the line: between samples in which that changes by much they are sampled
-        # more finely. `seen` has it first; `moving` is of `_moving`, and is written into.
-        determinant = seen.values[:, 0]
+        # more finely. `samples` has it first; `moving` is of `_moving`, and is written into.
+        determinant = samples.values[:, 0]
         low, high = (f(determinant[1:], determinant[:-1]) for f in (np.minimum, np.maximum))
         place, item = np.nonzero((low > 0.0) & (high > STEEP * low))
         if not len(place):
             return
         piece = np.repeat((np.arange(PIECES) + 0.5) / PIECES, len(place))
         item = np.tile(item, PIECES)
-        row, tau = seen.row[item], seen.instants(motions, item, np.tile(place, PIECES) + piece)
+        row, tau = samples.row[item], samples.instants(motions, item, np.tile(place, PIECES) + piece)
         places = Places(np.zeros(len(row), int), row, tau, motions.steps(row) / (2.0 * PIECES))
         found = self._of_motion.lower(moving, motions, places, sections=0).reshape(PIECES, 1, -1)
         some = low_points(found, moving[:1, row[: len(place)]])
         some = some[0] * len(place) + some[2]
         self._of_motion.lower(moving, motions, Places(*(x[some] for x in places)))
 
-    def _glances(self, motions: Motions, row: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        kernel = partial(glances, self.problem, pairs=self._pairs, kind=self.kind)
-        gap, view = in_batches(kernel, (*motions.items(row), tau), size=self.batch)
-        return gap, view / np.linalg.norm(view, axis=2, keepdims=True)
+    def _cable_vectors(self, motions: Motions, row: np.ndarray, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        kernel = partial(cable_vectors, self.problem, pairs=self._pairs, kind=self.kind)
+        gap, direction = in_batches(kernel, (*motions.items(row), tau), size=self.batch)
+        return gap, direction / np.linalg.norm(direction, axis=2, keepdims=True)

@@ -9,20 +9,20 @@ from cspr_jax.robots.interference import cables_cross, platform_hit
 
 HALVINGS = 12
 
-Glance = tuple[np.ndarray, np.ndarray]  # vectors between cables (k, n_pairs, 3), views (k, n_cables, 3)
+CableVectors = tuple[np.ndarray, np.ndarray]  # between cables (k, n_pairs, 3), along cables (k, n_cables, 3)
 
 
 def swept(
-    glances: Callable[[np.ndarray, np.ndarray], Glance],
+    cable_vectors: Callable[[np.ndarray, np.ndarray], CableVectors],
     platform: tuple[np.ndarray, np.ndarray],
     row: np.ndarray,
     ends: tuple[np.ndarray, np.ndarray],
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Whether cables cross, and whether one sweeps over the platform, within steps.
+    """Motions in whose steps cables cross, and those in which one sweeps over the platform.
 
     Args:
-        glances: of motions (k,) at instants (k,).
+        cable_vectors: of motions (k,) at instants (k,).
         platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
         row: (k,) whose step it is.
         ends: (k,) instants before and after each.
@@ -34,26 +34,26 @@ def swept(
     met, hit = (np.zeros(count, bool) for _ in range(2))
     if not len(row):
         return met, hit
-    seen = tuple(glances(row, tau) for tau in ends)
+    vectors = tuple(cable_vectors(row, tau) for tau in ends)
     for level in range(HALVINGS + 1):
-        (gap, view), (next_gap, next_view) = seen
-        turns = _turns_much(gap, next_gap) | _turns_much(view, next_view)
+        (gap, direction), (next_gap, next_direction) = vectors
+        turns = _turns_much(gap, next_gap) | _turns_much(direction, next_direction)
         closed = ~turns if level < HALVINGS else np.ones(len(row), bool)
         met[row[closed & cables_cross(gap, next_gap).any(1)]] = True
-        hit[row[closed & platform_hit(*platform, view, next_view).any(1)]] = True
+        hit[row[closed & platform_hit(*platform, direction, next_direction).any(1)]] = True
         row, before, after = row[~closed], ends[0][~closed], ends[1][~closed]
         if not len(row):
             break
         middle = 0.5 * (before + after)
-        between = glances(row, middle)
-        first, last = ((gap[~closed], view[~closed]) for gap, view in seen)
-        seen = _joined(first, between), _joined(between, last)
+        between = cable_vectors(row, middle)
+        first, last = ((gap[~closed], direction[~closed]) for gap, direction in vectors)
+        vectors = _joined(first, between), _joined(between, last)
         ends = np.concatenate([before, middle]), np.concatenate([middle, after])
         row = np.concatenate([row, row])
     return met, hit
 
 
-def _joined(first: Glance, second: Glance) -> Glance:
+def _joined(first: CableVectors, second: CableVectors) -> CableVectors:
     return np.concatenate([first[0], second[0]]), np.concatenate([first[1], second[1]])
 
 

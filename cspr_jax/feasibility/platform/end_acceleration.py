@@ -39,7 +39,7 @@ class Endpoint(NamedTuple):
 
 
 def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array) -> Endpoint:
-    """What beta-hat does at one end of a segment.
+    """Tensions at one end of a segment as functions of beta-hat.
 
     Args:
         robot: the robot.
@@ -53,9 +53,9 @@ def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array
     rotation = rotations.matrix(quaternion)
     matrix = -jacobian(robot, position, rotation).T
     eta = robot.gravity / z0  # (3.78)
-    spin = eta * rotation @ robot.inertia @ _angle_vector(quaternion) / robot.mass  # (3.80)
+    moment = eta * rotation @ robot.inertia @ _angle_vector(quaternion) / robot.mass  # (3.80)
     still = jnp.zeros(3)
-    right = jnp.stack([jnp.concatenate([-eta * position, still]), jnp.concatenate([still, spin])], axis=1)
+    right = jnp.stack([jnp.concatenate([-eta * position, still]), jnp.concatenate([still, moment])], axis=1)
     offset, slope = solved(matrix, right)[0].T  # (3.79)
     # Of (3.13): the combined tension that the translation asks for; eta where both centroids are at the origin.
     cables, _ = rays(robot, position, rotation)

@@ -1,4 +1,4 @@
-"""The compiled functions that look at many motions of a platform at once, one lane a segment."""
+"""Compiled criteria of many motions of a platform at once, one lane a segment."""
 
 from functools import partial
 from typing import NamedTuple
@@ -24,8 +24,8 @@ UNROLLED = 1024
 SECTIONS = 13
 
 
-class Look(NamedTuple):
-    """What was seen of n poses on their way along an arc.
+class StillSamples(NamedTuple):
+    """Criteria of n poses on their way along an arc that depend on the pose alone, and their cables in between.
 
     Fields:
         values: (m, n_values, n) still slacks, and the smallest distance between cables, m.
@@ -49,7 +49,7 @@ def moving_along(problem: Problem, within: Array, arcs, *, kind: Kind) -> Array:
         kind: of the motions.
 
     Returns:
-        (m, n_values, n) of `pose_lanes.moving_slacks`.
+        (m, n_values, n) of `slack_lanes.moving_slacks`.
     """
     segments, count, arc = arcs
 
@@ -61,10 +61,11 @@ def moving_along(problem: Problem, within: Array, arcs, *, kind: Kind) -> Array:
     return jnp.stack(lax.map(at, within), axis=1)
 
 
-def _seen(
+def _still(
     problem: Problem, pairs: tuple, segments: PoseSegment, arcs: Array, now: Instant, kind: Kind
 ) -> tuple[list[Array], list, list]:
-    # (n,) each: the still slacks, and the smallest distance between cables; the vectors between cables; the views.
+    # (n,) each: the still slacks, and the smallest distance between cables; the vectors between cables;
+    # the directions of cables.
     one = jnp.where(problem.robot.mass > 0.0, 1.0, 2.0).astype(segments.rate.dtype)
     here = state(segments, arcs, now, kind, one)
     wires = cables(problem.robot, here.position, here.turn)
@@ -73,13 +74,13 @@ def _seen(
     squares = [dot(gap, gap) for gap in apart]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
     values = [*still_slacks(problem, segments, here, wires), nearest]
-    return values, apart, contact_lanes.views(wires, here.turn)
+    return values, apart, contact_lanes.cable_directions(wires, here.turn)
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))
-def look_along(
+def still_along(
     problem: Problem, within: Array, arcs, *, platform: tuple[Array, Array], pairs: tuple, kind: Kind
-) -> Look:
+) -> StillSamples:
     """The criteria that depend on the pose alone, and what meets, along arcs of many segments.
 
     Args:
@@ -91,28 +92,28 @@ def look_along(
         kind: of the motions.
 
     Returns:
-        the look.
+        the samples.
     """
     segments, count, arc = arcs
 
-    def seen(place):
+    def at(place):
         now = instant_of_arc(problem.amplitude, segments.sense, count, arc, place)
-        return _seen(problem, pairs, segments, count, now, kind)
+        return _still(problem, pairs, segments, count, now, kind)
 
     def step(before, place):
-        values, gaps, views = seen(place)
+        values, gaps, directions = at(place)
         wide = contact_lanes.turns_much(before[0], gaps, LEAST_COSINE)
-        wide |= contact_lanes.turns_much(before[1], views, LEAST_COSINE)
-        hit = contact_lanes.platform_hit(*platform, before[1], views)
-        return (gaps, views), (values, hit, wide)
+        wide |= contact_lanes.turns_much(before[1], directions, LEAST_COSINE)
+        hit = contact_lanes.platform_hit(*platform, before[1], directions)
+        return (gaps, directions), (values, hit, wide)
 
-    shapes = jax.eval_shape(lambda: seen(within[0])[1:])
+    shapes = jax.eval_shape(lambda: at(within[0])[1:])
     start = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
-    # Two places a turn: what is carried on is copied half as often. Not where compiling takes longer than looking.
+    # Two places a turn: what is carried on is copied half as often. Not where compiling takes longer than computing.
     unroll = 2 if len(arc) >= UNROLLED else 1
     _, (values, hit, wide) = lax.scan(step, start, within, unroll=unroll)
     # There is no step before the first place.
-    return Look(jnp.stack(values, axis=1), (hit & ~wide)[1:].any(0), wide[1:])
+    return StillSamples(jnp.stack(values, axis=1), (hit & ~wide)[1:].any(0), wide[1:])
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind", "sections"))
@@ -122,7 +123,7 @@ def narrowed(problem: Problem, items, *, pairs: tuple | None, kind: Kind, sectio
     Args:
         problem: robot, limits, amplitude.
         items: segments (leaves (n, ...)), arcs (n,), instants (n,), half the width of the bracket (n,), and which
-            value (n,) of `moving_along`, or of `look_along`.
+            value (n,) of `moving_along`, or of `still_along`.
         pairs: of cables that can meet; None: for `moving_along`.
         kind: of the motions.
         sections: how many; 0: the smaller value of two points inside.
@@ -137,7 +138,7 @@ def narrowed(problem: Problem, items, *, pairs: tuple | None, kind: Kind, sectio
         if pairs is None:
             values = moving_slacks(problem, segments, arcs, now, kind)
         else:
-            values = _seen(problem, pairs, segments, arcs, now, kind)[0]
+            values = _still(problem, pairs, segments, arcs, now, kind)[0]
         found = values[0]
         for k, value in enumerate(values[1:], start=1):
             found = jnp.where(which == k, value, found)
@@ -157,8 +158,8 @@ def narrowed(problem: Problem, items, *, pairs: tuple | None, kind: Kind, sectio
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))
-def glances(problem: Problem, items, *, pairs: tuple, kind: Kind) -> tuple[Array, Array]:
-    """The vectors between cables, and the views of them, at one instant of each of many segments.
+def cable_vectors(problem: Problem, items, *, pairs: tuple, kind: Kind) -> tuple[Array, Array]:
+    """The vectors between cables, and the directions of cables, at one instant of each of many segments.
 
     Args:
         problem: robot, amplitude.
@@ -171,4 +172,4 @@ def glances(problem: Problem, items, *, pairs: tuple, kind: Kind) -> tuple[Array
     """
     segments, arcs, tau = items
     now = instant(problem.amplitude, segments.sense, arcs, tau)
-    return contact_lanes.as_arrays(*_seen(problem, pairs, segments, arcs, now, kind)[1:])
+    return contact_lanes.as_arrays(*_still(problem, pairs, segments, arcs, now, kind)[1:])

@@ -1,4 +1,4 @@
-"""What the cables do at still poses of a platform, and between neighbouring ones, thesis section 3.10.2."""
+"""Cables at still poses of a platform, and between neighbouring ones, thesis section 3.10.2."""
 
 from functools import partial
 from typing import NamedTuple
@@ -25,30 +25,30 @@ TOUCHING = 1e-9
 STEPS = 65536
 
 
-class Sights(NamedTuple):
-    """What is seen of n poses.
+class OrientationSamples(NamedTuple):
+    """Determinants and vectors of cables of n poses.
 
     Fields:
         share: (n,) determinant over that of the reference orientation at the same place; NaN where that is singular
             itself, or the place is not below the spools.
         gaps: (n, n_pairs, 3) shortest vectors between cables, m.
-        views: (n, n_cables, 3) cables seen from the platform, m.
+        cable_directions: (n, n_cables, 3) cables seen from the platform, m.
     """
 
     share: np.ndarray
     gaps: np.ndarray
-    views: np.ndarray
+    cable_directions: np.ndarray
 
 
 @partial(jax.jit, static_argnames="pairs")
-def _sights(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) -> tuple[Array, Array, Array]:
+def _sampled(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) -> tuple[Array, Array, Array]:
     places, quaternions = poses
     one = jnp.where(robot.mass > 0.0, 1.0, 2.0)
     turn = stored(rotation([quaternions[:, i] for i in range(4)]), one)
     wires = cables(robot, [places[:, i] for i in range(3)], turn)
     wires = wires._replace(rays=stored(wires.rays, one))
-    apart, seen = contact_lanes.gaps(robot.base_points, pairs, wires), contact_lanes.views(wires, turn)
-    return wrench_lanes.normalised_determinant(robot, wires), *contact_lanes.as_arrays(apart, seen)
+    apart, directions = contact_lanes.gaps(robot.base_points, pairs, wires), contact_lanes.cable_directions(wires, turn)
+    return wrench_lanes.normalised_determinant(robot, wires), *contact_lanes.as_arrays(apart, directions)
 
 
 def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
@@ -67,8 +67,8 @@ def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
     return here if float(depth) > 0.0 and bool(is_free) else np.nan
 
 
-class Watch:
-    """Looks at the orientations of a platform at one place.
+class OrientationSteps:
+    """Steps between orientations of a platform at one place.
 
     Args:
         robot: in its reference axes.
@@ -83,57 +83,58 @@ class Watch:
         self._reference = reference_share(robot, self._place)
         self._size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
         self._side = np.zeros(robot.n_cables)  # of each cable; not yet known, and nothing lies in the platform there
-        self._side = np.sign(self.at(np.array([[1.0, 0.0, 0.0, 0.0]])).views[0] @ self._contacts.normal)
+        self._side = np.sign(self.at(np.array([[1.0, 0.0, 0.0, 0.0]])).cable_directions[0] @ self._contacts.normal)
 
-    def at(self, quaternions: np.ndarray) -> Sights:
-        """What is seen of orientations.
+    def at(self, quaternions: np.ndarray) -> OrientationSamples:
+        """Determinants and vectors of cables of orientations.
 
         Args:
             quaternions: (n, 4) unit.
 
         Returns:
-            the sights.
+            the samples.
         """
         places = np.broadcast_to(self._place, (len(quaternions), 3))
         found = in_batches(
-            partial(_sights, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), size=BATCH
+            partial(_sampled, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), size=BATCH
         )
-        share, gaps, views = found
+        share, gaps, directions = found
         # Cables that touch have a gap of rounding errors, whose direction means nothing.
         gaps[np.linalg.norm(gaps, axis=2) < TOUCHING * self._size] = 0.0
         # So has the height of cables that lie in the platform: they are put on one side of it.
-        height, least = views @ self._contacts.normal, TOUCHING * np.linalg.norm(views, axis=2)
+        height, least = directions @ self._contacts.normal, TOUCHING * np.linalg.norm(directions, axis=2)
         height = np.where(np.abs(height) < least, 2.0 * least * self._side - height, 0.0)
-        return Sights(share / self._reference, gaps, views + height[..., None] * self._contacts.normal)
+        return OrientationSamples(share / self._reference, gaps, directions + height[..., None] * self._contacts.normal)
 
-    def regular(self, sights: Sights) -> np.ndarray:
+    def regular(self, samples: OrientationSamples) -> np.ndarray:
         """Orientations that are not beyond a singularity.
 
         Args:
-            sights: of n orientations.
+            samples: of n orientations.
 
         Returns:
             (n,).
         """
-        return is_regular(sights.share)
+        return is_regular(samples.share)
 
-    def passable(self, sights: Sights, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """Which steps from one orientation to a neighbouring one can be made.
+    def passable(self, samples: OrientationSamples, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+        """Possible steps from one orientation to a neighbouring one.
 
         Args:
-            sights: of all orientations.
+            samples: of all orientations.
             first: (n,) indices.
             last: (n,) indices.
 
         Returns:
             (n,) whether both are regular, no cables cross, and no cable sweeps over the platform.
         """
-        is_regular = self.regular(sights)
+        is_regular = self.regular(samples)
         ways = np.flatnonzero(is_regular[first] & is_regular[last])
         free = np.zeros(len(first), bool)
         for some in np.array_split(ways, max(1, -(-len(ways) // STEPS))):
             one, two = first[some], last[some]
-            met = cables_cross(sights.gaps[one], sights.gaps[two]).any(1)
-            hit = platform_hit(self._contacts.sides, self._contacts.normal, sights.views[one], sights.views[two])
+            met = cables_cross(samples.gaps[one], samples.gaps[two]).any(1)
+            directions = samples.cable_directions
+            hit = platform_hit(self._contacts.sides, self._contacts.normal, directions[one], directions[two])
             free[some] = ~met & ~hit.any(1)
         return free

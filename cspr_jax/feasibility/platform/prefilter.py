@@ -52,7 +52,7 @@ def smallest_tensions(
         rough: whether in float32.
 
     Returns:
-        (n,) of `pose_lanes.certain_tension`; and which instant it belongs to, (n,) from 0 on.
+        (n,) of `slack_lanes.certain_tension`; and which instant it belongs to, (n,) from 0 on.
     """
     if rough:
         robot, segments = _of_one_size(robot, segments)
@@ -118,8 +118,8 @@ def _tensions_at(robot: PlatformRobot, amplitude: Amplitude, arcs: Array, tau: A
     return lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau[when]), kind)
 
 
-class FirstLook(NamedTuple):
-    """Looks at motions of one robot.
+class Prefilter(NamedTuple):
+    """Prefilter of motions of one robot, by their tensions at a few instants.
 
     Fields:
         robot: the robot.
@@ -150,11 +150,11 @@ class FirstLook(NamedTuple):
         """
         lowest = np.full(len(segments.rate), np.inf)
         for chunk in _chunks(tau):
-            lowest = np.minimum(lowest, self._seen(segments, arcs, chunk)[0])
+            lowest = np.minimum(lowest, self._lowest(segments, arcs, chunk)[0])
         return np.where(np.isnan(lowest), -np.inf, lowest)
 
     def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        """Which motions some instants refute.
+        """Motions that some instants refute.
 
         Args:
             segments: leaves (n, ...), all of this number of arcs.
@@ -171,14 +171,14 @@ class FirstLook(NamedTuple):
                 break
             some = segments if len(alive) == len(found) else rows(segments, alive)
             if len(alive) <= room(self.size // FEWER):  # not worth two looks
-                found[alive] = ~(self._seen(some, arcs, chunk)[0] > self.least)
+                found[alive] = ~(self._lowest(some, arcs, chunk)[0] > self.least)
                 continue
-            lowest, when = self._seen(some, arcs, chunk, rough=True)
+            lowest, when = self._lowest(some, arcs, chunk, rough=True)
             doubtful = np.flatnonzero(lowest < 0.0)
             found[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk, when[doubtful]) > self.least)
         return found
 
-    def _seen(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, rough: bool = False):
+    def _lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, rough: bool = False):
         # Many in float32, few in float64: two compilations.
         self.count_instants(len(segments.rate) * len(tau))
         kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind, rough=rough)

@@ -18,7 +18,7 @@ LEVEL = 1e-9
 
 
 def rows(segments: PoseSegment, which: np.ndarray) -> PoseSegment:
-    """Some of many segments.
+    """Segments chosen from many.
 
     Args:
         segments: leaves (n, ...).
@@ -42,11 +42,11 @@ class Motions(NamedTuple):
     arcs: np.ndarray
 
     def rows(self, which: np.ndarray) -> "Motions":
-        """Some of them: indices, or (n,) a mask."""
+        """Motions chosen by indices, or by a mask (n,)."""
         return Motions(rows(self.segments, which), self.arcs[which])
 
     def steps(self, which: np.ndarray) -> np.ndarray:
-        """How far samples of some of them lie apart.
+        """Distance in tau between samples of chosen motions.
 
         Args:
             which: (m,) indices.
@@ -57,7 +57,7 @@ class Motions(NamedTuple):
         return 1.0 / (SAMPLES * self.arcs[which])
 
     def items(self, which: np.ndarray) -> tuple[PoseSegment, np.ndarray]:
-        """Some of them as kernels take them.
+        """Chosen motions as kernels take them.
 
         Args:
             which: (m,) indices.
@@ -68,13 +68,13 @@ class Motions(NamedTuple):
         return rows(self.segments, which), self.arcs[which].astype(float)
 
 
-class Seen(NamedTuple):
-    """What is seen along arcs; those of one motion lie side by side.
+class Samples(NamedTuple):
+    """Values along arcs; those of one motion lie side by side.
 
     Fields:
         row: (k,) whose arc it is.
         arc: (k,) which one, from 0 on.
-        values: what the kernel says, arcs last.
+        values: of the kernel, arcs last.
     """
 
     row: np.ndarray
@@ -89,8 +89,8 @@ class Seen(NamedTuple):
         """
         return np.minimum.reduceat(self.values.min(0), np.flatnonzero(self.arc == 0), axis=1)
 
-    def of(self, which: np.ndarray) -> "Seen":
-        """What is seen of some motions.
+    def of(self, which: np.ndarray) -> "Samples":
+        """Samples of some motions.
 
         Args:
             which: (n,) a mask.
@@ -100,10 +100,10 @@ class Seen(NamedTuple):
         """
         some = which[self.row]
         values = jax.tree.map(lambda x: x[..., some], self.values)
-        return Seen((np.cumsum(which) - 1)[self.row[some]], self.arc[some], values)
+        return Samples((np.cumsum(which) - 1)[self.row[some]], self.arc[some], values)
 
     def instants(self, motions: Motions, item: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """When arcs are at places.
+        """Instants at which arcs are at places.
 
         Args:
             motions: n of them.
@@ -117,7 +117,7 @@ class Seen(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where values are narrowed down.
+    """Instants around which values are narrowed down.
 
     Fields:
         which: (k,) the value.
@@ -132,16 +132,16 @@ class Places(NamedTuple):
     width: np.ndarray
 
 
-def along(kernel: Callable, motions: Motions, *, size: int) -> Seen:
-    """Look along all arcs of motions.
+def along(kernel: Callable, motions: Motions, *, size: int) -> Samples:
+    """Samples along all arcs of motions.
 
     Args:
-        kernel: `pose_kernel.moving_along` or `pose_kernel.look_along` of a robot.
+        kernel: `kernels.moving_along` or `kernels.still_along` of a robot.
         motions: n of them.
-        size: how many arcs are looked at in one call.
+        size: how many arcs are sampled in one call.
 
     Returns:
-        what is seen.
+        the samples.
     """
     arcs = motions.arcs
     row = np.repeat(np.arange(len(arcs)), arcs)
@@ -152,7 +152,7 @@ def along(kernel: Callable, motions: Motions, *, size: int) -> Seen:
         own, which = items
         return kernel(within, (*motions.items(own), which.astype(float)))
 
-    return Seen(row, arc, in_batches(batch, (row, arc), size=size, axis=-1))
+    return Samples(row, arc, in_batches(batch, (row, arc), size=size, axis=-1))
 
 
 class Narrowing(NamedTuple):
@@ -170,20 +170,20 @@ class Narrowing(NamedTuple):
     pairs: tuple | None
     size: int
 
-    def around(self, motions: Motions, seen: Seen) -> np.ndarray:
+    def around(self, motions: Motions, samples: Samples) -> np.ndarray:
         """The smallest values, narrowed down around the samples that may be near them.
 
         Args:
             motions: n of them.
-            seen: values (m, n_values, k) along them.
+            samples: values (m, n_values, k) along them.
 
         Returns:
             (n_values, n).
         """
-        least = seen.least()
-        place, which, item = low_points(seen.values, least[:, seen.row])
-        row = seen.row[item]
-        self.lower(least, motions, Places(which, row, seen.instants(motions, item, place), motions.steps(row)))
+        least = samples.least()
+        place, which, item = low_points(samples.values, least[:, samples.row])
+        row = samples.row[item]
+        self.lower(least, motions, Places(which, row, samples.instants(motions, item, place), motions.steps(row)))
         return least
 
     def lower(self, least: np.ndarray, motions: Motions, places: Places, sections: int = SECTIONS) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The slacks of `pose_slacks` for many platforms, one lane a case, and what the first look needs of them."""
+"""The slacks of `pose_slacks` for many platforms, one lane a case, and their part that the first look needs."""
 
 import jax.numpy as jnp
 from jax import Array
@@ -152,7 +152,7 @@ def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
 
 
 def order(limits: Limits) -> list[int]:
-    """Where the criteria of `pose_slacks.flags` stand among moving slacks and still ones, one after the other.
+    """Order of the criteria of `slacks.flags` among moving slacks and still ones, one after the other.
 
     Args:
         limits: which limits are given.

@@ -1,4 +1,4 @@
-"""Where a segment is cut for a first look: blocks between the knots of the amplitude function."""
+"""Blocks of a segment for a first look: cuts between the knots of the amplitude function."""
 
 import itertools
 import math

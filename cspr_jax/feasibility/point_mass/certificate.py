@@ -37,7 +37,7 @@ FINEST_CUT = 12
 
 @dataclasses.dataclass(frozen=True)
 class Proof:
-    """What is proved of n segments. `feasible` and `infeasible` exclude each other; neither is undecided.
+    """Proofs of n segments. `feasible` and `infeasible` exclude each other; neither is undecided.
 
     Fields:
         feasible: (n,) every criterion is met at every instant.

@@ -29,7 +29,7 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
 
 
 def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
-    """How many smooth functions each criterion is the smallest of.
+    """Numbers of smooth functions of which each criterion is the smallest.
 
     Args:
         robot: a point mass on cables.

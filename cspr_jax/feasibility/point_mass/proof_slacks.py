@@ -103,7 +103,7 @@ CLOSED = {
 
 
 def count(row: Limit, n_cables: int) -> int:
-    """How many smooth functions the slack of a limit is the smallest of.
+    """Number of smooth functions of which the slack of a limit is the smallest.
 
     Args:
         row: the limit's.
@@ -193,7 +193,7 @@ def _pace(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]
     turn = math.pi * segment.precession
     one = jnp.ones_like(omega)
     wave = Bounds(one, omega, omega**2)
-    rho = (over.bend + over.size.times(jnp.abs(segment.end_bend))).times(1.0 / period)
+    rho = (over.bend + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
     c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(turn)
     d_r = rho * wave + (over.growth * wave).times(2.0 * gain / omega)
     d_t = ((rho + over.size.times(2.0 * gain)) * wave).times(ratio)

@@ -92,7 +92,7 @@ def largest_term(amplitude: Amplitude, segment: Segment, arcs: Array) -> Array:
     span = jnp.abs(segment.end_radius - segment.start_radius)
     largest = amplitude.largest.astype(span.dtype)
     radius = jnp.maximum(segment.start_radius, segment.end_radius) + span * (largest[0] - 1.0)
-    gain, bend = steady / period, jnp.abs(segment.end_bend)
+    gain, bend = steady / period, jnp.abs(segment.end_curvature)
     force = (span * largest[2] + bend * radius) / period + gain * (span * largest[1] / arcs + 2.0 * ratio * radius)
     pull = jnp.max(jnp.sum(jnp.abs(segment.pull), axis=-1))
     twist = jnp.max(jnp.abs(segment.twist))
@@ -181,7 +181,7 @@ def row_bounds(
     x, y = tilt_r * over.size, (tilt_t * over.size).times(ratio)
     if pull is not None:
         pull_r, pull_t = _components(segment, pull, over)
-        rho = (over.bend + over.size.times(jnp.abs(segment.end_bend))).times(1.0 / period)
+        rho = (over.bend + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
         x = x + pull_r * rho
         y = y + (pull_t * (rho + over.size.times(2.0 * gain))).times(ratio)
         y = y + (pull_r * over.growth).times(2.0 * gain / omega)

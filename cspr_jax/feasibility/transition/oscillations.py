@@ -1,4 +1,4 @@
-"""How many oscillations a transition needs, from the envelopes of its pseudotensions, thesis chapter 1.
+"""Numbers of oscillations that a transition needs, from the envelopes of its pseudotensions, thesis chapter 1.
 
 With Omega = 4 pi^2 N - A''(1), N = n^2, the normalised pseudotension of cable k is, (1.32),
 
@@ -225,7 +225,7 @@ def best_epsilon(weights: Array) -> tuple[float, float]:
 
 
 def many_oscillations(amplitude: Amplitude, weights: Array) -> Array:
-    """What `least_oscillations` tends to on a horizontal transition as the weights grow, (1.55).
+    """Limit of `least_oscillations` on a horizontal transition as the weights grow, (1.55).
 
     Args:
         amplitude: A.

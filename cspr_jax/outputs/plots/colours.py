@@ -21,7 +21,7 @@ LARGEST = 1e100
 
 @dataclasses.dataclass(frozen=True)
 class Scale:
-    """From values to colours.
+    """Colours of values.
 
     Fields:
         colours: the colour map.

@@ -1,4 +1,4 @@
-"""From results to a picture: which kind it is, and which part of the data it shows."""
+"""Picture of results: its kind, and the part of the data that it shows."""
 
 from pathlib import Path
 from typing import NamedTuple

@@ -174,7 +174,7 @@ def values(result: Result, axis: str, points: np.ndarray) -> list[str]:
 
 
 def chosen(count: int, most: int) -> np.ndarray:
-    """Some of many points, evenly.
+    """Evenly chosen points of many.
 
     Args:
         count: of the points.

@@ -15,7 +15,7 @@ DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
 
 
 def columns_of(count: int) -> int:
-    """How many panels stand side by side.
+    """Number of panels side by side.
 
     Args:
         count: of all panels.

@@ -146,7 +146,7 @@ def lines_of(result: Result, data: np.ndarray, across: str, by: str) -> list[Lin
 
 
 def names_of(results: list[Result], stems: list[str]) -> list[str]:
-    """What tells results of one picture apart: their amplitude functions, else robots, else files.
+    """Names that tell results of one picture apart: their amplitude functions, else robots, else files.
 
     Args:
         results: the results.

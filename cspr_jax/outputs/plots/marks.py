@@ -1,4 +1,4 @@
-"""What stands in a section of a map beside its cells: the spools, P0, and where the motions start."""
+"""Marks in a section of a map beside its cells: the spools, P0, and the start of the motions."""
 
 from typing import Any, NamedTuple
 
@@ -67,7 +67,7 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
 
 
 def marked(result: Result, name: str, across: list[str], over: str, place: dict[str, float]) -> list[int]:
-    """Which of many parallel sections contain P0 or the fixed end of the motions.
+    """Those of many parallel sections that contain P0 or the fixed end of the motions.
 
     Args:
         result: the map.

@@ -1,4 +1,4 @@
-"""What a picture of a map keeps constant: where the motions start, and the axes that it does not show."""
+"""Constants of a picture of a map: the start of the motions, and the axes that it does not show."""
 
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import value
@@ -21,7 +21,7 @@ def table(settings: object, key: str) -> dict:
 
 
 def start(result: Result) -> dict[str, float]:
-    """Where all segments of a map start, if it is one place.
+    """Start of all segments of a map, if it is one place.
 
     Args:
         result: a map.
@@ -51,7 +51,7 @@ def starts_at_rest(result: Result, name: str) -> bool:
 
 
 def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[str]:
-    """What a picture of a map keeps constant.
+    """Constants of a picture of a map, in words.
 
     Args:
         result: the map.

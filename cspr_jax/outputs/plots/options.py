@@ -1,4 +1,4 @@
-"""What the command line asks of pictures; no matplotlib here, for `cspr --help` is to answer at once."""
+"""Options of the command line for pictures; no matplotlib here, for `cspr --help` is to answer at once."""
 
 import argparse
 

@@ -26,7 +26,7 @@ PANEL, SINGLE = 3.1, 5.2  # inches, the longer side
 
 
 class Section(NamedTuple):
-    """What sections of a map show.
+    """Content of sections of a map.
 
     Fields:
         name: of the quantity.
@@ -134,7 +134,7 @@ def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list
 
 
 def tells(name: str, data: np.ndarray) -> np.ndarray:
-    """Which cells say more than that there is nothing: most of all orientations are none that a robot can take.
+    """Cells that say more than that there is nothing: most of all orientations are none that a robot can take.
 
     Args:
         name: of the quantity.

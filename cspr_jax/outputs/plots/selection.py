@@ -1,4 +1,4 @@
-"""What a user chose to see: files, directories, and values of axes."""
+"""Selection that a user made: files, directories, and values of axes."""
 
 import math
 from pathlib import Path

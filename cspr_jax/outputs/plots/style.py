@@ -1,4 +1,4 @@
-"""How all pictures look, and how large they are; files have the same bytes for the same data."""
+"""Appearance and sizes of all pictures; files have the same bytes for the same data."""
 
 import io
 import math
@@ -43,7 +43,7 @@ LARGEST_PIXELS = 1e8
 
 
 class Style(NamedTuple):
-    """What a user chooses.
+    """Choices of the user.
 
     Fields:
         size: width and height, cm; None: what suits the picture.
