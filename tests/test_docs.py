@@ -172,9 +172,7 @@ def long_lines(text: str) -> list[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_prose_is_wrapped(page, request):
-    if page.name == "architecture.md":  # being rewritten; xfail is strict, so that this goes with the old page
-        request.applymarker(pytest.mark.xfail(reason="the old page"))
+def test_prose_is_wrapped(page):
     assert long_lines(page.read_text("utf-8")) == []
 
 
