@@ -142,7 +142,7 @@ def test_angles_near_zero_and_half_a_turn(start):
         segment = made(robot, *poses, Z0, (-2.0, -1.0), p)
         tau = np.linspace(0.0, 1.0, 61)
         found = states(robot, segment, amplitude, float(p), tau)
-        assert all(np.isfinite(leaf).all() for leaf in found)
+        assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
         step, time = 1e-6, float(segments.duration(segment, float(p)))
         before, after = (states(robot, segment, amplitude, float(p), tau[1:-1] + d) for d in (-step, step))
         slope = (np.asarray(after.rotation) - np.asarray(before.rotation)) / (2.0 * step * time)
