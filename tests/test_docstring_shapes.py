@@ -241,7 +241,8 @@ def check(function, examples: dict) -> None:
         check_fields(found, Sizes(sizes), function.__name__)
     else:
         # What comes in a dictionary is told by its keys.
-        assert isinstance(found, dict) or len(shapes) in (1, len(leaves)), f"{function.__name__}: shapes {shapes} for {len(leaves)} arrays"
+        fits = isinstance(found, dict) or len(shapes) in (1, len(leaves))
+        assert fits, f"{function.__name__}: shapes {shapes} for {len(leaves)} arrays"
     for shape, leaf in zip(shapes * len(leaves) if len(shapes) == 1 else shapes, leaves, strict=False):
         assert sizes.agrees(shape, leaf.shape), f"{function.__name__}: {shape} is of {leaf.shape}"
 
