@@ -92,7 +92,7 @@ def test_segments_of_candidates():
         for k in range(20):
             i = given.motion[k]
             pair = (places[i], turns[i]), (ends[i], targets[i])
-            one = made(robot, *pair, Z0, (given.bends[0][k], given.bends[1][k]), arcs)
+            one = made(robot, *pair, Z0, (given.beta_hats[0][k], given.beta_hats[1][k]), arcs)
             for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(found), strict=True):
                 np.testing.assert_allclose(b[k], a, rtol=1e-12, atol=1e-12)
 

@@ -136,9 +136,9 @@ def platform_motion(
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     places = _places(frame, start, end, z0)
     turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
-    bends = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
+    beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
     first, last = zip(places, turns, strict=True)
-    found = pose_segment(own, first, last, jnp.asarray(z0, float), bends, odd=jnp.mod(p, 2.0) == 1.0)
+    found = pose_segment(own, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
     return Placed(PlatformMotion(found, function, p, Kind(variable)), frame)
 
 

@@ -70,18 +70,18 @@ def minimum_pose_arcs(  # noqa: PLR0913
         checker = PoseChecker(problem, Kind(variable, from_rest=start is None), batch=MANY)
         ends = (frame.inward(places), frame.turned_quaternions(turns))
         if start is None:
-            first, bends = rest_poses(depth), np.full(len(depth), AT_REST)
+            first, beta_hats = rest_poses(depth), np.full(len(depth), AT_REST)
         else:
             place, turn = points_of("start", [start[0]]), quaternions("start", [start[1]], 1)
             rows = np.zeros(len(depth), int)
             first = (frame.inward(place)[rows], frame.turned_quaternions(turn)[rows])
-            bends = start_beta_hat(checker, first, depth)
-        trial = Candidates(first, ends, depth, np.arange(len(depth)), (bends, bends))
+            beta_hats = start_beta_hat(checker, first, depth)
+        trial = Candidates(first, ends, depth, np.arange(len(depth)), (beta_hats, beta_hats))
         value = float(beta_hat) if isinstance(beta_hat, int) else beta_hat
         answers = pose_arcs(checker, trial, beta_hat=value, max_arcs=max_arcs)
 
     def motions() -> Placed[PlatformMotion]:
-        chosen = trial._replace(bends=tuple(answers.beta_hat.T))
+        chosen = trial._replace(beta_hats=tuple(answers.beta_hat.T))
         segments = segments_with(problem.robot, chosen, answers.tried_arcs)
         return batched(PlatformMotion, segments, problem, answers, frame, Kind(variable))
 

@@ -54,7 +54,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
 
     Returns:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
-        axes; those of `schema.quantities.OF_PLATFORMS` only for a platform.
+        axes; "quaternion", "omega" and "omega_dot" only for a platform.
 
     Raises:
         ConfigError: a rate that is no number > 0, or too many rows.

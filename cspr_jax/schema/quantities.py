@@ -281,8 +281,6 @@ ACROSS = {
 }
 PARTS = {"axis": tuple("xyz"), "component": tuple("wxyz")}
 EVERY = ChainMap(AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
-# Those that only a rigid platform has.
-OF_PLATFORMS = ("quaternion", "omega", "omega_dot")
 _OWN = frozenset(QUANTITIES)
 
 

@@ -72,7 +72,7 @@ def settled(
     others = np.flatnonzero(found.arcs == 0)
     checks.put(others, checker.check(rows(segments, others), tried[others]))
     duration = checker.durations(segments, tried)
-    beta_hats = np.stack(candidates.bends, axis=1)
+    beta_hats = np.stack(candidates.beta_hats, axis=1)
     if checker.kind.plain:  # (3.66) has the one that its cosine has
         beta_hats = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
     doubtful = (found.undecided > 0) & ((found.arcs == 0) | (found.undecided < found.arcs))
@@ -131,7 +131,7 @@ def reached(
     beta_hats = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
     # Several values of one motion may have passed: the one tried first is last here.
     best = np.flatnonzero(found.arcs > 0)[::-1]
-    arcs[cell[best]], beta_hats[cell[best]] = found.arcs[best], trial.bends[1][best]
+    arcs[cell[best]], beta_hats[cell[best]] = found.arcs[best], trial.beta_hats[1][best]
     checks.put(cell[best], found.checks.rows(best))
     np.minimum.at(undecided, cell, np.where(found.undecided > 0, found.undecided, NEVER))
     best_found = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
@@ -139,4 +139,4 @@ def reached(
 
 
 def _with_ends(motions: Candidates, beta_hats: np.ndarray, *, same: bool) -> Candidates:
-    return motions._replace(bends=(beta_hats if same else motions.bends[0], beta_hats))
+    return motions._replace(beta_hats=(beta_hats if same else motions.beta_hats[0], beta_hats))

@@ -34,22 +34,22 @@ class Candidates(NamedTuple):
         z0: (m,) m.
         motion: (n,) which motion each candidate is of, in any order; those of one motion that are tried first come
             first.
-        bends: beta-hat at the start (n,) and at the end (n,).
+        beta_hats: beta-hat at the start (n,) and at the end (n,).
     """
 
     start: tuple[np.ndarray, np.ndarray]
     end: tuple[np.ndarray, np.ndarray]
     z0: np.ndarray
     motion: np.ndarray
-    bends: tuple[np.ndarray, np.ndarray]
+    beta_hats: tuple[np.ndarray, np.ndarray]
 
     def rows(self, which: np.ndarray) -> "Candidates":
         """Candidates chosen by indices, or by a mask (n,)."""
-        return self._replace(motion=self.motion[which], bends=(self.bends[0][which], self.bends[1][which]))
+        return self._replace(motion=self.motion[which], beta_hats=(self.beta_hats[0][which], self.beta_hats[1][which]))
 
     def motions(self, which: np.ndarray) -> "Candidates":
         """Motions of one candidate each, chosen by indices."""
-        start, end, beta_hats = ((a[which], b[which]) for a, b in (self.start, self.end, self.bends))
+        start, end, beta_hats = ((a[which], b[which]) for a, b in (self.start, self.end, self.beta_hats))
         return Candidates(start, end, self.z0[which], np.arange(len(which)), beta_hats)
 
 
@@ -86,7 +86,7 @@ class _Segments:
 
     def __call__(self, arcs: int, which: np.ndarray) -> PoseSegment:
         # (k,) indices of candidates.
-        motion, (first, last) = self._candidates.motion[which], self._candidates.bends
+        motion, (first, last) = self._candidates.motion[which], self._candidates.beta_hats
         found = rows(self._of_motions[arcs % 2], motion)
         return dataclasses.replace(
             found, turn=found.turn._replace(start_beta_hat=first[which], end_beta_hat=last[which])
