@@ -6,10 +6,9 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.robots import force_balance, wrench_balance
+from cspr_jax.robots import cables
+from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.state import State
 from cspr_jax.schema.limits import LIMITS, Limit
 
@@ -44,7 +43,7 @@ class Values(NamedTuple):
     acceleration: Array
 
 
-def values(robot: PointMassRobot | PlatformRobot, state: State) -> Values:
+def values(robot: AnyRobot, state: State) -> Values:
     """Quantities of a state that limits bound.
 
     Args:
@@ -54,13 +53,8 @@ def values(robot: PointMassRobot | PlatformRobot, state: State) -> Values:
     Returns:
         the quantities.
     """
-    if isinstance(robot, PlatformRobot):
-        force = wrench_balance.tensions(robot, state)
-        length, rate, bend = wrench_balance.cable_motion(robot, state)
-    else:
-        force = force_balance.tensions(robot, state.position, state.acceleration)
-        length, rate, bend = force_balance.cable_motion(robot, state.position, state.velocity, state.acceleration)
-    return Values(force, state.position[2], length, jnp.abs(rate), jnp.abs(bend))
+    length, rate, bend = cables.cable_motion(robot, state)
+    return Values(cables.tensions(robot, state), state.position[2], length, jnp.abs(rate), jnp.abs(bend))
 
 
 def scales(n_cables: int, weight: Array, z0: Array) -> dict[str, tuple[float, Array]]:
