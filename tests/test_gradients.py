@@ -96,7 +96,10 @@ def test_derivatives_of_states():
     robot, signs = point_mass("up")
     motion = hypocycloid(robot, FAR + np.array([0.2, -0.1, 1.5]) * signs, FAR + TARGET * signs, z0=1.7, arcs=5)
     tau, time = jnp.asarray(0.37), motion.duration()
-    position = lambda t: motion.state(t).position  # noqa: E731
+
+    def position(t):
+        return motion.state(t).position
+
     state = motion.state(tau)
     np.testing.assert_allclose(jax.jacfwd(position)(tau) / time, state.velocity, rtol=1e-9)
     np.testing.assert_allclose(jax.jacfwd(jax.jacfwd(position))(tau) / time**2, state.acceleration, rtol=1e-8)

@@ -69,7 +69,7 @@ def hypocycloid(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (2.49).
     """
-    own, frame = _prepared(robot, PointMassRobot, (3,), "a point mass on three cables")
+    own, frame = _prepared(robot, (3,), "a point mass on three cables")
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     first, last = _places(frame, start, end, z0)
     found = segment(own, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
@@ -94,7 +94,7 @@ def transition(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (1.27) or (1.28).
     """
-    own, frame = _prepared(robot, PointMassRobot, (2, 3), "a point mass")
+    own, frame = _prepared(robot, (2, 3), "a point mass")
     function = amplitude_of(amplitude, free_end=True)
     end = jnp.asarray(frame.inward(target), float)
     found = transitions.transition(own, function, end, jnp.asarray(z0, float))
@@ -132,7 +132,7 @@ def platform_motion(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (2.49).
     """
-    own, frame = _prepared(robot, PlatformRobot, (6,), "a platform on six cables")
+    own, frame = _prepared(robot, (6,), "a platform on six cables")
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     places = _places(frame, start, end, z0)
     turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
@@ -199,7 +199,7 @@ def _inner(motion: Motion) -> Motion:
     return motion.motion if isinstance(motion, Placed) else motion
 
 
-def _prepared(robot: Any, kind: type, dofs: tuple[int, ...], allowed: str) -> tuple[Any, Any]:
-    if not isinstance(robot, kind) or robot.dof not in dofs or robot.n_cables != robot.dof:  # type: ignore[attr-defined]
+def _prepared(robot: Any, dofs: tuple[int, ...], allowed: str) -> tuple[Any, Any]:
+    if getattr(robot, "dof", None) not in dofs or robot.n_cables != robot.dof:
         raise InputError("robot", getattr(robot, "name", robot), allowed)
     return prepared(robot)
