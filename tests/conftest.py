@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from cspr_jax.arithmetic import elementary
+from cspr_jax.arithmetic import batches, elementary
 from cspr_jax.robots import point_mass
 
 # Compiled code is kept from run to run beside the packages that it belongs to; XLA's key is the program. What tests
@@ -27,7 +27,7 @@ CHEAP = (
     "--xla_cpu_parallel_codegen_split_count=1",
 )
 # Compiled code of finished files goes where a process has more than so many bytes.
-ROOM = 1_000_000_000
+ROOM = 1_500_000_000
 os.environ["CSPR_CACHE_DIR"] = str(COMPILED)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_compilation_cache_dir", str(COMPILED / "tests"))
@@ -38,6 +38,8 @@ jax.config.update("jax_persistent_cache_enable_xla_caches", "none")
 elementary.PROMOTION = ("strict", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
+# Most tests ask for a handful of cases; a batch is padded.
+batches.RATIO["cpu"] = 1 / 16
 settings.register_profile("default", deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 settings.load_profile("default")
 
