@@ -39,7 +39,7 @@ elementary.PROMOTION = ("strict", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 # Most tests ask for a handful of cases; a batch is padded.
-batches.RATIO["cpu"] = 1 / 16
+batches.LARGEST = 64
 settings.register_profile("default", deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 settings.load_profile("default")
 

@@ -232,7 +232,7 @@ def test_workers_of_a_scheduler_choose_their_device(capsys):
 def test_batches_are_larger_on_a_gpu(monkeypatch, backend, length):
     """The shapes of the calls, and that padding is trimmed."""
     shapes = []
-    monkeypatch.setitem(batches.RATIO, "cpu", 1.0)
+    monkeypatch.setattr(batches, "LARGEST", 1 << 20)
     monkeypatch.setattr(jax, "default_backend", lambda: backend)
 
     def doubled(x):

@@ -14,9 +14,10 @@ import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
 
-# Length of a batch, times that on a CPU, whose caches it has to fit. A GPU needs more at a time; tests, which ask for
-# few cases at a time, less.
-RATIO = {"cpu": 1.0, "gpu": 16.0, "tpu": 16.0}
+# How many times as large a batch is elsewhere than on a CPU, whose caches it has to fit.
+LARGER = {"gpu": 16, "tpu": 16}
+# No batch is larger. Tests, which ask for few cases at a time, set it lower.
+LARGEST = 1 << 20
 THREADS = 2
 Found = TypeVar("Found")
 
@@ -71,7 +72,7 @@ def room(size: int) -> int:
     Returns:
         the length.
     """
-    return max(1, round(size * RATIO.get(jax.default_backend(), 1.0)))
+    return min(size * LARGER.get(jax.default_backend(), 1), LARGEST)
 
 
 def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
