@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
+from support.amplitudes import of_one_shape
 
 from cspr_jax.feasibility.point_mass import criteria
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, prove, tolerance
@@ -20,7 +21,7 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.amplitudes import named
 
-COUNT, SOAK_COUNT = 2_000, 20_000
+COUNT, SOAK_COUNT = 400, 20_000
 SAMPLES = 20_001
 Z0 = 1.7
 BASES = {"prototype": equilateral(0.26), "tilted": TILTED}
@@ -77,15 +78,6 @@ KAPPA_ETA_BOUNDS = jax.jit(jax.vmap(kappa_eta_bounds, (0, None, 0, 0, 0)))
 CURVATURES = jax.jit(jax.vmap(lambda *given: jnp.stack(criteria.curvatures(*given)), (None, None, None, 0, 0, 0, 0)))
 
 
-def of_one_shape(amplitude):
-    """The same function with three pieces of six coefficients and no name, so that kernels compile once."""
-    missing = 2 - len(amplitude.knots)
-    table = np.zeros((3, 6))
-    table[: 3 - missing, : amplitude.coefficients.shape[1]] = amplitude.coefficients
-    knots, origins = (np.r_[v, [2.0] * missing] for v in (amplitude.knots, amplitude.origins))
-    return dataclasses.replace(amplitude, knots=knots, origins=origins, coefficients=table, name="any")
-
-
 def random_intervals(rng, amplitude, n):
     """Intervals of very different lengths without a knot inside, and 17 instants of each."""
     edges = np.r_[0.0, amplitude.knots, 1.0]
@@ -107,7 +99,7 @@ def differences(values, tau):
 @pytest.mark.parametrize("amplitude", [QUINTIC, EFFECTIVE, SMOOTH], ids=lambda a: a.name)
 def test_bounds_of_each_cable_hold_and_are_sharp(name, amplitude):
     """Of every kappa_k and of eta: value, slope and curvature; too small proves falsehoods, too large nothing."""
-    rng, n = np.random.default_rng(21), 6000
+    rng, n = np.random.default_rng(21), 3000
     starts, ends, arcs = spread_points(rng, name, n)
     segments, p, same = segments_of(name, starts, ends, arcs), arcs.astype(float), of_one_shape(amplitude)
     start, stop, tau = random_intervals(rng, amplitude, n)
@@ -141,7 +133,7 @@ def limits_of(values, k=None):
 @pytest.mark.parametrize("name", BASES)
 def test_curvature_bounds_of_limits_hold(name):
     """Cable by cable: a bound that is too small lets a cable snap between samples. Only f'' <= M is needed."""
-    rng, n, robot, same = np.random.default_rng(22), 6000, ROBOTS[name], of_one_shape(EFFECTIVE)
+    rng, n, robot, same = np.random.default_rng(22), 2000, ROBOTS[name], of_one_shape(EFFECTIVE)
     starts, ends, arcs = spread_points(rng, name, n)
     segments, p = segments_of(name, starts, ends, arcs), arcs.astype(float)
     start, stop, tau = random_intervals(rng, EFFECTIVE, n)
@@ -186,7 +178,7 @@ def test_verdicts_agree_with_dense_samples():
 
 @pytest.mark.soak
 def test_verdicts_agree_with_dense_samples_in_full():
-    """The same, ten times as many."""
+    """The same, fifty times as many."""
     check_random_segments(SOAK_COUNT, 24)
 
 
@@ -206,7 +198,7 @@ def within(key, attained, limit):
 
 def test_verdicts_with_limits_agree_with_dense_samples():
     """Each limit alone at a value that parts the feasible segments, then all of them together."""
-    rng, name, n = np.random.default_rng(25), "prototype", 200
+    rng, name, n = np.random.default_rng(25), "prototype", 100
     starts, ends, arcs = random_points(rng, name, n)
     segments = segments_of(name, starts, ends, arcs)
     points = list(zip(starts, ends, arcs, strict=True))
@@ -224,15 +216,15 @@ def test_verdicts_with_limits_agree_with_dense_samples():
         proof = prove(Problem(ROBOTS[name], limits_of(values), QUINTIC), segments, arcs)
         assert np.array_equal(proof.feasible, wanted), values
         assert np.array_equal(proof.infeasible, ~wanted), values
-        assert 10 < wanted.sum() < taut.sum()
+        assert 5 < wanted.sum() < taut.sum()
 
 
 def test_undecided_only_within_the_tolerance():
     """Closing in on a margin of zero: infeasible, undecided, feasible in this order, the band as narrow as stated."""
-    name, end, arcs, n = "prototype", np.array([-1.1, -0.9, 1.5]), 2, 1001
+    name, end, arcs, n = "prototype", np.array([-1.1, -0.9, 1.5]), 2, 257
     problem = Problem(ROBOTS[name], Limits(), QUINTIC)
     low, high = 0.2, 0.6  # z of the start; it is 0.5 in Table 2.1
-    for _ in range(4):
+    for _ in range(5):
         z = np.linspace(low, high, n)
         starts = np.c_[np.full((n, 2), -1.1), z]
         segments, many = segments_of(name, starts, np.tile(end, (n, 1)), np.full(n, arcs)), np.full(n, arcs)

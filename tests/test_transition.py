@@ -10,6 +10,7 @@ import pytest
 from conftest import equilateral
 from hypothesis import given
 from hypothesis import strategies as st
+from support.amplitudes import of_one_shape
 
 from cspr_jax.cli import main
 from cspr_jax.feasibility.transition import oscillations as counts
@@ -21,13 +22,18 @@ from cspr_jax.trajectories import transition as transitions
 from cspr_jax.trajectories.amplitudes import derivatives, from_polynomial, named
 
 FUNCTIONS = {
-    "A1": named("A1"),
-    "A2": named("A2"),
-    "A3": named("A3"),
-    "effective": named("effective", 0.07),
-    "effective-c3": named("effective-c3", 0.2),
+    "A1": of_one_shape(named("A1")),
+    "A2": of_one_shape(named("A2")),
+    "A3": of_one_shape(named("A3")),
+    "effective": of_one_shape(named("effective", 0.07)),
+    "effective-c3": of_one_shape(named("effective-c3", 0.2)),
 }
 PRINTED = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}  # (1.101)
+LEAST, BEST = jax.jit(counts.least_oscillations), jax.jit(counts.best_inclination)
+LEAST_OF_MANY = jax.jit(jax.vmap(counts.least_oscillations, (None, None, 0)))
+ROOT = jax.jit(jax.vmap(counts.squared_oscillations_at, (None, 0, 0, 0)))
+TRANSITION, WEIGHTS, MOTION = (jax.jit(f) for f in (transitions.transition, transitions.weights, hypocycloid.motion))
+PULL, DERIVATIVES = jax.jit(force_balance.pseudotensions), jax.jit(derivatives, static_argnames="order")
 
 
 def envelope_root(name, weight, v, tau):
@@ -45,7 +51,7 @@ def envelope_root(name, weight, v, tau):
 def test_the_printed_root(name):
     rng = np.random.default_rng(1)
     weight, v, tau = rng.normal(scale=3.0, size=400), rng.uniform(-0.99, 0.99, 400), rng.uniform(0.01, 1.0, 400)
-    found = jax.vmap(lambda w, i, t: counts.squared_oscillations_at(FUNCTIONS[name], w, i, t))(weight, v, tau)
+    found = ROOT(FUNCTIONS[name], weight, v, tau)
     curve = np.polynomial.Polynomial(PRINTED[name])
     least = curve.deriv(2)(1.0) / (4.0 * np.pi**2)  # below it there is no duration
     np.testing.assert_allclose(found, np.maximum(envelope_root(name, weight, v, tau), least), rtol=1e-7, atol=1e-9)
@@ -61,7 +67,7 @@ def test_the_largest_root_is_found_between_samples(name):
         weights = np.append(weights, -weights.sum())
         v = rng.uniform(-1.0, 1.0) if i % 3 else rng.choice([-0.999, 0.9999])
         dense = max(envelope_root(name, w, v, tau).max() for w in weights)
-        found = float(counts.least_oscillations(FUNCTIONS[name], jnp.asarray(weights), jnp.asarray(v))) ** 2
+        found = float(LEAST(FUNCTIONS[name], weights, v)) ** 2
         assert found >= max(dense, 0.0) * (1.0 - 1e-9)
         assert found == pytest.approx(max(dense, 0.0), rel=2e-4, abs=1e-4)
 
@@ -71,14 +77,14 @@ def test_weights_make_the_pseudotensions(tilted, name):
     """(1.32) with the weights of a general triangle, against the force balance along the motion."""
     amplitude, z0, n = FUNCTIONS[name], 1.4, 5.0
     target = np.array([1.1, -0.7, 1.9])
-    one = transitions.transition(tilted, amplitude, jnp.asarray(target), jnp.asarray(z0))
-    at_rest = force_balance.pseudotensions(tilted, one.hub, jnp.zeros(3))
-    end = float(derivatives(amplitude, jnp.asarray(1.0), order=2)[2])
+    one = TRANSITION(tilted, amplitude, target, z0)
+    at_rest = PULL(tilted, one.hub, np.zeros(3))
+    end = float(DERIVATIVES(amplitude, jnp.asarray(1.0), order=2)[2])
     for tau in np.linspace(0.0, 1.0, 41):
-        position, _, acceleration = hypocycloid.motion(one, amplitude, jnp.asarray(2.0 * n), jnp.asarray(tau))
-        kappa = np.asarray(force_balance.pseudotensions(tilted, position, acceleration) / at_rest)
-        a, a1, a2 = (float(x) for x in derivatives(amplitude, jnp.asarray(tau), order=2))
-        v, w = float(transitions.inclination(one)), np.asarray(transitions.weights(one))
+        position, _, acceleration = MOTION(one, amplitude, 2.0 * n, tau)
+        kappa = np.asarray(PULL(tilted, position, acceleration)) / np.asarray(at_rest)
+        a, a1, a2 = (float(x) for x in DERIVATIVES(amplitude, jnp.asarray(tau), order=2))
+        v, w = float(transitions.inclination(one)), np.asarray(WEIGHTS(one))
         omega = (2.0 * np.pi * n) ** 2 - end  # (1.29)
         cosine = (v + w) * (a2 - a * end) / omega - v * a
         sine = 4.0 * np.pi * n * (v + w) * a1 / omega
@@ -91,24 +97,24 @@ def test_the_weights_of_the_equilateral_robot():
     a, z0 = 0.693, 2.0
     robot = point_mass_robot(equilateral(a), mass=0.129)
     for x, y, v in ((1.3, -0.4, 0.0), (-0.2, 0.9, 0.3), (0.0, 2.0, -0.6)):
-        one = transitions.transition(robot, FUNCTIONS["A2"], jnp.array([x, y, z0 * (1.0 + v)]), jnp.asarray(z0))
+        one = TRANSITION(robot, FUNCTIONS["A2"], np.array([x, y, z0 * (1.0 + v)]), z0)
         wanted = np.array([y - math.sqrt(3.0) * x, y + math.sqrt(3.0) * x, -2.0 * y]) / a
-        np.testing.assert_allclose(transitions.weights(one), wanted, atol=1e-12)
+        np.testing.assert_allclose(WEIGHTS(one), wanted, atol=1e-12)
         assert float(transitions.inclination(one)) == pytest.approx(v)
     for half, sign in ((0.5, 1.0), (-0.5, -1.0)):  # (1.37), with the cables numbered either way
         robot = planar_robot([[half, 0.0, 0.0], [-half, 0.0, 0.0]], mass=0.129)
-        one = transitions.transition(robot, FUNCTIONS["A2"], jnp.array([1.25, 0.0, 2.2]), jnp.asarray(z0))
-        np.testing.assert_allclose(transitions.weights(one), [-2.5 * sign, 2.5 * sign], atol=1e-12)
+        one = TRANSITION(robot, FUNCTIONS["A2"], np.array([1.25, 0.0, 2.2]), z0)
+        np.testing.assert_allclose(WEIGHTS(one), [-2.5 * sign, 2.5 * sign], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_motion_starts_at_rest_and_ends_like_a_pendulum(tilted, name):
-    amplitude, z0, n = FUNCTIONS[name], jnp.asarray(1.4), jnp.asarray(3.0)
-    target = jnp.array([0.6, 0.5, 1.1])
-    one = transitions.transition(tilted, amplitude, target, z0)
+    amplitude, z0, n = FUNCTIONS[name], 1.4, 3.0
+    target = np.array([0.6, 0.5, 1.1])
+    one = TRANSITION(tilted, amplitude, target, z0)
 
     def at(tau):
-        return [np.asarray(x) for x in hypocycloid.motion(one, amplitude, 2.0 * n, jnp.asarray(tau))]
+        return [np.asarray(x) for x in MOTION(one, amplitude, 2.0 * n, tau)]
 
     start, end = at(0.0), at(1.0)
     np.testing.assert_allclose(start[0], one.hub, atol=1e-14)
@@ -119,7 +125,7 @@ def test_motion_starts_at_rest_and_ends_like_a_pendulum(tilted, name):
     np.testing.assert_allclose(end[2], pendulum, atol=1e-10)
     time, h = float(hypocycloid.duration(one, 2.0 * n)), 1e-5
     for tau in (0.21, 0.5, 0.83):
-        swing = float(derivatives(amplitude, jnp.asarray(tau), order=0)[0]) * math.cos(6.0 * math.pi * tau)
+        swing = float(DERIVATIVES(amplitude, jnp.asarray(tau), order=0)[0]) * math.cos(6.0 * math.pi * tau)
         np.testing.assert_allclose(at(tau)[0], one.hub + (target - one.hub) * swing, atol=1e-12)  # (1.20)
         before, now, after = at(tau - h), at(tau), at(tau + h)
         for k in (0, 1):
@@ -136,12 +142,12 @@ def test_symmetries(pair, v, name, order):
     """The order of the cables is nothing; the opposite target at the opposite inclination needs as many."""
     weights = np.array([*pair, -sum(pair)])
     amplitude = FUNCTIONS[name]
-    n = float(counts.least_oscillations(amplitude, jnp.asarray(weights), jnp.asarray(v)))
-    assert float(counts.least_oscillations(amplitude, jnp.asarray(weights[list(order)]), jnp.asarray(v))) == n
-    assert float(counts.least_oscillations(amplitude, jnp.asarray(-weights), jnp.asarray(-v))) == pytest.approx(n)
+    n = float(LEAST(amplitude, weights, v))
+    assert float(LEAST(amplitude, weights[list(order)], v)) == n
+    assert float(LEAST(amplitude, -weights, -v)) == pytest.approx(n)
     # Above it the envelopes (1.39) are positive at every instant, below it one of them is not.
     tau = np.linspace(0.0, 1.0, 2001)
-    a, a1, a2 = (np.asarray(x) for x in derivatives(amplitude, jnp.asarray(tau), order=2))
+    a, a1, a2 = (np.asarray(x) for x in DERIVATIVES(amplitude, jnp.asarray(tau), order=2))
     for factor, sign in ((1.001, 1.0), (0.999, -1.0)):
         if n < 0.05:  # where next to nothing is asked
             continue
@@ -157,28 +163,24 @@ def test_far_targets_need_oscillations_in_proportion(name):
     """(1.55): n(0) tends to w_max / pi times the largest slope; not below (1.104), but where A''(1) helps."""
     amplitude = FUNCTIONS[name]
     for w in (1.0, 30.0, 3000.0):
-        weights = jnp.array([w, -w, 0.0])
-        n = float(counts.least_oscillations(amplitude, weights, jnp.asarray(0.0)))
+        weights = np.array([w, -w, 0.0])
+        n = float(LEAST(amplitude, weights, 0.0))
         if name not in ("A1", "A3") or w > 1.0:
-            assert n >= float(zero_tension.least_oscillations(weights, jnp.asarray(0.0))) * (1.0 - 1e-12)
-    assert n == pytest.approx(float(counts.many_oscillations(amplitude, weights)), rel=1e-5)
+            assert n >= float(zero_tension.least_oscillations(jnp.asarray(weights), jnp.asarray(0.0))) * (1.0 - 1e-12)
+    assert n == pytest.approx(float(counts.many_oscillations(amplitude, jnp.asarray(weights))), rel=1e-5)
     assert n == pytest.approx(3000.0 * float(amplitude.largest[1]) / math.pi, rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.soak if name in ("A2", "A3") else ()) for name in FUNCTIONS]
-)
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_best_inclination(name):
     """No inclination of a fine scan needs less; it is against the largest weight, and zero where two are largest."""
     amplitude = FUNCTIONS[name]
     for weights in ([1.0, 1.0, -2.0], [-3.0, 2.5, 0.5], [0.4, -0.3, -0.1], [8.0, -1.0, -7.0]):
-        v, n = (float(x) for x in counts.best_inclination(amplitude, jnp.array(weights)))
-        scan = jax.vmap(lambda i, w=weights: counts.least_oscillations(amplitude, jnp.array(w), i))(
-            jnp.linspace(-0.99, 0.99, 397)
-        )
+        v, n = (float(x) for x in BEST(amplitude, np.array(weights)))
+        scan = LEAST_OF_MANY(amplitude, np.array(weights), np.linspace(-0.99, 0.99, 397))
         assert n <= float(scan.min()) + 1e-9
         assert np.sign(v) == -np.sign(weights[int(np.argmax(np.abs(weights)))])
-    assert float(counts.best_inclination(amplitude, jnp.array([2.0, -2.0, 0.0]))[0]) == pytest.approx(0.0, abs=1e-6)
+    assert float(BEST(amplitude, np.array([2.0, -2.0, 0.0]))[0]) == pytest.approx(0.0, abs=1e-6)
 
 
 def overshooting(rng):
@@ -188,7 +190,7 @@ def overshooting(rng):
     return np.pad(curve.coef, (0, 10 - len(curve.coef))).tolist()
 
 
-def densest(coefficients, weights, v, samples=400_001):
+def densest(coefficients, weights, v, samples=200_001):
     """The largest root of (1.44) over samples, the printed formula in NumPy; infinite where |v A| reaches 1."""
     curve, tau = np.polynomial.Polynomial(coefficients), np.linspace(0.0, 1.0, samples)
     size, slope, bend, end = curve(tau), curve.deriv()(tau), curve.deriv(2)(tau), curve.deriv(2)(1.0)
@@ -204,15 +206,12 @@ def densest(coefficients, weights, v, samples=400_001):
     return math.sqrt(found)
 
 
-LEAST, BEST = jax.jit(counts.least_oscillations), jax.jit(counts.best_inclination)
-
-
 def test_functions_that_overshoot():
     """Their peaks are sharp where |v A| comes near to 1, and beyond that no number of oscillations will do."""
     rng, beyond = np.random.default_rng(4), 0
-    for i in range(40):
+    for i in range(20):
         coefficients = overshooting(rng)
-        amplitude = from_polynomial(coefficients)
+        amplitude = of_one_shape(from_polynomial(coefficients))
         most = max(abs(float(amplitude.lowest)), float(amplitude.highest))
         v = float(rng.choice([-1, 1]) * (1.0 - 10 ** rng.uniform(-6, -1)) / (most if i % 4 else 1.0))
         weights = rng.normal(size=3) * 3.0
@@ -223,7 +222,7 @@ def test_functions_that_overshoot():
         best, n = (float(x) for x in BEST(amplitude, weights))
         assert abs(best) * most < 1.0
         assert n == pytest.approx(densest(coefficients, weights, best), rel=1e-5)
-    assert 3 < beyond < 20
+    assert 1 < beyond < 10
 
 
 def test_beyond_its_reach_no_number_of_oscillations_will_do():
@@ -252,7 +251,7 @@ def test_the_best_epsilon():
     found = [counts.best_epsilon(w) for w in weights]
     assert found[0][0] > found[1][0] > found[2][0]
     for epsilon in np.linspace(0.02, 0.4, 20):
-        needed = float(counts.least_oscillations(named("effective", epsilon), weights[1], jnp.asarray(0.0)))
+        needed = float(LEAST(of_one_shape(named("effective", epsilon)), weights[1], 0.0))
         assert found[1][1] <= needed + 1e-9
 
 

@@ -23,6 +23,8 @@ BOUNDARY_TOLERANCE = 1e-9
 # Shorter ends ask for accelerations that no robot has, and lose the digits of A'' to rounding.
 SMALLEST_EPSILON = 1e-3
 LARGEST_COEFFICIENT = 1e9
+# Tables have at least so many columns: functions of few shapes are compiled once, and zeros change no bit.
+COLUMNS = 6
 # Coefficients below this part of the largest one do not change where a function is stationary.
 NEGLIGIBLE = 1e-100
 
@@ -34,7 +36,7 @@ class Amplitude:
     Fields:
         knots: (n_pieces - 1,) where one piece ends and the next begins, increasing.
         origins: (n_pieces,) point about which each piece is expanded.
-        coefficients: (n_pieces, degree + 1) of the powers of (tau - origin), lowest first.
+        coefficients: (n_pieces, 6 or more) of the powers of (tau - origin), lowest first.
         largest: (6,) largest |A|, |A'|, ... |A^(5)| over [0, 1], rounded up.
         lowest: () smallest A over [0, 1].
         highest: () largest A over [0, 1].
@@ -113,8 +115,7 @@ def from_pieces(
     Returns:
         the amplitude function, float64.
     """
-    degree = max(len(piece) for piece in pieces)
-    table = np.zeros((len(pieces), degree))
+    table = np.zeros((len(pieces), max(COLUMNS, *(len(piece) for piece in pieces))))
     for row, piece in zip(table, pieces, strict=True):
         row[: len(piece)] = piece
     ends = [0.0, *knots, 1.0]
