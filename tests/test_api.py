@@ -137,7 +137,8 @@ def test_plans(folder, capsys):
 
 
 def test_a_plan_that_is_not_feasible(folder):
-    data = tomllib.loads(PLAN) | {"tension_min": 4.0, "max_arcs": 3}
+    data = tomllib.loads(PLAN) | {"max_arcs": 1}
+    data["pose"][1]["position"] = [1.8, 0.2, 0.4]
     plan = cspr_jax.plan(data)
     assert not plan.feasible and plan.to_dict()["segments"][0]["arcs"] is None
     with pytest.raises(ConfigError, match="not proved feasible"):

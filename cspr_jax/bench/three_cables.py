@@ -10,7 +10,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_threads
+from cspr_jax.arithmetic.batches import in_threads, room
 from cspr_jax.bench.timing import best
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
@@ -51,7 +51,7 @@ def work() -> Work:
     half = math.sqrt(3.0) / 2.0
     base = RADIUS * np.array([[half, -0.5, 0.0], [-half, -0.5, 0.0], [0.0, 1.0, 0.0]])
     problem = Problem(point_mass_robot(base, mass=0.198), Limits(), amplitudes.named("quintic"))
-    ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * arc_sieve.BATCH, 3))
+    ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * room(arc_sieve.BATCH), 3))
     starts = np.broadcast_to(START, ends.shape).copy()
     found, _ = segments_between(problem, starts, ends, np.full(len(ends), Z0))
     return Work(problem, ends, (found[0], found[1]))

@@ -12,7 +12,7 @@ import cspr_jax
 from cspr_jax.robots import point_mass
 from cspr_jax.trajectories.amplitudes import named
 
-N, EXAMPLES = 300, 10
+N, EXAMPLES = 64, 10
 QUINTIC = named("quintic")
 DOWN = np.array([0.0, 0.0, 1.0])
 SEEDS = st.integers(0, 2**16)
