@@ -44,25 +44,41 @@ settings.register_profile("default", deadline=None, derandomize=True, suppress_h
 settings.load_profile("default")
 
 
-# Files that take long go first, so that both processes end together.
-_LONG = (
-    "test_workers",
-    "test_pose_plans",
-    "test_crashes",
-    "test_xla",
-    "test_orientation_maps",
-    "test_platform",
-    "test_random_segments",
-    "test_pose_maps",
-    "test_certificate",
-    "test_transition",
-    "test_first_look",
-    "test_envelopes",
+# What compiles the same kernels goes to one process, in this order; every other file is a group of its own.
+_POINT_MASSES = (
+    "test_docs",
+    "test_api",
+    "test_sweep",
+    "test_plan",
     "test_python",
     "test_minimum_arcs",
+    "test_certificate",
+    "test_random_segments",
+    "test_margins",
+    "test_symmetries",
+    "test_motions",
+    "test_outputs",
+    "test_rows",
     "test_transition_plans",
     "test_minimum_oscillations",
+    "test_envelopes",
+    "test_transition",
+    "test_bench",
+    "test_hypocycloid",
 )
+_PLATFORMS = (
+    "test_pose_plans",
+    "test_mujoco",
+    "test_pose_maps",
+    "test_gradients",
+    "test_families",
+    "test_searches",
+    "test_orientation_maps",
+    "test_orientations",
+    "test_first_look",
+    "test_platform",
+)
+_ORDER = {name: place for place, name in enumerate((*_POINT_MASSES, *_PLATFORMS, "test_workers", "test_crashes"))}
 
 
 def pytest_configure(config):
@@ -76,10 +92,14 @@ def pytest_configure(config):
                 path.unlink()
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Long files first, the longest before all."""
-    rank = {name: place for place, name in enumerate(_LONG)}
-    items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
+    """Groups, the long ones first, so that both processes end together."""
+    items.sort(key=lambda item: _ORDER.get(item.path.stem, len(_ORDER)))
+    for item in items:
+        stem = item.path.stem
+        name = "point masses" if stem in _POINT_MASSES else "platforms" if stem in _PLATFORMS else stem
+        item.add_marker(pytest.mark.xdist_group(name))
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -1,9 +1,6 @@
 """Plans through the command line: JSON, tables and motions, beside printed numbers and the NumPy oracle."""
 
-import contextlib
 import csv
-import io
-import json
 import tomllib
 from pathlib import Path
 
@@ -12,8 +9,8 @@ import numpy as np
 import pytest
 import xarray
 from oracles import point_mass
+from support.commands import plan, planned, strict_json
 
-from cspr_jax.cli import main
 from cspr_jax.plans import choices
 
 ROOT = Path(__file__).parent.parent
@@ -33,32 +30,6 @@ HEAD, *PARTS = FREE.split("[[pose]]\n")
 SHORT, ONE = ("[[pose]]\n".join([HEAD, *PARTS[first:last]]) for first, last in ((5, 8), (3, 5)))
 
 
-def cspr(folder: Path, text: str, *arguments: str) -> tuple[int, str, str]:
-    """Exit code and both outputs of `cspr plan` for a plan's text."""
-    path = folder / "plan.toml"
-    path.write_text(text, "utf-8")
-    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
-        code = main(["plan", str(path), *arguments])
-    return code, out.getvalue(), err.getvalue()
-
-
-def strict_json(text: str) -> dict:
-    """One JSON object on one line, without NaN and infinities."""
-    assert text.count("\n") == 1
-
-    def refuse(word):
-        raise ValueError(word)
-
-    return json.loads(text, parse_constant=refuse)
-
-
-def planned(folder: Path, text: str) -> dict:
-    """What `cspr plan --json` prints of a plan that is feasible."""
-    code, out, err = cspr(folder, text, "--json")
-    assert (code, err) == (0, "")
-    return strict_json(out)
-
-
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
     """The JSON of Table 2.1's sequence, from a process in which jax still has 32 bits."""
@@ -74,8 +45,8 @@ def free(tmp_path_factory):
     """The same without a floor; its motion as CSV and as HDF5."""
     folder = tmp_path_factory.mktemp("free")
     found = planned(folder, FREE)
-    assert cspr(folder, FREE, "-o", str(folder / "motion.csv"))[::2] == (0, "")
-    assert cspr(folder, FREE, "-o", str(folder / "motion.h5"))[::2] == (0, "")
+    assert plan(folder, FREE, "-o", str(folder / "motion.csv"))[::2] == (0, "")
+    assert plan(folder, FREE, "-o", str(folder / "motion.h5"))[::2] == (0, "")
     assert sorted(path.name for path in folder.iterdir()) == ["motion.csv", "motion.h5", "plan.toml"]
     return found, folder
 
@@ -132,7 +103,7 @@ def test_numbers_of_each_segment_are_the_oracle_s(printed):
 
 def test_a_plan_that_is_not_feasible(tmp_path):
     output = tmp_path / "motion.csv"
-    code, out, err = cspr(tmp_path, FREE.replace("max_arcs = 30", "max_arcs = 1"), "--json", "-o", str(output))
+    code, out, err = plan(tmp_path, FREE.replace("max_arcs = 30", "max_arcs = 1"), "--json", "-o", str(output))
     found = strict_json(out)
     assert (code, found["feasible"]) == (1, False)
     assert len(err.splitlines()) == 1 and str(output) in err
@@ -141,7 +112,7 @@ def test_a_plan_that_is_not_feasible(tmp_path):
         assert (segment["arcs"], segment["tried_arcs"]) == (None, 1)
         assert set(segment["verdict"].split("+")) == {"no_arcs", "slack_cable"}
         assert segment["margin"] < 0.0 and segment["duration"] > 0.0 and segment["limit_margin"] is None
-    code, out, _ = cspr(tmp_path, FREE.replace("max_arcs = 30", "max_arcs = 1"))
+    code, out, _ = plan(tmp_path, FREE.replace("max_arcs = 30", "max_arcs = 1"))
     assert code == 1 and "no_arcs" in out and "none found" in out
 
 
@@ -152,7 +123,7 @@ def test_a_fixed_number_of_arcs(tmp_path, free):
     before, after = free[0]["segments"], found["segments"]
     assert [s["arcs"] for s in after] == [s["arcs"] + 2 * (s["from"] == 3) for s in before]
     assert after[3]["margin"] > before[3]["margin"] and after[3]["tension_min"] > before[3]["tension_min"]
-    code, out, _ = cspr(tmp_path, FREE.replace(place, f"{place}arcs = 1\n"), "--json")
+    code, out, _ = plan(tmp_path, FREE.replace(place, f"{place}arcs = 1\n"), "--json")
     segment = strict_json(out)["segments"][3]
     assert (code, segment["arcs"], segment["tried_arcs"]) == (1, None, 1)
 
@@ -227,7 +198,7 @@ def test_the_motion_as_hdf5(free):
 
 def test_rows_at_a_rate(tmp_path):
     output = tmp_path / "motion.csv"
-    assert cspr(tmp_path, SHORT, "--rate", "40", "-o", str(output))[::2] == (0, "")
+    assert plan(tmp_path, SHORT, "--rate", "40", "-o", str(output))[::2] == (0, "")
     segments, motion = planned(tmp_path, SHORT)["segments"], columns(output)
     total = sum(s["duration"] for s in segments)
     ticks = [*np.arange(np.ceil(total * 40)) / 40, total]
@@ -240,7 +211,7 @@ def test_rows_at_a_rate(tmp_path):
         np.testing.assert_allclose(motion["position"][inside], oracle_motion(5 + i, segment["arcs"], tau)[1], atol=1e-9)
         start += segment["duration"]
     for rate in ("0", "-5", "nan", "inf", "1e12"):
-        code, _, err = cspr(tmp_path, SHORT, "--rate", rate, "-o", str(tmp_path / "other.csv"))
+        code, _, err = plan(tmp_path, SHORT, "--rate", rate, "-o", str(tmp_path / "other.csv"))
         assert code == 2 and err.startswith("cspr: --rate: ") and len(err.splitlines()) == 1
     assert not (tmp_path / "other.csv").exists()
 
@@ -250,7 +221,7 @@ def test_outputs_that_cannot_be_written(tmp_path, name, code):
     for blocker in (None, tmp_path / "none"):
         if blocker:
             blocker.write_text("a file where a folder should be")
-        found, _, err = cspr(tmp_path, SHORT, "-o", str(tmp_path / name))
+        found, _, err = plan(tmp_path, SHORT, "-o", str(tmp_path / name))
         assert found == code, err
         assert err.startswith("cspr: ") and len(err.splitlines()) == 1 and name in err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["none", "plan.toml"]
@@ -270,7 +241,7 @@ def test_an_upward_z_axis_mirrors_a_downward_one(tmp_path, printed):
             wanted = -value if key == "z_lowest" else value
             assert up[key] == (pytest.approx(wanted, rel=1e-9) if isinstance(value, float) else wanted), key
     output = tmp_path / "up.csv"
-    assert cspr(tmp_path, text, "-o", str(output))[0] == 0
+    assert plan(tmp_path, text, "-o", str(output))[0] == 0
     motion = columns(output)
     np.testing.assert_allclose(motion["position"][400], TARGETS[0] * [1, 1, -1], atol=1e-12)
     place = (BASE * [1, 1, -1], motion["position"])
@@ -280,7 +251,7 @@ def test_an_upward_z_axis_mirrors_a_downward_one(tmp_path, printed):
 
 
 def test_the_table_for_people(tmp_path):
-    code, out, err = cspr(tmp_path, SHORT)
+    code, out, err = plan(tmp_path, SHORT)
     assert (code, err) == (0, "")
     rows = [line for line in out.splitlines() if "feasible" in line]
     for row, place, arcs in zip(rows, ("(0.1, -0.6, 1.8)", "(0, -1.1, 1.7)"), "56", strict=True):
@@ -297,7 +268,7 @@ def test_hints_go_to_stderr_and_change_nothing_else(tmp_path):
     """Spools in millimetres, and below everything, as z was meant to point up: both are computed, and asked about."""
     points = (1000.0 * BASE + [0.0, 0.0, 10.0]).tolist()
     robot = f'{{ name = "mm", mass = 0.198, base_points = {points} }}'
-    code, out, err = cspr(tmp_path, SEQUENCE.replace('"prototype"', robot), "--json")
+    code, out, err = plan(tmp_path, SEQUENCE.replace('"prototype"', robot), "--json")
     assert (code, strict_json(out)["feasible"]) == (1, False)
     units, axis = err.splitlines()
     assert units.startswith(
@@ -310,7 +281,7 @@ def test_all_errors(tmp_path):
     text = ONE.replace("max_arcs = 30", "max_arcs = 0\nmax_tension = 3.0")
     line = "unknown key max_tension = 3.0: did you mean tension_max? allowed: amplitude,"
     for arguments, count in (((), 1), (("--all-errors",), 2)):
-        code, out, err = cspr(tmp_path, text, *arguments)
+        code, out, err = plan(tmp_path, text, *arguments)
         assert (code, out, len(err.splitlines())) == (2, "", count) and line in err
         assert ("(and 1 more: --all-errors shows them)" in err) == (count == 1)
     assert err.endswith("plan.toml: max_arcs = 0: must be at least 1\n")

@@ -4,9 +4,7 @@ Nothing of the package is touched. What this process registers, `cspr` does in t
 tiles gets the row with the sweep and imports the class by its name.
 """
 
-import contextlib
 import importlib
-import io
 import json
 import pickle
 import sys
@@ -15,8 +13,8 @@ import h5py
 import matplotlib.image
 import numpy as np
 import pytest
+from support.commands import cspr
 
-from cspr_jax.cli import main
 from cspr_jax.config import robot as catalogue
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, register, registered
@@ -71,13 +69,6 @@ y = [-0.3, 0.0, 0.4]
 z = [1.1]
 [trajectory]
 """
-
-
-def cspr(*arguments: object) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error of a command."""
-    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
-        code = main([str(argument) for argument in arguments])
-    return code, out.getvalue(), err.getvalue()
 
 
 @pytest.fixture

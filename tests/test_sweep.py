@@ -1,7 +1,5 @@
 """Sweeps from file to HDF5: what is stored, where, under which name, and what a failure leaves behind."""
 
-import contextlib
-import io
 import itertools
 import json
 from pathlib import Path
@@ -12,9 +10,9 @@ import numpy as np
 import pytest
 import xarray
 from oracles import point_mass
+from support.commands import cspr
 
 import cspr_jax
-from cspr_jax.cli import main
 from cspr_jax.errors import SelfCheckError
 from cspr_jax.maps.arcs import MinimumArcsMap
 from cspr_jax.schema.map_kinds import MAP_KINDS
@@ -45,13 +43,6 @@ def sweep_file(folder: Path, axes: str = AXES, start: str = FROM, run: str = "",
     path = folder / "tiny.toml"
     path.write_text(f"{text}[run]\nstore = {json.dumps(list(QUANTITIES))}\n{run}\n")
     return path
-
-
-def cspr(*arguments: object) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error of a command."""
-    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
-        code = main([str(argument) for argument in arguments])
-    return code, out.getvalue(), err.getvalue()
 
 
 def computed(folder: Path, **parts: str) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:

@@ -1,11 +1,9 @@
 """Plans of transitions: there, swings, and back, beside formulas of chapter 1 written again in NumPy."""
 
-import json
-
 import h5py
 import numpy as np
 import pytest
-from support.commands import cspr
+from support.commands import plan, planned
 
 G, MASS, Z0 = 9.81, 0.129, 1.6
 SPOOLS = 0.693 * np.array([[np.sqrt(0.75), -0.5, 0.0], [-np.sqrt(0.75), -0.5, 0.0], [0.0, 1.0, 0.0]])
@@ -32,17 +30,6 @@ rest = true
 
 def text(robot="transition-prototype", amplitude='"A1"', depth=f"z0 = {Z0}", target=None):
     return PLAN.format(robot=robot, amplitude=amplitude, depth=depth, target=target or TARGETS[robot])
-
-
-def told(folder, plan, *arguments):
-    (folder / "plan.toml").write_text(plan)
-    return cspr("plan", folder / "plan.toml", *arguments)
-
-
-def planned(folder, plan, code=0):
-    found = told(folder, plan, "--json")
-    assert found[0] == code and found[2] == ""
-    return json.loads(found[1])
 
 
 def forward(name, target, n, tau):
@@ -82,7 +69,7 @@ SOME = {("transition-prototype", "A1"), ("transition-planar", "A1")}
 )
 def test_there_swings_and_back(tmp_path, robot, name):
     """Every row of the motion is the printed motion; acceleration and tensions go on without a jump."""
-    code, _, err = told(tmp_path, text(robot, f'"{name}"'), "-o", tmp_path / "motion.h5")
+    code, _, err = plan(tmp_path, text(robot, f'"{name}"'), "-o", tmp_path / "motion.h5")
     found = planned(tmp_path, text(robot, f'"{name}"'))
     assert (code, err) == (0, "")
     there, swings, back = found["segments"]
@@ -179,7 +166,7 @@ def test_depths_that_are_chosen(tmp_path, how):
 )
 def test_mistakes(tmp_path, change, words):
     assert change[0] in text()
-    code, out, err = told(tmp_path, text().replace(*change, 1), "-o", tmp_path / "motion.csv")
+    code, out, err = plan(tmp_path, text().replace(*change, 1), "-o", tmp_path / "motion.csv")
     assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1
     assert not (tmp_path / "motion.csv").exists()
 
@@ -188,10 +175,10 @@ def test_two_targets_and_an_inclination(tmp_path):
     more = "\n[[pose]]\nposition = [-1.0, 0.2, {z}]\n"
     assert planned(tmp_path, text(depth="inclination = 0.2") + more.format(z=2.1))["feasible"]
     for depth, z, words in (("inclination = 0.2", 2.2, "different depths"), ('inclination = "best"', 2.1, "a number")):
-        code, _, err = told(tmp_path, text(depth=depth) + more.format(z=z))
+        code, _, err = plan(tmp_path, text(depth=depth) + more.format(z=z))
         assert code == 2 and words in err
 
 
 def test_the_table_for_people(tmp_path):
-    code, out, _ = told(tmp_path, text())
+    code, out, _ = plan(tmp_path, text())
     assert code == 0 and "oscillations" in out and "0.3125" in out and "arcs" not in out

@@ -2,6 +2,8 @@
 
 import contextlib
 import io
+import json
+from pathlib import Path
 
 from cspr_jax.cli import main
 
@@ -11,3 +13,31 @@ def cspr(*arguments: object) -> tuple[int, str, str]:
     with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
         code = main([str(argument) for argument in arguments])
     return code, out.getvalue(), err.getvalue()
+
+
+def plan(folder: Path, text: str, *arguments: object) -> tuple[int, str, str]:
+    """The same of `cspr plan` for the text of a plan, which lies in the folder."""
+    path = folder / "plan.toml"
+    path.write_text(text, "utf-8")
+    return cspr("plan", path, *arguments)
+
+
+def strict_json(text: str) -> dict:
+    """One JSON object on one line, without NaN and infinities.
+
+    Raises:
+        ValueError: one of them stands there.
+    """
+    assert text.count("\n") == 1
+
+    def refuse(word):
+        raise ValueError(word)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def planned(folder: Path, text: str, code: int = 0) -> dict:
+    """What `cspr plan --json` prints of a plan, without a word on standard error."""
+    found, out, err = plan(folder, text, "--json")
+    assert (found, err) == (code, "")
+    return strict_json(out)
