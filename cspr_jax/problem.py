@@ -87,7 +87,7 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
         ConfigError: its geometry, inertia or limits cannot be used.
     """
     given: dict[str, Any] = {"mass": spec.mass, "gravity": gravity_of(spec, keys), "name": spec.name}
-    given |= {"z_axis": spec.z_axis, "limits": build_limits(spec, LimitKeys(), None, file)}
+    given |= {"z_axis": spec.z_axis, "limits": build_limits(spec, LimitKeys(), file)}
     try:
         if not spec.is_platform:
             make = point_mass.planar_robot if spec.planar else point_mass.point_mass_robot
@@ -197,13 +197,12 @@ def build_amplitude(
     return amplitude
 
 
-def build_limits(spec: RobotFile, keys: LimitKeys, floor: float | None, file: object) -> Limits:
+def build_limits(spec: RobotFile, keys: LimitKeys, file: object) -> Limits:
     """Limits of the file over those of the robot.
 
     Args:
         spec: the robot.
         keys: of the plan or sweep.
-        floor: z of the floor in the file's axes, or None.
         file: named in errors.
 
     Returns:
@@ -213,7 +212,7 @@ def build_limits(spec: RobotFile, keys: LimitKeys, floor: float | None, file: ob
         ConfigError: a smallest tension that is not below the largest, or a list of another length.
     """
     try:
-        return _limits(spec, vars(keys) | {"floor": floor}, vars(spec), "")
+        return _limits(spec, vars(keys), vars(spec), "")
     except InputError as error:
         raise ConfigError(file, str(error)) from error
 
@@ -287,7 +286,7 @@ def build_problem(
         ConfigError: the robot, the amplitude function or the limits cannot be used.
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
-    given = build_limits(spec, limits, limits.floor, file)
+    given = build_limits(spec, limits, file)
     robot = kernel_robot(spec, keys, file)
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
 
