@@ -9,6 +9,7 @@ import matplotlib.colors
 import numpy as np
 import pytest
 from reliability.support import go, sweep_of
+from support.reading import read_here
 
 import cspr_jax
 from cspr_jax.cli import main
@@ -31,6 +32,12 @@ position = [-1.1, -1.1, 0.5]
 [[pose]]
 position = [-1.1, -0.9, 1.5]
 """
+
+
+@pytest.fixture(autouse=True)
+def files_are_read_here(monkeypatch):
+    """By this process; how another one reads them is for reliability/test_hostile_results.py."""
+    read_here(monkeypatch)
 
 
 def cspr(capsys, *arguments: object, code: int = 0) -> str:

@@ -8,10 +8,18 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from support.reading import read_here
 from test_outputs import cspr, panels
 
 from cspr_jax.outputs.plots.colours import NONE_COLOUR, scale_of
 from cspr_jax.store.netcdf import make_datasets, new_hdf5
+
+
+@pytest.fixture(autouse=True)
+def files_are_read_here(monkeypatch):
+    """By this process; how another one reads them is for reliability/test_hostile_results.py."""
+    read_here(monkeypatch)
+
 
 TRIANGLE = [[0.3, -0.2, 0.1], [-0.3, -0.2, 0.1], [0.0, 0.4, 0.1]]
 MSSM = [point for point in TRIANGLE for _ in range(2)]

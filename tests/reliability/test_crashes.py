@@ -59,12 +59,14 @@ def every_crash(job, tmp_path, modes_at):
     return count
 
 
-def test_every_crash_point(long_job, tmp_path):
-    assert every_crash(long_job, tmp_path, lambda k: [CRASHES[k % 4]]) > 90
+def test_every_crash_point(short_job, tmp_path):
+    """Neighbouring calls die in different ways: of a file's calls, each way comes once or more."""
+    assert every_crash(short_job, tmp_path, lambda k: [CRASHES[k % 4]]) > 35
 
 
-def test_every_crash_point_in_two_ways(short_job, tmp_path):
-    assert every_crash(short_job, tmp_path, lambda k: [CRASHES[k % 4], CRASHES[(k + 2) % 4]]) > 75
+@pytest.mark.soak
+def test_every_crash_point_in_every_way_all_of_a_short_run(short_job, tmp_path):
+    assert every_crash(short_job, tmp_path, lambda k: CRASHES) > 140
 
 
 @pytest.mark.soak
@@ -72,10 +74,11 @@ def test_every_crash_point_in_every_way_all(long_job, tmp_path):
     assert every_crash(long_job, tmp_path, lambda k: CRASHES) > 350
 
 
-def crash_twice(job, tmp_path, step):
+def crash_twice(job, tmp_path, calls_between, step):
+    """Crash at every so many-th call, and again while the next run goes on, at every so many-th call of that."""
     sweep, reference, calls = job
     pairs = 0
-    for k in range(1, calls + 1):
+    for k in range(1, calls + 1, calls_between):
         for j in itertools.count(1 + k % step, step):
             directory = tmp_path / "run"
             assert crash(sweep, directory, k, CRASHES[(k + j // step) % 4])
@@ -91,35 +94,51 @@ def crash_twice(job, tmp_path, step):
 
 
 def test_crashes_while_going_on(short_job, tmp_path):
-    assert crash_twice(short_job, tmp_path, 23) > 40
+    assert crash_twice(short_job, tmp_path, 7, 19) > 5
 
 
 @pytest.mark.soak
 def test_crashes_while_going_on_all(short_job, tmp_path):
-    assert crash_twice(short_job, tmp_path, 1) > 1000
+    assert crash_twice(short_job, tmp_path, 1, 1) > 1000
 
 
+def refusals(job, tmp_path, faults_at):
+    """One line, exit code 4, nothing unfinished left; then the same bytes."""
+    sweep, reference, calls = job
+    for k in range(1, calls + 1):
+        for fault, lasting in faults_at(k):
+            directory = tmp_path / "run"
+            with pytest.raises(StoreError) as failure:
+                go(sweep, directory, disk=FaultyDisk(k, fault, lasting=lasting))
+            assert failure.value.exit_code == ExitCode.INPUT_OUTPUT
+            assert len(str(failure.value).splitlines()) == 1
+            if not lasting:  # a disk that refuses everything refuses to remove, too
+                assert not list(directory.rglob(".*.part")) if directory.exists() else True
+            check_prefix(directory, reference)
+            go(sweep, directory)
+            check_same(directory, reference)
+            shutil.rmtree(directory)
+
+
+def test_a_disk_that_refuses(short_job, tmp_path):
+    """Every call, for one reason after the other; every third for good."""
+    refusals(short_job, tmp_path, lambda k: [([*FAULTS][k % 5], k % 3 == 0)])
+
+
+@pytest.mark.soak
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_disk_that_refuses(short_job, tmp_path, fault):
-    """One line, exit code 4, nothing unfinished left; then the same bytes. Whether it refuses once or from then on."""
-    sweep, reference, calls = short_job
-    for k, lasting in itertools.product(range(1, calls + 1), (False, True) if fault == "ENOSPC" else (False,)):
-        directory = tmp_path / "run"
-        with pytest.raises(StoreError) as failure:
-            go(sweep, directory, disk=FaultyDisk(k, fault, lasting=lasting))
-        assert failure.value.exit_code == ExitCode.INPUT_OUTPUT
-        assert len(str(failure.value).splitlines()) == 1
-        if not lasting:  # a disk that refuses everything refuses to remove, too
-            assert not list(directory.rglob(".*.part")) if directory.exists() else True
-        check_prefix(directory, reference)
-        go(sweep, directory)
-        check_same(directory, reference)
-        shutil.rmtree(directory)
+def test_a_disk_that_refuses_all(short_job, tmp_path, fault):
+    """Every call, for every reason, once or from then on."""
+    refusals(short_job, tmp_path, lambda k: [(fault, False), (fault, True)])
 
 
 def test_short_writes_change_nothing(short_job, tmp_path):
-    sweep, reference, calls = short_job
-    for k in range(1, calls + 1):
+    sweep, reference, _ = short_job
+    disk = FaultyDisk()
+    go(sweep, tmp_path / "whole", disk=disk)
+    writes = [k for k, call in enumerate(disk.log, start=1) if call[0] == "write"]
+    assert len(writes) > 4
+    for k in writes:
         go(sweep, tmp_path / str(k), disk=FaultyDisk(k, "short"))
         check_same(tmp_path / str(k), reference)
 

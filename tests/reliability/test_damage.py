@@ -71,7 +71,7 @@ def check_flips(noticed, count):
 
 
 def test_flipped_bits(finished, tmp_path):
-    check_flips(flips(finished, tmp_path, 100), 100)
+    check_flips(flips(finished, tmp_path, 30), 30)
 
 
 @pytest.mark.soak
@@ -111,11 +111,12 @@ def replacements(finished, tmp_path):
     }
 
 
-def test_replaced_shards(finished, tmp_path):
+def replaced(finished, tmp_path, cuts):
+    """Something else under the name of a shard, or a part of it: set aside, and made again."""
     sweep, source, reference = finished
     ways, directory = replacements(finished, tmp_path), tmp_path / "run"
     rng = np.random.default_rng(9)
-    ways |= {f"cut {i}": lambda path: cut(path, rng) for i in range(30)}
+    ways |= {f"cut {i}": lambda path: cut(path, rng) for i in range(cuts)}
     for name, way in ways.items():
         shutil.copytree(source, directory)
         way(directory / "shards" / "00002.h5")
@@ -128,16 +129,34 @@ def test_replaced_shards(finished, tmp_path):
         shutil.rmtree(directory)
 
 
-def test_cut_results(finished, tmp_path):
+def test_replaced_shards(finished, tmp_path):
+    replaced(finished, tmp_path, 6)
+
+
+@pytest.mark.soak
+def test_replaced_shards_all(finished, tmp_path):
+    replaced(finished, tmp_path, 300)
+
+
+def cut_results(finished, tmp_path, count):
     sweep, source, reference = finished
     rng = np.random.default_rng(10)
     shutil.copytree(source, tmp_path / "run")
-    for _ in range(30):
+    for _ in range(count):
         cut(tmp_path / "run" / "small.h5", rng)
         assert verify(tmp_path / "run")["faults"]
         go(sweep, tmp_path / "run")
         assert without_quarantine(tmp_path / "run") == ["small.h5.0"]
         check_same(tmp_path / "run", reference)
+
+
+def test_cut_results(finished, tmp_path):
+    cut_results(finished, tmp_path, 8)
+
+
+@pytest.mark.soak
+def test_cut_results_all(finished, tmp_path):
+    cut_results(finished, tmp_path, 300)
 
 
 def test_shards_of_another_sweep_are_not_touched_when_the_record_is_damaged(finished, tmp_path):

@@ -16,7 +16,7 @@ SWEEP = """schema = 1
 map = "transition-envelopes"
 robot = "transition-prototype"
 [axes]
-x = [2.0, 2.1]
+x = {x}
 y = [0.0]
 z = [2.0]
 inclination = [0.0]
@@ -36,19 +36,32 @@ def hostile(tmp_path):
     folder.mkdir()
     for name in (*sys.stdlib_module_names, *OTHERS):
         (folder / f"{name}.py").write_text(f"open({str(marks)!r}, 'a').write({name!r} + '\\n')\n")
-    (folder / "small.toml").write_text(SWEEP)
     return folder, marks
 
 
-def test_a_folder_full_of_modules(hostile, tmp_path, monkeypatch):
-    """The trial of a flag, the command, its workers, and what multiprocessing starts beside them."""
+def run_there(hostile, tmp_path, x, environment):
+    """The command with its workers, and what multiprocessing starts beside them; a tile, so a worker, for each x."""
     folder, marks = hostile
-    monkeypatch.chdir(folder)
-    assert not xla._is_known(tmp_path, "--xla_no_such_flag=1") and not marks.exists()
+    (folder / "small.toml").write_text(SWEEP.format(x=x))
     script = Path(sysconfig.get_path("scripts")) / "cspr"
-    here = os.environ | {"CSPR_CACHE_DIR": str(tmp_path / "kept")}
     command = [str(script), "run", "small.toml", "-o", str(tmp_path / "run"), "--workers", "2"]
-    done = subprocess.run(command, env=here, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
     assert not marks.exists(), marks.read_text()
-    assert (done.returncode, done.stderr) == (0, "") and list(tmp_path.glob("kept/*"))
+    assert (done.returncode, done.stderr) == (0, "") and (tmp_path / "run" / "small.h5").exists()
     assert executors.SAFE_PATH not in os.environ
+
+
+def test_a_folder_full_of_modules(hostile, tmp_path, monkeypatch):
+    """The trial of a flag, the command, and a worker."""
+    folder, marks = hostile
+    with monkeypatch.context() as patch:
+        patch.chdir(folder)
+        assert not xla._is_known(tmp_path, "--xla_no_such_flag=1") and not marks.exists()
+    run_there(hostile, tmp_path, [2.0], os.environ)
+
+
+@pytest.mark.soak
+def test_a_folder_full_of_modules_all(hostile, tmp_path):
+    """Where no code is kept yet, the command itself tries a flag."""
+    run_there(hostile, tmp_path, [2.0, 2.1], os.environ | {"CSPR_CACHE_DIR": str(tmp_path / "kept")})
+    assert list(tmp_path.glob("kept/*"))

@@ -1,18 +1,18 @@
 """Sealed result files that nobody wrote: each gives one line and an exit code, in little time and memory."""
 
 import faulthandler
-import io
 import json
 import os
 import subprocess
 import sys
 import zlib
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from support.commands import cspr
+from support.reading import read_here
 from test_outputs import settings_of
 
 import cspr_jax
@@ -20,12 +20,11 @@ from cspr_jax.errors import StoreError
 from cspr_jax.outputs.plots.draw import _map_figure
 from cspr_jax.outputs.plots.motion import motion_figure
 from cspr_jax.schema.identity import identity
-from cspr_jax.store import isolated, reader
+from cspr_jax.store import isolated
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.disk import Disk
-from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, make_datasets, reason, set_attributes
-from cspr_jax.store.seal import LENGTH, DamagedError, check_file, seal_file, sealed
-from reliability.test_hostile import cspr
+from cspr_jax.store.netcdf import LAYOUT, make_datasets, set_attributes
+from cspr_jax.store.seal import LENGTH, DamagedError, seal_file, sealed
 
 AXES = {"x": [0.1, 0.2, 0.3, 0.4], "y": [0.1, 0.2, 0.3], "z": [1.0, 1.5], "z0": [1.7]}
 SHAPE = tuple(len(points) for points in AXES.values())
@@ -255,31 +254,6 @@ def hostile(tmp_path_factory):
     return found
 
 
-@pytest.fixture
-def here(monkeypatch):
-    """Files are read by this process, without limits: a process for each would take longer than all the rest."""
-    monkeypatch.setattr(reader, "_grant", lambda *limits: None)
-
-    def fetched(path):
-        check_file(path)
-        pipe = io.BytesIO()
-        monkeypatch.setattr(reader, "FILE", path)
-        try:
-            reader._result(pipe)
-        except UNREADABLE as error:
-            raise DamagedError(reason(error)) from error
-        pipe.seek(0)
-        found = isolated._header(pipe, patience=None)
-        arrays = {name: np.empty(shape, dtype) for name, dtype, shape in found["arrays"]}
-        for array in arrays.values():
-            isolated._header(pipe, patience=None)
-            if array.size:
-                pipe.readinto(array.reshape(-1).data.cast("B"))
-        return found["attributes"], arrays
-
-    monkeypatch.setattr("cspr_jax.store.result.fetch", fetched)
-
-
 def test_good_ones_are_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda self, *args, **kwargs: None)
     for name, fill in (("map", a_map), ("motion", a_motion)):
@@ -289,7 +263,8 @@ def test_good_ones_are_drawn(tmp_path, monkeypatch):
     assert cspr("verify", path) == (0, f"{path}: rows 5\n", "")
 
 
-def test_hostile_files_are_refused(hostile, here):
+def test_hostile_files_are_refused(hostile, monkeypatch):
+    read_here(monkeypatch)
     assert len(hostile) >= 60
     faulthandler.dump_traceback_later(300.0, exit=True)  # HDF5 would wait for ever, and Python with it
     for name, path in hostile.items():
@@ -312,16 +287,15 @@ MEASURED = """
 import resource, sys
 from pathlib import Path
 from cspr_jax.cli import main
-for path in sys.argv[1:]:
-    for command in ("plot", "verify"):
-        print(main([command, path]), flush=True)
+for command, path in zip(sys.argv[1::2], sys.argv[2::2]):
+    print(main([command, path]), flush=True)
 if sys.platform == "linux":  # its own peak, not what it had from its parent before it was this program
     own = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
     print("peak", max(int(own.split()[1]), resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss))
 """
 
 
-def test_the_worst_take_little_time_and_memory(hostile, tmp_path):
+def worst(hostile, tmp_path, commands_of):
     """As commands, each file read by a process of its own; nothing of the working folder is run."""
     for name in ("h5py", "numpy", "cspr_jax", "json"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit(99)")
@@ -331,16 +305,27 @@ def test_the_worst_take_little_time_and_memory(hostile, tmp_path):
         file.truncate(6 << 30)
         os.pwrite(file.fileno(), line, 6 << 30)
     (tmp_path / "link.h5").symlink_to(hostile["a link to a pipe"].with_name("fifo"))
-    paths = [*(hostile[name] for name in WORST), large, tmp_path / "link.h5", Path("/dev/zero")]
-    command = [sys.executable, "-I", "-c", MEASURED, *map(str, paths)]
+    quick = [(command, path) for path in (large, tmp_path / "link.h5", "/dev/zero") for command in ("plot", "verify")]
+    asked = [(command, hostile[name]) for i, name in enumerate(WORST) for command in commands_of(i)] + quick
+    command = [sys.executable, "-I", "-c", MEASURED, *(str(word) for words in asked for word in words)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=True)
-    assert [line for line in done.stdout.splitlines() if line.isdigit()] == ["4"] * 2 * len(paths)
+    assert [line for line in done.stdout.splitlines() if line.isdigit()] == ["4"] * len(asked)
     errors = done.stderr.splitlines()
-    assert len(errors) == 2 * len(paths) and all(line.startswith("cspr: ") for line in errors)
+    assert len(errors) == len(asked) and all(line.startswith("cspr: ") for line in errors)
     # Not hashed, which takes long.
     assert ["GB of it are none of its quantities" in line for line in errors if str(large) in line] == [True, True]
     peaks = [int(line.split()[1]) for line in done.stdout.splitlines() if line.startswith("peak")]
     assert all(peak < 500_000 for peak in peaks)
+
+
+def test_the_worst_take_little_time_and_memory(hostile, tmp_path):
+    """Each is drawn or verified; test_hostile_files_are_refused does both with each, but not as a command."""
+    worst(hostile, tmp_path, lambda i: [("plot", "verify")[i % 2]])
+
+
+@pytest.mark.soak
+def test_the_worst_take_little_time_and_memory_all(hostile, tmp_path):
+    worst(hostile, tmp_path, lambda i: ("plot", "verify"))
 
 
 def mutated(rng, data):
@@ -380,7 +365,7 @@ def mutate(folder, count):
 
 
 def test_mutations(tmp_path):
-    assert mutate(tmp_path, 12) > 3
+    assert mutate(tmp_path, 8) > 2
 
 
 @pytest.mark.soak

@@ -1,8 +1,12 @@
-"""Several processes and a dask scheduler give the bytes of one process; a lost worker's tile is computed again."""
+"""Several processes and a dask scheduler give the bytes of one process; a lost worker's tile is computed again.
+
+Quick tests take a kind of map without kernels, whose worker dies by itself at a known tile; soak tests take the real
+kernels, and kill at any time.
+"""
 
 import contextlib
-import io
 import os
+import pickle
 import shutil
 import signal
 import subprocess
@@ -15,13 +19,16 @@ import numpy as np
 import psutil
 import pytest
 from distributed import LocalCluster
+from support import toy
+from support.commands import cspr
 
-from cspr_jax.cli import main
+from cspr_jax.schema.map_kinds import registered
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.distributed import Scheduler
 from cspr_jax.sweep.signals import Stop
 from reliability.support import check_prefix, check_same, content
 
+ROOT = Path(__file__).parents[2]
 SWEEP = """schema = 1
 map = "minimum-arcs"
 robot = "prototype"
@@ -35,23 +42,44 @@ from = { position = [0.7, 0.7, 3.0] }
 [run]
 tile = [1, 3, 2, 1]
 """
+KILLS = 200
+# Another process: here batches are smaller, and XLA's flags are others than in what `cspr` starts.
+WHOLE = "import sys, cspr_jax; cspr_jax.run(sys.argv[1], sys.argv[2])"
 
 
-def cspr(*arguments):
-    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
-        code = main([str(argument) for argument in arguments])
-    return code, out.getvalue(), err.getvalue()
+@pytest.fixture
+def toys(tmp_path):
+    """A sweep file of six tiles, and what one process makes of it."""
+    path = tmp_path / "toys" / "toys.toml"
+    path.parent.mkdir()
+    path.write_text(toy.SWEEP)
+    with registered(toy.KIND, *toy.QUANTITIES):
+        assert cspr("run", path, "-o", tmp_path / "one")[::2] == (0, "")
+        yield path, content(tmp_path / "one")
 
 
 @pytest.fixture(scope="module")
-def job(tmp_path_factory):
-    """A sweep file of eight tiles, and what one process makes of it."""
-    folder = tmp_path_factory.mktemp("job")
-    path = folder / "eight.toml"
+def file(tmp_path_factory):
+    """A sweep file of eight tiles."""
+    path = tmp_path_factory.mktemp("job") / "eight.toml"
     path.write_text(SWEEP)
-    code, _, err = cspr("run", path, "-o", folder / "run")
-    assert (code, err) == (0, "")
-    return path, content(folder / "run")
+    return path
+
+
+@pytest.fixture(scope="module")
+def job(file):
+    """That file, and what one process makes of it."""
+    subprocess.run([sys.executable, "-c", WHOLE, file, file.parent / "run"], check=True, capture_output=True, cwd=ROOT)
+    return file, content(file.parent / "run")
+
+
+def test_worker_processes(toys, tmp_path):
+    """One dies at the last tile; what is missing then is computed by new ones."""
+    path, reference = toys
+    (path.parent / "die").write_text("0.5")
+    code, _, err = cspr("run", path, "-o", tmp_path / "run", "--workers", 2)
+    assert (code, err) == (0, "") and not (path.parent / "die").exists()
+    check_same(tmp_path / "run", reference)
 
 
 def kill_one_when(directory, shards, victims):
@@ -76,26 +104,8 @@ def spawned():
     return [p for p in found if "spawn_main" in " ".join(p.cmdline()) and p.memory_info().rss > 1 << 27]
 
 
-def test_worker_processes(job, tmp_path):
+def one_killed_of_two(job, tmp_path, victims):
     path, reference = job
-    thread = kill_one_when(tmp_path / "run", 2, spawned)
-    code, _, err = cspr("run", path, "-o", tmp_path / "run", "--workers", 2)
-    thread.join()
-    assert (code, err) == (0, "")
-    check_same(tmp_path / "run", reference)
-
-
-@pytest.mark.soak
-def test_a_worker_dies_while_another_cannot_end(job, tmp_path):
-    """As one does that waits for a lock the dead one held; here it is stopped."""
-    path, reference = job
-
-    def victims():
-        found = spawned()
-        if len(found) > 1:
-            found[1].suspend()
-        return found
-
     thread = kill_one_when(tmp_path / "run", 2, victims)
     code, _, err = cspr("run", path, "-o", tmp_path / "run", "--workers", 2)
     thread.join()
@@ -103,25 +113,55 @@ def test_a_worker_dies_while_another_cannot_end(job, tmp_path):
     check_same(tmp_path / "run", reference)
 
 
-def workers_of(cluster):
-    return [psutil.Process(worker.pid) for worker in cluster.workers.values()]
-
-
-def test_a_dask_scheduler(job, tmp_path):
-    path, reference = job
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster:
-        thread = kill_one_when(tmp_path / "run", 2, lambda: workers_of(cluster))
-        code, _, err = cspr("run", path, "-o", tmp_path / "run", "--scheduler", cluster.scheduler_address)
-        thread.join()
-        assert (code, err) == (0, "")
-        check_same(tmp_path / "run", reference)
+@pytest.mark.soak
+def test_worker_processes_all(job, tmp_path):
+    one_killed_of_two(job, tmp_path, spawned)
 
 
 @pytest.mark.soak
-def test_ctrl_c_while_no_worker_is_there(job, tmp_path):
+def test_a_worker_dies_while_another_cannot_end(job, tmp_path):
+    """As one does that waits for a lock the dead one held; here it is stopped."""
+
+    def victims():
+        found = spawned()
+        if len(found) > 1:
+            found[1].suspend()
+        return found
+
+    one_killed_of_two(job, tmp_path, victims)
+
+
+def a_cluster(workers):
+    return LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50)
+
+
+def test_a_dask_scheduler(toys, tmp_path):
+    """One worker dies; what it was at is computed by another."""
+    path, reference = toys
+    (path.parent / "die").write_text("0.2")
+    with a_cluster(2) as cluster:
+        code, _, err = cspr("run", path, "-o", tmp_path / "run", "--scheduler", cluster.scheduler_address)
+    assert (code, err) == (0, "") and not (path.parent / "die").exists()
+    check_same(tmp_path / "run", reference)
+
+
+@pytest.mark.soak
+def test_a_dask_scheduler_all(job, tmp_path):
+    path, reference = job
+    with a_cluster(2) as cluster:
+        victims = [psutil.Process(worker.pid) for worker in cluster.workers.values()]
+        thread = kill_one_when(tmp_path / "run", 2, lambda: victims)
+        code, _, err = cspr("run", path, "-o", tmp_path / "run", "--scheduler", cluster.scheduler_address)
+        thread.join()
+    assert (code, err) == (0, "")
+    check_same(tmp_path / "run", reference)
+
+
+@pytest.mark.soak
+def test_ctrl_c_while_no_worker_is_there(file, tmp_path):
     """Before the first worker comes, and after the last one has gone."""
-    command = [sys.executable, "-m", "cspr_jax", "run", str(job[0]), "-o", str(tmp_path / "run"), "--scheduler"]
-    with LocalCluster(n_workers=0, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster:
+    command = [sys.executable, "-m", "cspr_jax", "run", str(file), "-o", str(tmp_path / "run"), "--scheduler"]
+    with a_cluster(0) as cluster:
         process = subprocess.Popen(
             [*command, cluster.scheduler_address], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
@@ -141,7 +181,7 @@ def test_ctrl_c_while_no_worker_is_there(job, tmp_path):
             asked.ask(signal.SIGTERM)
 
         cluster.scale(1)
-        scheduler = Scheduler(read_sweep(job[0]), cluster.scheduler_address, warn=ask_when_gone)
+        scheduler = Scheduler(read_sweep(file), cluster.scheduler_address, warn=ask_when_gone)
         tiles = scheduler.tiles(range(8), asked)
         next(tiles)
         cluster.scale(0)
@@ -158,25 +198,52 @@ def test_ctrl_c_while_no_worker_is_there(job, tmp_path):
         (("--scheduler", "tls://127.0.0.1:1"), 2, "must fit dask's TLS settings"),
     ],
 )
-def test_wrong_workers(job, tmp_path, options, code, words):
-    found, out, err = cspr("run", job[0], "-o", tmp_path / "run", *options)
+def test_wrong_workers(file, tmp_path, options, code, words):
+    found, out, err = cspr("run", file, "-o", tmp_path / "run", *options)
     assert (found, out, len(err.splitlines())) == (code, "", 1) and words in err
     assert not (tmp_path / "run").exists()
 
 
-def real_kills(job, tmp_path, count, longest):
+def test_a_kill_of_the_command(toys, tmp_path):
+    """Its whole process group killed in the middle; the next run goes on from what it has left."""
+    path, reference = toys
+    directory = tmp_path / "run"
+    (path.parent / "pause").write_text("0.2")
+    # Without a folder for compiled code the command leaves XLA's flags alone, which are part of the environment.
+    process = subprocess.Popen(
+        [sys.executable, "-m", "support.toy", "run", str(path), "-o", str(directory)],
+        **{"start_new_session": True, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE},
+        cwd=ROOT / "tests",
+        env=os.environ | {"CSPR_CACHE_DIR": ""},
+    )
+    end = time.monotonic() + 60
+    while not (directory / "shards" / "00001.h5").exists():
+        assert time.monotonic() < end and process.poll() is None, process.stderr.read()
+        time.sleep(0.005)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    check_prefix(directory, reference)
+    kept = {path: path.stat().st_mtime_ns for path in (directory / "shards").glob("0*.h5")}
+    assert 2 <= len(kept) < toy.TILES and not list(directory.glob("*.h5"))
+    (path.parent / "pause").unlink()
+    assert cspr("run", path, "-o", directory)[::2] == (0, "")
+    check_same(directory, reference)
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept  # they were not made again
+
+
+@pytest.mark.soak
+def test_kills_of_the_real_command_all(file, tmp_path):
     """The real command line, its whole process group killed while it compiles, computes or writes."""
     rng, directory, killed = np.random.default_rng(5), tmp_path / "run", 0
-    root, words = Path(__file__).parents[2], [sys.executable, "-m", "cspr_jax", "run", str(job[0]), "-o"]
-    # The command sets a vector width, with which the last bits are others than in this process.
-    subprocess.run([*words, str(tmp_path / "whole")], check=True, capture_output=True, cwd=root)
+    words = [sys.executable, "-m", "cspr_jax", "run", str(file), "-o"]
+    subprocess.run([*words, str(tmp_path / "whole")], check=True, capture_output=True, cwd=ROOT)
     command, reference = [*words, str(directory)], content(tmp_path / "whole")
-    while killed < count:
+    while killed < KILLS:
         process = subprocess.Popen(
-            command, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root
+            command, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT
         )
         try:
-            process.communicate(timeout=rng.uniform(0.5, longest))
+            process.communicate(timeout=rng.uniform(0.5, 8.0))
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
@@ -186,27 +253,16 @@ def real_kills(job, tmp_path, count, longest):
         assert process.returncode == 0
         check_same(directory, reference)
         shutil.rmtree(directory)
-    subprocess.run(command, check=True, capture_output=True, cwd=root)
+    subprocess.run(command, check=True, capture_output=True, cwd=ROOT)
     check_same(directory, reference)
 
 
-def test_kills_of_the_real_command(job, tmp_path):
-    real_kills(job, tmp_path, 1, 7.0)
-
-
-@pytest.mark.soak
-def test_kills_of_the_real_command_all(job, tmp_path):
-    real_kills(job, tmp_path, 200, 8.0)
-
-
-def test_the_sweep_travels_whole(job):
+def test_the_sweep_travels_whole(file):
     """Workers get the sweep by pickle; errors come back with their exit codes."""
-    import pickle
-
     from cspr_jax.errors import ConfigError, InputError, ResourceError, SelfCheckError
 
-    sweep = pickle.loads(pickle.dumps(read_sweep(job[0])))
-    assert sweep.identity == read_sweep(job[0]).identity
+    sweep = pickle.loads(pickle.dumps(read_sweep(file)))
+    assert sweep.identity == read_sweep(file).identity
     for error in (ConfigError("f", "m"), InputError("k", 1, "2"), ResourceError("r"), SelfCheckError("s")):
         again = pickle.loads(pickle.dumps(error))
         assert (type(again), str(again), again.exit_code) == (type(error), str(error), error.exit_code)
@@ -232,15 +288,15 @@ def test_a_long_sweep_that_is_killed_all_the_time(tmp_path):
     """Four million cells; every 5 to 60 s all processes of the run are killed, for half an hour and until it ends."""
     path = tmp_path / "long.toml"
     path.write_text(LONG)
-    assert cspr("run", path, "-o", tmp_path / "whole")[0] == 0
-    reference = content(tmp_path / "whole")
-    command = [sys.executable, "-m", "cspr_jax", "run", str(path), "-o", str(tmp_path / "run")]
+    words = [sys.executable, "-m", "cspr_jax", "run", str(path), "-o"]
+    subprocess.run([*words, str(tmp_path / "whole")], check=True, capture_output=True, cwd=ROOT)
+    command, reference = [*words, str(tmp_path / "run")], content(tmp_path / "whole")
     rng, begin, kills, ends = np.random.default_rng(18), time.monotonic(), 0, 0
     while time.monotonic() < begin + 1800 or (tmp_path / "run").exists():
         process = subprocess.Popen(
             [*command, *(["--workers", "2"] if kills % 4 == 3 else [])],
             **{"start_new_session": True, "stderr": subprocess.PIPE, "stdout": subprocess.PIPE},
-            cwd=Path(__file__).parents[2],
+            cwd=ROOT,
         )
         try:
             _, err = process.communicate(timeout=rng.uniform(5.0, 60.0))
