@@ -4,9 +4,7 @@ Nothing of the package is touched by the family of this file: its motion, its le
 the plan.
 """
 
-import contextlib
 import importlib
-import io
 import json
 import sys
 from pathlib import Path
@@ -14,9 +12,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from support.commands import cspr
+from support.platforms import state_of
 
 import cspr_jax
-from cspr_jax.cli import main
 from cspr_jax.schema.families import FAMILIES, moving, registered
 from cspr_jax.store.result import open_result
 
@@ -81,13 +80,6 @@ position = [0.1, 0.05, 1.5]
 [[pose]]
 position = {last}
 """
-
-
-def cspr(*arguments: object) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error of a command."""
-    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
-        code = main([str(argument) for argument in arguments])
-    return code, out.getvalue(), err.getvalue()
 
 
 @pytest.fixture
@@ -169,7 +161,7 @@ def test_rows_of_the_package():
 def assert_continuous(plan) -> None:
     """Position, velocity and acceleration (and turning) go on from each segment to the next, to 1e-9."""
     for before, after in zip(plan.motions[:-1], plan.motions[1:], strict=True):
-        last, first = before.state(1.0), after.state(0.0)
+        last, first = state_of(before, 1.0), state_of(after, 0.0)
         for name in ("position", "velocity", "acceleration", "rotation", "angular_velocity", "angular_acceleration"):
             a, b = getattr(last, name), getattr(first, name)
             if a is not None:
@@ -206,7 +198,8 @@ def test_each_segment_is_that_of_its_own_family(tmp_path):
 def test_two_families_of_a_platform(tmp_path):
     """Standard hypocycloids and those of variable amplitude meet at poses, with one beta-hat there."""
     (tmp_path / "plan.toml").write_text(
-        'schema = 1\nrobot = "laval-mssm"\nfamily = "hypocycloid"\nz0 = 1.4\n[[pose]]\nrest = true\n'
+        'schema = 1\nrobot = "laval-mssm"\nfamily = "hypocycloid"\nz0 = 1.4\n'
+        'amplitude = { name = "effective-c3", epsilon = 0.1 }\n[[pose]]\nrest = true\n'
         "[[pose]]\nposition = [0.6, 0.2, 1.4]\ntilt_torsion = [0.3, 0.2, 0.1]\n"
         '[[pose]]\nposition = [-0.5, 0.4, 1.5]\nfamily = "hypocycloid-standard"\n[[pose]]\nrest = true\n'
     )

@@ -7,21 +7,14 @@ import jax
 import numpy as np
 import pytest
 from oracles import platform as oracle
-from test_platform import MSSM, Z0, made, ours
+from support.platforms import EFFECTIVE, FROM_REST, MSSM, Z0, checker_of, made, ours
 
 from cspr_jax.feasibility.platform import prefilter
-from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.robots.limits import Limits
 from cspr_jax.search.platform_arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_segment import Kind
+from cspr_jax.trajectories.platform_segment import USUAL
 
 BENDS, ARCS = 5, 8
-
-
-def checker_of(robot, *, batch=512):
-    return PoseChecker(Problem(ours(robot), Limits(), named("quintic")), Kind(from_rest=True), batch=batch)
 
 
 def candidates(robot, rng, count):
@@ -37,9 +30,20 @@ def candidates(robot, rng, count):
 
 
 def test_the_search_is_the_full_search():
-    """20,000 trajectories: smallest numbers of arcs, and what passes where each is checked in full."""
-    robot, motions, rng = MSSM, 500, np.random.default_rng(3)
-    checker, full = checker_of(robot), checker_of(robot)
+    """2,400 trajectories: smallest numbers of arcs, and what passes where each is checked in full."""
+    check_search(60, EFFECTIVE)
+
+
+@pytest.mark.soak
+def test_the_search_is_the_full_search_all():
+    """20,000 trajectories."""
+    check_search(500, named("quintic"))
+
+
+def check_search(motions, amplitude):
+    """Of so many motions, with all values of beta-hat and numbers of arcs."""
+    robot, rng = MSSM, np.random.default_rng(3)
+    checker, full = (checker_of(kind=FROM_REST, amplitude=amplitude) for _ in range(2))
     given = candidates(robot, rng, motions)
     segments, every = _Segments(full.problem.robot, given), np.arange(motions * BENDS)
     passes = np.zeros((ARCS + 1, len(every)), bool)
@@ -58,11 +62,10 @@ def test_the_search_is_the_full_search():
     assert checker.done["motions"] < 0.2 * motions * BENDS * ARCS and work < 0.25 * brute
 
 
-@pytest.mark.parametrize("kind", [Kind(), Kind(from_rest=True)])
+@pytest.mark.parametrize("kind", [USUAL, FROM_REST])
 def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     """Instants of every kind; with a float32 that is wrong on purpose, less is refuted but never more."""
-    checker, rng = checker_of(MSSM), np.random.default_rng(4)
-    checker = PoseChecker(checker.problem, kind, batch=64)
+    checker, rng = checker_of(kind=kind, batch=64), np.random.default_rng(4)
     segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 60))(6, np.arange(300))
     tau = np.linspace(1.0, 0.0, 37)
     lowest = checker.prefilter.lowest(segments, 6, tau)
@@ -98,7 +101,7 @@ def test_segments_of_candidates():
 
 
 def test_more_instants_refute_more():
-    checker, rng = checker_of(MSSM, batch=64), np.random.default_rng(5)
+    checker, rng = checker_of(kind=FROM_REST, batch=64), np.random.default_rng(5)
     segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 40))(5, np.arange(200))
     found = [checker.prefilter.refuted(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
     assert all(not (a & ~b).any() for a, b in pairwise(found))
@@ -110,18 +113,18 @@ def test_the_size_of_the_robot_changes_nothing(scale):
     sizes = []
     for unit in (1.0, scale):
         robot = replace(MSSM, base=MSSM.base * unit, platform=MSSM.platform * unit, inertia=MSSM.inertia * unit**2)
-        checker, given = checker_of(robot, batch=64), candidates(MSSM, np.random.default_rng(6), 60)
+        checker, given = checker_of(robot, FROM_REST, batch=64), candidates(MSSM, np.random.default_rng(6), 60)
         start, end = ((place * unit, turn) for place, turn in (given.start, given.end))
         given = given._replace(start=start, end=end, z0=given.z0 * unit)
         segments = _Segments(checker.problem.robot, given)(5, np.arange(300))
         sizes.append(checker.prefilter.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
         rough, _ = prefilter.smallest_tensions(
             checker.problem.robot,
-            named("quintic"),
+            EFFECTIVE,
             5.0,
             np.linspace(0.1, 1.0, 8),
             segments,
-            kind=Kind(from_rest=True),
+            kind=FROM_REST,
             rough=True,
         )
         assert not np.isnan(rough).any() and (np.asarray(rough) < 0.0).sum() > 20

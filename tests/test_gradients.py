@@ -1,11 +1,13 @@
 """One motion from Python: states, margins and gradients, in the axes of the robot."""
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support.platforms import margin_of, state_of
 
 import cspr_jax
 from cspr_jax.api.motions import (
@@ -22,6 +24,12 @@ from cspr_jax.errors import InputError
 FAR = np.array([120.0, -40.0, 7.0])
 TARGET = np.array([-0.6, 0.4, 1.8])
 STEP = 1e-6
+
+
+@functools.partial(jax.jit, static_argnames="arcs")
+def moving(robot, start, end, z0, *, arcs):
+    """A hypocycloid, in one piece: eager operations would be compiled one by one."""
+    return hypocycloid(robot, start, end, z0=z0, arcs=arcs)
 
 
 def point_mass(z_axis="down", offset=FAR):
@@ -62,15 +70,16 @@ def test_gradients_are_those_of_finite_differences(case):
     """With respect to every coordinate of the spools and of the target, and to z0."""
     function, spools, z0, target = CASES[case]
     given = [jnp.asarray(x) for x in (spools(), z0, target)]
-    found = jax.jit(jax.grad(function, argnums=(0, 1, 2)))(*given)
-    value = jax.jit(function)
+    # One function for both: compiling takes longer than computing.
+    both = jax.jit(jax.value_and_grad(function, argnums=(0, 1, 2)))
+    found = both(*given)[1]
     for i, (gradient, argument) in enumerate(zip(found, given, strict=True)):
         for place in np.ndindex(argument.shape):
             ends = []
             for sign in (1.0, -1.0):
                 moved = list(given)
                 moved[i] = argument.at[place].add(sign * STEP)
-                ends.append(float(value(*moved)))
+                ends.append(float(both(*moved)[0]))
             slope = (ends[0] - ends[1]) / (2.0 * STEP)
             assert float(gradient[place]) == pytest.approx(slope, rel=1e-5, abs=1e-6), (i, place)
         assert np.abs(np.asarray(gradient)).max() > 1e-3
@@ -82,11 +91,11 @@ def test_margin_and_state_of_answers(z_axis):
     robot, signs = point_mass(z_axis)
     start, target = FAR + np.array([0.2, -0.1, 1.5]) * signs, FAR + TARGET * signs
     answers = cspr_jax.minimum_arcs(robot, [target], start=start, z0=1.7)
-    motion = hypocycloid(robot, start, target, z0=1.7, arcs=int(answers.arcs[0]))
+    motion = moving(robot, start, target, 1.7, arcs=int(answers.arcs[0]))
     assert float(motion.duration()) == pytest.approx(answers.duration[0], rel=1e-12)
-    assert float(sampled_margin(make_problem(robot), motion, 20_000)) == pytest.approx(answers.margin[0], abs=1e-6)
+    assert float(margin_of(make_problem(robot), motion, 20_000)) == pytest.approx(answers.margin[0], abs=1e-6)
     for tau, place in ((0.0, start), (1.0, target)):
-        state = motion.state(tau)
+        state = state_of(motion, tau)
         np.testing.assert_allclose(state.position, place, atol=1e-12)
         np.testing.assert_allclose(state.velocity, 0.0, atol=1e-12)
 
@@ -94,15 +103,16 @@ def test_margin_and_state_of_answers(z_axis):
 def test_derivatives_of_states():
     """Velocity and acceleration are the derivatives of the position in time, in axes that point up."""
     robot, signs = point_mass("up")
-    motion = hypocycloid(robot, FAR + np.array([0.2, -0.1, 1.5]) * signs, FAR + TARGET * signs, z0=1.7, arcs=5)
-    tau, time = jnp.asarray(0.37), motion.duration()
+    motion = moving(robot, FAR + np.array([0.2, -0.1, 1.5]) * signs, FAR + TARGET * signs, 1.7, arcs=5)
+    tau, time = jnp.asarray(0.37), float(motion.duration())
 
     def position(t):
         return motion.state(t).position
 
-    state = motion.state(tau)
-    np.testing.assert_allclose(jax.jacfwd(position)(tau) / time, state.velocity, rtol=1e-9)
-    np.testing.assert_allclose(jax.jacfwd(jax.jacfwd(position))(tau) / time**2, state.acceleration, rtol=1e-8)
+    slope, bend = jax.jit(lambda t: (jax.jacfwd(position)(t), jax.jacfwd(jax.jacfwd(position))(t)))(tau)
+    state = state_of(motion, 0.37)
+    np.testing.assert_allclose(slope / time, state.velocity, rtol=1e-9)
+    np.testing.assert_allclose(bend / time**2, state.acceleration, rtol=1e-8)
 
 
 def test_tensions_balance_the_motion():
@@ -110,19 +120,11 @@ def test_tensions_balance_the_motion():
     for z_axis in ("down", "up"):
         robot, signs = point_mass(z_axis)
         motion = transition(robot, FAR + np.array([0.7, 0.2, 1.6]) * signs, z0=1.6, oscillations=3)
-        state = motion.state(0.61)
+        state = state_of(motion, 0.61)
         rays = np.asarray(robot.base_points) - np.asarray(state.position)
         pull = np.asarray(tensions(robot, state)) @ (rays / np.linalg.norm(rays, axis=1)[:, None])
         weight = 1.7 * 9.81 * np.array([0.0, 0.0, signs[2]])
         np.testing.assert_allclose(pull + weight, 1.7 * np.asarray(state.acceleration), rtol=1e-9)
-
-
-def test_margin_of_a_platform():
-    """Of a plan's segment: its samples do not lie below the refined margin, and come near it."""
-    plan = cspr_jax.plan("sweeps/table_3_2.toml")
-    smallest = np.minimum(plan.answers.margin[0], plan.answers.det_margin[0])
-    found = float(sampled_margin(plan.problem, plan.motions[0], 4000))
-    assert smallest - 1e-9 <= found <= smallest + 1e-3
 
 
 def test_slacks_are_mapped_and_compiled():

@@ -6,8 +6,9 @@ import json
 import h5py
 import numpy as np
 import pytest
+from support.commands import plan
 from test_outputs import panels
-from test_plan import SHORT, cspr
+from test_plan import SHORT
 
 import cspr_jax
 from cspr_jax import __version__
@@ -25,8 +26,8 @@ def motions(tmp_path_factory):
     """A plan that is feasible and one that is not, as HDF5."""
     folder = tmp_path_factory.mktemp("motions")
     assert HARD != SHORT
-    assert cspr(folder, SHORT, "-o", str(folder / "good.h5"))[::2] == (0, "")
-    code, _, err = cspr(folder, HARD, "-o", str(folder / "hard.h5"), "--anyway")
+    assert plan(folder, SHORT, "-o", str(folder / "good.h5"))[::2] == (0, "")
+    code, _, err = plan(folder, HARD, "-o", str(folder / "hard.h5"), "--anyway")
     assert code == 1 and len(err.splitlines()) == 1 and "hard.h5: is not proved feasible" in err
     return folder
 
@@ -81,18 +82,18 @@ def test_pictures_are_marked(motions, figures, capsys):
 def test_rows_of_a_motion_that_is_not_feasible(tmp_path):
     """A last column says which rows are of a segment that is proved feasible."""
     output = tmp_path / "hard.csv"
-    code, _, err = cspr(tmp_path, HARD, "-o", str(output))
+    code, _, err = plan(tmp_path, HARD, "-o", str(output))
     assert (code, output.exists()) == (1, False) and "--anyway" in err and len(err.splitlines()) == 1
-    assert cspr(tmp_path, HARD, "-o", str(output), "--anyway", "--rate", "20")[0] == 1
+    assert plan(tmp_path, HARD, "-o", str(output), "--anyway", "--rate", "20")[0] == 1
     heads, *rows = csv.reader(output.read_text("utf-8").splitlines())
     assert heads[:4] == ["t", "position_x", "position_y", "position_z"]
     assert heads[-2:] == ["tension_3", "feasible"]
     end = cspr_jax.plan(tmp_path / "plan.toml").answers.duration[0]
     assert {row[-1] for row in rows if float(row[0]) < end} == {"1"}
     assert {row[-1] for row in rows if float(row[0]) >= end} == {"0"}
-    code, _, err = cspr(tmp_path, SHORT, "--anyway")
+    code, _, err = plan(tmp_path, SHORT, "--anyway")
     assert code == 2 and err == "cspr: --anyway: must be absent without -o\n"
-    assert cspr(tmp_path, SHORT, "-o", str(output), "--anyway", "--rate", "20")[::2] == (0, "")
+    assert plan(tmp_path, SHORT, "-o", str(output), "--anyway", "--rate", "20")[::2] == (0, "")
     assert output.read_text("utf-8").splitlines()[0].endswith("tension_3")
 
 

@@ -2,19 +2,14 @@
 
 from typing import NamedTuple
 
-import jax
 import numpy as np
 import pytest
 from oracles import platform as oracle
-from test_platform import Z0, general, made, ours, states
-from test_pose_plans import SHORT
+from support.platforms import EFFECTIVE, SHORT, Z0, cables_at, general, made, ours, states
 
 import cspr_jax
 from cspr_jax.outputs import motion_files
-from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.state import State
-from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import duration
 
 mujoco = pytest.importorskip("mujoco")
@@ -42,15 +37,16 @@ def planned(folder):
 
 def asymmetrical(_):
     """One segment between tilted poses of a robot without symmetry, whose axis of rotation turns too."""
-    rng, robot, amplitude, arcs = np.random.default_rng(2), ours(general()), named("effective-c3", 0.1), 6
+    rng, robot, arcs = np.random.default_rng(2), ours(general()), 6
     poses = []
     for _ in range(2):
         position = np.array([*rng.uniform(-0.8, 0.8, 2), rng.uniform(1.1, 1.6)])
         angles = rng.uniform([-np.pi, 0.2, -0.5], [np.pi, 0.8, 0.5])
         poses.append((position, oracle.pose_quaternion(position, angles)))
     segment, tau = made(robot, *poses, Z0, (-3.0, -2.0), arcs), np.linspace(0.0, 1.0, SAMPLES)
-    at = states(robot, segment, amplitude, float(arcs), tau)
-    length, rate, _ = jax.vmap(lambda *x: wrench_balance.cable_motion(robot, State(*x)))(*at)
+    at = states(segment, EFFECTIVE, arcs, tau)
+    cables = cables_at(robot, at)
+    length, rate, _ = cables["motion"]
     quaternion = np.zeros((SAMPLES, 4))
     for q, rotation in zip(quaternion, np.asarray(at.rotation), strict=True):
         mujoco.mju_mat2Quat(q, rotation.ravel())
@@ -64,7 +60,7 @@ def asymmetrical(_):
         "omega_dot": at.angular_acceleration,
         "length": length,
         "rate": rate,
-        "tension": jax.vmap(lambda *x: wrench_balance.tensions(robot, State(*x)))(*at),
+        "tension": cables["tension"],
     }
     spread = np.linalg.svd(at.angular_velocity, compute_uv=False)
     assert spread[1] > 0.5 * spread[0] and columns["tension"].min() > 0.0

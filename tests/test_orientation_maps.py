@@ -3,46 +3,48 @@
 import json
 from pathlib import Path
 
-import jax
 import numpy as np
 import pytest
-from test_orientations import place
-from test_platform import MSSM, ours
-from test_pose_plans import cspr
+from support.commands import cspr
+from support.platforms import FROM_REST, LOOSE, MSSM, checker_of, ours, place
 
-from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.problem import Problem
 from cspr_jax.outputs.plots.reasons import reasons
 from cspr_jax.published import chapter_3
-from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.accessible import accessible
 from cspr_jax.search.attainable import attainable
 from cspr_jax.store.result import open_result
-from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_segment import Kind
+
+NEAR = ("x = 1.5b", "y = 1.5b")
 
 
-@pytest.fixture(autouse=True)
-def _64_bits():
-    with jax.enable_x64(True):
-        yield
+def test_tables_of_orientations(monkeypatch):
+    """Cells of two places, with a coarse step and few arcs; options that do not belong are refused."""
+    monkeypatch.setattr(chapter_3, "MAX_ARCS", 8)
+    monkeypatch.setattr(chapter_3, "PLACES", {name: chapter_3.PLACES[name] for name in NEAR})
+    check_tables(monkeypatch)
+    code, _, err = cspr("table", "2.1", "--fine")
+    assert code == 2 and err == "cspr: --fine: must be absent with table 2.1\n"
 
 
-def test_tables_of_orientations(tmp_path, monkeypatch):
-    """Their cells, with a coarse step; options that do not belong are refused."""
+@pytest.mark.soak
+def test_tables_of_orientations_all(monkeypatch):
+    """All places."""
+    check_tables(monkeypatch)
+
+
+def check_tables(monkeypatch):
+    """Proportions are of the counts, and near the printed ones."""
     monkeypatch.setattr(chapter_3, "DIVISIONS", 8)
     code, out, err = cspr("table", "3.3", "--json", "--definition", "grid")
     assert code == 0, err
     cells = json.loads(out)["cells"]
-    assert len(cells) == 32 and {c["variant"]["definition"] for c in cells} == {"grid"}
+    assert len(cells) == 8 * len(chapter_3.PLACES) and {c["variant"]["definition"] for c in cells} == {"grid"}
     by = {(c["row"], c["column"]): c for c in cells}
-    for row in ("x = 1.5b", "y = 1.5b"):
+    for row in NEAR:
         share = by[row, "attainable"]["computed"] / by[row, "accessible"]["computed"]
         assert 100.0 * share == pytest.approx(by[row, "proportion"]["computed"])
         assert by[row, "proportion"]["computed"] == pytest.approx(by[row, "proportion"]["published"], abs=4.0)
-    code, _, err = cspr("table", "2.1", "--fine")
-    assert code == 2 and err == "cspr: --fine: must be absent with table 2.1\n"
 
 
 SWEEP = """schema = 1
@@ -72,7 +74,7 @@ def test_maps_of_places(tmp_path):
     code, out, err = swept(tmp_path)
     assert code == 0, err
     data = {name: values[0, 0] for name, values in open_result(Path(out.split()[-1])).data.items()}
-    checker = PoseChecker(Problem(ours(MSSM), Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    checker = checker_of(kind=FROM_REST)
     for i, azimuth in enumerate((0.2, 0.8471975511965976, 1.5)):
         there = place(1.5, azimuth)
         inside = accessible(ours(MSSM), there, "scan", 6)
@@ -132,11 +134,19 @@ def every_orientation(folder, name, **keys):
     return Path(out.split()[-1])
 
 
-def test_a_map_of_every_orientation(tmp_path):
-    """Its cells are those of the functions; in axes turned over phi and sigma are turned around."""
-    there = place(1.5, 0.7)
-    at = dict(zip("xyz", there, strict=True))
-    result = open_result(every_orientation(tmp_path, "down", robot='"laval-mssm"', **at))
+THERE = place(1.5, 0.7)
+
+
+@pytest.fixture(scope="module")
+def whole_map(tmp_path_factory):
+    """Path of the map of all orientations of a place."""
+    at = dict(zip("xyz", THERE, strict=True))
+    return every_orientation(tmp_path_factory.mktemp("map"), "down", robot='"laval-mssm"', **at)
+
+
+def test_a_map_of_every_orientation(whole_map):
+    """Its cells are those of the functions."""
+    there, result = THERE, open_result(whole_map)
     assert list(result.axes) == ["x", "y", "z", "torsion", "tilt_azimuth", "tilt"]
     arcs, verdict = (result.data[name][0, 0, 0] for name in ("arcs", "verdict"))
     assert verdict.shape == (12, 12, 6)
@@ -144,14 +154,18 @@ def test_a_map_of_every_orientation(tmp_path):
     seen = (verdict & Verdict.NOT_ACCESSIBLE.value) == 0
     assert seen[:, :, 1:].sum() + seen[:, 0, 0].sum() == len(inside.angles)
     sigma, phi, theta = (result.axes[name] for name in ("torsion", "tilt_azimuth", "tilt"))
-    checker = PoseChecker(Problem(ours(MSSM), Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    checker = checker_of(kind=FROM_REST)
     some = np.argwhere(seen)[::7]
     angles = np.array([[phi[j], theta[k], sigma[i]] for i, j, k in some])
     many, z0 = np.tile(there, (len(some), 1)), np.full(len(some), 1.7)
     found = attainable(checker, many, angles, z0, max_arcs=8, values=4)
     assert (found.arcs == arcs[tuple(some.T)]).all() and (found.verdict == verdict[tuple(some.T)]).all()
     assert (arcs > 0).sum() > 0.8 * seen.sum()
-    # The same robot, z up: phi becomes -phi, sigma -sigma.
+
+
+def test_a_map_in_axes_turned_over(whole_map, tmp_path):
+    """The same robot, z up: phi becomes -phi, sigma -sigma."""
+    arcs, at = open_result(whole_map).data["arcs"][0, 0, 0], dict(zip("xyz", THERE, strict=True))
     up = open_result(every_orientation(tmp_path, "up", robot=_turned_over(), x=at["x"], y=-at["y"], z=-at["z"]))
     around, mirrored = -np.arange(12) % 12, np.array([*range(10, -1, -1), 11])
     assert (up.data["arcs"][0, 0, 0][mirrored][:, around] == arcs).all()
@@ -167,10 +181,9 @@ def _turned_over():
     )
 
 
-def test_pictures_of_every_orientation(tmp_path):
-    path = every_orientation(tmp_path, "down", robot='"laval-mssm"', x=1.0, y=0.5, z=1.7)
-    for options in (["--envelope"], ["--quantity", "verdict"], ["--envelope", "--at", "x=1.0"], []):
-        picture = tmp_path / "picture.png"
+def test_pictures_of_every_orientation(whole_map, tmp_path):
+    path, picture = whole_map, tmp_path / "picture.png"
+    for options in (["--envelope"], ["--quantity", "verdict"], ["--envelope", "--at", f"x={THERE[0]}"], []):
         code, _, err = cspr("plot", path, "-o", picture, *options)
         assert code == 0 and picture.stat().st_size > 20_000, err
     for options, words in (
@@ -211,8 +224,15 @@ def test_a_map_of_what_is_accessible(tmp_path):
 
 
 def test_the_main_reason_may_be_a_limit(tmp_path):
-    """Where a limit stands in the way of all, it is named."""
-    code, out, err = swept(tmp_path, "[orientations]", "[limits]\ntension_max = 0.1\n[orientations]")
+    """Where a limit stands in the way of all, it is named; the others are loose."""
+    every = LOOSE | {"tension_max": 0.1}
+    limits = "".join(["[limits]\n", *(f"{name} = {value}\n" for name, value in every.items())])
+    (tmp_path / "places.toml").write_text(
+        SWEEP.replace("[orientations]", limits + "[orientations]")
+        .replace("azimuth = [0.2, 0.8471975511965976, 1.5]", "azimuth = [0.2]")
+        .replace("divisions = 6", "divisions = 4")
+    )
+    code, out, err = cspr("run", tmp_path / "places.toml", "-o", tmp_path / "run")
     assert code == 0, err
     data = open_result(Path(out.split()[-1])).data
     assert (data["attainable"] == 0).all() and (data["main_reason"] == Verdict.OVER_TENSION).all()

@@ -3,7 +3,6 @@
 import itertools
 import math
 
-import jax
 import numpy as np
 import pytest
 from oracles import platform as oracle
@@ -11,32 +10,15 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
-from test_platform import MSSM, ours
+from support.platforms import FROM_REST, MSSM, checker_of, ours, place
 
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.orientation_steps import OrientationSteps
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
 from cspr_jax.search.accessible import DEFINITIONS, accessible
 from cspr_jax.search.attainable import attainable, attained
 from cspr_jax.search.orientation_grids import equal_volume_grid, tilt_torsion_grid
 from cspr_jax.search.pose_ends import end_options
-from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_segment import Kind
-
-B = 0.86
-
-
-@pytest.fixture(autouse=True)
-def _64_bits():
-    with jax.enable_x64(True):
-        yield
-
-
-def place(radius, azimuth, depth=1.7):
-    return np.array([radius * B * math.cos(azimuth), radius * B * math.sin(azimuth), depth])
 
 
 def rotations(angles):
@@ -154,15 +136,26 @@ def test_no_way_leads_through_touching_cables():
 
 
 def test_the_accessible_volume_beside_random_orientations():
-    """A random roadmap, which knows no grid: its part of 20,000 orientations is the volume, within its error."""
-    count, robot = 20_000, ours(MSSM)
+    """A random roadmap, which knows no grid: its part of 8,000 orientations is the volume, within its error."""
+    check_volume(8_000, 24, [place(1.5, 0.0)])
+
+
+@pytest.mark.soak
+def test_the_accessible_volume_beside_random_orientations_all():
+    """20,000 orientations, two places."""
+    check_volume(20_000, 32, [place(1.5, 0.0), place(3.0, 1.2)])
+
+
+def check_volume(count, divisions, places):
+    """Of so many random orientations, and of the finest grid."""
+    robot = ours(MSSM)
     some = Rotation.random(count - 1, random_state=3).as_quat(scalar_first=True)
     every = np.concatenate([np.eye(4)[:1], some])
     step = (8.0 * math.pi**2 / count) ** (1.0 / 3.0)
     tree = cKDTree(np.concatenate([every, -every]))
     pairs = tree.query_pairs(2.0 * math.sin(0.25 * 1.5 * step), output_type="ndarray") % count
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    for there in (place(1.5, 0.0), place(3.0, 1.2)):
+    for there in places:
         steps = OrientationSteps(robot, there)
         samples = steps.at(every)
         way = pairs[steps.passable(samples, *pairs.T)]
@@ -170,7 +163,7 @@ def test_the_accessible_volume_beside_random_orientations():
         part = connected_components(links, directed=False)[1]
         share = ((part == part[0]) & steps.regular(samples)).mean()
         error = math.sqrt(share * (1.0 - share) / count)
-        volume = accessible(robot, there, "equal-volume", 32).volume.sum()
+        volume = accessible(robot, there, "equal-volume", divisions).volume.sum()
         assert share == pytest.approx(volume, abs=3.0 * error)
 
 
@@ -182,7 +175,7 @@ def test_nothing_is_accessible_above_the_spools():
 def test_attained_orientations():
     """More arcs allowed attain no fewer, and the same numbers where found; margins are positive where attained."""
     robot = ours(MSSM)
-    checker = PoseChecker(Problem(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    checker = checker_of(kind=FROM_REST)
     there = place(1.5, 0.0)
     inside = accessible(robot, there, "scan", 8)
     many, z0 = np.tile(there, (len(inside.angles), 1)), np.full(len(inside.angles), 1.7)
@@ -214,7 +207,7 @@ def test_orientations_that_a_mirror_joins():
     mirrored = np.abs(mirror @ turns[stands] @ mirror - turns).max((1, 2)) < 1e-8
     assert (same | mirrored).all()
     assert (alike(symmetries(robot), where + np.array([0.1, 0.0]), angles) == np.arange(len(angles))).all()
-    checker = PoseChecker(Problem(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    checker = checker_of(kind=FROM_REST)
     many, z0 = np.tile(there, (len(angles), 1)), np.full(len(angles), 1.7)
     once, twice = (
         attainable(checker, many, angles, z0, max_arcs=8, values=4, found=found) for found in (symmetries(robot), NONE)
@@ -227,8 +220,8 @@ def test_orientations_that_a_mirror_joins():
 
 def test_a_dip_beside_a_singularity():
     """A tension that is negative for a thousandth of the motion, near a nearly singular end: four arcs are too few."""
-    robot, there, angles = ours(MSSM), place(1.5, math.pi / 2.0), np.array([[0.67737013, 0.40312747, -1.6689711]])
-    checker = PoseChecker(Problem(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True))
+    there, angles = place(1.5, math.pi / 2.0), np.array([[0.67737013, 0.40312747, -1.6689711]])
+    checker = checker_of(kind=FROM_REST)
     found = attainable(checker, there[None], angles, np.array([1.7]), max_arcs=8, values=4)
     turned = from_tilt_torsion(angles[0] + np.array([math.pi / 2.0, 0.0, 0.0]))
     way = (np.array([0.0, 0.0, 1.7]), there, 1.7, np.eye(4)[0], turned)
@@ -242,7 +235,7 @@ def test_a_dip_beside_a_singularity():
 def test_verdicts_are_the_oracle_s():
     """2,000 random orientations: the smallest number of arcs, over all values of beta-hat, is the oracle's."""
     robot, rng, close, attained = ours(MSSM), np.random.default_rng(21), 0, 0
-    checker = PoseChecker(Problem(robot, Limits(), named("effective-c3", 0.1)), Kind(from_rest=True), batch=1024)
+    checker = checker_of(kind=FROM_REST, batch=1024)
     for radius, azimuth in ((1.5, 0.0), (3.0, 0.0), (1.5, math.pi / 2.0), (2.2, 0.4)):
         there = place(radius, azimuth)
         angles = accessible(robot, there, "scan", 32).angles

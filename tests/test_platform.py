@@ -1,25 +1,36 @@
 """The six-cable robot: geometry, rotations, wrench balance, motion and ends, beside an oracle and mechanics."""
 
 import dataclasses
-import functools
 import itertools
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from oracles import platform as oracle
+from support.platforms import (
+    EFFECTIVE,
+    FROM_REST,
+    MSSM,
+    Z0,
+    cables_at,
+    general,
+    lowest_and_slopes,
+    made,
+    ours,
+    random_pose,
+    stacked,
+    states,
+)
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.config.robot import CATALOGUE, read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.platform.end_acceleration import endpoint
-from cspr_jax.feasibility.platform.prefilter import smallest_tensions
+from cspr_jax.feasibility.platform.prefilter import CHUNK, smallest_tensions
 from cspr_jax.problem import kernel_robot
-from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import pairs_apart, platform_robot
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.state import State
@@ -27,73 +38,26 @@ from cspr_jax.trajectories import platform_segment as segments
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import USUAL, Kind
 
-MSSM = oracle.mssm()
 PLATFORMS = ("laval-mssm", "nist-robocrane", "fast", "greenline")
 AMPLITUDES = {
     "quintic": (named("quintic"), oracle.quintic),
-    "effective-c3": (named("effective-c3", 0.1), oracle.effective_c3(0.1)),
+    "effective-c3": (EFFECTIVE, oracle.effective_c3(0.1)),
 }
-Z0 = 1.4
+STANDARD = Kind(variable=False)
+# As of `endpoint`, whose eager operations would be compiled one by one.
+end_of = jax.jit(endpoint)
 
 
-def ours(robot):
-    """An oracle's robot as the package has it."""
-    return platform_robot(
-        robot.base, robot.platform, mass=robot.mass, inertia=robot.inertia, centre_of_mass=robot.com, name="mine"
-    )
+def soak(*values):
+    """Parameters for the soak alone."""
+    return pytest.param(*values, marks=pytest.mark.soak)
 
 
-def general(seed=0):
-    """A robot without any symmetry; its points centred on the mass centre, as the oracle's motion needs."""
-    rng = np.random.default_rng(seed)
-    base = MSSM.base + rng.normal(scale=0.1, size=(6, 3))
-    base -= base.mean(0)
-    turn = oracle.matrix(rng.normal(size=4) / 1.0)
-    turn, _ = np.linalg.qr(turn)
-    inertia = turn @ np.diag([0.02, 0.03, 0.04]) @ turn.T
-    return oracle.Robot(base, MSSM.platform + rng.normal(scale=0.02, size=(6, 3)), 2.5, inertia)
-
-
-def random_pose(rng, *, rest=False):
-    if rest:
-        return np.array([0.0, 0.0, Z0]), np.array([1.0, 0.0, 0.0, 0.0])
-    position = np.array([*rng.uniform(-1.8, 1.8, 2), rng.uniform(0.6, 2.2)])
-    angles = rng.uniform([-np.pi, 0.0, -2.0], [np.pi, 1.2, 2.0])
-    return position, oracle.pose_quaternion(position, angles)
-
-
-@functools.partial(jax.jit, static_argnames="kind")
-def states(robot, segment, amplitude, arcs, tau, *, kind=USUAL):
-    return jax.vmap(lambda t: segments.motion(segment, amplitude, arcs, t, kind=kind))(tau)
-
-
-@jax.jit
-def _made(robot, start, end, z0, beta_hats, odd):
-    return segments.pose_segment(robot, start, end, z0, beta_hats, odd=odd)
-
-
-def made(robot, start, end, z0, beta_hats, p):
-    """A segment of the package."""
-    as_arrays = [tuple(jnp.asarray(x) for x in pose) for pose in (start, end)]
-    odd = jnp.asarray(p % 2 == 1)
-    return _made(robot, *as_arrays, jnp.asarray(z0), tuple(jnp.asarray(float(b)) for b in beta_hats), odd)
-
-
-def _lowest(chosen, robot, amplitude, poses, p):
-    z0, *beta_hats = chosen
-    # A rest pose moves with z0.
-    poses = [(jnp.where(jnp.isnan(x), jnp.stack([z0 * 0.0, z0 * 0.0, z0]), x), q) for x, q in poses]
-    one = _made(robot, *poses, z0, tuple(beta_hats), p % 2.0 == 1.0)
-    at = jax.vmap(lambda t: segments.motion(one, amplitude, p, t))(jnp.linspace(0.0, 1.0, 201))
-    return jnp.min(jax.vmap(lambda *leaves: wrench_balance.tensions(robot, State(*leaves)))(*at))
-
-
-lowest, slopes = jax.jit(_lowest), jax.jit(jax.grad(_lowest))
-
-
-@pytest.mark.parametrize("which", ["variable", "standard"])
-@pytest.mark.parametrize("name", AMPLITUDES)
-def test_motions_are_the_oracle_s(name, which):
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("effective-c3", USUAL), ("quintic", STANDARD), soak("quintic", USUAL), soak("effective-c3", STANDARD)],
+)
+def test_motions_are_the_oracle_s(name, kind):
     """Pose, velocity and acceleration of random segments, rest ends and both parities among them."""
     rng, amplitude = np.random.default_rng(1), AMPLITUDES[name]
     tau = np.linspace(0.0, 1.0, 41)
@@ -102,17 +66,12 @@ def test_motions_are_the_oracle_s(name, which):
         p = int(rng.integers(2, 12))
         start, end = random_pose(rng, rest=i % 4 == 0), random_pose(rng, rest=i % 4 == 1)
         beta_hats = tuple(rng.uniform(-6.0, 2.0, 2))
-        wanted = oracle.motion(
-            MSSM,
-            oracle.Segment(
-                start[0], end[0], Z0, start[1], end[1], amplitude=amplitude[1], standard=which == "standard"
-            ),
-            p,
-            beta_hats,
-            tau,
-        )
+        way = oracle.Segment(start[0], end[0], Z0, start[1], end[1], amplitude=amplitude[1], standard=not kind.variable)
+        wanted = oracle.motion(MSSM, way, p, beta_hats, tau)
         segment = made(robot, start, end, Z0, beta_hats, p)
-        found = states(robot, segment, amplitude[0], float(p), tau, kind=Kind(which == "variable"))
+        # The platform of a variable amplitude stands still at every cusp.
+        found = states(segment, amplitude[0], p, np.concatenate([tau, np.linspace(0.0, 1.0, p + 1)]), kind=kind)
+        found, cusps = (State(*(x[part] for x in found[:6])) for part in (slice(41), slice(41, None)))
         assert float(segments.duration(segment, float(p))) == pytest.approx(wanted.duration, rel=1e-12)
         np.testing.assert_allclose(found.position, wanted.position, atol=1e-11)
         np.testing.assert_allclose(found.velocity, wanted.velocity, atol=1e-10)
@@ -120,69 +79,67 @@ def test_motions_are_the_oracle_s(name, which):
         np.testing.assert_allclose(found.rotation, wanted.rotation, atol=1e-10)
         np.testing.assert_allclose(found.angular_velocity, wanted.omega, atol=1e-8)
         np.testing.assert_allclose(found.angular_acceleration, wanted.omega_dot, atol=1e-7)
-        if which == "variable":  # the platform stands still at every cusp
-            places = np.minimum(np.arange(13) / p, 1.0)  # one shape for all p
-            cusps = states(robot, segment, amplitude[0], float(p), places)
+        if kind.variable:
             np.testing.assert_allclose(cusps.velocity, 0.0, atol=1e-11)
-
-
-def turned_slightly(rotation, angle):
-    return rotation @ oracle.matrix(np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)]))
 
 
 @pytest.mark.parametrize("start", [0.0, 1e-13, 1e-9, 1e-5, 0.3, np.pi - 1e-9, np.pi])
 def test_angles_near_zero_and_half_a_turn(start):
     """Values, rates and gradients stay finite, and rates are the differences of the orientation."""
-    robot, amplitude = ours(MSSM), named("quintic")
+    robot, amplitude = ours(MSSM), EFFECTIVE
     for end, p in ((0.0, 4), (1e-9, 3), (2.0, 5), (np.pi, 6)):
         poses = [
             (np.array([0.3, 0.5, 1.2]), np.array([np.cos(a / 2), np.sin(a / 2) * 0.6, 0.0, np.sin(a / 2) * 0.8]))
             for a in (start, end)
         ]
         segment = made(robot, *poses, Z0, (-2.0, -1.0), p)
-        tau = np.linspace(0.0, 1.0, 61)
-        found = states(robot, segment, amplitude, float(p), tau)
+        # Not at the knots, where an angular acceleration has a corner.
+        tau = np.concatenate([[0.0], np.linspace(0.005, 0.995, 60), [1.0]])
+        found = states(segment, amplitude, p, tau)
         assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
         step, time = 1e-6, float(segments.duration(segment, float(p)))
-        before, after = (states(robot, segment, amplitude, float(p), tau[1:-1] + d) for d in (-step, step))
+        before, after = (states(segment, amplitude, p, tau[1:-1] + d) for d in (-step, step))
         slope = (np.asarray(after.rotation) - np.asarray(before.rotation)) / (2.0 * step * time)
         omega_cross = np.einsum("nij,nkj->nik", slope, np.asarray(found.rotation)[1:-1])
         omega = np.stack([omega_cross[:, 2, 1], omega_cross[:, 0, 2], omega_cross[:, 1, 0]], axis=1)
         np.testing.assert_allclose(found.angular_velocity[1:-1], omega, atol=2e-7)
         bend = (np.asarray(after.angular_velocity) - np.asarray(before.angular_velocity)) / (2.0 * step * time)
         np.testing.assert_allclose(found.angular_acceleration[1:-1], bend, atol=2e-5)
-        gradient = slopes((jnp.asarray(Z0), jnp.asarray(-2.0), jnp.asarray(-1.0)), robot, amplitude, poses, float(p))
-        assert np.isfinite(gradient).all()
+        gradient = lowest_and_slopes(_place(Z0, -2.0, -1.0), robot, amplitude, poses, np.asarray(float(p)))
+        assert np.isfinite(gradient[0]) and np.isfinite(gradient[1]).all()
+
+
+def _place(*values):
+    return tuple(np.asarray(x) for x in values)
 
 
 def test_gradients_are_differences():
     """Of the smallest tension with respect to z0 and beta-hat, from rest and between poses."""
-    robot, amplitude, rng = ours(MSSM), named("quintic"), np.random.default_rng(4)
+    robot, amplitude, rng = ours(MSSM), EFFECTIVE, np.random.default_rng(4)
     for rest in (True, False):
         end, start = random_pose(rng), random_pose(rng)
         if rest:
             start = (np.full(3, np.nan), np.array([1.0, 0.0, 0.0, 0.0]))
-        place, rest_of_it = (
-            (jnp.asarray(Z0), jnp.asarray(-1.0), jnp.asarray(-1.7)),
-            (robot, amplitude, [start, end], 7.0),
-        )
-        found = slopes(place, *rest_of_it)
+        place, rest_of_it = (Z0, -1.0, -1.7), (robot, amplitude, [start, end], np.asarray(7.0))
+        found = lowest_and_slopes(_place(*place), *rest_of_it)[1]
         for i in (0, 2):
             h = 1e-6
-            shifted = [tuple(x + s * h * (j == i) for j, x in enumerate(place)) for s in (-1.0, 1.0)]
-            slope = (lowest(shifted[1], *rest_of_it) - lowest(shifted[0], *rest_of_it)) / (2.0 * h)
-            assert float(found[i]) == pytest.approx(float(slope), rel=1e-5, abs=1e-7)
+            shifted = [_place(*(x + s * h * (j == i) for j, x in enumerate(place))) for s in (-1.0, 1.0)]
+            low, high = (float(lowest_and_slopes(there, *rest_of_it)[0]) for there in shifted)
+            assert float(found[i]) == pytest.approx((high - low) / (2.0 * h), rel=1e-5, abs=1e-7)
 
 
 @pytest.mark.parametrize("robot", [MSSM, general()])
 def test_wrench_balance(robot):
     """Force and moment of the tensions along the cables make the motion: Newton and Euler, cable by cable."""
-    rng, found = np.random.default_rng(2), ours(robot)
+    rng, cases = np.random.default_rng(2), []
     for _ in range(50):
         position, quaternion = random_pose(rng)
         rotation, (velocity, omega, pull, spin) = oracle.matrix(quaternion), rng.normal(size=(4, 3))
-        pose = State(*(jnp.asarray(x) for x in (position, velocity, pull, rotation, omega, spin)))
-        tension = np.asarray(wrench_balance.tensions(found, pose))
+        cases.append(State(position, velocity, pull, rotation, omega, spin))
+    found = cables_at(ours(robot), State(*(np.stack(x) for x in zip(*(case[:6] for case in cases), strict=True))))
+    for pose, tension, determinant in zip(cases, found["tension"], found["determinant"], strict=True):
+        position, _, pull, rotation, omega, spin = pose[:6]
         arms = robot.platform @ rotation.T
         cables = position + arms - robot.base
         units = -cables / np.linalg.norm(cables, axis=1)[:, None]
@@ -195,8 +152,7 @@ def test_wrench_balance(robot):
         ratios = oracle.force_ratios(robot, position, rotation, oracle.wrench(robot, rotation, pull, omega, spin))
         wanted = oracle.tensions(robot, position, rotation, ratios).reshape(6)
         np.testing.assert_allclose(tension, wanted, rtol=1e-8, atol=1e-8 * scale)
-        wanted = np.sign(np.linalg.det(oracle.jacobian(robot, position, rotation)))
-        assert np.sign(wrench_balance.normalised_determinant(found, pose.position, pose.rotation)) == wanted
+        assert np.sign(determinant) == np.sign(np.linalg.det(oracle.jacobian(robot, position, rotation)))
 
 
 def test_work_of_the_cables_is_the_change_of_energy():
@@ -210,16 +166,14 @@ def test_work_of_the_cables_is_the_change_of_energy():
     edges = np.unique(np.concatenate([np.linspace(0.0, 1.0, p + 1), [0.15, 0.85], [0.4]]))
     work, last = 0.0, None
     for a, b in itertools.pairwise(edges):
-        at = states(
-            package, segment, amplitude, float(p), np.concatenate([[a], 0.5 * (a + b) + 0.5 * (b - a) * nodes, [b]])
-        )
-        tension = np.asarray(jax.vmap(lambda *x: wrench_balance.tensions(package, State(*x)))(*at))
-        _, rate, _ = jax.vmap(lambda *x: wrench_balance.cable_motion(package, State(*x)))(*at)
-        power = -(tension * np.asarray(rate)).sum(1)
+        tau = np.concatenate([[a], 0.5 * (a + b) + 0.5 * (b - a) * nodes, [b]])
+        at = states(segment, amplitude, p, tau)
+        cables = cables_at(package, at)
+        power = -(cables["tension"] * cables["motion"][1]).sum(1)
         work += 0.5 * (b - a) * time * float(parts @ power[1:-1])
 
         def energy(i, at=at):
-            turn, omega = np.asarray(at.rotation[i]), np.asarray(at.angular_velocity[i])
+            turn, omega = at.rotation[i], at.angular_velocity[i]
             kinetic = (
                 robot.mass * float(at.velocity[i] @ at.velocity[i]) + omega @ turn @ robot.inertia @ turn.T @ omega
             )
@@ -235,7 +189,7 @@ def test_ends(robot):
     rng, package = np.random.default_rng(6), ours(robot)
     for _ in range(20):
         position, quaternion = random_pose(rng)
-        found = endpoint(package, jnp.asarray(position), jnp.asarray(quaternion), jnp.asarray(Z0))
+        found = end_of(package, position, quaternion, np.asarray(Z0))
         u, v = oracle.deviations(robot, position, quaternion, Z0)
         if robot is MSSM:
             assert float(found.preferred) == pytest.approx(oracle.preferred_beta_hat(u, v), rel=1e-8)
@@ -246,22 +200,26 @@ def test_ends(robot):
             assert found.lowest > found.highest
         bend = float(rng.uniform(-4.0, 2.0))
         segment = made(package, random_pose(rng), (position, quaternion), Z0, (-1.0, bend), 5)
-        at = jax.tree.map(lambda x: x[0], states(package, segment, named("quintic"), 5.0, np.ones(1)))
-        np.testing.assert_allclose(
-            wrench_balance.tensions_per_length(package, at), found.offset + bend * found.slope, rtol=1e-7, atol=1e-8
-        )
-    rest = endpoint(package, jnp.array([0.0, 0.0, Z0]), jnp.array([1.0, 0.0, 0.0, 0.0]), jnp.asarray(Z0))
+        at = cables_at(package, states(segment, EFFECTIVE, 5, np.ones(1)))
+        promised = np.asarray(found.offset) + bend * np.asarray(found.slope)
+        np.testing.assert_allclose(at["per_length"][0], promised, rtol=1e-7, atol=1e-8)
+    rest = end_of(package, *random_pose(rng, rest=True), np.asarray(Z0))
     assert float(rest.preferred) == -1.0
+
+
+@jax.jit
+def _turned(q):
+    return rotations.matrix(q), rotations.matrix(rotations.upper(q)), rotations.product(q, rotations.conjugate(q))
 
 
 @given(*[st.floats(-7.0, 7.0)] * 3)
 def test_tilt_and_torsion(azimuth, tilt, torsion):
-    q = jnp.asarray(rotations.from_tilt_torsion(np.array([azimuth, tilt, torsion])))
-    assert float(jnp.linalg.norm(q)) == pytest.approx(1.0, abs=1e-14)
+    q = rotations.from_tilt_torsion(np.array([azimuth, tilt, torsion]))
+    assert float(np.linalg.norm(q)) == pytest.approx(1.0, abs=1e-14)
     wanted = oracle.tilt_torsion_matrix(azimuth, tilt, torsion)
-    np.testing.assert_allclose(rotations.matrix(q), wanted, atol=1e-14)
-    np.testing.assert_allclose(rotations.matrix(rotations.upper(q)), wanted, atol=1e-14)
-    back = rotations.product(q, rotations.conjugate(q))
+    matrix, of_upper, back = _turned(q)
+    np.testing.assert_allclose(matrix, wanted, atol=1e-14)
+    np.testing.assert_allclose(of_upper, wanted, atol=1e-14)
     np.testing.assert_allclose(back, [1.0, 0.0, 0.0, 0.0], atol=1e-14)
 
 
@@ -336,44 +294,35 @@ def test_robots_that_do_not_hang():
         reference_pose(changed(platform_points=ring, base_points=ring), Z0)
 
 
-@jax.jit
-def readable(package, poses):
-    """Tensions per mass and length, and determinants, of many poses."""
-
-    def one(*x):
-        pose = State(*x)
-        found = wrench_balance.tensions_per_length(package, pose)
-        return found, wrench_balance.normalised_determinant(package, pose.position, pose.rotation)
-
-    return jax.vmap(one)(*poses)
-
-
 def test_joints():
     """Points where cables meet are known as such."""
     assert ours(MSSM).joints == (0, 1, 1, 3, 3, 0)
     assert ours(general(2)).joints == tuple(range(6))
 
 
-KINDS = [USUAL, Kind(variable=False), Kind(plain=True), Kind(from_rest=True)]
+# Standard hypocycloids whose orientations beat with beta_1: what no usual motion has.
+OTHERS = Kind(variable=False, plain=True)
+KINDS = [USUAL, STANDARD, Kind(plain=True), FROM_REST]
 
 
 @pytest.mark.parametrize(
     ("robot", "name", "kind"),
     [
-        *((MSSM, "quintic", kind) for kind in KINDS),
-        *(
-            pytest.param(general(2), "effective-c3", kind, marks=() if kind in KINDS[::3] else pytest.mark.soak)
-            for kind in KINDS
-        ),
+        (MSSM, "effective-c3", USUAL),
+        (MSSM, "effective-c3", OTHERS),
+        (general(2), "effective-c3", FROM_REST),
+        *(soak(MSSM, "quintic", kind) for kind in KINDS),
+        *(soak(general(2), "effective-c3", kind) for kind in KINDS[:3]),
     ],
 )
 def test_the_fast_kernel(robot, name, kind):
     """The smallest tension of many segments as the readable functions give it; -inf past a singularity."""
     package, rng, amplitude = ours(robot), np.random.default_rng(9), AMPLITUDES[name][0]
-    rest = (jnp.array([0.0, 0.0, Z0]), jnp.eye(3))
-    reference = float(wrench_balance.normalised_determinant(package, *rest))
+    standing = State(np.array([[0.0, 0.0, Z0]]), *np.zeros((2, 1, 3)), np.eye(3)[None], *np.zeros((2, 1, 3)))
+    reference = cables_at(package, standing)["determinant"][0]
+    seen = {"regular": 0, "singular": 0}
     for p in (1, 4, 7):
-        tau = np.linspace(0.0, 1.0, 32)
+        tau = np.linspace(0.0, 1.0, 4 * CHUNK)
         some = [
             made(
                 package,
@@ -385,20 +334,32 @@ def test_the_fast_kernel(robot, name, kind):
             )
             for i in range(24)
         ]
-        batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
-        found, when = smallest_tensions(package, amplitude, float(p), tau, batch, kind=kind)
-        rough, _ = smallest_tensions(package, amplitude, float(p), tau, batch, kind=kind, rough=True)
+        batch = stacked([*some, *some[:1] * (64 - len(some))])  # the batch that `conftest` sets: compiled once for all
+        found, when = _smallest(package, amplitude, p, tau, batch, kind=kind)
+        rough, _ = _smallest(package, amplitude, p, tau, batch, kind=kind, rough=True)
         assert rough.dtype == np.float32
-        alone, _ = smallest_tensions(
-            package, amplitude, float(p), tau[np.resize(np.unique(when), len(tau))], batch, kind=kind
-        )
-        assert (np.asarray(alone) == found).all()
+        alone, _ = _smallest(package, amplitude, p, np.resize(tau[np.unique(when)], len(tau)), batch, kind=kind)
+        assert (alone == found).all()
         for i, segment in enumerate(some):
-            at = states(package, segment, amplitude, float(p), tau, kind=kind)
-            mu, det = (np.asarray(x) for x in readable(package, at))
+            at = cables_at(package, states(segment, amplitude, p, tau, kind=kind))
+            mu, det = at["per_length"], at["determinant"]
             if (det / reference > 1e-4).all():
                 wanted = 6.0 * Z0 / 9.81 * mu.min()
                 assert float(found[i]) == pytest.approx(wanted, rel=1e-8, abs=1e-9)
                 assert float(rough[i]) == pytest.approx(wanted, rel=0.02, abs=0.02)
+                seen["regular"] += 1
             elif (det / reference < -1e-4).any():
                 assert float(found[i]) == -np.inf
+                seen["singular"] += 1
+    assert min(seen.values()) > 5, seen
+
+
+def _smallest(robot, amplitude, p, tau, batch, **how):
+    # Of instants in calls of the length that the first look has, and which of all instants it belongs to.
+    parts = [
+        smallest_tensions(robot, amplitude, float(p), tau[k : k + CHUNK], batch, **how)
+        for k in range(0, len(tau), CHUNK)
+    ]
+    values, when = (np.stack([np.asarray(part[k]) for part in parts]) for k in (0, 1))
+    first = values.argmin(0)
+    return values.min(0), np.take_along_axis(when, first[None], 0)[0] + CHUNK * first

@@ -1,5 +1,6 @@
 """Maps of poses of a platform beside plans of the same poses; the fast forms beside the readable ones; mistakes."""
 
+import functools
 import itertools
 from pathlib import Path
 
@@ -7,21 +8,40 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from test_platform import MSSM, Z0, general, made, ours, random_pose, states
-from test_pose_plans import HEAD, SHORT, cspr, planned
+from oracles import platform as oracle
+from support.commands import cspr
+from support.platforms import (
+    EFFECTIVE,
+    FROM_REST,
+    HEAD,
+    INSTANTS,
+    MSSM,
+    SHORT,
+    Z0,
+    general,
+    limits_of,
+    made,
+    ours,
+    planned,
+    random_pose,
+    stacked,
+    states,
+)
 
+from cspr_jax.feasibility.platform.kernels import cable_vectors, moving_along, still_along
 from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.feasibility.platform.slacks import pose_slacks
 from cspr_jax.feasibility.problem import Problem
+from cspr_jax.plans import choices
 from cspr_jax.plans.planning import plan
 from cspr_jax.robots import contact_lanes, interference
-from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_lanes import instant, instant_of_arc, state
-from cspr_jax.trajectories.platform_segment import USUAL, Kind
+from cspr_jax.trajectories.platform_segment import USUAL, Kind, motion
 
 REST = "{ rest = true }"
 POSE = "{ position = [0.6, -0.4, 1.5], tilt_torsion = [0.3, 0.4, -0.2], beta_hat = -2.0 }"
@@ -43,9 +63,11 @@ max_arcs = 12
 from = {start}
 {more}
 """
-ALL_LIMITS = {
+# Many motions break each of them.
+TIGHT = {
     "tension_min": 0.01,
     "tension_max": 3.0,
+    "floor": 2.0,
     "cable_length_max": 3.0,
     "cable_speed_max": 2.5,
     "cable_acceleration_max": 9.0,
@@ -97,38 +119,104 @@ def test_mirrored_cells(tmp_path):
         np.testing.assert_allclose(mirrored[name], plain[name], rtol=1e-6, atol=1e-8, err_msg=name)
 
 
-@pytest.mark.parametrize("robot", [MSSM, general(2)])
-def test_lanes_are_the_readable_slacks(robot):
-    """Every criterion with every limit, and what meets, at random instants of random motions."""
-    package, rng, amplitude = ours(robot), np.random.default_rng(3), named("quintic")
-    limits = Limits(floor=np.asarray(2.0), **{name: np.full(6, x) for name, x in ALL_LIMITS.items()})
-    problem, near = Problem(package, limits, amplitude), interference.contacts(package)
-    p, tau = 5, np.linspace(0.03, 0.97, 9)
-    some = [made(package, random_pose(rng), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p) for _ in range(12)]
-    batch = jax.tree.map(lambda *x: np.stack([np.asarray(y) for y in x]), *some)
-    seen = 0
-    for t in tau:
-        now = instant(amplitude, batch.sense, np.full(12, float(p)), np.full(12, t))
-        here = state(batch, np.full(12, float(p)), now, USUAL)
-        wires = cables(package, here.position, here.turn)
-        found = moving_slacks(problem, batch, jnp.full(12, float(p)), now, USUAL) + still_slacks(
-            problem, batch, here, wires
-        )
-        found = np.stack(found)[order(limits)]
-        gaps = np.stack([np.stack(v, -1) for v in contact_lanes.gaps(package.base_points, near.pairs, wires)], 1)
-        directions = np.stack([np.stack(v, -1) for v in contact_lanes.cable_directions(wires, here.turn)], 1)
-        for i, segment in enumerate(some):
-            at = jax.tree.map(lambda x: x[0], states(package, segment, amplitude, float(p), np.array([t])))
-            pose = State(*at)
-            wanted = np.asarray(pose_slacks(problem, pose, jnp.asarray(Z0), segment.regular))
+slacks_of, gaps_of = jax.jit(pose_slacks), jax.jit(interference.gaps)
+directions_of = jax.jit(interference.cable_directions)
+
+
+def test_lanes_are_the_readable_slacks():
+    """Every criterion with every limit, and distances between cables, along arcs of random motions from rest."""
+    package, rng, p = ours(MSSM), np.random.default_rng(3), 5
+    limits = limits_of(**TIGHT)
+    problem, near, places = Problem(package, limits, EFFECTIVE), interference.contacts(package), np.linspace(0, 1, 65)
+    motions = [
+        made(package, random_pose(rng, rest=True), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p)
+        for _ in range(12)
+    ]
+    which = np.arange(INSTANTS) % len(motions)
+    arcs = stacked([motions[i] for i in which]), np.full(INSTANTS, float(p)), (which % p).astype(float)
+    pairs = tuple((int(i), int(j)) for i, j in near.pairs)
+    moving = np.asarray(moving_along(problem, places, arcs, kind=FROM_REST))
+    still = still_along(problem, places, arcs, platform=(near.sides, near.normal), pairs=pairs, kind=FROM_REST).values
+    *still, nearest = np.moveaxis(np.asarray(still), 1, 0)
+    found, seen = np.concatenate([np.moveaxis(moving, 1, 0), still])[order(limits)], 0
+    for i, segment in enumerate(motions):
+        some = np.sort(rng.choice(len(places), 9, replace=False))
+        at = states(segment, EFFECTIVE, p, (i % p + places[some]) / p)
+        for place, *leaves in zip(some, *at[:6], strict=True):
+            pose = State(*leaves)
+            wanted = np.asarray(slacks_of(problem, pose, np.asarray(Z0), segment.regular))
             if abs(wanted[1]) > 1e-3:
-                np.testing.assert_allclose(found[:, i], wanted, rtol=1e-7, atol=1e-8)
+                np.testing.assert_allclose(found[:, place, i], wanted, rtol=1e-7, atol=1e-8)
                 seen += 1
-            where = (package, pose.position, pose.rotation)
-            wanted_gaps = np.asarray(interference.gaps(package, jnp.asarray(near.pairs), *where[1:]))
-            np.testing.assert_allclose(gaps[i], wanted_gaps, atol=1e-9)
-            own = directions[i] / np.linalg.norm(directions[i], axis=1, keepdims=True)
-            np.testing.assert_allclose(own, np.asarray(interference.cable_directions(*where)), atol=1e-9)
+            gaps = np.asarray(gaps_of(package, near.pairs, pose.position, pose.rotation))
+            assert nearest[place, i] == pytest.approx(np.linalg.norm(gaps, axis=1).min(), abs=1e-9)
+    assert seen > 40
+
+
+def test_vectors_of_lanes():
+    """Between cables, and along them, between poses: as the readable functions give them."""
+    package, rng, p = ours(MSSM), np.random.default_rng(8), 5
+    near, tau = interference.contacts(package), rng.uniform(0.0, 1.0, INSTANTS)
+    some = [made(package, random_pose(rng), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p) for _ in tau]
+    pairs = tuple((int(i), int(j)) for i, j in near.pairs)
+    items = stacked(some), np.full(INSTANTS, float(p)), tau
+    gaps, directions = cable_vectors(Problem(package, NO_LIMITS, EFFECTIVE), items, pairs=pairs, kind=USUAL)
+    own = directions / np.linalg.norm(directions, axis=2, keepdims=True)
+    for segment, t, found, along in zip(some, tau, np.asarray(gaps), own, strict=True):
+        pose = states(segment, EFFECTIVE, p, [t])
+        where = pose.position[0], pose.rotation[0]
+        np.testing.assert_allclose(found, gaps_of(package, near.pairs, *where), atol=1e-9)
+        np.testing.assert_allclose(along, directions_of(package, *where), atol=1e-9)
+
+
+@functools.partial(jax.jit, static_argnames="pairs")
+def as_lanes(problem, batch, p, t, *, pairs):
+    """Slacks (n_criteria, n), vectors between cables and directions of cables of motions, by the fast forms."""
+    now = instant(problem.amplitude, batch.sense, p, t)
+    here = state(batch, p, now, USUAL)
+    wires = cables(problem.robot, here.position, here.turn)
+    slacks = moving_slacks(problem, batch, p, now, USUAL) + still_slacks(problem, batch, here, wires)
+    gaps = contact_lanes.gaps(problem.robot.base_points, pairs, wires)
+    return jnp.stack(slacks), *contact_lanes.as_arrays(gaps, contact_lanes.cable_directions(wires, here.turn))
+
+
+@jax.jit
+def as_read(problem, batch, p, t, *, pairs):
+    """The same by the readable functions, slacks (n, n_criteria) in their own order."""
+
+    def one(segment, arcs, tau):
+        pose = motion(segment, problem.amplitude, arcs, tau)
+        where = (problem.robot, pose.position, pose.rotation)
+        slacks = pose_slacks(problem, pose, problem.robot.gravity / segment.rate, segment.regular)
+        return slacks, interference.gaps(problem.robot, pairs, *where[1:]), interference.cable_directions(*where)
+
+    return jax.vmap(one)(batch, p, t)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("robot", [MSSM, general(2)])
+def test_lanes_are_the_readable_slacks_all(robot):
+    """Every criterion with every limit, and what meets, at random instants of random motions."""
+    package, rng = ours(robot), np.random.default_rng(3)
+    limits = limits_of(**TIGHT)
+    problem, near = Problem(package, limits, EFFECTIVE), interference.contacts(package)
+    p, count = np.full(12, 5.0), 12
+    batch = stacked(
+        made(package, random_pose(rng), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), 5) for _ in range(count)
+    )
+    pairs, seen = tuple((int(i), int(j)) for i, j in near.pairs), 0
+    for tau in np.linspace(0.03, 0.97, 9):
+        t = np.full(count, tau)
+        found, gaps, directions = (np.asarray(x) for x in as_lanes(problem, batch, p, t, pairs=pairs))
+        wanted, wanted_gaps, wanted_directions = (
+            np.asarray(x) for x in as_read(problem, batch, p, t, pairs=np.asarray(near.pairs))
+        )
+        some = np.abs(wanted[:, 1]) > 1e-3
+        np.testing.assert_allclose(found[order(limits)].T[some], wanted[some], rtol=1e-7, atol=1e-8)
+        seen += some.sum()
+        np.testing.assert_allclose(gaps, wanted_gaps, atol=1e-9)
+        own = directions / np.linalg.norm(directions, axis=2, keepdims=True)
+        np.testing.assert_allclose(own, wanted_directions, atol=1e-9)
     assert seen > 40
 
 
@@ -137,35 +225,36 @@ def test_hits_of_lanes():
     near, rng = interference.contacts(ours(MSSM)), np.random.default_rng(4)
     before, after = rng.normal(size=(2, 500, 6, 3))
     wanted = interference.platform_hit(near.sides, near.normal, before, after).any(1)
-    as_lanes = [[tuple(x[:, k].T) for k in range(6)] for x in (before, after)]
-    assert (np.asarray(contact_lanes.platform_hit(near.sides, near.normal, *as_lanes)) == wanted).all()
+    vectors = [[tuple(x[:, k].T) for k in range(6)] for x in (before, after)]
+    found = jax.jit(contact_lanes.platform_hit)(near.sides, near.normal, *vectors)
+    assert (np.asarray(found) == wanted).all()
     assert 50 < wanted.sum() < 450
 
 
 def test_instants_of_arcs():
     """A place within an arc is an instant of the whole."""
     amplitude, rng = named("effective-c3", 0.2), np.random.default_rng(5)
+    of_arc, of_all = jax.jit(instant_of_arc), jax.jit(instant)
     for p in (1, 4, 7):
-        arc, within = rng.integers(0, p, 20).astype(float), jnp.asarray(rng.random())
+        arc, within = rng.integers(0, p, 20).astype(float), np.asarray(rng.random())
         sense = 1.0 if p % 2 else -1.0
-        found = instant_of_arc(amplitude, np.full(20, sense), np.full(20, float(p)), arc, within)
-        wanted = instant(amplitude, np.full(20, sense), np.full(20, float(p)), (arc + within) / p)
+        found = of_arc(amplitude, np.full(20, sense), np.full(20, float(p)), arc, within)
+        wanted = of_all(amplitude, np.full(20, sense), np.full(20, float(p)), (arc + within) / p)
         np.testing.assert_allclose(np.stack(found), np.stack(wanted), atol=1e-12)
 
 
 def test_time_functions_of_the_rotation():
     """beta_1 is a cosine, beta_0 has no angular acceleration at the ends, beta_f one at both."""
-    robot, amplitude, p = ours(MSSM), named("quintic"), 4
+    robot, p = ours(MSSM), 4
     start, end = random_pose(np.random.default_rng(6), rest=True), random_pose(np.random.default_rng(7))
     tau = np.array([0.0, 0.3, 1.0])
     segment = made(robot, start, end, Z0, (0.0, 0.0), p)
-    still = states(robot, segment, amplitude, float(p), tau)
-    np.testing.assert_allclose(np.asarray(still.angular_acceleration)[[0, 2]], 0.0, atol=1e-9)
-    plain = states(robot, segment, amplitude, float(p), tau, kind=Kind(plain=True))
+    still = states(segment, EFFECTIVE, p, tau)
+    np.testing.assert_allclose(still.angular_acceleration[[0, 2]], 0.0, atol=1e-9)
+    plain = states(segment, EFFECTIVE, p, tau, kind=Kind(variable=False, plain=True))
     angle = 2.0 * np.arccos(np.clip(abs(end[1][0]), 0.0, 1.0))
-    now = tau**3 * (10 - 15 * tau + 6 * tau**2)
-    wanted = np.cos(np.abs(angle * now * np.cos(np.pi * p * tau)))
-    np.testing.assert_allclose((np.trace(np.asarray(plain.rotation), axis1=1, axis2=2) - 1.0) / 2.0, wanted, atol=1e-9)
+    wanted = np.cos(np.abs(angle * oracle.effective_c3(0.1)(tau)[0] * np.cos(np.pi * p * tau)))
+    np.testing.assert_allclose((np.trace(plain.rotation, axis1=1, axis2=2) - 1.0) / 2.0, wanted, atol=1e-9)
 
 
 @pytest.mark.parametrize("beat", ["beta_f", "beta_0", pytest.param("beta_1", marks=pytest.mark.soak)])
@@ -186,8 +275,20 @@ def test_beats_in_plans_and_maps(tmp_path, beat):
     assert code == 0 and (open_result(Path(out.split()[-1])).data["arcs"] > 0).any(), err
 
 
-def test_chosen_depth_and_epsilon(tmp_path):
-    """The fastest z0 is no slower than others, nor the best epsilon; both are feasible."""
+def test_chosen_depth_and_epsilon(tmp_path, monkeypatch):
+    """The fastest z0 of few is no slower than others, nor the best epsilon of few; both are feasible."""
+    monkeypatch.setattr(choices, "DEPTHS", 40)
+    monkeypatch.setattr(choices, "EPSILONS", np.array([0.02, 0.1, 0.3]))
+    check_choices(tmp_path)
+
+
+@pytest.mark.soak
+def test_chosen_depth_and_epsilon_all(tmp_path):
+    check_choices(tmp_path)
+
+
+def check_choices(tmp_path):
+    """Beside plans with given values."""
     target = "[[pose]]\nposition = [0.3, 1.4, 1.5]\ntilt_torsion = [1.0, 0.4, 0.2]\n"
     plain = HEAD + "[[pose]]\nrest = true\n" + target
     totals = []

@@ -6,6 +6,7 @@ import json
 import jax
 import numpy as np
 import pytest
+from support.platforms import EFFECTIVE
 
 import cspr_jax
 from cspr_jax.errors import InputError
@@ -14,20 +15,26 @@ PLACES = np.array([[0.5, 0.3, 1.4], [1.2, 0.2, 1.5], [-0.4, 0.6, 1.3]])
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0], [np.cos(0.1), np.sin(0.1), 0.0, 0.0], [np.cos(0.05), 0.0, 0.0, np.sin(0.05)]])
 
 
+states_reached = jax.jit(jax.vmap(lambda motion, tau: motion.state(tau), (0, None)))
+# What other tests of platforms compile for, as a plan writes it.
+WRITTEN = {"name": "effective-c3", "epsilon": 0.1}
+
+
 def reached(answers) -> np.ndarray:
     """Where the motions of answers end."""
-    return np.asarray(jax.vmap(lambda motion: motion.state(1.0).position)(answers.motions()))
+    return np.asarray(states_reached(answers.motions(), 1.0).position)
 
 
-def test_transitions_are_those_of_a_plan():
+@pytest.mark.parametrize("amplitude", ["quintic", pytest.param("A1", marks=pytest.mark.soak)])
+def test_transitions_are_those_of_a_plan(amplitude):
     robot, target = cspr_jax.load_robot("transition-prototype"), [0.9, 0.2, 1.5]
-    found = cspr_jax.minimum_oscillations(robot, [target], z0=1.5, amplitude="A1")
+    found = cspr_jax.minimum_oscillations(robot, [target], z0=1.5, amplitude=amplitude)
     plan = cspr_jax.plan(
         {
             "schema": 1,
             "robot": "transition-prototype",
             "family": "transition",
-            "amplitude": "A1",
+            "amplitude": amplitude,
             "z0": 1.5,
             "pose": [{"rest": True}, {"position": target}],
         }
@@ -41,9 +48,9 @@ def test_transitions_are_those_of_a_plan():
 def test_poses_are_those_of_a_plan():
     """One pose with the preferred beta-hat, as in a plan of one segment that fixes the same."""
     robot = cspr_jax.load_robot("laval-mssm")
-    found = cspr_jax.minimum_pose_arcs(robot, PLACES, TURNS, z0=1.4, beta_hat="preferred")
+    found = cspr_jax.minimum_pose_arcs(robot, PLACES, TURNS, z0=1.4, beta_hat="preferred", amplitude=EFFECTIVE)
     np.testing.assert_allclose(reached(found), PLACES, atol=1e-12)
-    turned = jax.vmap(lambda motion: motion.state(1.0).quaternion)(found.motions())
+    turned = states_reached(found.motions(), 1.0).quaternion
     np.testing.assert_allclose(np.abs(np.sum(np.asarray(turned) * TURNS, axis=1)), 1.0, atol=1e-12)
     i = 1
     plan = cspr_jax.plan(
@@ -51,6 +58,7 @@ def test_poses_are_those_of_a_plan():
             "schema": 1,
             "robot": "laval-mssm",
             "family": "hypocycloid",
+            "amplitude": WRITTEN,
             "z0": 1.4,
             "pose": [
                 {"rest": True},
@@ -74,8 +82,8 @@ def test_z_up_and_far_away():
         z_axis="up",
     )
     mirrored = TURNS * np.append(1.0, signs)
-    here = cspr_jax.minimum_pose_arcs(robot, PLACES, TURNS, z0=1.4)
-    there = cspr_jax.minimum_pose_arcs(turned, PLACES * signs + offset, mirrored, z0=1.4)
+    here = cspr_jax.minimum_pose_arcs(robot, PLACES, TURNS, z0=1.4, amplitude=EFFECTIVE)
+    there = cspr_jax.minimum_pose_arcs(turned, PLACES * signs + offset, mirrored, z0=1.4, amplitude=EFFECTIVE)
     np.testing.assert_array_equal(here.arcs, there.arcs)
     np.testing.assert_allclose(here.margin, there.margin, rtol=1e-9)
     np.testing.assert_allclose(reached(there), PLACES * signs + offset, atol=1e-10)
@@ -83,14 +91,14 @@ def test_z_up_and_far_away():
 
 def test_attainable_orientations_are_those_of_a_sweep(tmp_path):
     robot, place = cspr_jax.load_robot("laval-mssm"), [0.5, 0.3, 1.4]
-    inside, answers = cspr_jax.attainable(robot, place, definition="grid", divisions=4)
+    inside, answers = cspr_jax.attainable(robot, place, definition="grid", divisions=4, amplitude=EFFECTIVE)
     assert len(inside.angles) == len(answers.arcs)
     sweep = {
         "schema": 1,
         "map": "attainability",
         "robot": "laval-mssm",
         "axes": {"x": [0.5], "y": [0.3], "z": [1.4]},
-        "trajectory": {"family": "hypocycloid"},
+        "trajectory": {"family": "hypocycloid", "amplitude": WRITTEN},
         "orientations": {"definition": "grid", "divisions": 4},
     }
     data = cspr_jax.compute(sweep)
