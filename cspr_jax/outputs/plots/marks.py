@@ -10,6 +10,7 @@ from matplotlib.path import Path
 from matplotlib.projections.polar import PolarAxes
 from matplotlib.transforms import Bbox
 
+from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.outputs.plots.labels import as_drawn
 from cspr_jax.outputs.plots.notes import start, starts_at_rest, table
 from cspr_jax.store.result import Result
@@ -113,15 +114,14 @@ def _points(section: _Section, name: str) -> dict[str, np.ndarray]:
 def _rest_point(section: _Section, name: str) -> np.ndarray | None:
     # P0 lies below the centroid of the spools; None where it is not one point.
     place, result = section.place, section.result
-    down = -1.0 if result.attributes.get("z_axis") == "up" else 1.0
-    depth = place.get("z0")
+    frame, depth = frame_of(section.base, str(result.attributes.get("z_axis", "down"))), place.get("z0")
     if depth is None and "z" in place and starts_at_rest(result, name):
         # z0 is chosen for each target: its own depth, or by the inclination.
         given = table(result.settings, "trajectory").get("inclination")
         inclination = place.get("inclination", 0.0 if given is None else given)
         if isinstance(inclination, float) and inclination > -1.0:
-            depth = (place["z"] - section.centre[2]) * down / (1.0 + inclination)
-    return None if depth is None else section.centre + np.array([0.0, 0.0, down * depth])
+            depth = float(frame.depth(place["z"])) / (1.0 + inclination)
+    return None if depth is None else frame.outward(np.array([0.0, 0.0, depth]))
 
 
 def _coordinate(name: str, points: np.ndarray, centre: np.ndarray, azimuth: float | None) -> np.ndarray:

@@ -11,6 +11,8 @@ from cspr_jax.store.result import Result
 
 # Of longer plans the lines would hide the rest.
 BOUNDARIES = 200
+# Share of the distance between spools that typed digits may leave between points of one plane.
+ONE_PLANE = 1e-9
 
 
 def motion_figure(result: Result) -> Figure:
@@ -23,8 +25,10 @@ def motion_figure(result: Result) -> Figure:
         the figure.
     """
     time, position, tension = result.axes["t"], result.data["position"], result.data["tension"]
-    planar = tension.shape[1] == 2
-    places: Any = [["xz", "xz"] if planar else ["xy", "xz"], ["tension", "tension"]]
+    # Of a planar robot, spools and path are in one vertical plane y = constant. Old files lack the spools.
+    points = np.vstack([position, result.attributes.get("base_points", np.empty((0, 3)))])
+    is_planar = np.ptp(points[:, 1]) <= ONE_PLANE * np.ptp(points[:, 0])
+    places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["tension", "tension"]]
     heights = [1.2, 1.0]
     if "quaternion" in result.data:
         places.insert(1, ["orientation", "orientation"])
