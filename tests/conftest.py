@@ -1,7 +1,9 @@
 """Settings for every test: 64 bits, strict promotion, repeatable examples, kept code; robots that many tests share."""
 
+import ctypes
 import gc
 import os
+import platform
 import sys
 import tempfile
 from pathlib import Path
@@ -38,6 +40,8 @@ jax.config.update("jax_persistent_cache_enable_xla_caches", "none")
 elementary.PROMOTION = ("strict", "raise")
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
+# As `double_precision` has it: what tests call themselves, and what commands call, is one program.
+jax.config.update("jax_default_matmul_precision", "highest")
 # Most tests ask for a handful of cases; a batch is padded.
 batches.LARGEST = 64
 settings.register_profile("default", deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
@@ -111,6 +115,8 @@ def room():
     if pages * os.sysconf("SC_PAGE_SIZE") > ROOM:
         jax.clear_caches()
         gc.collect()
+        if platform.libc_ver()[0] == "glibc":  # else the next file finds as little room
+            ctypes.CDLL(None).malloc_trim(0)
 
 
 def equilateral(radius: float) -> np.ndarray:
