@@ -95,10 +95,10 @@ class OrientationSteps:
             the samples.
         """
         places = np.broadcast_to(self._place, (len(quaternions), 3))
-        found = in_batches(
+        sampled = in_batches(
             partial(_sampled, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), size=BATCH
         )
-        share, gaps, directions = found
+        share, gaps, directions = sampled
         # Cables that touch have a gap of rounding errors, whose direction means nothing.
         gaps[np.linalg.norm(gaps, axis=2) < TOUCHING * self._size] = 0.0
         # So has the height of cables that lie in the platform: they are put on one side of it.
