@@ -83,7 +83,7 @@ def turns_much(before: Sequence[Vector], after: Sequence[Vector], least_cosine: 
 
 
 def platform_hit(sides: Array, normal: Array, before: Sequence[Vector], after: Sequence[Vector]) -> Array:
-    """Whether any cable swept over the platform between two instants; see `interference.platform_hit`.
+    """Whether any cable passed over the platform between two instants; see `interference.platform_hit`.
 
     Args:
         sides: (n_cables, 2, 3) of `interference.contacts`.

@@ -15,7 +15,7 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, room
-from cspr_jax.feasibility.platform.crossings import swept
+from cspr_jax.feasibility.platform.crossings import passed_over
 from cspr_jax.feasibility.platform.kernels import cable_vectors, moving_along, still_along
 from cspr_jax.feasibility.platform.prefilter import FIRST, Prefilter
 from cspr_jax.feasibility.platform.samples import Motions, Narrowing, Places, Samples, along, low_points
@@ -193,7 +193,7 @@ class PoseChecker:
         is_finite = np.isfinite(least).all(0) & ~np.isnan(nearest) & (self.durations(*motions) > 0.0)
         step, item = np.nonzero(still_samples.wide)
         ends = samples.instants(motions, item, step), samples.instants(motions, item, step + 1)
-        met, hit = swept(
+        met, hit = passed_over(
             partial(self._cable_vectors, motions), self._platform, samples.row[item], ends, len(motions.arcs)
         )
         hit[samples.row[still_samples.hit]] = True

@@ -29,7 +29,7 @@ class StillSamples(NamedTuple):
 
     Fields:
         values: (m, n_values, n) still slacks, and the smallest distance between cables, m.
-        hit: (n,) whether a cable swept over the platform in a step that needs no halving.
+        hit: (n,) whether a cable passed over the platform in a step that needs no halving.
         wide: (m - 1, n) steps to be halved.
     """
 

@@ -19,7 +19,7 @@ from cspr_jax.robots.wrench_lanes import cables
 
 BATCH = 4096
 # Gaps between cables below this part of the platform's size are none. A cable that makes a smaller angle with the
-# platform lies in it, and counts as being where it is in the reference orientation: it has not yet swept over.
+# platform lies in it, and counts as being where it is in the reference orientation: it has not yet passed over.
 TOUCHING = 1e-9
 # Steps between neighbours that are held at a time.
 STEPS = 65536
@@ -126,7 +126,7 @@ class OrientationSteps:
             last: (n,) indices.
 
         Returns:
-            (n,) whether both are regular, no cables cross, and no cable sweeps over the platform.
+            (n,) whether both are regular, no cables cross, and no cable passes over the platform.
         """
         is_regular = self.regular(samples)
         ways = np.flatnonzero(is_regular[first] & is_regular[last])
