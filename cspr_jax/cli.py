@@ -211,16 +211,16 @@ def _hint(lines: list[str]) -> None:
 def _status(options: argparse.Namespace) -> int:
     from cspr_jax.api.runs import status
 
-    found = status(options.path)
+    state = status(options.path)
     if options.json:
-        _print_json(found)
+        _print_json(state)
         return ExitCode.DONE
-    last = found["last"] or {}
+    last = state["last"] or {}
     sys.stdout.write(
-        f"{found['directory']}: {found['sweep']}, identity {found['identity'][:12]}\n"
-        f"  {found['shards']} of {found['tiles']} tiles as shards, {found['quarantined']} set aside, "
-        f"{found['unfinished']} unfinished\n"
-        f"  result: {found['result'] or 'not yet'}\n"
+        f"{state['directory']}: {state['sweep']}, identity {state['identity'][:12]}\n"
+        f"  {state['shards']} of {state['tiles']} tiles as shards, {state['quarantined']} set aside, "
+        f"{state['unfinished']} unfinished\n"
+        f"  result: {state['result'] or 'not yet'}\n"
         f"  last: {last.get('event', '-')} at {last.get('time', '-')}\n"
     )
     return ExitCode.DONE
@@ -229,16 +229,16 @@ def _status(options: argparse.Namespace) -> int:
 def _verify(options: argparse.Namespace) -> int:
     from cspr_jax.api.runs import verify
 
-    found = verify(options.path)
+    report = verify(options.path)
     if options.json:
-        _print_json(found)
+        _print_json(report)
     else:
-        counts = ", ".join(f"{key} {found[key]}" for key in VERIFIED if key in found)
-        sys.stdout.write(f"{found['path']}: {counts}\n")
-    again = "run the sweep" if "shards" in found else "run or plan it"
-    for fault in found["faults"]:
+        counts = ", ".join(f"{key} {report[key]}" for key in VERIFIED if key in report)
+        sys.stdout.write(f"{report['path']}: {counts}\n")
+    again = "run the sweep" if "shards" in report else "run or plan it"
+    for fault in report["faults"]:
         sys.stderr.write(f"cspr: {fault}: {again} again to make it anew\n")
-    return ExitCode.INPUT_OUTPUT if found["faults"] else ExitCode.DONE
+    return ExitCode.INPUT_OUTPUT if report["faults"] else ExitCode.DONE
 
 
 def _plan(options: argparse.Namespace) -> int:
@@ -323,8 +323,8 @@ def _quantities(options: argparse.Namespace) -> int:
     return _listed(options, lists.list_quantities(), quantities_table)
 
 
-def _listed(options: argparse.Namespace, found: Any, table: Callable[[Any], Any]) -> int:
-    _print_json(found) if options.json else _print(table(found))
+def _listed(options: argparse.Namespace, listed: Any, table: Callable[[Any], Any]) -> int:
+    _print_json(listed) if options.json else _print(table(listed))
     return ExitCode.DONE
 
 
@@ -333,9 +333,9 @@ def _examples(options: argparse.Namespace) -> int:
 
     known = examples.list_examples()
     names = list(known) if options.all else options.name
-    found = [str(path) for path in examples.copy_examples(names, options.output)] if names else known
-    lines = found if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
-    _print_json(found) if options.json else sys.stdout.write("".join(f"{line}\n" for line in lines))
+    shown = [str(path) for path in examples.copy_examples(names, options.output)] if names else known
+    lines = shown if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
+    _print_json(shown) if options.json else sys.stdout.write("".join(f"{line}\n" for line in lines))
     return ExitCode.DONE
 
 
@@ -344,9 +344,9 @@ def _bench(options: argparse.Namespace) -> int:
     from cspr_jax.api.speed import benchmark
     from cspr_jax.bench import lines
 
-    found = benchmark(options.kernels)
+    report = benchmark(options.kernels)
     if options.json:
-        _print_json(found)
+        _print_json(report)
     else:
-        sys.stdout.write("\n".join(lines(found)) + "\n")
+        sys.stdout.write("\n".join(lines(report)) + "\n")
     return ExitCode.DONE

@@ -236,17 +236,17 @@ def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None) ->
 
 def _limits(robot, given: Mapping[str, Any], own: Mapping[str, Any], at: str) -> Limits:
     # What is given over the robot's own; `robot` has base_points and z_axis of its file.
-    n_cables, found = len(robot.base_points), dict[str, Any]()
+    n_cables, values = len(robot.base_points), dict[str, Any]()
     for row in LIMITS:
         value = given.get(row.name)
         value = own.get(row.name) if value is None else value
-        found[row.name] = None if value is None else _limit(row, value, n_cables, at)
-    low, high = found["tension_min"], found["tension_max"]
+        values[row.name] = None if value is None else _limit(row, value, n_cables, at)
+    low, high = values["tension_min"], values["tension_max"]
     if low is not None and high is not None and not (low < high).all():
         raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
-    if found["floor"] is not None:
-        found["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(found["floor"]))
-    return Limits(**found)
+    if values["floor"] is not None:
+        values["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
+    return Limits(**values)
 
 
 def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:

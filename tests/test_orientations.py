@@ -210,10 +210,11 @@ def test_orientations_that_a_mirror_joins():
     checker = checker_of(kind=FROM_REST)
     many, z0 = np.tile(there, (len(angles), 1)), np.full(len(angles), 1.7)
     once, twice = (
-        attainable(checker, many, angles, z0, max_arcs=8, values=4, found=found) for found in (symmetries(robot), NONE)
+        attainable(checker, many, angles, z0, max_arcs=8, values=4, symmetry=found)
+        for found in (symmetries(robot), NONE)
     )
     assert (once.arcs == twice.arcs).all()
-    whether = attained(checker, many, angles, z0, max_arcs=8, values=4, found=symmetries(robot))
+    whether = attained(checker, many, angles, z0, max_arcs=8, values=4, symmetry=symmetries(robot))
     assert (whether == (once.arcs > 0)).all() and whether.any() and not whether.all()
     np.testing.assert_allclose(once.margin[once.arcs > 0], twice.margin[once.arcs > 0], atol=1e-6)
 

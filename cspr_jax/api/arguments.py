@@ -32,15 +32,15 @@ def amplitude_of(given: str | Amplitude, *, free_end: bool | None = None) -> Amp
     Raises:
         InputError: an unknown name, or conditions that it breaks.
     """
-    found = named(given) if isinstance(given, str) else given
-    if free_end is not None and isinstance(found.coefficients, np.ndarray):
-        broken = boundary_errors(found, free_end=free_end)
+    function = named(given) if isinstance(given, str) else given
+    if free_end is not None and isinstance(function.coefficients, np.ndarray):
+        broken = boundary_errors(function, free_end=free_end)
         if broken:
             conditions = "(1.27) and (1.28)" if free_end else "(2.49)"
             raise InputError(
-                "amplitude", found.name, f"an amplitude function that meets {conditions}: " + "; ".join(broken)
+                "amplitude", function.name, f"an amplitude function that meets {conditions}: " + "; ".join(broken)
             )
-    return found
+    return function
 
 
 def kernel_problem(

@@ -72,8 +72,8 @@ def hypocycloid(
     own, frame = _prepared(robot, (3,), "a point mass on three cables")
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     first, last = _places(frame, start, end, z0)
-    found = segment(own, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
-    return Placed(Hypocycloid(found, function, p), frame)
+    geometry = segment(own, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
+    return Placed(Hypocycloid(geometry, function, p), frame)
 
 
 def transition(
@@ -97,8 +97,8 @@ def transition(
     own, frame = _prepared(robot, (2, 3), "a point mass")
     function = amplitude_of(amplitude, free_end=True)
     end = jnp.asarray(frame.inward(target), float)
-    found = transitions.transition(own, function, end, jnp.asarray(z0, float))
-    return Placed(Hypocycloid(found, function, 2.0 * jnp.asarray(oscillations, float)), frame)
+    geometry = transitions.transition(own, function, end, jnp.asarray(z0, float))
+    return Placed(Hypocycloid(geometry, function, 2.0 * jnp.asarray(oscillations, float)), frame)
 
 
 def platform_motion(
@@ -138,8 +138,8 @@ def platform_motion(
     turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
     beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
     first, last = zip(places, turns, strict=True)
-    found = pose_segment(own, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
-    return Placed(PlatformMotion(found, function, p, Kind(variable)), frame)
+    geometry = pose_segment(own, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
+    return Placed(PlatformMotion(geometry, function, p, Kind(variable)), frame)
 
 
 def tensions(robot: AnyRobot, state: State) -> Array:

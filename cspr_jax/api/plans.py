@@ -108,10 +108,10 @@ def plan(given: str | Path | Mapping[str, Any]) -> Plan:
     with double_precision():
         if isinstance(given, Mapping):
             data = plain(given)
-            found = planning.plan_of(plan_keys(data, NAME), NAME)
+            planned = planning.plan_of(plan_keys(data, NAME), NAME)
             text = text_of(data)
         else:
-            found = planning.plan(Path(given))
-            text = found.text
-    fields = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
+            planned = planning.plan(Path(given))
+            text = planned.text
+    fields = {field.name: getattr(planned, field.name) for field in dataclasses.fields(planned)}
     return Plan(**fields | {"text": text})

@@ -87,9 +87,9 @@ def narrowed(function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, valu
     column = np.arange(values.shape[2])
     for _ in range(ROUNDS):
         points = np.clip(place[..., None] + width * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
-        found = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
+        samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
         # Of each place of a function its own values alone: (n_motions, PLACES, n_functions, POINTS).
-        own = np.moveaxis(found[:, :, column, :, column], 0, 2)
+        own = np.moveaxis(samples[:, :, column, :, column], 0, 2)
         smallest = np.minimum(smallest, own.min((1, 3)))
         place = np.take_along_axis(points, own.argmin(3)[..., None], axis=3)[..., 0]
         width = 2.0 * width / (POINTS - 1)

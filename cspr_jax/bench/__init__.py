@@ -42,7 +42,7 @@ def bench(kernels: Path | None = None) -> dict[str, Any]:
         "operations_per_check": six_cables.operations_a_check(six.robot, batches[0]),
         "peak_per_second": timing.peak(),
         "hand_written": written,
-        "ratio_to_numpy": _ratios(rates, {name: found["numpy"] for name, found in rates.items()}),
+        "ratio_to_numpy": _ratios(rates, {name: row["numpy"] for name, row in rates.items()}),
         "ratio_to_hand_written": None if written is None else _ratios(rates, written),
         "cores": timing.cores(),
         "device": f"{jax.devices()[0].platform} {jax.devices()[0].device_kind}",
@@ -60,29 +60,29 @@ def _ratios(rates: dict[str, dict[str, float]], to: dict[str, float]) -> dict[st
     }
 
 
-def lines(found: dict[str, Any]) -> list[str]:
+def lines(report: dict[str, Any]) -> list[str]:
     """Lines that `cspr bench` prints for people.
 
     Args:
-        found: by `bench`.
+        report: by `bench`.
 
     Returns:
         the lines.
     """
-    text = [f"checks per second, best of {found['repeats']}, {found['cores']} cores, {found['device']}"]
+    text = [f"checks per second, best of {report['repeats']}, {report['cores']} cores, {report['device']}"]
     for name, key in (("six_cable", "checks_per_second"), ("three_cable", "three_cable")):
         text.append(name.replace("_", "-"))
-        for dtype, rate in found[key].items():
-            ratio = found["ratio_to_numpy"][name].get(dtype)
+        for dtype, rate in report[key].items():
+            ratio = report["ratio_to_numpy"][name].get(dtype)
             words = "" if ratio is None else f"  {ratio:6.0f} x NumPy"
-            if ratio is not None and found["hand_written"] is not None:
-                words += f"  {found['ratio_to_hand_written'][name][dtype]:5.2f} x hand-written C++ in float32"
+            if ratio is not None and report["hand_written"] is not None:
+                words += f"  {report['ratio_to_hand_written'][name][dtype]:5.2f} x hand-written C++ in float32"
             text.append(f"  {dtype:8s} {rate / 1e6:8.2f} M/s{words}")
-    if found["operations_per_check"] is None or not found["device"].startswith("cpu"):
+    if report["operations_per_check"] is None or not report["device"].startswith("cpu"):
         return text
     for dtype in ("float32", "float64"):
-        used = found["checks_per_second"][dtype] * found["operations_per_check"] / found["peak_per_second"][dtype]
-        peak = found["peak_per_second"][dtype] / 1e9
+        used = report["checks_per_second"][dtype] * report["operations_per_check"] / report["peak_per_second"][dtype]
+        peak = report["peak_per_second"][dtype] / 1e9
         text.append(
             f"six-cable {dtype}: {used:.0%} of what products of matrices reach, {peak:.0f} G operations a second"
         )

@@ -76,8 +76,8 @@ def rates(kernels: Kernels, six: six_cables.Work, three: three_cables.Work) -> d
     Raises:
         ConfigError: a kernel computes something else.
     """
-    found = _six_cables(kernels.six_cables, six), _three_cables(kernels.three_cables, three)
-    return dict(zip(("six_cable", "three_cable"), found, strict=True))
+    both = _six_cables(kernels.six_cables, six), _three_cables(kernels.three_cables, three)
+    return dict(zip(("six_cable", "three_cable"), both, strict=True))
 
 
 def _compiled(source: Path) -> Callable:
@@ -105,9 +105,9 @@ def _lined(values) -> np.ndarray:
     array = np.ascontiguousarray(values, np.float32)
     room = np.zeros(array.size + ALIGNED // 4, np.float32)
     first = -room.ctypes.data % ALIGNED // 4
-    found = room[first : first + array.size].reshape(array.shape)
-    found[...] = array
-    return found
+    lined = room[first : first + array.size].reshape(array.shape)
+    lined[...] = array
+    return lined
 
 
 def _pointers(*arrays: np.ndarray) -> list[ctypes.c_void_p]:
@@ -124,14 +124,12 @@ def _three_cables(kernel: Callable, work: three_cables.Work) -> float:
         fields += [*s.pull.reshape(-1, 6).T, *s.twist.T]
         table = arc_sieve.sample_table(work.problem.amplitude, arcs, tau, np.float32)
         given = [_lined(x) for x in (np.stack(fields), table, arcs, tau)]
-        found = _lined(np.zeros((len(arcs), len(s.rate))))
+        out = _lined(np.zeros((len(arcs), len(s.rate))))
         sizes = ctypes.c_size_t(len(s.rate)), ctypes.c_int(len(arcs)), ctypes.c_int(len(tau))
-        calls.append(partial(kernel, *_pointers(*given), *sizes, *_pointers(found)))
-        kept.append((given, found))
+        calls.append(partial(kernel, *_pointers(*given), *sizes, *_pointers(out)))
+        kept.append((given, out))
         few = jax.tree.map(lambda x: x[: arc_sieve.BATCH], s)
-        _compare(
-            "three_cables.cpp", found, calls[-1], arc_sieve.smallest_sampled(work.problem.amplitude, few, arcs, tau)
-        )
+        _compare("three_cables.cpp", out, calls[-1], arc_sieve.smallest_sampled(work.problem.amplitude, few, arcs, tau))
     return three_cables.checks(len(work.ends)) / best(lambda: [call() for call in calls])
 
 
@@ -148,14 +146,14 @@ def _six_cables(kernel: Callable, work: six_cables.Work) -> float:
         fields = [_stacked(which.reach), _stacked(which.axis), inertia, np.stack([which.angle, which.end_beta_hat])]
         table = rest_table(six_cables.QUINTIC, jnp.asarray(float(batch.arcs)), jnp.asarray(tau), six_cables.FROM_REST)
         given = [_lined(np.concatenate(fields)), _lined(table)]
-        found = _lined(np.zeros(six_cables.LANES))
+        out = _lined(np.zeros(six_cables.LANES))
         numbers = ctypes.c_float(six_cables.PLACE[2]), ctypes.c_float(float(robot.gravity))
         sizes = ctypes.c_size_t(six_cables.LANES), ctypes.c_int(len(tau))
-        calls.append(partial(kernel, *_pointers(*given, *constants, joint), *numbers, *sizes, *_pointers(found)))
-        kept.append((given, found))
+        calls.append(partial(kernel, *_pointers(*given, *constants, joint), *numbers, *sizes, *_pointers(out)))
+        kept.append((given, out))
         count += batch.real
         wanted = six_cables.tensions(robot, batch, rough=False) * float(batch.segments.rate[0]) / 6.0
-        _compare("six_cables.cpp", found, calls[-1], wanted)
+        _compare("six_cables.cpp", out, calls[-1], wanted)
     return count * six_cables.SAMPLES / best(lambda: [call() for call in calls])
 
 
@@ -163,11 +161,11 @@ def _stacked(vector: Vector) -> np.ndarray:
     return np.stack([np.asarray(x) for x in vector])
 
 
-def _compare(name: str, found: np.ndarray, call: Callable, wanted) -> None:
+def _compare(name: str, out: np.ndarray, call: Callable, wanted) -> None:
     # A kernel that computes something else has no rate. Beside singularities float32 has no digits.
     call()
     wanted = np.asarray(wanted, float)
-    mine = found[..., : wanted.shape[-1]]
+    mine = out[..., : wanted.shape[-1]]
     is_far = (mine < -1e20) | (wanted < -1e20)
     agrees = np.where(is_far, (mine < 0.0) & (wanted < 0.0), np.isclose(mine, wanted, rtol=0.01, atol=0.01))
     if agrees.mean() < AGREES:

@@ -90,15 +90,15 @@ def batches(given: Work) -> list[Batch]:
     """
     half = given.angle[:, None] / 2.0
     quaternions = np.concatenate([np.cos(half), np.sin(half) * given.axis], axis=1)
-    found = []
+    portions = []
     for arcs in np.unique(given.arcs):
         which = np.flatnonzero(given.arcs == arcs)
         kernel = partial(_segments, given.robot, np.asarray(arcs % 2 == 1))
         every = in_batches(kernel, (quaternions[which], given.beta_hat[which]), size=LANES)
         for start in range(0, len(which), LANES):
             some = jax.tree.map(lambda x, s=start: x[s : s + LANES], every)
-            found.append(Batch(int(arcs), len(some.rate), jax.device_put(padded(some, LANES))))
-    return found
+            portions.append(Batch(int(arcs), len(some.rate), jax.device_put(padded(some, LANES))))
+    return portions
 
 
 @jax.jit
@@ -127,9 +127,9 @@ def rate(robot: PlatformRobot, some: list[Batch], *, rough: bool) -> tuple[float
     def call(batch):
         return jax.block_until_ready(tensions(robot, batch, rough=rough))
 
-    found = [np.asarray(call(batch)) for batch in some]
+    lowest = [np.asarray(call(batch)) for batch in some]
     total = sum(batch.real for batch in some)
-    taut = sum(int((x[: batch.real] > 0.0).sum()) for x, batch in zip(found, some, strict=True))
+    taut = sum(int((x[: batch.real] > 0.0).sum()) for x, batch in zip(lowest, some, strict=True))
     return total * SAMPLES / best(partial(in_threads, call, some)), taut / total
 
 

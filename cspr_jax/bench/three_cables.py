@@ -53,8 +53,8 @@ def work() -> Work:
     problem = Problem(point_mass_robot(base, mass=0.198), Limits(), amplitudes.named("quintic"))
     ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * room(arc_sieve.BATCH), 3))
     starts = np.broadcast_to(START, ends.shape).copy()
-    found, _ = segments_between(problem, starts, ends, np.full(len(ends), Z0))
-    return Work(problem, ends, (found[0], found[1]))
+    parities, _ = segments_between(problem, starts, ends, np.full(len(ends), Z0))
+    return Work(problem, ends, (parities[0], parities[1]))
 
 
 def rate(given: Work, dtype: str) -> float:
@@ -114,7 +114,7 @@ def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
     q2 = across / np.linalg.norm(across, axis=1)[:, None]
     psi = np.arctan2(np.linalg.norm(across, axis=1), v2 @ q1)[:, None]
     r, slope, curve = r1 + (r2 - r1) * amplitude[0], (r2 - r1) * amplitude[1], (r2 - r1) * bend
-    found = []
+    smallest = []
     for p in range(1, MAX_ARCS + 1):
         theta = psi + (-1) ** (p - 1) * 2.0 * math.pi * math.ceil((p - 1) / 2)  # (2.34)
         n = 2.0 * math.pi * p / np.abs(theta)
@@ -128,8 +128,8 @@ def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
         along, side = rate * (curve * u + 2 * slope * u1 + r * u2), rate * (curve * v + 2 * slope * v1d + r * v2d)
         place = [hub[i] + q1[i] * (r * u) + q2[:, i, None] * (r * v) for i in range(3)]
         force = [q1[i] * along + q2[:, i, None] * side - (g if i == 2 else 0.0) for i in range(3)]
-        found.append(np.min([_kappa(base, k, place, force).min(1) for k in range(3)], axis=0))
-    return np.stack(found, axis=1)
+        smallest.append(np.min([_kappa(base, k, place, force).min(1) for k in range(3)], axis=0))
+    return np.stack(smallest, axis=1)
 
 
 def _kappa(base: np.ndarray, k: int, place: list, force: list) -> np.ndarray:

@@ -47,13 +47,13 @@ def peak() -> dict[str, float]:
     Returns:
         "float32" and "float64" operations a second, "bytes" read and written a second.
     """
-    found = {}
+    rates = {}
     for dtype in ("float32", "float64"):
         matrix, product = np.ones((SIDE, SIDE), dtype), np.empty((SIDE, SIDE), dtype)
-        found[dtype] = 2.0 * SIDE**3 / best(partial(np.matmul, matrix, matrix, out=product))
+        rates[dtype] = 2.0 * SIDE**3 / best(partial(np.matmul, matrix, matrix, out=product))
     array, copy = np.ones(COPIED // 8), np.empty(COPIED // 8)
-    found["bytes"] = 2.0 * COPIED / best(partial(np.copyto, copy, array))
-    return found
+    rates["bytes"] = 2.0 * COPIED / best(partial(np.copyto, copy, array))
+    return rates
 
 
 def operations(lowered: Any, cases: int) -> float | None:
@@ -66,5 +66,5 @@ def operations(lowered: Any, cases: int) -> float | None:
     Returns:
         of each case; None where XLA does not say.
     """
-    found = lowered.compile().cost_analysis() or {}
-    return found["flops"] / cases if "flops" in found else None
+    costs = lowered.compile().cost_analysis() or {}
+    return costs["flops"] / cases if "flops" in costs else None

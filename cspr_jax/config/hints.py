@@ -24,10 +24,10 @@ def robot_hints(spec: RobotFile) -> list[str]:
     Returns:
         one line each.
     """
-    found, spools = [], np.asarray(spec.base_points)
+    lines, spools = [], np.asarray(spec.base_points)
     span = float(np.linalg.norm(spools[:, None] - spools, axis=2).max())
     if span > LARGEST_SPAN and spec.mass < LARGEST_MASS:
-        found.append(
+        lines.append(
             f"robot.base_points: spools {span:g} m apart, for a mass of {spec.mass:g} kg: are these millimetres? "
             "Lengths are in m"
         )
@@ -36,11 +36,11 @@ def robot_hints(spec: RobotFile) -> list[str]:
         size, largest = float(np.linalg.norm(arms, axis=1).max()), float(np.abs(spec.inertia).max())
         ratio = largest / (spec.mass * size**2) if size > 0.0 else 1.0
         if not INERTIA_RATIOS[0] < ratio < INERTIA_RATIOS[1]:
-            found.append(
+            lines.append(
                 f"robot.inertia: {largest:g} kg m^2 for a mass of {spec.mass:g} kg and platform_points {size:g} m "
                 "from it: do the units fit? Inertia is in kg m^2, lengths are in m"
             )
-    return found
+    return lines
 
 
 def plan_hints(keys: PlanFile, spec: RobotFile) -> list[str]:

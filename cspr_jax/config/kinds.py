@@ -36,7 +36,7 @@ def refuse_other_kinds(data: dict[str, Any], wanted: str, file: object) -> None:
     if any(key in data for key in _MARKS[wanted]):
         return
     for kind, marks in _MARKS.items():
-        found = [key for key in marks if key in data]
-        if found:
-            keys = ", ".join(found)
+        theirs = [key for key in marks if key in data]
+        if theirs:
+            keys = ", ".join(theirs)
             raise ConfigError(file, f"is a {kind} file (it has {keys}): must be {_WANTED[wanted]}; {_PLACES[kind]}")

@@ -111,6 +111,6 @@ def checked(model: type[Model], data: Any, file: object, *, at: str = "") -> Mod
     except RecursionError as error:
         raise ConfigError(file, "is nested too deeply") from error
     except ValidationError as error:
-        found = sorted(error.errors(include_url=False), key=wording.rank)
-        lines = [wording.line(model, one, at) for one in found[:MOST_LINES]]
-        raise ConfigError(file, lines[0], others=lines[1:], count=len(found) - 1) from error
+        mistakes = sorted(error.errors(include_url=False), key=wording.rank)
+        lines = [wording.line(model, one, at) for one in mistakes[:MOST_LINES]]
+        raise ConfigError(file, lines[0], others=lines[1:], count=len(mistakes) - 1) from error

@@ -37,13 +37,13 @@ NotNegativePerCable = Annotated[
 
 
 def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    keys: dict[str, Any] = {}
     for row in LIMITS:
         if row.per_cable == per_cable:
             kind = (NotNegativePerCable if row.from_zero else PerCable) if per_cable else Coordinate
             text = f"{row.description}{', one number or one a cable' * per_cable}, {row.unit}"
-            found[row.name] = (kind | None, Field(None, description=text))
-    return found
+            keys[row.name] = (kind | None, Field(None, description=text))
+    return keys
 
 
 # Their fields are rows of `schema.limits.LIMITS`; of a base that it does not know mypy asks nothing.

@@ -61,7 +61,7 @@ def _values(robot, arguments) -> Array:
         state = motion.state(tau)
         force = cables.tensions(robot, state)
         length, rate, rate_slope = cables.cable_motion(robot, state)
-        found = [
+        extremes = [
             jnp.min(force),
             -jnp.max(force),
             jnp.min(force / length) / robot.mass,
@@ -71,7 +71,7 @@ def _values(robot, arguments) -> Array:
             -jnp.max(jnp.abs(rate)),
             -jnp.max(jnp.abs(rate_slope)),
         ]
-        return jnp.stack(found)
+        return jnp.stack(extremes)
 
     return jax.vmap(one)(*arguments)
 
@@ -87,7 +87,7 @@ def demands(robot: Any, motions: Sequence[Motion], samples: Sequence[int]) -> De
     Returns:
         the demands.
     """
-    found = np.empty((len(motions), len(_NAMES)))
+    table = np.empty((len(motions), len(_NAMES)))
     alike: dict[Any, list[int]] = {}
     for i, (motion, count) in enumerate(zip(motions, samples, strict=True)):
         # Those of one structure and one number of samples are computed together.
@@ -98,8 +98,8 @@ def demands(robot: Any, motions: Sequence[Motion], samples: Sequence[int]) -> De
         for first in range(0, len(members), size):
             stage(f"demands of {len(motions)} segments")
             some = members[first : first + size]
-            found[some] = _of_alike(robot, [motions[i] for i in some], count)
-    columns = (found * _SIGNS + 0.0).T  # no -0
+            table[some] = _of_alike(robot, [motions[i] for i in some], count)
+    columns = (table * _SIGNS + 0.0).T  # no -0
     return Demands(**dict(zip(_NAMES, columns, strict=True)), samples=np.array(samples))
 
 

@@ -36,14 +36,14 @@ def slacks(problem: Problem, motion: Motion, tau: Array) -> Array:
     """
     robot, state, z0 = problem.robot, motion.state(tau), motion.z0
     balance = _of_platform if isinstance(robot, PlatformRobot) else _of_point_mass
-    found = [*balance(robot, state, z0), jnp.atleast_1d(plane_normal(robot) @ state.position / z0)]
+    terms = [*balance(robot, state, z0), jnp.atleast_1d(plane_normal(robot) @ state.position / z0)]
     rows = given(problem.limits)
     if rows:
         now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
         for row in rows:
             limit = jnp.asarray(getattr(problem.limits, row.name))
-            found.append(jnp.atleast_1d(slack(row, limit, getattr(now, row.quantity), scale)))
-    return jnp.concatenate(found)
+            terms.append(jnp.atleast_1d(slack(row, limit, getattr(now, row.quantity), scale)))
+    return jnp.concatenate(terms)
 
 
 def flags(problem: Problem) -> tuple[Verdict, ...]:
@@ -55,13 +55,13 @@ def flags(problem: Problem) -> tuple[Verdict, ...]:
     Returns:
         n_slacks flags, in the order of `slacks`.
     """
-    robot, found = problem.robot, [Verdict.SLACK_CABLE] * problem.robot.n_cables
+    robot, verdicts = problem.robot, [Verdict.SLACK_CABLE] * problem.robot.n_cables
     if isinstance(robot, PlatformRobot):
-        found.append(Verdict.SINGULAR)
-    found.append(Verdict.ABOVE_SPOOLS)
+        verdicts.append(Verdict.SINGULAR)
+    verdicts.append(Verdict.ABOVE_SPOOLS)
     for row in given(problem.limits):
-        found += [row.flag] * (robot.n_cables if row.per_cable else 1)
-    return tuple(found)
+        verdicts += [row.flag] * (robot.n_cables if row.per_cable else 1)
+    return tuple(verdicts)
 
 
 def _of_point_mass(robot: PointMassRobot, state: State, z0: Array) -> list[Array]:

@@ -31,12 +31,12 @@ def _instants(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
         envelope = jax.vmap(lambda k: lower_envelope(amplitude, k, v, n, tau))(w)
         # Cable 0 stands for all of them.
         place = jnp.maximum(cable - 1, 0)
-        found = (
+        numbers = (
             n,
             jnp.where(cable > 0, squared[place], jnp.max(squared)),
             jnp.where(cable > 0, envelope[place], jnp.min(envelope)),
         )
-        return tuple(jnp.where(inside, value, jnp.nan) for value in found)
+        return tuple(jnp.where(inside, value, jnp.nan) for value in numbers)
 
     return jax.vmap(one)(*arguments)
 

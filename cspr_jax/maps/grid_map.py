@@ -116,12 +116,12 @@ class PlatformMap(GridMap):
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        found = answers["arcs"] > 0
+        feasible = answers["arcs"] > 0
         margins = np.minimum(np.minimum(answers["margin"], answers["limit_margin"]), answers["det_margin"])
         return {
-            "a feasible cell with a margin below zero": found & ~(margins > 0.0),
-            "an infeasible cell whose verdict is 0": ~found & (answers["verdict"] == 0),
-            "a feasible cell without a duration": found & ~(answers["duration"] > 0.0),
+            "a feasible cell with a margin below zero": feasible & ~(margins > 0.0),
+            "an infeasible cell whose verdict is 0": ~feasible & (answers["verdict"] == 0),
+            "a feasible cell without a duration": feasible & ~(answers["duration"] > 0.0),
         }
 
 
@@ -136,13 +136,13 @@ class PointMassMap(GridMap):
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        found, margin, verdict = answers["arcs"] > 0, answers["margin"], answers["verdict"]
+        feasible, margin, verdict = answers["arcs"] > 0, answers["margin"], answers["verdict"]
         unsure = np.uint16(Verdict.FEWER_ARCS_UNDECIDED.value)
         lasts = np.isfinite(answers["duration"]) & (answers["duration"] > 0.0)
         return {
-            "a feasible cell with a margin below zero": found & ~(margin > -ROUNDING),
-            "a feasible cell whose verdict is not": found & ((verdict & ~unsure) != 0),
-            "an infeasible cell whose verdict is 0": ~found & (verdict == 0),
+            "a feasible cell with a margin below zero": feasible & ~(margin > -ROUNDING),
+            "a feasible cell whose verdict is not": feasible & ((verdict & ~unsure) != 0),
+            "an infeasible cell whose verdict is 0": ~feasible & (verdict == 0),
             "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
-            "a feasible cell without a duration": found & ~lasts,
+            "a feasible cell without a duration": feasible & ~lasts,
         }

@@ -30,9 +30,9 @@ class OrientationsMap(AttainabilityMap):
         every["verdict"] = np.full(count, Verdict.NOT_ACCESSIBLE.value, np.uint16)
         if len(some):
             answers = self._attainable(places[some], angles[some], z0[some])
-            found = vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
+            columns = vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
             for name, values in every.items():
-                values[some] = found[name]
+                values[some] = columns[name]
         return every
 
     def _accessible(self, places: np.ndarray, angles: np.ndarray) -> np.ndarray:

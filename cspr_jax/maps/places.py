@@ -36,8 +36,8 @@ class OrientationWorkspaceMap(PlatformMap):
         azimuth = folded(self._alike, azimuth)
         places = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), places[:, 2]], axis=1)
         every, own = np.unique(np.round(np.c_[places, depths], DIGITS), axis=0, return_inverse=True)
-        found = self._places(every[:, :3], every[:, 3])
-        return {name: values[own.ravel()] for name, values in found.items()}
+        answers = self._places(every[:, :3], every[:, 3])
+        return {name: values[own.ravel()] for name, values in answers.items()}
 
     def _depths(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # z0 of horizontal transitions, where none is given; not needed for what is accessible.
@@ -72,7 +72,7 @@ class AttainabilityMap(OrientationWorkspaceMap):
     def _attainable(self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray) -> PoseAnswers:
         # Of (n, 3) angles at (n, 3) places, both in the kernels' axes.
         values, most = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
-        return attainable(self._checker, places, angles, z0, max_arcs=most, values=values, found=self._alike)
+        return attainable(self._checker, places, angles, z0, max_arcs=most, values=values, symmetry=self._alike)
 
     def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
         fine, coarse = (self._sets(places, k) for k in (1, 2))

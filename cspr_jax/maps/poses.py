@@ -37,14 +37,14 @@ class PosesMap(PlatformMap):
         starts, beta_hats = self._starts(z0)
         ends = (targets, orientations(self._frame, targets, angles))
         trajectory = self._keys.trajectory
-        found = pose_arcs(
+        answers = pose_arcs(
             self._checker,
             Candidates(starts, ends, z0, np.arange(len(z0)), (beta_hats, beta_hats)),
             beta_hat=trajectory.beta_hat,
             beat=trajectory.beat,
             max_arcs=trajectory.max_arcs,
         )
-        return vars(found) | {"beta_hat": found.beta_hat[:, 1]}
+        return vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
 
     def _starts(self, z0: np.ndarray) -> tuple[Poses, np.ndarray]:
         # Poses and values of beta-hat.

@@ -34,11 +34,11 @@ def examples() -> dict[str, str]:
     Raises:
         StoreError: they cannot be read.
     """
-    found = {}
+    purposes = {}
     for path in sorted(folder().glob("*.toml")):
         first = path.read_text("utf-8").partition("\n")[0]
-        found[path.stem] = first.removeprefix("#").strip()
-    return found
+        purposes[path.stem] = first.removeprefix("#").strip()
+    return purposes
 
 
 def copy(names: list[str], place: Path) -> list[Path]:

@@ -20,11 +20,11 @@ def robots() -> list[dict[str, Any]]:
     return [spec.model_dump(exclude_none=True) | {"fault": fault_at_rest(spec)} for spec in specs]
 
 
-def robots_table(found: list[dict[str, Any]]):
+def robots_table(listed: list[dict[str, Any]]):
     """The robots for a terminal.
 
     Args:
-        found: as `robots.point_mass` gives them.
+        listed: as `robots.point_mass` gives them.
 
     Returns:
         a rich table.
@@ -39,7 +39,7 @@ def robots_table(found: list[dict[str, Any]]):
             robot["source"],
             robot["fault"] or "taut",
         )
-        for robot in found
+        for robot in listed
     ]
     return _table(("name", "cables", "mass (kg)", "z axis", "limits", "source", "at rest"), rows)
 
@@ -54,17 +54,17 @@ def quantities() -> list[dict[str, Any]]:
     return [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
 
 
-def quantities_table(found: list[dict[str, Any]]):
+def quantities_table(listed: list[dict[str, Any]]):
     """The quantities for a terminal.
 
     Args:
-        found: as `schema.quantities` gives them.
+        listed: as `schema.quantities` gives them.
 
     Returns:
         a rich table.
     """
     heads = ("group", "name", "units", "description")
-    return _table(heads, [tuple(row[head] for head in heads) for row in found])
+    return _table(heads, [tuple(row[head] for head in heads) for row in listed])
 
 
 def _table(heads: tuple[str, ...], rows: list[tuple]):

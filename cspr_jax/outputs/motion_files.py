@@ -96,13 +96,13 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
         ConfigError: too many rows, or a best candidate that is not finite.
         StoreError: the disk or the folder refuses.
     """
-    found = rows(plan, rate=rate)
-    if not all(np.isfinite(values).all() for name, values in found.items() if name != "tension"):
+    columns = rows(plan, rate=rate)
+    if not all(np.isfinite(values).all() for name, values in columns.items() if name != "tension"):
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
     if path.suffix == ".csv":
-        publish(Disk(), path, _csv(found, None if plan.feasible else _feasible_rows(plan, found["t"])).encode())
+        publish(Disk(), path, _csv(columns, None if plan.feasible else _feasible_rows(plan, columns["t"])).encode())
     else:
-        _write_hdf5(plan, path, found)
+        _write_hdf5(plan, path, columns)
 
 
 def _feasible_rows(plan: Plan, t: np.ndarray) -> np.ndarray:
@@ -113,11 +113,11 @@ def _feasible_rows(plan: Plan, t: np.ndarray) -> np.ndarray:
     return good[before] & good[after]
 
 
-def _csv(found: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
+def _csv(columns: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
     heads = ["t"]
-    for name in list(found)[1:]:
-        heads += [f"{name}_{part}" for part in _parts(name, found[name].shape[1])]
-    table = np.column_stack(list(found.values()))
+    for name in list(columns)[1:]:
+        heads += [f"{name}_{part}" for part in _parts(name, columns[name].shape[1])]
+    table = np.column_stack(list(columns.values()))
     last = [[]] * len(table) if feasible is None else [[int(flag)] for flag in feasible]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -130,17 +130,17 @@ def _parts(name: str, count: int) -> list[str]:
     return list(PARTS.get(ACROSS[name], [str(k + 1) for k in range(count)]))
 
 
-def _write_hdf5(plan: Plan, path: Path, found: dict[str, np.ndarray]) -> None:
+def _write_hdf5(plan: Plan, path: Path, columns: dict[str, np.ndarray]) -> None:
     of_segments = segments(plan)
-    numbers = list(range(1, found["tension"].shape[1] + 1))
+    numbers = list(range(1, columns["tension"].shape[1] + 1))
     with new_hdf5(path, attributes(plan)) as file:
-        scales = {"t": found["t"], "axis": list(PARTS["axis"]), "cable": numbers, "segment": of_segments["segment"]}
-        if "quaternion" in found:
+        scales = {"t": columns["t"], "axis": list(PARTS["axis"]), "cable": numbers, "segment": of_segments["segment"]}
+        if "quaternion" in columns:
             scales["component"] = list(PARTS["component"])
         for name, labels in scales.items():
             file[name] = labels
             file[name].make_scale(name)
-        for name, values in found.items():
+        for name, values in columns.items():
             data: h5py.Dataset = file[name] if name == "t" else file.create_dataset(name, data=values)
             describe(data, TRAJECTORY[name])
             if name != "t":
@@ -191,7 +191,7 @@ def segments(plan: Plan) -> dict[str, np.ndarray]:
         (n,) each, by the names of `schema.quantities.SEGMENTS`.
     """
     answers, ends = plan.answers, np.cumsum(plan.answers.duration)
-    found = {
+    columns = {
         "segment": np.arange(1, len(ends) + 1),
         "segment_start": np.concatenate([[0.0], ends[:-1]]),
         "segment_end": ends,
@@ -202,5 +202,5 @@ def segments(plan: Plan) -> dict[str, np.ndarray]:
     }
     return {
         name: np.asarray(values, "float64" if (kind := SEGMENTS[name].kind) == "float" else kind)
-        for name, values in found.items()
+        for name, values in columns.items()
     }

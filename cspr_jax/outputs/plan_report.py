@@ -19,7 +19,7 @@ def plan_object(plan: Plan) -> dict[str, Any]:
         plain values; what does not apply, or is not finite, is None.
     """
     segments = [_segment_object(plan, i) for i in range(len(plan.answers.arcs))]
-    found = {
+    fields = {
         "schema": SCHEMA,
         "robot": plan.spec.name,
         "family": plan.keys.family,
@@ -31,7 +31,7 @@ def plan_object(plan: Plan) -> dict[str, Any]:
         "total_duration": float(plan.answers.duration.sum()),
         "feasible": plan.feasible,
     }
-    return _finite(found)
+    return _finite(fields)
 
 
 def verdict_text(verdict: int, arcs: int) -> str:
@@ -65,7 +65,7 @@ _OF_SOME = (
 def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
     answers, asked = plan.answers, plan.demands
     arcs = int(answers.arcs[i])
-    found = {
+    fields = {
         "from": i,
         "to": i + 1,
         "family": plan.keys.family_of(i),
@@ -88,7 +88,7 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "cable_acceleration_max": float(asked.acceleration_max[i]),
         "samples": int(asked.samples[i]),
     }
-    return found | dict.fromkeys(_OF_SOME) | plan.details(i)
+    return fields | dict.fromkeys(_OF_SOME) | plan.details(i)
 
 
 def _finite(value: Any) -> Any:
@@ -123,12 +123,12 @@ def plan_table(plan: Plan):
     for i, segment in enumerate(segments):
         position = ", ".join(f"{round(value, 9) + 0.0:.4g}" for value in plan.points[i + 1])
         beta_hats = " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
-        found = segment["oscillations" if swings else "arcs"]
+        fewest = segment["oscillations" if swings else "arcs"]
         tried = segment["tried_arcs"] // (2 if swings else 1)
         table.add_row(
             str(i + 1),
             f"({position})",
-            str(found or f"- ({tried})"),
+            str(fewest or f"- ({tried})"),
             *([_number(segment["inclination"], ".4f")] if swings else []),
             _number(segment["duration"], ".2f"),
             _number(segment["margin"], ".4f"),

@@ -101,16 +101,16 @@ def _depth_of_inclination(problem: Problem, stops: Stops) -> float:
         v = float(best_inclination(problem.amplitude, weights(one))[0])
     else:
         v = float(inclination or 0.0)
-    found = [float(depth_for(problem.robot, jnp.asarray(target), jnp.asarray(v))) for target in targets]
-    if max(found) - min(found) > AT_P0 * float(spool_radius(problem.robot)):
+    levels = [float(depth_for(problem.robot, jnp.asarray(target), jnp.asarray(v))) for target in targets]
+    if max(levels) - min(levels) > AT_P0 * float(spool_radius(problem.robot)):
         raise ConfigError(
             path, f"inclination = {v:g}: must be replaced by z0, since the targets lie at different depths"
         )
-    if not found[0] > 0.0:
+    if not levels[0] > 0.0:
         hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.spec))
         why = f"since the targets are not below the spool plane{hint}"
         raise ConfigError(path, f"inclination: must be replaced by z0, {why}")
-    return found[0]
+    return levels[0]
 
 
 def _fastest_depth(problem: Problem, sequence: Sequence) -> float:
@@ -119,11 +119,11 @@ def _fastest_depth(problem: Problem, sequence: Sequence) -> float:
     safe = depths.conservative_depth(problem.robot, sequence.stops.targets)
     trial = np.linspace(0.5 * least, max(1.5 * least, safe if np.isfinite(safe) else 0.0), DEPTHS)
     for _ in range(2):
-        found = sequence.table(problem, trial)
-        cost = np.where(found["arcs"] > 0, found["duration"], np.inf).sum(1)
+        table = sequence.table(problem, trial)
+        cost = np.where(table["arcs"] > 0, table["duration"], np.inf).sum(1)
         best = int(np.argmin(cost))
         if not np.isfinite(cost[best]):
-            worst = np.nan_to_num(found["margin"], nan=-np.inf).min(1)
+            worst = np.nan_to_num(table["margin"], nan=-np.inf).min(1)
             best = int(np.argmax(worst))
         chosen = float(trial[best])
         trial = np.linspace(trial[max(best - 1, 0)], chosen, DEPTHS)
@@ -147,7 +147,7 @@ def best_amplitude(problem: Any, sequence: Sequence, z0: float) -> tuple[Amplitu
         trial = problem._replace(amplitude=amplitude)
         depth = chosen_depth(trial, sequence) if sequence.stops.keys.inclination == "best" else z0
         with within(f"epsilon {epsilon:.2f} of {EPSILONS[-1]:.2f}"):
-            found = sequence.table(trial, np.array([depth]))
-        cost = np.where(found["arcs"] > 0, found["duration"], np.inf).sum()
-        ranked.append((round(float(cost), 9), -float(found["margin"].min()), len(ranked), amplitude, depth))
+            table = sequence.table(trial, np.array([depth]))
+        cost = np.where(table["arcs"] > 0, table["duration"], np.inf).sum()
+        ranked.append((round(float(cost), 9), -float(table["margin"].min()), len(ranked), amplitude, depth))
     return min(ranked)[-2:]

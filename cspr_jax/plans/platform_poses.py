@@ -109,9 +109,9 @@ class _Poses(Leg):
         first, last = (np.concatenate([pair[k].ravel() for own in pairs for pair in own]) for k in (0, 1))
         trial = self._candidates(points, quaternions, z0, motion, (first, last))
         fixed, largest = np.tile(self.stops.arcs, len(depths)), self.stops.max_arcs
-        found = smallest_arcs(checker, trial, max_arcs=largest, fixed=fixed, beyond=BEYOND)
-        path = _best_paths(found.arcs, pairs)
-        best = Found(found.arcs[path], found.undecided[path], found.checks.rows(path))
+        of_trials = smallest_arcs(checker, trial, max_arcs=largest, fixed=fixed, beyond=BEYOND)
+        path = _best_paths(of_trials.arcs, pairs)
+        best = Found(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.rows(path))
         return settled(checker, trial.rows(path), best, max_arcs=largest, fixed=fixed)
 
     def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -131,20 +131,20 @@ class _Poses(Leg):
 
     def _beta_hats(self, problem: Problem, points: np.ndarray, quaternions: np.ndarray, z0: float) -> list[np.ndarray]:
         # Values of beta-hat to try at each pose; NaN where none keeps every cable taut.
-        found: list[np.ndarray] = []
+        tries: list[np.ndarray] = []
         stops, changes = self.stops, self._changes()
         for i, (pose, position, quaternion) in enumerate(zip(stops.poses, points, quaternions, strict=True)):
             if stops.keys.beat in WITHOUT_BETA_HAT:
-                found.append(np.zeros(1))
+                tries.append(np.zeros(1))
                 continue
             if pose.beta_hat is not None or pose.rest:
-                found.append(np.array([AT_REST if pose.beta_hat is None else pose.beta_hat]))
+                tries.append(np.array([AT_REST if pose.beta_hat is None else pose.beta_hat]))
                 continue
             preferred, lowest, highest = (np.atleast_1d(x) for x in _end(problem.robot, position, quaternion, z0)[2:])
             values = options(preferred, lowest, highest)[0]
             is_one = np.isnan(values[0]) or i in changes
-            found.append(values[:1] if is_one else values[~np.isnan(values)])
-        return found
+            tries.append(values[:1] if is_one else values[~np.isnan(values)])
+        return tries
 
     def _changes(self) -> set[int]:
         # Poses where another family goes on: both take the value that is tried first, so that accelerations meet.
@@ -180,8 +180,8 @@ def _best_paths(arcs: np.ndarray, pairs: list) -> np.ndarray:
         for first, _ in own:
             starts.append(last)
             last += first.size
-            found = arcs[starts[-1] : last].reshape(first.shape)
-            costs.append(np.where(found > 0, found, np.inf))
+            counts = arcs[starts[-1] : last].reshape(first.shape)
+            costs.append(np.where(counts > 0, counts, np.inf))
         steps = itertools.pairwise(cheapest_path(costs))
         for start, cost, step in zip(starts, costs, steps, strict=True):
             places.append(start + int(np.ravel_multi_index(step, cost.shape)))

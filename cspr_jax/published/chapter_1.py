@@ -51,12 +51,12 @@ def table_1_1() -> dict[Key, float | None]:
         "H_0": _weights("transition-prototype", [1.0, 0.0]),  # between two spools
         "H_1": _weights("transition-prototype", [0.0, 1.0]),  # under a spool
     }
-    found: dict[Key, float | None] = {}
+    cells: dict[Key, float | None] = {}
     for name, w in cases.items():
         stage(name)
-        found["w_max", name, ""] = float(jnp.max(jnp.abs(w)))
-        found["n", name, ""] = _horizontal(named("A1"), w)
-    return found
+        cells["w_max", name, ""] = float(jnp.max(jnp.abs(w)))
+        cells["n", name, ""] = _horizontal(named("A1"), w)
+    return cells
 
 
 def table_1_2() -> dict[Key, float | None]:
@@ -66,12 +66,12 @@ def table_1_2() -> dict[Key, float | None]:
         cells; columns name the inclination and hold the number of oscillations, but for "optimal inclination".
     """
     w = jnp.array([1.0, 1.0, -2.0])
-    found: dict[Key, float | None] = {}
+    cells: dict[Key, float | None] = {}
     for name in ("A1", "A2", "A3"):
         stage(name)
         amplitude = named(name)
         best, least = best_inclination(amplitude, w)
-        found[name, "optimal inclination", ""] = float(best)
+        cells[name, "optimal inclination", ""] = float(best)
         for column, v in (
             ("-v_opt", -best),
             ("0", 0.0),
@@ -79,9 +79,9 @@ def table_1_2() -> dict[Key, float | None]:
             ("0.8", 0.8),
             ("0.999", 0.999),
         ):
-            found[name, column, ""] = float(least_oscillations(amplitude, w, jnp.asarray(v)))
-        found[name, "v_opt", ""] = float(least)
-    return found
+            cells[name, column, ""] = float(least_oscillations(amplitude, w, jnp.asarray(v)))
+        cells[name, "v_opt", ""] = float(least)
+    return cells
 
 
 def table_1_3() -> dict[Key, float | None]:
@@ -90,19 +90,19 @@ def table_1_3() -> dict[Key, float | None]:
     Returns:
         cells.
     """
-    found: dict[Key, float | None] = {}
+    cells: dict[Key, float | None] = {}
     for reading, largest in _READINGS.items():
         w = jnp.array([largest, -largest, 0.0])
-        found["n", "A_idl", reading] = float(zero_tension.least_oscillations(w, jnp.asarray(0.0)))
+        cells["n", "A_idl", reading] = float(zero_tension.least_oscillations(w, jnp.asarray(0.0)))
         for name in ("A1", "A2", "A3"):
             stage(f"{reading}, {name}")
-            found["n", name, reading] = _horizontal(named(name), w)
-            found["n of (1.55)", name, reading] = float(many_oscillations(named(name), w))
+            cells["n", name, reading] = _horizontal(named(name), w)
+            cells["n of (1.55)", name, reading] = float(many_oscillations(named(name), w))
         stage(f"{reading}, A_eff")
         epsilon, least = best_epsilon(w)
-        found["n", "A_eff", reading], found["epsilon", "A_eff", reading] = least, epsilon
-        found["n of (1.55)", "A_eff", reading] = float(many_oscillations(named("effective", epsilon), w))
-    return found
+        cells["n", "A_eff", reading], cells["epsilon", "A_eff", reading] = least, epsilon
+        cells["n of (1.55)", "A_eff", reading] = float(many_oscillations(named("effective", epsilon), w))
+    return cells
 
 
 # As printed, digit by digit.

@@ -92,9 +92,9 @@ def attained(checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]]) ->
     """
     sizes = [len(angles) for _, angles in sets]
     places = np.repeat([place for place, _ in sets], sizes, axis=0)
-    found = symmetries(checker.problem.robot)
+    symmetry = symmetries(checker.problem.robot)
     every = np.concatenate([angles for _, angles in sets])
-    good = attainable.attained(checker, places, every, places[:, 2], max_arcs=MAX_ARCS, found=found)
+    good = attainable.attained(checker, places, every, places[:, 2], max_arcs=MAX_ARCS, symmetry=symmetry)
     return np.split(good, np.cumsum(sizes)[:-1])
 
 
@@ -107,7 +107,7 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
     Returns:
         cells; proportions, volumes (accessible of SO(3), attainable of that) and errors in percent.
     """
-    found: dict[Key, float | None] = {}
+    cells: dict[Key, float | None] = {}
     # The step of the table, and twice that for the errors.
     steps = [DIVISIONS * choice.finer, DIVISIONS * choice.finer // 2]
     for amplitude in choice.amplitudes:
@@ -115,11 +115,11 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
         for definition in choice.definitions:
             places = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in PLACES.values()]
             with within(f"{amplitude}, {definition}"):
-                cells = [_cells(checker, places, definition, divisions) for divisions in steps]
-            for row, fine, coarse in zip(PLACES, *cells, strict=True):
+                both = [_cells(checker, places, definition, divisions) for divisions in steps]
+            for row, fine, coarse in zip(PLACES, *both, strict=True):
                 errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
-                found |= {(row, column, variant(definition, amplitude)): x for column, x in (fine | errors).items()}
-    return found
+                cells |= {(row, column, variant(definition, amplitude)): x for column, x in (fine | errors).items()}
+    return cells
 
 
 def _cells(checker: PoseChecker, places: list[np.ndarray], definition: str, divisions: int) -> list[dict[str, float]]:
@@ -146,7 +146,7 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
     Returns:
         cells, in percent.
     """
-    found: dict[Key, float | None] = {}
+    cells: dict[Key, float | None] = {}
     for amplitude in choice.amplitudes:
         checker = checker_of(amplitude)
         robot = checker.problem.robot
@@ -162,8 +162,8 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
                 with within(f"{amplitude}, {definition}, z = {depth:g}"):
                     sets = [(place, accessible(robot, place, definition, divisions).angles) for place in places]
                     smallest = min(good.mean() for good in attained(checker, sets))
-                found[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * float(smallest)
-    return found
+                cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * float(smallest)
+    return cells
 
 
 _PRINTED = {

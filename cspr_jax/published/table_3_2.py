@@ -33,7 +33,7 @@ def table_3_2() -> dict[Key, float | None]:
     Returns:
         cells; rows name the pose at which a segment starts.
     """
-    data, found = read_toml(SEQUENCE), {}
+    data, cells = read_toml(SEQUENCE), {}
     for amplitude, key in _AMPLITUDES.items():
         for torsion, angle in _TORSIONS.items():
             changed = copy.deepcopy(data)
@@ -43,9 +43,9 @@ def table_3_2() -> dict[Key, float | None]:
                 answers = plan_of(checked(PlanFile, changed, SEQUENCE), SEQUENCE).answers
             for i, arcs in enumerate(answers.arcs):
                 is_found = arcs > 0
-                found[str(i), "p", _variant(amplitude, torsion)] = float(arcs) if is_found else None
-                found[str(i), "T", _variant(amplitude, torsion)] = float(answers.duration[i]) if is_found else None
-    return found
+                cells[str(i), "p", _variant(amplitude, torsion)] = float(arcs) if is_found else None
+                cells[str(i), "T", _variant(amplitude, torsion)] = float(answers.duration[i]) if is_found else None
+    return cells
 
 
 _PRINTED = {

@@ -38,11 +38,11 @@ class Source:
 def _table_2_1() -> dict[Key, float | None]:
     answers = plan(Path(__file__).with_name("table_2_1.toml")).answers
     columns = {"feasible_at_infinity": answers.feasible_at_infinity, "p": answers.arcs, "T": answers.duration}
-    found: dict[Key, float | None] = {}
+    cells: dict[Key, float | None] = {}
     for i, arcs in enumerate(answers.arcs):
         for name, values in columns.items():
-            found[str(i + 1), name, ""] = float(values[i]) if name == "feasible_at_infinity" or arcs > 0 else None
-    return found
+            cells[str(i + 1), name, ""] = float(values[i]) if name == "feasible_at_infinity" or arcs > 0 else None
+    return cells
 
 
 _PUBLISHED_2_1 = {
@@ -133,8 +133,8 @@ def table_object(name: str, cells: list[Cell]) -> dict[str, Any]:
 
 
 def _plain(cell: Cell) -> dict[str, Any]:
-    found = {"row": cell.row, "column": cell.column, "computed": cell.computed, "published": cell.published}
-    return found | ({"variant": _variant(cell.variant)} if cell.variant else {})
+    fields = {"row": cell.row, "column": cell.column, "computed": cell.computed, "published": cell.published}
+    return fields | ({"variant": _variant(cell.variant)} if cell.variant else {})
 
 
 def _variant(text: str) -> dict[str, str]:

@@ -22,7 +22,7 @@ def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: Cables) ->
         one vector a pair, from its first cable to its second, m.
     """
     squares = [dot(ray, ray) for ray in wires.rays]
-    found: list[Vector] = []
+    vectors: list[Vector] = []
     for i, j in pairs:
         u, v, uu, vv = wires.rays[i], wires.rays[j], squares[i], squares[j]
         apart = [base_points[j, k] - base_points[i, k] for k in range(3)]
@@ -33,8 +33,8 @@ def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: Cables) ->
         s = jnp.clip(jnp.where(is_parallel, 0.0, s), 0.0, 1.0)
         t = jnp.clip((s * uv - av) / vv, 0.0, 1.0)
         s = jnp.clip((au + t * uv) / uu, 0.0, 1.0)
-        found.append(tuple(apart[k] + t * v[k] - s * u[k] for k in range(3)))
-    return found
+        vectors.append(tuple(apart[k] + t * v[k] - s * u[k] for k in range(3)))
+    return vectors
 
 
 def cable_directions(wires: Cables, turn: Matrix) -> list[Vector]:
@@ -75,15 +75,15 @@ def turns_much(before: Sequence[Vector], after: Sequence[Vector], least_cosine: 
     Returns:
         (n,).
     """
-    found = jnp.asarray(False)
+    turns = jnp.asarray(False)
     for a, b in zip(before, after, strict=True):
         inner = dot(a, b)
-        found = found | (inner < 0.0) | (inner * inner < least_cosine**2 * dot(a, a) * dot(b, b))
-    return found
+        turns = turns | (inner < 0.0) | (inner * inner < least_cosine**2 * dot(a, a) * dot(b, b))
+    return turns
 
 
 def platform_hit(sides: Array, normal: Array, before: Sequence[Vector], after: Sequence[Vector]) -> Array:
-    """Whether any cable swept over the platform between two instants; see `interference.platform_hit`.
+    """Whether any cable passed over the platform between two instants; see `interference.platform_hit`.
 
     Args:
         sides: (n_cables, 2, 3) of `interference.contacts`.
@@ -94,12 +94,12 @@ def platform_hit(sides: Array, normal: Array, before: Sequence[Vector], after: S
     Returns:
         (n,).
     """
-    found, up = jnp.asarray(False), [normal[i] for i in range(3)]
+    hit, up = jnp.asarray(False), [normal[i] for i in range(3)]
     for k, (a, b) in enumerate(zip(before, after, strict=True)):
         one, two = ([sides[k, j, i] for i in range(3)] for j in range(2))
         high, low = dot(a, up), dot(b, up)
         weight = combined([(jnp.abs(low), a), (jnp.abs(high), b)])
         across = dot(cross(one, two), up)
         inside = (dot(cross(weight, two), up) * across >= 0.0) & (dot(cross(one, weight), up) * across >= 0.0)
-        found = found | ((high * low <= 0.0) & inside)
-    return found
+        hit = hit | ((high * low <= 0.0) & inside)
+    return hit

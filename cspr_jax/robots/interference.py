@@ -115,7 +115,7 @@ def cables_cross(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
 
 def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Cables that swept over the platform between two instants: as in the text, in platform axes.
+    """Cables that passed over the platform between two instants: as in the text, in platform axes.
 
     Args:
         sides: (n_cables, 2, 3) of `contacts`.

@@ -132,16 +132,16 @@ def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
     points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]
-    found = [_straightest(points @ side.T, base) for side in sides]
-    best = int(np.argmax([nearness for _, nearness in found]))
-    return about_vertical(found[best][0]) @ sides[best]
+    turns = [_straightest(points @ side.T, base) for side in sides]
+    best = int(np.argmax([nearness for _, nearness in turns]))
+    return about_vertical(turns[best][0]) @ sides[best]
 
 
 def _traced(robot: PlatformRobot) -> Any:
     # The same, where jax is tracing the spools: on these depends the turn about the vertical alone.
     points = np.asarray(robot.platform_points)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
-    found = []
+    both = []
     for side in (_to_vertical(sign * normal) for sign in (1.0, -1.0)):
         x, y, _ = (points @ side.T).T
         along = x @ robot.base_points[:, 0] + y @ robot.base_points[:, 1]
@@ -149,8 +149,8 @@ def _traced(robot: PlatformRobot) -> Any:
         nearness = jnp.hypot(along, across)
         zero, one = jnp.zeros_like(along), jnp.ones_like(along)
         turn = jnp.stack([along, -across, zero, across, along, zero, zero, zero, nearness]).reshape(3, 3) / nearness
-        found.append((nearness, jnp.where(nearness > ALIGNED * one, turn, jnp.eye(3)) @ side))
-    (first, rotation), (second, other) = found
+        both.append((nearness, jnp.where(nearness > ALIGNED * one, turn, jnp.eye(3)) @ side))
+    (first, rotation), (second, other) = both
     chosen = jnp.where(first >= second, rotation, other)
     return jnp.where(jnp.max(jnp.abs(chosen - jnp.eye(3))) < ALIGNED, jnp.eye(3), chosen)
 

@@ -52,26 +52,26 @@ def symmetries(robot: PlatformRobot) -> Symmetries:
     return Symmetries(fold, tuple(mirrors))
 
 
-def folded(found: Symmetries, azimuths: np.ndarray) -> np.ndarray:
+def folded(symmetry: Symmetries, azimuths: np.ndarray) -> np.ndarray:
     """Azimuths that stand for others, at which the robot can do the same.
 
     Args:
-        found: symmetries of the robot.
+        symmetry: symmetries of the robot.
         azimuths: (n,) directions from the vertical through the centroid, rad.
 
     Returns:
         (n,) equal for directions that symmetries take into each other.
     """
-    width = 2.0 * math.pi / found.fold
-    images = np.mod(np.stack([azimuths, *(2.0 * mirror - azimuths for mirror in found.mirrors)]), width)
+    width = 2.0 * math.pi / symmetry.fold
+    images = np.mod(np.stack([azimuths, *(2.0 * mirror - azimuths for mirror in symmetry.mirrors)]), width)
     return np.where(width - images < ROUNDING, 0.0, images).min(0)
 
 
-def alike(found: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def alike(symmetry: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
     """Orientations that stand for others: where a place lies on a mirror plane, the plane joins them in pairs.
 
     Args:
-        found: symmetries of the robot.
+        symmetry: symmetries of the robot.
         places: (n, m) x and y from the vertical through the centroid, and whatever else tells places apart.
         angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad.
 
@@ -79,7 +79,7 @@ def alike(found: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.ndarr
         (n,) index of the first orientation that the robot can take in the same way.
     """
     azimuths, stands = np.arctan2(places[:, 1], places[:, 0]), np.arange(len(places))
-    mirrored = np.flatnonzero((np.abs(np.sin(azimuths[:, None] - np.asarray(found.mirrors))) < ROUNDING).any(1))
+    mirrored = np.flatnonzero((np.abs(np.sin(azimuths[:, None] - np.asarray(symmetry.mirrors))) < ROUNDING).any(1))
     if not len(mirrored):
         return stands
     # The axis of the tilt is no vector: phi becomes pi - phi, and sigma -sigma.

@@ -132,15 +132,15 @@ def determinant(wires: Cables) -> Array:
         (...) m^9.
     """
     moments = [cross(arm, ray) for arm, ray in zip(wires.arms, wires.rays, strict=True)]
-    found = jnp.zeros(())
+    total = jnp.zeros(())
     for three in itertools.combinations(range(CABLES), 3):
         others = [k for k in range(CABLES) if k not in three]
         a, b, c = (wires.rays[k] for k in three)
         d, e, f = (moments[k] for k in others)
         # Laplace's expansion by the first three columns.
         sign = -1.0 if (sum(three) - 3) % 2 else 1.0
-        found = found + sign * dot(a, cross(b, c)) * dot(d, cross(e, f))
-    return found
+        total = total + sign * dot(a, cross(b, c)) * dot(d, cross(e, f))
+    return total
 
 
 def normalised_determinant(robot: PlatformRobot, wires: Cables) -> Array:
@@ -173,7 +173,7 @@ def cable_rates(
     Returns:
         lengths, rates, accelerations: six arrays (...) each.
     """
-    found = []
+    rows = []
     for arm, ray in zip(wires.arms, wires.rays, strict=True):
         swing = cross(omega, arm)
         pace = combined([(jnp.ones(()), velocity), (jnp.ones(()), swing)])
@@ -181,5 +181,5 @@ def cable_rates(
         pull = tuple(acceleration[i] + across[i] + inward[i] for i in range(3))
         length = jnp.sqrt(dot(ray, ray))
         rate = dot(ray, pace) / length
-        found.append((length, rate, (dot(pace, pace) + dot(ray, pull) - rate * rate) / length))
-    return [list(column) for column in zip(*found, strict=True)]
+        rows.append((length, rate, (dot(pace, pace) + dot(ray, pull) - rate * rate) / length))
+    return [list(column) for column in zip(*rows, strict=True)]

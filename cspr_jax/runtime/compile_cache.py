@@ -78,15 +78,15 @@ def _quiet(folder: Path, warn: Callable[[str], None]) -> None:
     usual, told = warnings.showwarning, threading.Event()
 
     def show(message, category, filename, lineno, file=None, line=None):
-        found = _TROUBLE.match(str(message))
-        if found is None:
+        match = _TROUBLE.match(str(message))
+        if match is None:
             usual(message, category, filename, lineno, file, line)
             return
-        if found[1] == "writing":
+        if match[1] == "writing":
             _write_no_more()
         if not told.is_set():
             told.set()
-            action = "kept" if found[1] == "writing" else "read"
+            action = "kept" if match[1] == "writing" else "read"
             reason = str(message).partition("': ")[2]
             warn(f"{folder}: compiled code cannot be {action}: {reason}; what is missing is compiled each time")
 

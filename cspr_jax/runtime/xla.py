@@ -123,9 +123,9 @@ def check_device(device: str | None) -> None:
         return
     import jax
 
-    found = jax.devices()[0].platform
-    if found != "gpu":
-        raise ConfigError("--device", f"gpu: must be cpu here, since jax finds no GPU (it has {found})")
+    kind = jax.devices()[0].platform
+    if kind != "gpu":
+        raise ConfigError("--device", f"gpu: must be cpu here, since jax finds no GPU (it has {kind})")
 
 
 def tell_compiling() -> None:

@@ -107,15 +107,15 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
         name: ((*axes, *both) if values.ndim > 1 else tuple(axes), values.reshape(*shape, *values.shape[1:]))
         for name, values in arrays.items()
     }
-    found = dataset(variables, axes | both)
-    if "beta_hat" in found and both:
-        found["beta_hat"].attrs = {"units": "1", "long_name": "beta-hat"}  # the table's is at the target alone
-    return found
+    data = dataset(variables, axes | both)
+    if "beta_hat" in data and both:
+        data["beta_hat"].attrs = {"units": "1", "long_name": "beta-hat"}  # the table's is at the target alone
+    return data
 
 
 def _described(name: str) -> dict[str, Any]:
     if name not in EVERY:
         return {}
     quantity = EVERY[name]
-    found = {"units": quantity.units, "long_name": quantity.long_name, "description": quantity.description}
-    return found | (flag_attributes() if name.endswith("verdict") else {})
+    attributes = {"units": quantity.units, "long_name": quantity.long_name, "description": quantity.description}
+    return attributes | (flag_attributes() if name.endswith("verdict") else {})

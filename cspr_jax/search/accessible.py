@@ -104,10 +104,10 @@ def _section(
     free &= angles[:, 1:, 1] < math.pi
     free = np.cumprod(free, axis=1).astype(bool)
     ends = centre + (free.sum(1) * step)[:, None] * rays
-    found = angles[:, 1:][free]
+    reached = angles[:, 1:][free]
     # Of a sector of the plane, where the measure is sin(theta) / theta.
-    volume = np.broadcast_to(far[1:], free.shape)[free] * np.sinc(found[:, 1] / math.pi) * step**3 / WHOLE
-    return (found, volume), ends.mean(0)
+    volume = np.broadcast_to(far[1:], free.shape)[free] * np.sinc(reached[:, 1] / math.pi) * step**3 / WHOLE
+    return (reached, volume), ends.mean(0)
 
 
 def _angles(points: np.ndarray, torsion: np.ndarray) -> np.ndarray:

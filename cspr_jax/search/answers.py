@@ -139,17 +139,17 @@ def decided(
         the answers; the segments that durations and margins belong to, leaves (n, ...).
     """
     known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
-    found, doubtful, bound = _search(problem, parities, upper, known)
-    tried, slack = _best(problem, parities, upper, found, measure)
-    chosen = pick(parities, np.arange(len(found)), tried)
+    smallest, doubtful, bound = _search(problem, parities, upper, known)
+    tried, slack = _best(problem, parities, upper, smallest, measure)
+    chosen = pick(parities, np.arange(len(smallest)), tried)
     duration = in_batches(_durations, (chosen, tried.astype(float)), size=BATCH)
-    none = np.flatnonzero(found == 0)
+    none = np.flatnonzero(smallest == 0)
     if len(none):
         bound[none] = prove(problem, pick(parities, none, tried[none]), tried[none]).bound[:, :2].min(1)
     answers = Answers(
-        found,
+        smallest,
         tried,
-        _verdicts(problem, found, doubtful, slack),
+        _verdicts(problem, smallest, doubtful, slack),
         duration,
         slack[:, :2].min(1),
         bound,
@@ -224,33 +224,33 @@ def _search(
     problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: Known
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, and the proved margin.
-    found, doubtful, bound = np.zeros(len(upper), int), np.zeros(len(upper), bool), np.full(len(upper), -np.inf)
+    smallest, doubtful, bound = np.zeros(len(upper), int), np.zeros(len(upper), bool), np.full(len(upper), -np.inf)
     alive = upper >= -SMALLEST_MARGIN
     while True:
-        rows = np.flatnonzero((found == 0) & alive.any(1))
+        rows = np.flatnonzero((smallest == 0) & alive.any(1))
         if not len(rows):
-            return found, doubtful, bound
+            return smallest, doubtful, bound
         arcs = np.argmax(alive[rows], axis=1) + 1
         given = arcs == known.arcs[rows]
-        found[rows[given]], bound[rows[given]] = arcs[given], known.bound[rows[given]]
+        smallest[rows[given]], bound[rows[given]] = arcs[given], known.bound[rows[given]]
         rows, arcs = rows[~given], arcs[~given]
         if not len(rows):
             continue
         proof = prove(problem, pick(parities, rows, arcs), arcs)
-        found[rows[proof.feasible]] = arcs[proof.feasible]
+        smallest[rows[proof.feasible]] = arcs[proof.feasible]
         bound[rows] = proof.bound[:, :2].min(1)
         doubtful[rows[~proof.feasible & ~proof.infeasible]] = True
         alive[rows, arcs - 1] = False
 
 
 def _best(
-    problem: Problem, parities: dict[int, Segment], upper: np.ndarray, found: np.ndarray, measure: Callable
+    problem: Problem, parities: dict[int, Segment], upper: np.ndarray, smallest: np.ndarray, measure: Callable
 ) -> tuple[np.ndarray, np.ndarray]:
     # Margins at the number of arcs found, else at the candidate with the largest; upper bounds say where to look next.
-    tried = np.where(found > 0, found, np.argmax(upper, axis=1) + 1)
-    slack = measure(problem, pick(parities, np.arange(len(found)), tried), tried)
+    tried = np.where(smallest > 0, smallest, np.argmax(upper, axis=1) + 1)
+    slack = measure(problem, pick(parities, np.arange(len(smallest)), tried), tried)
     best = slack.min(1)
-    rest = np.where(found[:, None] > 0, -np.inf, upper)
+    rest = np.where(smallest[:, None] > 0, -np.inf, upper)
     rest[np.arange(len(rest)), tried - 1] = -np.inf
     while True:
         rows = np.flatnonzero(rest.max(1) > np.where(np.isnan(best), -np.inf, best) + TIE * (1.0 + np.abs(best)))
@@ -264,11 +264,11 @@ def _best(
         best[rows[better]] = candidate.min(1)[better]
 
 
-def _verdicts(problem: Problem, found: np.ndarray, doubtful: np.ndarray, slack: np.ndarray) -> np.ndarray:
-    broken = np.zeros(len(found), np.uint16)
+def _verdicts(problem: Problem, smallest: np.ndarray, doubtful: np.ndarray, slack: np.ndarray) -> np.ndarray:
+    broken = np.zeros(len(smallest), np.uint16)
     for flag, column in zip(criteria.flags(problem.limits), slack.T, strict=True):
         broken |= np.where(column <= 0.0, flag.value, 0).astype(np.uint16)
     broken |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(np.uint16)
     none = np.where(doubtful, Verdict.UNDECIDED.value, Verdict.NO_ARCS.value | broken)
     some = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
-    return np.where(found > 0, some, none).astype(np.uint16)
+    return np.where(smallest > 0, some, none).astype(np.uint16)

@@ -120,12 +120,12 @@ def upper_bounds(amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs:
     tau = (np.arange(SAMPLES) + 0.5) / SAMPLES
     numbers = np.arange(1, max_arcs + 1)
     dtype = even.rate.dtype
-    found = jnp.zeros((max_arcs, len(even.rate)), dtype)
+    bounds = jnp.zeros((max_arcs, len(even.rate)), dtype)
     scale = jax.vmap(partial(largest_term, amplitude), in_axes=(0, None))
     for first, segments in ((0, odd), (1, even)):
         mine = numbers[first::2]
         if len(mine):
             terms = jax.vmap(scale, in_axes=(None, 0))(segments, jnp.asarray(mine, dtype))
             guard = ROUNDING * jnp.finfo(dtype).eps * jnp.where(jnp.isfinite(terms), terms, 0.0)
-            found = found.at[first::2].set(smallest_sampled(amplitude, segments, mine, tau) + guard)
-    return found.T
+            bounds = bounds.at[first::2].set(smallest_sampled(amplitude, segments, mine, tau) + guard)
+    return bounds.T

@@ -27,7 +27,7 @@ def attainable(
     *,
     max_arcs: int,
     values: int = VALUES,
-    found: Symmetries = NONE,
+    symmetry: Symmetries = NONE,
 ) -> PoseAnswers:
     """Smallest numbers of arcs from rest to orientations of places.
 
@@ -38,12 +38,12 @@ def attainable(
         z0: (n,) m.
         max_arcs: largest number tried.
         values: of beta-hat, the preferred one first.
-        found: symmetries of the robot; orientations that they join are computed once.
+        symmetry: symmetries of the robot; orientations that they join are computed once.
 
     Returns:
         the answers.
     """
-    some, own = _once(checker, places, angles, z0, found)
+    some, own = _once(checker, places, angles, z0, symmetry)
 
     def part(which):
         which = some[which]
@@ -61,7 +61,7 @@ def attained(
     *,
     max_arcs: int,
     values: int = VALUES,
-    found: Symmetries = NONE,
+    symmetry: Symmetries = NONE,
 ) -> np.ndarray:
     """Orientations of places that some number of arcs and some value of beta-hat attains.
 
@@ -74,12 +74,12 @@ def attained(
         z0: (n,) m.
         max_arcs: largest number tried.
         values: of beta-hat, the preferred one first.
-        found: symmetries of the robot; orientations that they join are computed once.
+        symmetry: symmetries of the robot; orientations that they join are computed once.
 
     Returns:
         (n,).
     """
-    some, own = _once(checker, places, angles, z0, found)
+    some, own = _once(checker, places, angles, z0, symmetry)
 
     def part(which):
         which = some[which]
@@ -98,9 +98,9 @@ def attained(
     return np.concatenate(in_parts(part, len(some), PART))[own]
 
 
-def _once(checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, found: Symmetries):
+def _once(checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
     # Orientations that stand for others too, and where each of all is among them.
-    some, own = np.unique(alike(found, np.c_[places, z0], angles), return_inverse=True)
+    some, own = np.unique(alike(symmetry, np.c_[places, z0], angles), return_inverse=True)
     return some, own.ravel()
 
 

@@ -140,9 +140,9 @@ def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.A
         cosine, sine = jnp.cos(omega * tau), jnp.sin(omega * tau)
         h = ((bend - size * end) * cosine - 2.0 * omega * slope * sine) / period
         worst = jnp.maximum(high[:, None] * h[None], low[:, None] * h[None])
-        found = jnp.min(1.0 + v[:, None] * size[None] * cosine[None] - worst, axis=1)
+        lowest = jnp.min(1.0 + v[:, None] * size[None] * cosine[None] - worst, axis=1)
         guard = ROUNDING * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * jnp.max(jnp.abs(h)))
-        return jnp.where(period > 0.0, found + guard, -jnp.inf)
+        return jnp.where(period > 0.0, lowest + guard, -jnp.inf)
 
     return lax.map(one, jnp.arange(1.0, largest + 1.0)).T
 
@@ -192,7 +192,7 @@ def minimum_oscillations(
     v, weights = np.asarray(transition.inclination(segments)), np.asarray(transition.weights(segments))
     envelopes = _level if (v == 0.0).all() else _envelopes
     look = in_batches(partial(envelopes, problem.amplitude), (weights, v), size=BATCH)
-    real, gain = (np.array(found) for found in look)
+    real, gain = (np.array(column) for column in look)
     loads = v[:, None] + weights
     extreme = (np.maximum(loads.max(1), 0.0), np.minimum(loads.min(1), 0.0), v)
     kernel = partial(_upper_bounds, problem.amplitude, largest=largest)

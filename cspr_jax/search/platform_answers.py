@@ -49,14 +49,14 @@ class PoseAnswers(Answers):
 
 
 def settled(
-    checker: PoseChecker, candidates: Candidates, found: Found, *, max_arcs: int, fixed: np.ndarray | None = None
+    checker: PoseChecker, candidates: Candidates, smallest: Found, *, max_arcs: int, fixed: np.ndarray | None = None
 ) -> tuple[PoseAnswers, PoseSegment]:
     """Answers with all margins.
 
     Args:
         checker: of the robot.
         candidates: one of each of n motions.
-        found: of these; its checks are completed.
+        smallest: of these; its checks are completed.
         max_arcs: largest number tried.
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
 
@@ -64,25 +64,25 @@ def settled(
         the answers, found at refined samples; nothing is proved, and (2.55) does not apply: NaN. The
         segments that they belong to.
     """
-    tried = found.arcs if fixed is None else np.where(found.arcs > 0, found.arcs, fixed)
+    tried = smallest.arcs if fixed is None else np.where(smallest.arcs > 0, smallest.arcs, fixed)
     none = np.flatnonzero(tried == 0)
     tried = tried.copy()
     tried[none] = best_candidates(checker, candidates.rows(none), max_arcs=max_arcs)
-    segments, checks = segments_with(checker.problem.robot, candidates, tried), found.checks
-    others = np.flatnonzero(found.arcs == 0)
+    segments, checks = segments_with(checker.problem.robot, candidates, tried), smallest.checks
+    others = np.flatnonzero(smallest.arcs == 0)
     checks.put(others, checker.check(rows(segments, others), tried[others]))
     duration = checker.durations(segments, tried)
     beta_hats = np.stack(candidates.beta_hats, axis=1)
     if checker.kind.plain:  # (3.66) has the one that its cosine has
         beta_hats = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
-    doubtful = (found.undecided > 0) & ((found.arcs == 0) | (found.undecided < found.arcs))
+    doubtful = (smallest.undecided > 0) & ((smallest.arcs == 0) | (smallest.undecided < smallest.arcs))
     refused = np.where(doubtful, Verdict.UNDECIDED.value, checks.verdict | Verdict.NO_ARCS.value)
     less = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
     nothing = np.full(len(tried), np.nan)
     answers = PoseAnswers(
-        arcs=found.arcs,
+        arcs=smallest.arcs,
         tried_arcs=tried,
-        verdict=np.where(found.arcs > 0, less, refused).astype(np.uint16),
+        verdict=np.where(smallest.arcs > 0, less, refused).astype(np.uint16),
         duration=duration,
         margin=np.minimum(checks.slack[:, 0], checks.slack[:, 2]),
         margin_bound=nothing,
@@ -126,16 +126,16 @@ def reached(
         the answers; where there is none, those of the first value, or of that at rest.
     """
     cell, trial = trials(motions, values, same=same)
-    found = smallest_arcs(checker, trial, max_arcs=max_arcs)
+    of_trials = smallest_arcs(checker, trial, max_arcs=max_arcs)
     arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
     beta_hats = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
     # Several values of one motion may have passed: the one tried first is last here.
-    best = np.flatnonzero(found.arcs > 0)[::-1]
-    arcs[cell[best]], beta_hats[cell[best]] = found.arcs[best], trial.beta_hats[1][best]
-    checks.put(cell[best], found.checks.rows(best))
-    np.minimum.at(undecided, cell, np.where(found.undecided > 0, found.undecided, NEVER))
-    best_found = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
-    return settled(checker, _with_ends(motions, beta_hats, same=same), best_found, max_arcs=max_arcs)[0]
+    best = np.flatnonzero(of_trials.arcs > 0)[::-1]
+    arcs[cell[best]], beta_hats[cell[best]] = of_trials.arcs[best], trial.beta_hats[1][best]
+    checks.put(cell[best], of_trials.checks.rows(best))
+    np.minimum.at(undecided, cell, np.where(of_trials.undecided > 0, of_trials.undecided, NEVER))
+    smallest = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
+    return settled(checker, _with_ends(motions, beta_hats, same=same), smallest, max_arcs=max_arcs)[0]
 
 
 def _with_ends(motions: Candidates, beta_hats: np.ndarray, *, same: bool) -> Candidates:

@@ -87,9 +87,9 @@ class _Segments:
     def __call__(self, arcs: int, which: np.ndarray) -> PoseSegment:
         # (k,) indices of candidates.
         motion, (first, last) = self._candidates.motion[which], self._candidates.beta_hats
-        found = rows(self._of_motions[arcs % 2], motion)
+        segments = rows(self._of_motions[arcs % 2], motion)
         return dataclasses.replace(
-            found, turn=found.turn._replace(start_beta_hat=first[which], end_beta_hat=last[which])
+            segments, turn=segments.turn._replace(start_beta_hat=first[which], end_beta_hat=last[which])
         )
 
 
@@ -112,9 +112,9 @@ def smallest_arcs(
         what was found.
     """
     motion, count = candidates.motion, len(candidates.motion)
-    found, undecided, checks = np.zeros(count, int), np.zeros(count, int), checker.nothing(count)
+    smallest, undecided, checks = np.zeros(count, int), np.zeros(count, int), checker.nothing(count)
     if not count:
-        return Found(found, undecided, checks)
+        return Found(smallest, undecided, checks)
     last = np.full(len(candidates.z0), max_arcs)
     only = np.zeros(len(last), int) if fixed is None else fixed
     segments = _Segments(checker.problem.robot, candidates)
@@ -123,7 +123,7 @@ def smallest_arcs(
             break
         stage(f"arcs {arcs} of {max_arcs}")
         is_open = (last >= arcs) & ((only == 0) | (only == arcs))
-        alive = np.flatnonzero((found == 0) & is_open[motion])
+        alive = np.flatnonzero((smallest == 0) & is_open[motion])
         alive = _sieved(checker, segments, arcs, alive, np.maximum(1.0 - TELLING / arcs, 0.0))
         first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
         # The first candidate of each motion, then all others of motions where it fails: few and large batches.
@@ -135,10 +135,10 @@ def smallest_arcs(
             got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False)
             checks.put(turn, got)
             passed, unsure = (turn[got.verdict == verdict] for verdict in (0, Verdict.UNDECIDED))
-            found[passed] = arcs
+            smallest[passed] = arcs
             undecided[unsure] = np.where(undecided[unsure] > 0, undecided[unsure], arcs)
             last[motion[passed]] = np.minimum(last[motion[passed]], arcs + beyond)
-    return Found(found, undecided, checks)
+    return Found(smallest, undecided, checks)
 
 
 def _sieved(checker: PoseChecker, segments: _Segments, arcs: int, alive: np.ndarray, tau: np.ndarray) -> np.ndarray:

@@ -20,9 +20,9 @@ BATCH = 1024
 def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
     # Of each pose (3.91), the interval (3.92), the determinant over that at the same depth in the middle, the depth.
     def one(position, quaternion, z0):
-        found, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
+        end, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
         share = determinant_share(robot, position, rotations.matrix(quaternion))
-        return found.preferred, found.lowest, found.highest, share, depth
+        return end.preferred, end.lowest, end.highest, share, depth
 
     return jax.vmap(one)(*poses)
 

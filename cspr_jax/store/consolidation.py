@@ -91,8 +91,8 @@ def consolidate(
                 environments.add(shard.environment)
                 near_zero += shard.near_zero
             mixed = int(environments != {attributes["environment"]})
-            found = {"cells_near_zero": near_zero, "mixed": mixed, "environments": " ".join(sorted(environments))}
-            set_attributes(file, found)
+            totals = {"cells_near_zero": near_zero, "mixed": mixed, "environments": " ".join(sorted(environments))}
+            set_attributes(file, totals)
             set_attributes(file, {"content_sha256": _fold(grid.axes, digests)})
         with os.fdopen(os.dup(descriptor), "rb") as again, h5py.File(again, "r") as file:
             again_digests = _digests(file, grid, layout.store, between)
@@ -105,11 +105,11 @@ def _fold(axes: dict[str, np.ndarray], digests: list[str]) -> str:
 
 
 def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[], None]) -> list[str]:
-    found = []
+    digests = []
     for place in grid.tiling:
         between()
-        found.append(digest_of({name: np.asarray(file[name][place]) for name in store}))
-    return found
+        digests.append(digest_of({name: np.asarray(file[name][place]) for name in store}))
+    return digests
 
 
 def read_content(path: Path) -> Content:
@@ -149,10 +149,10 @@ def content_of(path: Path, begun: Callable[[Iterable[Found]], None] = lambda _: 
             if identity(settings) != _text(file, "identity"):
                 raise DamagedError("its settings and its identity do not fit")
             tile, store, axes = settings["run"]["tile"], settings["run"]["store"], settings["dimensions"]
-            found = _found(file, axes, store)
-            grid = Grid({name: found[name].values().reshape(-1) for name in axes}, tuple(tile))
-            _check_shapes(found, grid, store)
-            begun(found.values())
+            datasets = _found(file, axes, store)
+            grid = Grid({name: datasets[name].values().reshape(-1) for name in axes}, tuple(tile))
+            _check_shapes(datasets, grid, store)
+            begun(datasets.values())
             digests = _digests(file, grid, store, lambda: None)
             if _fold(grid.axes, digests) != _text(file, "content_sha256"):
                 raise DamagedError("its content has changed")
@@ -163,10 +163,10 @@ def content_of(path: Path, begun: Callable[[Iterable[Found]], None] = lambda _: 
 
 
 def _text(file: h5py.File, name: str) -> str:
-    found = guard.text(file, name)
-    if found is None:
+    text = guard.text(file, name)
+    if text is None:
         raise DamagedError(f"it has no {name}")
-    return found
+    return text
 
 
 def _found(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, Found]:
@@ -176,17 +176,17 @@ def _found(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, Foun
         raise DamagedError("its settings name other quantities than cspr has")
     if h5py.h5g.open(file.id, b"/").get_num_objs() != len(names):
         raise DamagedError("it holds other datasets than its settings say")
-    found = guard.datasets(file, names)
-    if found.keys() != {*names}:
+    datasets = guard.datasets(file, names)
+    if datasets.keys() != {*names}:
         raise DamagedError("it holds other datasets than its settings say")
-    if any(found[name].size > LARGEST_AXIS_BYTES for name in axes):
+    if any(datasets[name].size > LARGEST_AXIS_BYTES for name in axes):
         raise DamagedError("its axes have no fitting size")
-    guard.refuse_dense(found.values(), os.stat(file.filename).st_size)
-    return found
+    guard.refuse_dense(datasets.values(), os.stat(file.filename).st_size)
+    return datasets
 
 
-def _check_shapes(found: dict[str, Found], grid: Grid, store: list[str]) -> None:
-    if any(found[name].shape != grid.shape for name in store) or len(grid.tile) != len(grid.shape):
+def _check_shapes(datasets: dict[str, Found], grid: Grid, store: list[str]) -> None:
+    if any(datasets[name].shape != grid.shape for name in store) or len(grid.tile) != len(grid.shape):
         raise DamagedError("its datasets do not fit its axes")
     largest = 8.0 * float(np.prod([float(n) for n in grid.tile]))
     if largest > LARGEST_TILE_BYTES or not all(isinstance(n, int) and n > 0 for n in grid.tile):

@@ -57,8 +57,8 @@ class RunFolder:
         Returns:
             the index that each name says, sorted.
         """
-        found = {path: _SHARD.fullmatch(path.name) for path in sorted(self.shards.glob("*"))}
-        return {path: int(match[1]) for path, match in found.items() if match}
+        matches = {path: _SHARD.fullmatch(path.name) for path in sorted(self.shards.glob("*"))}
+        return {path: int(match[1]) for path, match in matches.items() if match}
 
     def make(self) -> None:
         """Make the directory; its parents too.

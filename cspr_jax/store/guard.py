@@ -87,18 +87,18 @@ def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, Found]:
     return {name: _dataset(file, name) for name in names if file.id.links.exists(name.encode())}
 
 
-def refuse_dense(found: Iterable[Found], size: int, *, densest: int = DENSEST) -> None:
+def refuse_dense(wanted: Iterable[Found], size: int, *, densest: int = DENSEST) -> None:
     """Refuse datasets that hold much more than their file can, or much less than it has.
 
     Args:
-        found: all that would be read.
+        wanted: all that would be read.
         size: of the file, bytes.
         densest: bytes that one of the file may stand for.
 
     Raises:
         DamagedError: they do.
     """
-    every = list(found)
+    every = list(wanted)
     total, most = sum(one.size for one in every), _PLENTY + densest * size
     if total > most:
         raise DamagedError(

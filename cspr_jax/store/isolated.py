@@ -57,14 +57,14 @@ def fetch(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         DamagedError: it is no file, is damaged, or holds what no file of this program does.
         StoreError: the system refuses to read anything at the moment.
     """
-    with _asked(path, "result") as (found, pipe):
+    with _asked(path, "result") as (answer, pipe):
         arrays = {}
-        for name, dtype, shape in found["arrays"]:
+        for name, dtype, shape in answer["arrays"]:
             _header(pipe, patience=None)
             arrays[name] = np.empty(shape, dtype)
             if arrays[name].size:
                 _fill(pipe, arrays[name].reshape(-1).data.cast("B"))
-    return found["attributes"], arrays
+    return answer["attributes"], arrays
 
 
 def content(path: Path) -> dict[str, Any] | None:
@@ -80,8 +80,8 @@ def content(path: Path) -> dict[str, Any] | None:
         DamagedError: it is no file, or damaged.
         StoreError: the system refuses to read anything at the moment.
     """
-    with _asked(path, "content") as (found, pipe):
-        return None if "motion" in found else _header(pipe, patience=None)["content"]
+    with _asked(path, "content") as (answer, pipe):
+        return None if "motion" in answer else _header(pipe, patience=None)["content"]
 
 
 @contextlib.contextmanager
@@ -93,10 +93,10 @@ def _asked(path: Path, what: str) -> Iterator[tuple[dict[str, Any], RawIOBase]]:
         if not large:
             check_open(path, file)
         with _reading(path, file, what) as pipe:
-            found = _header(pipe, patience=_PATIENCE)
+            answer = _header(pipe, patience=_PATIENCE)
             if large:
                 check_open(path, file)
-            yield found, pipe
+            yield answer, pipe
     finally:
         os.close(file)
 
@@ -140,10 +140,10 @@ def _header(pipe: RawIOBase, *, patience: float | None) -> dict[str, Any]:
     _fill(pipe, memoryview(size))
     data = bytearray(int.from_bytes(size, "little"))
     _fill(pipe, memoryview(data))
-    found = json.loads(data)
-    if "refused" in found:
-        raise DamagedError(found["refused"])
-    return found
+    header = json.loads(data)
+    if "refused" in header:
+        raise DamagedError(header["refused"])
+    return header
 
 
 def _fill(pipe: RawIOBase, place: memoryview) -> None:

@@ -205,7 +205,7 @@ def file_size(path: Path) -> int:
         bytes; -1 if it is not a regular file, a link included.
     """
     try:
-        found = os.lstat(path)
+        status = os.lstat(path)
     except OSError:
         return -1
-    return found.st_size if stat.S_ISREG(found.st_mode) else -1
+    return status.st_size if stat.S_ISREG(status.st_mode) else -1

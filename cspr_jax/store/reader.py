@@ -59,17 +59,17 @@ def _result(out: BinaryIO) -> None:
     with h5py.File(FILE, "r") as file:
         attributes = _attributes(file)
         tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS)
-        found = guard.datasets(file, [name for table in tables for name in table])
+        datasets = guard.datasets(file, [name for table in tables for name in table])
         marks = [name for name in _MARKS if "map" not in attributes and file.id.links.exists(name)]
-        guard.refuse_others(file, len(found) + len(marks), len(attributes))
-        guard.refuse_dense(found.values(), FILE.stat().st_size, densest=DENSEST)
-        total = sum(one.size for one in found.values())
+        guard.refuse_others(file, len(datasets) + len(marks), len(attributes))
+        guard.refuse_dense(datasets.values(), FILE.stat().st_size, densest=DENSEST)
+        total = sum(one.size for one in datasets.values())
         if total > LARGEST_DATA:
             raise DamagedError(f"it holds {total / 1e9:.3g} GB of data: must be at most {LARGEST_DATA / 1e9:.3g} GB")
-        arrays = [[name, one.dtype, one.shape] for name, one in found.items()]
+        arrays = [[name, one.dtype, one.shape] for name, one in datasets.items()]
         _answer(out, {"attributes": attributes, "arrays": arrays})
-        _grant_for(found.values())
-        for one in found.values():
+        _grant_for(datasets.values())
+        for one in datasets.values():
             values = one.values()
             _answer(out, {})  # it could be read
             if one.size:
@@ -84,34 +84,34 @@ def _content(out: BinaryIO) -> None:
         _answer(out, {"motion": True})
         return
 
-    def go_on(found: Iterable[guard.Found]) -> None:
+    def go_on(datasets: Iterable[guard.Found]) -> None:
         _answer(out, {})  # what takes long begins
-        _grant_for(found)
+        _grant_for(datasets)
 
     _answer(out, {"content": dataclasses.asdict(content_of(FILE, go_on))})
 
 
 def _attributes(file: h5py.File) -> dict[str, Any]:
     # Those that this program writes; whatever else there is stays where it is.
-    found: dict[str, Any] = {name: guard.text(file, name) for name in _LONG}
-    found |= {name: guard.text(file, name, largest=1 << 16) for name in _TEXTS}
+    attributes: dict[str, Any] = {name: guard.text(file, name) for name in _LONG}
+    attributes |= {name: guard.text(file, name, largest=1 << 16) for name in _TEXTS}
     for names, dtype in ((_INTEGERS, "int64"), (_NUMBERS, "float64")):
         for name in names:
             value = guard.numbers(file, name, dtype)
-            found[name] = None if value is None else value.item()
+            attributes[name] = None if value is None else value.item()
     points = guard.numbers(file, "base_points", "float64", (None, 3))
-    found["base_points"] = None if points is None else points.tolist()
-    return {name: value for name, value in found.items() if value is not None}
+    attributes["base_points"] = None if points is None else points.tolist()
+    return {name: value for name, value in attributes.items() if value is not None}
 
 
-def _answer(out: BinaryIO, found: dict[str, Any]) -> None:
-    data = json.dumps(found).encode()
+def _answer(out: BinaryIO, answer: dict[str, Any]) -> None:
+    data = json.dumps(answer).encode()
     out.write(len(data).to_bytes(8, "little") + data)
     out.flush()
 
 
-def _grant_for(found: Iterable[guard.Found]) -> None:
-    every = list(found)
+def _grant_for(datasets: Iterable[guard.Found]) -> None:
+    every = list(datasets)
     seconds = sum(one.size * _PER_BYTE + one.chunks * _PER_CHUNK for one in every)
     _grant(_LOOK + seconds, 2 * max((one.size for one in every), default=0))
 

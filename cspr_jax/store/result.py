@@ -108,12 +108,12 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
     if max(text.count("[") + text.count("{"), text.count(":")) > _MOST_PARTS:
         raise DamagedError(f"its {name} have more parts than cspr writes")
     try:
-        found = json.loads(text)
+        table = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise DamagedError(f"its {name} cannot be read: {error}") from error
-    if not isinstance(found, dict):
-        raise DamagedError(f"its {name} = {shown(found)}: must be a table")
-    return found
+    if not isinstance(table, dict):
+        raise DamagedError(f"its {name} = {shown(table)}: must be a table")
+    return table
 
 
 def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:

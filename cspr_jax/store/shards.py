@@ -122,12 +122,12 @@ def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -
         try:
             if set(file) != set(layout.store):
                 raise DamagedError("it holds other quantities")
-            found = guard.datasets(file, layout.store)
-            if any(one.dtype != dtype_of(name, layout.dtype) for name, one in found.items()):
+            datasets = guard.datasets(file, layout.store)
+            if any(one.dtype != dtype_of(name, layout.dtype) for name, one in datasets.items()):
                 raise DamagedError("it holds other types")
-            if any(one.shape != shape for one in found.values()):
+            if any(one.shape != shape for one in datasets.values()):
                 raise DamagedError("it holds a tile of another shape")
-            values = {name: one.values() for name, one in found.items()}
+            values = {name: one.values() for name, one in datasets.items()}
             written = file.attrs["content_sha256"]
         except UNREADABLE as error:
             raise DamagedError(f"HDF5 cannot read it: {reason(error)}") from error
@@ -146,15 +146,15 @@ def owners(paths: Iterable[Path]) -> set[tuple[str, str]]:
     Returns:
         the identities of their sweeps, each with the hash of an environment.
     """
-    found = set()
+    identities = set()
     for path in paths:
         try:
             file, header = _opened(path)
         except DamagedError:
             continue
         file.close()
-        found.add((str(header["identity"]), str(header["environment"])))
-    return found
+        identities.add((str(header["identity"]), str(header["environment"])))
+    return identities
 
 
 def _opened(path: Path) -> tuple[h5py.File, dict[str, Any]]:

@@ -97,20 +97,20 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
     raise RefusedError("\n".join(one_line(f"{folder.path}: {line}: {advice}") for line in lines))
 
 
-def refuse_worker(expected: dict[str, Any], found: dict[str, Any]) -> None:
+def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
     """Refuse a tile of a worker that differs from what the run was begun with.
 
     Args:
         expected: environment of the run.
-        found: of the worker.
+        actual: of the worker.
 
     Raises:
         RefusedError: with a line for each key that differs.
     """
-    if found == expected:
+    if actual == expected:
         return
     advice = "--accept-environment-change takes it"
-    lines = differences(found, expected)
+    lines = differences(actual, expected)
     raise RefusedError("\n".join(one_line(f"a worker differs from the run: {line}: {advice}") for line in lines))
 
 
@@ -147,9 +147,9 @@ def own_record(sweep: Sweep, folder: RunFolder, environment: dict[str, Any], com
     Raises:
         StoreError: the disk or the folder refuses.
     """
-    found = _record(folder.record)
-    if found is not None:
-        return found
+    present = _record(folder.record)
+    if present is not None:
+        return present
     source = {"file": sweep.file.name, "text": sweep.text, "command": list(command)}
     record = Record(sweep.identity, sweep.settings, environment, source)
     write_record(folder.disk, folder.record, record)

@@ -104,25 +104,25 @@ class Scheduler:
             ResourceError: no worker there, or one that has no cspr_jax.
         """
         try:
-            found = list(self._client.run(environment).values())
+            environments = list(self._client.run(environment).values())
         except Exception as error:  # dask raises it for whatever a worker cannot import
             raise ResourceError(
                 f"--scheduler {self._address}: a worker cannot run cspr_jax: {reason(error)}: install the same there"
             ) from error
-        if not found:
+        if not environments:
             raise ResourceError(f"--scheduler {self._address}: has lost its workers: start some")
-        for other in found[1:]:
-            lines = differences(found[0], other)
+        for other in environments[1:]:
+            lines = differences(environments[0], other)
             if lines and not self._accept:
                 raise RefusedError(
                     "\n".join(f"workers differ: {line}: --accept-environment-change takes them" for line in lines)
                 )
         here = environment()
-        if found[0]["package"] != here["package"] and not self._accept:
+        if environments[0]["package"] != here["package"] and not self._accept:
             raise RefusedError(
                 "workers run another cspr_jax than this process: install the same one, or --accept-environment-change"
             )
-        return found[0]
+        return environments[0]
 
     def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
         """Compute tiles in any order.

@@ -66,25 +66,25 @@ def verify(path: Path) -> dict[str, Any]:
         return _verify_file(path, {"schema": 1, "path": str(path), "faults": []})
     record = _record(path)
     folder = _folder(path, record)
-    found: dict[str, Any] = {"schema": 1, "path": str(path), "tiles": 0, "shards": 0, "missing": 0, "faults": []}
+    report: dict[str, Any] = {"schema": 1, "path": str(path), "tiles": 0, "shards": 0, "missing": 0, "faults": []}
     tiling = _tiling(record)
     run = record.settings["run"]
     layout = Layout(record.identity, list(run["store"]), run["dtype"])
-    found["tiles"] = len(tiling)
+    report["tiles"] = len(tiling)
     for index in range(len(tiling)):
         place = folder.shard(index)
         if not place.exists():
-            found["missing"] += 1
+            report["missing"] += 1
             continue
         try:
             read_shard(place, layout, index, tiling.extent(index))
-            found["shards"] += 1
+            report["shards"] += 1
         except DamagedError as error:
-            found["faults"].append(one_line(f"{place}: {error}"))
+            report["faults"].append(one_line(f"{place}: {error}"))
     if folder.result.exists():
         # Shards may have been pruned: the result stands for them.
-        _verify_result(folder.result, record, found)
-    return found
+        _verify_result(folder.result, record, report)
+    return report
 
 
 def result_in(directory: Path) -> Path:
@@ -105,17 +105,17 @@ def result_in(directory: Path) -> Path:
     return path
 
 
-def _verify_file(path: Path, found: dict[str, Any]) -> dict[str, Any]:
+def _verify_file(path: Path, report: dict[str, Any]) -> dict[str, Any]:
     try:
         inside = content(path)
     except DamagedError as error:
-        return found | {"result": str(path), "faults": [one_line(f"{path}: {error}")]}
+        return report | {"result": str(path), "faults": [one_line(f"{path}: {error}")]}
     if inside is not None:
-        return found | {"result": str(path)} | _counts(inside)
+        return report | {"result": str(path)} | _counts(inside)
     try:
         result = open_result(path)
     except StoreError as error:
-        return found | {"motion": str(path), "faults": [str(error)]}
+        return report | {"motion": str(path), "faults": [str(error)]}
     # Motions of earlier versions say nothing of their segments.
     segments = result.data.get("segment", np.empty(0)).size or None
     feasible = result.attributes.get("feasible")
@@ -124,11 +124,11 @@ def _verify_file(path: Path, found: dict[str, Any]) -> dict[str, Any]:
         "segments": segments,
         "feasible": None if feasible is None else feasible > 0,
     }
-    return found | {"motion": str(path)} | {key: value for key, value in counts.items() if value is not None}
+    return report | {"motion": str(path)} | {key: value for key, value in counts.items() if value is not None}
 
 
-def _verify_result(path: Path, record: Record, found: dict[str, Any]) -> None:
-    found["result"] = str(path)
+def _verify_result(path: Path, record: Record, report: dict[str, Any]) -> None:
+    report["result"] = str(path)
     try:
         if file_size(path) < 0:
             raise DamagedError("it is not a file")
@@ -136,9 +136,9 @@ def _verify_result(path: Path, record: Record, found: dict[str, Any]) -> None:
         if inside is None or inside["identity"] != record.identity:
             raise DamagedError("it belongs to another sweep")
     except DamagedError as error:
-        found["faults"].append(one_line(f"{path}: {error}"))
+        report["faults"].append(one_line(f"{path}: {error}"))
     else:
-        found |= {key: value for key, value in _counts(inside).items() if key not in found}
+        report |= {key: value for key, value in _counts(inside).items() if key not in report}
 
 
 def _counts(inside: dict[str, Any]) -> dict[str, Any]:
@@ -182,9 +182,9 @@ def _last(log: Path) -> dict[str, Any] | None:
         return None
     for line in reversed(lines):
         try:
-            found = json.loads(line)
+            entry = json.loads(line)
         except ValueError:
             continue
-        if isinstance(found, dict):
-            return found
+        if isinstance(entry, dict):
+            return entry
     return None

@@ -5,7 +5,7 @@ hypocycloid whose size changes from r1 to r2; every arc ends in a cusp. With lam
 end accelerations are those of a pendulum hung from the centroid.
 
 Two forms of the same motion stand here. `motion` is the printed one, (2.32) to (2.48). `swing` is
-the closed form: the hypocycloid is an ellipse, swept p / 2 times, which slowly precesses by the
+the closed form: the hypocycloid is an ellipse, traversed p / 2 times, which slowly precesses by the
 angle delta = psi (p even) or pi - psi (p odd), so that all that oscillates fast is one sine and one
 cosine of p pi tau, which do not depend on the points. They agree to 1e-12 (tests).
 

@@ -169,11 +169,11 @@ def _ellipse(segment: PoseSegment, arcs: Array, now: Instant, *, variable: bool)
         place = (r * cosine, nu * r * sine)
         pace = (r1 * cosine - r * steady / omega * sine, nu * r1 * sine)
         bend = ((r2 - r * steady) * cosine - 2.0 * r1 * steady / omega * sine, nu * (r2 + r * steady) * sine)
-    found = []
+    vectors = []
     for x, y in (place, pace, bend):
         along, across = axial * x + lateral * y, axial * y - lateral * x
-        found.append(tuple(segment.plane[:, i, 0] * along + segment.plane[:, i, 1] * across for i in range(3)))
-    return tuple(found)
+        vectors.append(tuple(segment.plane[:, i, 0] * along + segment.plane[:, i, 1] * across for i in range(3)))
+    return tuple(vectors)
 
 
 def _beat(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> tuple[Array, Array, Array]:

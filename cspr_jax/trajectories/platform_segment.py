@@ -237,8 +237,8 @@ class PlatformMotion:
         """State; see `Motion.state`."""
         tau = jnp.asarray(tau, float)
         quaternion = quaternion_at(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
-        found = motion(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
-        return found._replace(quaternion=quaternion)
+        state = motion(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        return state._replace(quaternion=quaternion)
 
     def breaks(self) -> Array:
         """Knots of the amplitude function; see `Motion.breaks`."""

@@ -15,7 +15,7 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, room
-from cspr_jax.feasibility.platform.crossings import swept
+from cspr_jax.feasibility.platform.crossings import passed_over
 from cspr_jax.feasibility.platform.kernels import cable_vectors, moving_along, still_along
 from cspr_jax.feasibility.platform.prefilter import FIRST, Prefilter
 from cspr_jax.feasibility.platform.samples import Motions, Narrowing, Places, Samples, along, low_points
@@ -95,8 +95,8 @@ class PoseChecker:
         """Find what can meet."""
         self.problem, self.kind, self.batch = problem, kind, batch
         self.done, self._lock = {"prefilter": 0, "checks": 0, "motions": 0}, threading.Lock()
-        found = contacts(problem.robot)
-        self._platform, self._pairs = (found.sides, found.normal), tuple((int(i), int(j)) for i, j in found.pairs)
+        near = contacts(problem.robot)
+        self._platform, self._pairs = (near.sides, near.normal), tuple((int(i), int(j)) for i, j in near.pairs)
         self._flags = flags(problem.limits)
         self._size = float(np.linalg.norm(np.asarray(problem.robot.platform_points), axis=1).max())
         knots = np.asarray(problem.amplitude.knots)
@@ -133,29 +133,29 @@ class PoseChecker:
         Returns:
             the checks.
         """
-        found, motions = self.nothing(len(arcs)), Motions(segments, arcs)
+        checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         self._count("motions", len(arcs))
         size = max(room(ARCS) // max(arcs, default=1), 1)
         for start in range(0, len(arcs), size):
             piece = np.arange(start, min(start + size, len(arcs)))
-            found.put(piece, self._checked(motions.rows(piece), whole))
-        return found
+            checks.put(piece, self._checked(motions.rows(piece), whole))
+        return checks
 
     def _checked(self, motions: Motions, whole: bool) -> PoseChecks:
-        found = self.nothing(len(motions.arcs))
+        checks = self.nothing(len(motions.arcs))
         samples = self._along(moving_along, motions)
         # Samples refute most of what is not feasible; what is narrowed down around them, some of the others.
         is_open = np.logical_or(whole, (samples.least() > -TOLERANCE).all(0))
         rest, motions = np.flatnonzero(is_open), motions.rows(is_open)
-        found.verdict[~is_open] = Verdict.SLACK_CABLE.value
+        checks.verdict[~is_open] = Verdict.SLACK_CABLE.value
         if not len(rest):
-            return found
+            return checks
         moving = self._moving(motions, samples.of(is_open))
         is_open = np.logical_or(whole, (moving > -TOLERANCE).all(0))
-        found.verdict[rest[~is_open]] = Verdict.SLACK_CABLE.value
+        checks.verdict[rest[~is_open]] = Verdict.SLACK_CABLE.value
         if is_open.any():
-            found.put(rest[is_open], self._still(motions.rows(is_open), moving[:, is_open]))
-        return found
+            checks.put(rest[is_open], self._still(motions.rows(is_open), moving[:, is_open]))
+        return checks
 
     def nothing(self, count: int) -> PoseChecks:
         """Checks to be filled.
@@ -193,7 +193,7 @@ class PoseChecker:
         is_finite = np.isfinite(least).all(0) & ~np.isnan(nearest) & (self.durations(*motions) > 0.0)
         step, item = np.nonzero(still_samples.wide)
         ends = samples.instants(motions, item, step), samples.instants(motions, item, step + 1)
-        met, hit = swept(
+        met, hit = passed_over(
             partial(self._cable_vectors, motions), self._platform, samples.row[item], ends, len(motions.arcs)
         )
         hit[samples.row[still_samples.hit]] = True
@@ -225,8 +225,8 @@ class PoseChecker:
         item = np.tile(item, PIECES)
         row, tau = samples.row[item], samples.instants(motions, item, np.tile(place, PIECES) + piece)
         places = Places(np.zeros(len(row), int), row, tau, motions.steps(row) / (2.0 * PIECES))
-        found = self._of_motion.lower(moving, motions, places, sections=0).reshape(PIECES, 1, -1)
-        some = low_points(found, moving[:1, row[: len(place)]])
+        tension = self._of_motion.lower(moving, motions, places, sections=0).reshape(PIECES, 1, -1)
+        some = low_points(tension, moving[:1, row[: len(place)]])
         some = some[0] * len(place) + some[2]
         self._of_motion.lower(moving, motions, Places(*(x[some] for x in places)))
 

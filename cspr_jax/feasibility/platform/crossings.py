@@ -12,14 +12,14 @@ HALVINGS = 12
 CableVectors = tuple[np.ndarray, np.ndarray]  # between cables (k, n_pairs, 3), along cables (k, n_cables, 3)
 
 
-def swept(
+def passed_over(
     cable_vectors: Callable[[np.ndarray, np.ndarray], CableVectors],
     platform: tuple[np.ndarray, np.ndarray],
     row: np.ndarray,
     ends: tuple[np.ndarray, np.ndarray],
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Motions in whose steps cables cross, and those in which one sweeps over the platform.
+    """Motions in whose steps cables cross, and those in which one passes over the platform.
 
     Args:
         cable_vectors: of motions (k,) at instants (k,).

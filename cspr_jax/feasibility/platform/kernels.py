@@ -29,7 +29,7 @@ class StillSamples(NamedTuple):
 
     Fields:
         values: (m, n_values, n) still slacks, and the smallest distance between cables, m.
-        hit: (n,) whether a cable swept over the platform in a step that needs no halving.
+        hit: (n,) whether a cable passed over the platform in a step that needs no halving.
         wide: (m - 1, n) steps to be halved.
     """
 
@@ -139,10 +139,10 @@ def narrowed(problem: Problem, items, *, pairs: tuple | None, kind: Kind, sectio
             values = moving_slacks(problem, segments, arcs, now, kind)
         else:
             values = _still(problem, pairs, segments, arcs, now, kind)[0]
-        found = values[0]
+        chosen = values[0]
         for k, value in enumerate(values[1:], start=1):
-            found = jnp.where(which == k, value, found)
-        return jnp.where(jnp.isnan(found), jnp.inf, found)
+            chosen = jnp.where(which == k, value, chosen)
+        return jnp.where(jnp.isnan(chosen), jnp.inf, chosen)
 
     low, high = jnp.maximum(tau - width, 0.0), jnp.minimum(tau + width, 1.0)
     left, right = inner_points(low, high)

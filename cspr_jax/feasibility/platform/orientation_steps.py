@@ -19,7 +19,7 @@ from cspr_jax.robots.wrench_lanes import cables
 
 BATCH = 4096
 # Gaps between cables below this part of the platform's size are none. A cable that makes a smaller angle with the
-# platform lies in it, and counts as being where it is in the reference orientation: it has not yet swept over.
+# platform lies in it, and counts as being where it is in the reference orientation: it has not yet passed over.
 TOUCHING = 1e-9
 # Steps between neighbours that are held at a time.
 STEPS = 65536
@@ -95,10 +95,10 @@ class OrientationSteps:
             the samples.
         """
         places = np.broadcast_to(self._place, (len(quaternions), 3))
-        found = in_batches(
+        sampled = in_batches(
             partial(_sampled, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), size=BATCH
         )
-        share, gaps, directions = found
+        share, gaps, directions = sampled
         # Cables that touch have a gap of rounding errors, whose direction means nothing.
         gaps[np.linalg.norm(gaps, axis=2) < TOUCHING * self._size] = 0.0
         # So has the height of cables that lie in the platform: they are put on one side of it.
@@ -126,7 +126,7 @@ class OrientationSteps:
             last: (n,) indices.
 
         Returns:
-            (n,) whether both are regular, no cables cross, and no cable sweeps over the platform.
+            (n,) whether both are regular, no cables cross, and no cable passes over the platform.
         """
         is_regular = self.regular(samples)
         ways = np.flatnonzero(is_regular[first] & is_regular[last])

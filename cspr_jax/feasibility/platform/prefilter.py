@@ -164,19 +164,19 @@ class Prefilter(NamedTuple):
         Returns:
             (n,) where a tension is, or is none, or the determinant has changed its sign.
         """
-        found = np.zeros(len(segments.rate), bool)
+        is_refuted = np.zeros(len(segments.rate), bool)
         for chunk in _chunks(tau):
-            alive = np.flatnonzero(~found)
+            alive = np.flatnonzero(~is_refuted)
             if not len(alive):
                 break
-            some = segments if len(alive) == len(found) else rows(segments, alive)
+            some = segments if len(alive) == len(is_refuted) else rows(segments, alive)
             if len(alive) <= room(self.size // FEWER):  # not worth two looks
-                found[alive] = ~(self._lowest(some, arcs, chunk)[0] > self.least)
+                is_refuted[alive] = ~(self._lowest(some, arcs, chunk)[0] > self.least)
                 continue
             lowest, when = self._lowest(some, arcs, chunk, rough=True)
             doubtful = np.flatnonzero(lowest < 0.0)
-            found[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk, when[doubtful]) > self.least)
-        return found
+            is_refuted[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk, when[doubtful]) > self.least)
+        return is_refuted
 
     def _lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, rough: bool = False):
         # Many in float32, few in float64: two compilations.

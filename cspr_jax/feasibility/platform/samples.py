@@ -203,9 +203,9 @@ class Narrowing(NamedTuple):
             return np.zeros(0)
         items = (*motions.items(row), tau, width, which.astype(np.int32))
         kernel = partial(narrowed, self.problem, pairs=self.pairs, kind=self.kind, sections=sections)
-        found = in_batches(kernel, items, size=self.size)
-        np.minimum.at(least, (which, row), found)
-        return found
+        values = in_batches(kernel, items, size=self.size)
+        np.minimum.at(least, (which, row), values)
+        return values
 
 
 def low_points(values: np.ndarray, least: np.ndarray) -> tuple[np.ndarray, ...]:

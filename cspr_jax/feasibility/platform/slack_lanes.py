@@ -36,33 +36,33 @@ def _balanced(robot: PlatformRobot, now: State, wires: Cables, squared: Array) -
     return balance(wires, force, slowed(moment))
 
 
-def _is_flat(wires: Cables, found: Balance) -> Array:
+def _is_flat(wires: Cables, balance: Balance) -> Array:
     # Where three of the cables are nearly in one plane.
     a, b, c = (dot(wires.rays[k], wires.rays[k]) for k in range(0, CABLES, 2))
-    return found.volume * found.volume < FLAT**2 * a * b * c
+    return balance.volume * balance.volume < FLAT**2 * a * b * c
 
 
-def _smallest_tension(rate: Array, found: Balance) -> Array:
+def _smallest_tension(rate: Array, balance: Balance) -> Array:
     # Over its value at rest in P0 if all were equal.
-    share = CABLES / (rate * found.denominator)
-    return smallest([x * share for x in found.numerators])
+    share = CABLES / (rate * balance.denominator)
+    return smallest([x * share for x in balance.numerators])
 
 
-def certain_tension(rate: Array, regular: Array, wires: Cables, found: Balance) -> Array:
+def certain_tension(rate: Array, regular: Array, wires: Cables, balance: Balance) -> Array:
     """The smallest tension, where the fast balance gives one.
 
     Args:
         rate: (n,) lambda of (3.50), 1/s^2.
         regular: (n,) determinant at rest in P0, whose sign must not change.
         wires: the cables.
-        found: the tensions.
+        balance: the tensions.
 
     Returns:
         (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign, infinite
         where the fast balance has no digits.
     """
-    lowest = jnp.where(found.signed * regular > 0.0, _smallest_tension(rate, found), -jnp.inf)
-    return jnp.where(_is_flat(wires, found), jnp.inf, lowest)
+    lowest = jnp.where(balance.signed * regular > 0.0, _smallest_tension(rate, balance), -jnp.inf)
+    return jnp.where(_is_flat(wires, balance), jnp.inf, lowest)
 
 
 def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> Array:
@@ -80,8 +80,8 @@ def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now:
     """
     here = state(segment, arcs, now, kind)
     wires = cables(robot, here.position, here.turn)
-    found = _balanced(robot, here, wires, squared_duration(segment, arcs))
-    return certain_tension(segment.rate, segment.regular, wires, found)
+    balance = _balanced(robot, here, wires, squared_duration(segment, arcs))
+    return certain_tension(segment.rate, segment.regular, wires, balance)
 
 
 def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> list[Array]:
@@ -100,16 +100,16 @@ def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Inst
     robot, limits = problem.robot, problem.limits
     here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
     wires = cables(robot, here.position, here.turn)
-    found = _balanced(robot, here, wires, squared)
-    is_flat = _is_flat(wires, found)
-    values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment.rate, found))]
+    balance = _balanced(robot, here, wires, squared)
+    is_flat = _is_flat(wires, balance)
+    values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment.rate, balance))]
     rows = _given(limits, of_motion=True)
     if not rows:
         return values
     lengths, rates, bends = cable_rates(wires, here.velocity, here.acceleration, here.omega, here.spin)
     pace, scale = jnp.sqrt(squared), scales(CABLES, robot.mass * robot.gravity, robot.gravity / segment.rate)
     each = {
-        "tension": [robot.mass * x / found.denominator * y for x, y in zip(found.numerators, lengths, strict=True)],
+        "tension": [robot.mass * x / balance.denominator * y for x, y in zip(balance.numerators, lengths, strict=True)],
         "speed": [jnp.abs(rate) / pace for rate in rates],
         "acceleration": [jnp.abs(bend) / squared for bend in bends],
     }

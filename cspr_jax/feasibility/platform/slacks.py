@@ -48,14 +48,14 @@ def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Ar
     """
     robot, limits = problem.robot, problem.limits
     per_length = wrench_balance.tensions_per_length(robot, state)
-    found = [
+    basic = [
         robot.n_cables * z0 / robot.gravity * jnp.min(per_length),
         wrench_balance.normalised_determinant(robot, state.position, state.rotation) / regular,
         plane_normal(robot) @ state.position / z0,
     ]
     rows = given(limits)
     if not rows:
-        return jnp.stack(found)
+        return jnp.stack(basic)
     now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
     every = (slack(row, getattr(limits, row.name), getattr(now, row.quantity), scale) for row in rows)
-    return jnp.stack([*found, *(jnp.min(x) for x in every)])
+    return jnp.stack([*basic, *(jnp.min(x) for x in every)])

@@ -58,10 +58,10 @@ def smooth_slacks(
         numbers (), as many as `counts` adds up to, criterion by criterion.
     """
     now = instant(segment, amplitude, arcs, tau)
-    found = [*now.kappa, now.eta]
+    terms = [*now.kappa, now.eta]
     for slack in limit_slacks(robot, limits, segment, arcs, tau, now):
-        found += slack
-    return tuple(found)
+        terms += slack
+    return tuple(terms)
 
 
 def slacks(

@@ -125,8 +125,8 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
     evaluate, groups = functions
 
     def step(state, start, stop):
-        found = jax.vmap(partial(_block_estimates, evaluate, problem), out_axes=1)(segments, arcs, start, stop)
-        return _insert(state, *found)
+        fresh = jax.vmap(partial(_block_estimates, evaluate, problem), out_axes=1)(segments, arcs, start, stop)
+        return _insert(state, *fresh)
 
     nothing = jnp.full((CANDIDATES, sum(groups), *arcs.shape), jnp.inf, arcs.dtype)
     nowhere = jnp.full_like(nothing, -1.0)
@@ -163,8 +163,8 @@ def smallest_values(
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    found = in_batches(partial(_minima, functions, problem, *table), arguments, size=batch)
-    return found[np.argsort(order, kind="stable")]
+    minima = in_batches(partial(_minima, functions, problem, *table), arguments, size=batch)
+    return minima[np.argsort(order, kind="stable")]
 
 
 def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:

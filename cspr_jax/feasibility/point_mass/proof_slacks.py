@@ -141,8 +141,8 @@ def limit_slacks(
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
     lift = jnp.stack(now.kappa) * length / (len(now.kappa) * z0)
     here = _Now(z0, time, weight, now.eta, lift, position[2], length, rate, rate_slope)
-    found = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in given(limits))
-    return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in found)
+    slacks = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in given(limits))
+    return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in slacks)
 
 
 def _path(segment: Segment, arcs: Array, tau: Array, now: Instant) -> tuple[Array, Array, Array]:

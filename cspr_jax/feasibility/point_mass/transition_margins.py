@@ -51,8 +51,8 @@ def transition_margins(problem: Problem, segments: Segment, arcs: np.ndarray) ->
         return margins(problem, segments, arcs)
     table = blocks(problem.amplitude, int(np.max(arcs)))
     smallest = smallest_values(Functions(_extreme_pseudotensions, (1, 1)), problem, segments, arcs, table).min(1)
-    found = np.stack([smallest, smallest], axis=1)
+    slacks = np.stack([smallest, smallest], axis=1)
     unclear = np.flatnonzero(~(np.isfinite(smallest) & (smallest > 0.0)))
     if len(unclear):
-        found[unclear] = margins(problem, jax.tree.map(lambda leaf: leaf[unclear], segments), arcs[unclear])
-    return found
+        slacks[unclear] = margins(problem, jax.tree.map(lambda leaf: leaf[unclear], segments), arcs[unclear])
+    return slacks

@@ -113,23 +113,23 @@ def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, 
     none = -jnp.inf * jnp.ones_like(function(tuple(p[0] for p in points)))
     nowhere = jnp.zeros((), jnp.int32)
 
-    def take(found, value, place):
-        (first, at_first), (second, at_second) = found
+    def take(peaks, value, place):
+        (first, at_first), (second, at_second) = peaks
         leads, follows = value > first, value > second
         next_one = jnp.where(leads, first, jnp.where(follows, value, second))
         at_next = jnp.where(leads, at_first, jnp.where(follows, place, at_second))
         return (jnp.where(leads, value, first), jnp.where(leads, place, at_first)), (next_one, at_next)
 
     def step(state, point):
-        before, here, place, found = state
+        before, here, place, peaks = state
         after = function(point)
         is_peak = (here >= before) & (here >= after)
-        return (here, after, place + 1, take(found, jnp.where(is_peak, here, -jnp.inf), place)), None
+        return (here, after, place + 1, take(peaks, jnp.where(is_peak, here, -jnp.inf), place)), None
 
     start = (none, none, nowhere - 1, ((none, nowhere), (none, nowhere)))
-    (before, here, place, found), _ = lax.scan(step, start, points, unroll=UNROLL)
-    found = take(found, jnp.where(here >= before, here, -jnp.inf), place)
-    return jnp.stack([found[0][1], found[1][1]]), found[0][0]
+    (before, here, place, peaks), _ = lax.scan(step, start, points, unroll=UNROLL)
+    peaks = take(peaks, jnp.where(here >= before, here, -jnp.inf), place)
+    return jnp.stack([peaks[0][1], peaks[1][1]]), peaks[0][0]
 
 
 def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
@@ -138,12 +138,12 @@ def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
     middle, width = _golden(lambda t: -function(t), low, high, STEPS), 0.5 * (high - low) * GOLDEN**STEPS
 
     def narrow(_, state):
-        found, at, width = state
+        largest, at, width = state
         points = jnp.clip(at + width * jnp.array([-1.0, 0.0, 1.0]), low, high)
         values = jax.vmap(function)(points)
         shares = 1.0 / jnp.maximum(values, jnp.maximum(SMALLEST_SHARE * jnp.max(values), TINY))
         move = vertex(shares[0], shares[1], shares[2])[0]
-        return jnp.maximum(found, jnp.max(values)), jnp.clip(points[1] + width * move, low, high), width / 16.0
+        return jnp.maximum(largest, jnp.max(values)), jnp.clip(points[1] + width * move, low, high), width / 16.0
 
     return lax.fori_loop(0, PARABOLAS, narrow, (jnp.full_like(middle, -jnp.inf), middle, width))[0]
 

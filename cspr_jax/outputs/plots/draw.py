@@ -101,7 +101,7 @@ def _envelope(results: list[Result], quantity: str | None, at: dict[str, float],
 def _overlay(
     paths: list[Path], results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None
 ) -> Figure:
-    found: list[tuple[Result, np.ndarray, str]] = []
+    columns: list[tuple[Result, np.ndarray, str]] = []
     constant: list[list[str]] = []
     if lines is not None:
         raise InputError("--lines", lines, "absent where several results are drawn")
@@ -111,11 +111,11 @@ def _overlay(
         view = _view(result, quantity, at)
         if len(view.across) != 1:
             raise InputError("results", f"{path} over {view.across}", "maps over one axis; --at fixes the others")
-        found.append((result, view.data, view.across[0]))
+        columns.append((result, view.data, view.across[0]))
         constant.append(_constant(result, view))
     stems = [path.stem for path in paths]
     names = names_of(results, stems if len(set(stems)) == len(stems) else [str(path) for path in paths])
-    across, drawn = overlaid(names, found)
+    across, drawn = overlaid(names, columns)
     same = [note for note in constant[0] if all(note in other for other in constant)]
     robots = {result.attributes["robot"] for result in results}
     title = heading(results[0], view.name)
@@ -154,8 +154,8 @@ def _constant(result: Result, view: View, name: str | None = None) -> list[str]:
 def _told(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
     # The same for every quantity of a file, so that their pictures show the same sections.
     names = ["verdict"] if "verdict" in result.data else list(result.data)
-    found = [tells(name, _panelled(result, _view(result, name, at), order).data) for name in names]
-    return np.any(found, axis=0)
+    telling = [tells(name, _panelled(result, _view(result, name, at), order).data) for name in names]
+    return np.any(telling, axis=0)
 
 
 def _lines_figure(result: Result, view: View, by: str) -> Figure:

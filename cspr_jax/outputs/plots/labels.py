@@ -73,8 +73,8 @@ def axis_label(result: Result, axis: str) -> str:
 
 
 def _in_brackets(result: Result, name: str) -> str:
-    found = unit(result, name)
-    return f" ({found})" if found else ""
+    symbol = unit(result, name)
+    return f" ({symbol})" if symbol else ""
 
 
 def unit(result: Result, name: str) -> str:
@@ -87,8 +87,8 @@ def unit(result: Result, name: str) -> str:
     Returns:
         the unit; empty for a pure number.
     """
-    found = "°" if is_angle(result, name) else shortened(result.units[name])
-    return "" if found == "1" else found
+    symbol = "°" if is_angle(result, name) else shortened(result.units[name])
+    return "" if symbol == "1" else symbol
 
 
 def is_angle(result: Result, name: str) -> bool:
@@ -143,7 +143,7 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
         such as "z0 = 1.7 m", "tilt = 45°", or "cable 1".
     """
     drawn = float(as_drawn(result, axis, np.asarray(point, float)))
-    found = unit(result, axis)
+    symbol = unit(result, axis)
     if is_angle(result, axis):
         drawn = turned(drawn)
     # A range that passes zero may miss it by rounding.
@@ -151,7 +151,7 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
     name = WORDS.get(axis, shortened(axis))
     if axis == "cable":
         return f"{name} {drawn:g}"
-    return f"{name} = {drawn:.{digits}g}" + (f" {found}" if found not in ("", "°") else found)
+    return f"{name} = {drawn:.{digits}g}" + (f" {symbol}" if symbol not in ("", "°") else symbol)
 
 
 def values(result: Result, axis: str, points: np.ndarray) -> list[str]:
@@ -165,12 +165,12 @@ def values(result: Result, axis: str, points: np.ndarray) -> list[str]:
     Returns:
         one text a point.
     """
-    found: list[str] = []
+    texts: list[str] = []
     for digits in range(3, 17):
-        found = [value(result, axis, point, digits=digits) for point in points]
-        if len(set(found)) == len(set(points.tolist())):
+        texts = [value(result, axis, point, digits=digits) for point in points]
+        if len(set(texts)) == len(set(points.tolist())):
             break
-    return found
+    return texts
 
 
 def chosen(count: int, most: int) -> np.ndarray:

@@ -76,9 +76,9 @@ def line_figure(
         panel.set_ylabel(label(result, name))
     _ticks(every[0], result, across, drawn, words)
     if any(line.name for line in drawn[0]):
-        found = every[0].legend(every[0].lines, [""] * len(drawn[0]), frameon=True, framealpha=0.9, fontsize="small")
+        legend = every[0].legend(every[0].lines, [""] * len(drawn[0]), frameon=True, framealpha=0.9, fontsize="small")
         # Set afterwards: a name that begins with an underscore would be left out.
-        for text, line in zip(found.get_texts(), drawn[0], strict=True):
+        for text, line in zip(legend.get_texts(), drawn[0], strict=True):
             text.set_text(line.name)
     figure.suptitle("\n".join([title, ", ".join(fixed)]).strip())
     return figure
@@ -87,8 +87,8 @@ def line_figure(
 def _as_drawn(result: Result, name: str, across: str, line: Line) -> Line:
     # The points of an axis may come in any order.
     order = np.argsort(line.points, kind="stable")
-    points, found = as_drawn(result, across, line.points[order]), as_drawn(result, name, line.values[order])
-    return Line(points, found, line.name)
+    points, data = as_drawn(result, across, line.points[order]), as_drawn(result, name, line.values[order])
+    return Line(points, data, line.name)
 
 
 def _draw(panel: Axes, lines: list[Line]) -> None:
@@ -157,9 +157,9 @@ def names_of(results: list[Result], stems: list[str]) -> list[str]:
     """
     if len(results) > 1:
         for words in (_amplitude, robot_name):
-            found = [words(result) for result in results]
-            if len(set(found)) == len(results) and all(found):
-                return found
+            names = [words(result) for result in results]
+            if len(set(names)) == len(results) and all(names):
+                return names
     return [shortened(stem) for stem in stems]
 
 
@@ -192,4 +192,4 @@ def overlaid(names: list[str], results: list[tuple[Result, np.ndarray, str]]) ->
     if len(axes) > 1:
         raise InputError("results", axes, "results that vary along the same axis")
     lines = zip(names, results, strict=True)
-    return axes[0], [Line(result.axes[axis], found, name) for name, (result, found, axis) in lines]
+    return axes[0], [Line(result.axes[axis], data, name) for name, (result, data, axis) in lines]

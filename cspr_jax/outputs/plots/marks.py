@@ -56,15 +56,15 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
     if section is None:
         return {}
     limits = panel.get_xlim(), panel.get_ylim()
-    found = _spools(section)
+    artists = _spools(section)
     for words, point in _points(section, name).items():
         if _contains(section, point):
             at = _drawn(section, point[None])
             if _inside(limits, at).any():
                 symbol, size = ("P", 7.0) if words == "P0" else ("o", 5.5)
-                found[words] = panel.plot(*at[0], symbol, markersize=size, **_EDGE)[0]
+                artists[words] = panel.plot(*at[0], symbol, markersize=size, **_EDGE)[0]
     panel.set(xlim=limits[0], ylim=limits[1])
-    return found
+    return artists
 
 
 def marked(result: Result, name: str, across: list[str], over: str, place: dict[str, float]) -> list[int]:
@@ -84,13 +84,13 @@ def marked(result: Result, name: str, across: list[str], over: str, place: dict[
     if section is None or over not in section.space:
         return []
     every = result.axes[over]
-    found = []
+    indices = []
     for point in _points(section, name).values():
         gaps = every - _coordinate(over.removeprefix("from_"), point[None], section.centre, None)[0]
         nearest = int(np.argmin(np.abs(gaps)))
         if _contains(section._replace(place=section.place | {over: float(every[nearest])}), point):
-            found.append(nearest)
-    return sorted(set(found))
+            indices.append(nearest)
+    return sorted(set(indices))
 
 
 def _section(panel: Axes | None, result: Result, across: list[str], place: dict[str, float]) -> _Section | None:
@@ -105,10 +105,10 @@ def _section(panel: Axes | None, result: Result, across: list[str], place: dict[
 def _points(section: _Section, name: str) -> dict[str, np.ndarray]:
     # P0, and the end that all motions share, by their words.
     words, end = ("start", start(section.result)) if section.space is OF_TARGETS else ("target", section.place)
-    found = {"P0": _rest_point(section, name)}
+    points = {"P0": _rest_point(section, name)}
     if all(axis in end for axis in "xyz"):
-        found[words] = np.array([end[axis] for axis in "xyz"], float)
-    return {words: point for words, point in found.items() if point is not None}
+        points[words] = np.array([end[axis] for axis in "xyz"], float)
+    return {words: point for words, point in points.items() if point is not None}
 
 
 def _rest_point(section: _Section, name: str) -> np.ndarray | None:

@@ -16,8 +16,8 @@ def table(settings: object, key: str) -> dict:
     Returns:
         the table; empty if there is none.
     """
-    found = settings.get(key) if isinstance(settings, dict) else None
-    return found if isinstance(found, dict) else {}
+    inner = settings.get(key) if isinstance(settings, dict) else None
+    return inner if isinstance(inner, dict) else {}
 
 
 def start(result: Result) -> dict[str, float]:
@@ -63,13 +63,13 @@ def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[
         phrases.
     """
     place = start(result)
-    found = []
+    phrases = []
     if place:
-        found.append(f"from ({', '.join(f'{number:.4g}' for number in place.values())}) m")
+        phrases.append(f"from ({', '.join(f'{number:.4g}' for number in place.values())}) m")
     elif name and starts_at_rest(result, name):
-        found.append("from rest")
-    found += fixed
-    found += [value(result, a, p[0]) for a, p in result.axes.items() if a not in used and len(p) == 1]
+        phrases.append("from rest")
+    phrases += fixed
+    phrases += [value(result, a, p[0]) for a, p in result.axes.items() if a not in used and len(p) == 1]
     if "z" in result.axes:
-        found.append(f"z axis {shortened(str(result.attributes.get('z_axis', 'down')))}")
-    return list(dict.fromkeys(found))
+        phrases.append(f"z axis {shortened(str(result.attributes.get('z_axis', 'down')))}")
+    return list(dict.fromkeys(phrases))

@@ -37,13 +37,13 @@ def reasons(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, list[str], lis
         (...) number of the reason, from 0 on; the words of those that occur; their colours.
     """
     flags = verdicts.astype(int) & ~NO_REASON.value
-    found = np.zeros(flags.shape, int)
+    numbers = np.zeros(flags.shape, int)
     for number, flag in reversed(list(enumerate(REASONS, start=1))):
-        found = np.where(flags & flag.value, number, found)
-    used = np.unique(found)
+        numbers = np.where(flags & flag.value, number, numbers)
+    used = np.unique(numbers)
     every = [(QUANTITIES[name].unflagged, FEASIBLE_COLOUR), *REASONS.values()]
     words, colours = zip(*(every[number] for number in used), strict=True)
-    return np.searchsorted(used, found), list(words), list(colours)
+    return np.searchsorted(used, numbers), list(words), list(colours)
 
 
 def reason_scale(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, Scale]:

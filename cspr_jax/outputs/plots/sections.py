@@ -97,13 +97,13 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
 
 def _moved(shown: np.ndarray, wanted: list[int]) -> np.ndarray:
     # Evenly chosen sections, the nearest ones moved to where there is something to mark.
-    found = shown.tolist()
+    indices = shown.tolist()
     for index in wanted:
-        if index not in found:
-            free = [other for other in found if other not in wanted]
+        if index not in indices:
+            free = [other for other in indices if other not in wanted]
             if free:
-                found[found.index(min(free, key=lambda other: abs(other - index)))] = index
-    return np.sort(found)
+                indices[indices.index(min(free, key=lambda other: abs(other - index)))] = index
+    return np.sort(indices)
 
 
 def _size(result: Result, across: list[str], count: int) -> tuple[float, float]:
