@@ -15,7 +15,7 @@ demo: $(STAMP)
 	@echo "Look at results/demo/demo.png; the data are in results/demo/demo.h5."
 
 test: $(TESTS)
-	$(BIN)/python -m pytest -m "not soak" -n 2 --dist loadgroup --no-loadscope-reorder
+	$(BIN)/python -m pytest -m "not soak" -n 2 --dist loadscope --no-loadscope-reorder
 
 soak: $(TESTS)
 	$(BIN)/python -m pytest -m soak

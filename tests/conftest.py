@@ -12,6 +12,7 @@ import jax
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from xdist.scheduler import LoadScopeScheduling
 
 from cspr_jax.arithmetic import batches, elementary
 from cspr_jax.robots import point_mass
@@ -28,6 +29,8 @@ CHEAP = (
     "--xla_cpu_use_fusion_emitters=false",
     "--xla_cpu_parallel_codegen_split_count=1",
 )
+# Most quick tests ask for a handful of cases, and a batch is padded.
+LARGEST_BATCH = 64
 # Compiled code of finished files goes where a process has more than so many bytes.
 ROOM = 1_500_000_000
 os.environ["CSPR_CACHE_DIR"] = str(COMPILED)
@@ -42,8 +45,6 @@ jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 # As `double_precision` has it: what tests call themselves, and what commands call, is one program.
 jax.config.update("jax_default_matmul_precision", "highest")
-# Most tests ask for a handful of cases; a batch is padded.
-batches.LARGEST = 64
 settings.register_profile("default", deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 settings.load_profile("default")
 
@@ -85,10 +86,24 @@ _PLATFORMS = (
 _ORDER = {name: place for place, name in enumerate((*_POINT_MASSES, *_PLATFORMS, "test_workers", "test_crashes"))}
 
 
+class _Groups(LoadScopeScheduling):
+    # pytest-xdist's own groups are marks that it writes into names, where this pytest no longer reads them.
+    def _split_scope(self, nodeid):
+        stem = nodeid.partition("::")[0].rpartition("/")[2].removesuffix(".py")
+        return "point masses" if stem in _POINT_MASSES else "platforms" if stem in _PLATFORMS else stem
+
+
+@pytest.hookimpl
+def pytest_xdist_make_scheduler(config, log):
+    """Who gives the processes their tests."""
+    return _Groups(config, log)
+
+
 def pytest_configure(config):
-    """Before jax compiles anything."""
+    """Before jax compiles anything. The soak takes batches and flags of users."""
     if config.option.markexpr == "not soak":
         os.environ["XLA_FLAGS"] = " ".join([*CHEAP, os.environ.get("XLA_FLAGS", "")]).strip()
+        batches.LARGEST = LARGEST_BATCH
     is_first = not hasattr(config, "workerinput")
     if is_first and sum(path.stat().st_size for path in COMPILED.rglob("*") if path.is_file()) > LARGEST:
         for path in COMPILED.rglob("*"):
@@ -96,14 +111,9 @@ def pytest_configure(config):
                 path.unlink()
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Groups, the long ones first, so that both processes end together."""
+    """The long groups first, so that both processes end together."""
     items.sort(key=lambda item: _ORDER.get(item.path.stem, len(_ORDER)))
-    for item in items:
-        stem = item.path.stem
-        name = "point masses" if stem in _POINT_MASSES else "platforms" if stem in _PLATFORMS else stem
-        item.add_marker(pytest.mark.xdist_group(name))
 
 
 @pytest.fixture(autouse=True, scope="module")
