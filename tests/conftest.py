@@ -83,7 +83,9 @@ _PLATFORMS = (
     "test_first_look",
     "test_platform",
 )
-_ORDER = {name: place for place, name in enumerate((*_POINT_MASSES, *_PLATFORMS, "test_workers", "test_crashes"))}
+_ORDER = {
+    name: place for place, name in enumerate((*_POINT_MASSES, *_PLATFORMS, "test_xla", "test_workers", "test_crashes"))
+}
 
 
 class _Groups(LoadScopeScheduling):
