@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from oracles import platform as oracle
-from support.commands import cspr
+from support.commands import cspr, plan
 from support.platforms import (
     EFFECTIVE,
     FROM_REST,
@@ -22,7 +22,6 @@ from support.platforms import (
     limits_of,
     made,
     ours,
-    planned,
     random_pose,
     stacked,
     states,
@@ -32,8 +31,7 @@ from cspr_jax.feasibility.platform.kernels import cable_vectors, moving_along, s
 from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.feasibility.platform.slacks import pose_slacks
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.plans import choices
-from cspr_jax.plans.planning import plan
+from cspr_jax.plans import choices, planning
 from cspr_jax.robots import contact_lanes, interference
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.state import State
@@ -94,7 +92,7 @@ def test_cells_are_plans(tmp_path, start):
         last += f"tilt_torsion = [{at['tilt_azimuth']}, {at['tilt']}, {at['torsion']}]\n"
         (tmp_path / "plan.toml").write_text(head + first + last)
         with jax.enable_x64(True):
-            answers = plan(tmp_path / "plan.toml").answers
+            answers = planning.plan(tmp_path / "plan.toml").answers
         assert result.data["arcs"][cell] == answers.arcs[0] and result.data["verdict"][cell] == answers.verdict[0]
         for name in ("duration", "margin", "det_margin", "cable_distance"):
             assert result.data[name][cell] == pytest.approx(getattr(answers, name)[0], rel=1e-6, abs=1e-9), name
@@ -264,7 +262,7 @@ def test_beats_in_plans_and_maps(tmp_path, beat):
     parts = ["rest = true\n", "position = [0.0, 1.2, 1.5]\ntilt_torsion = [1.0, 0.3, 0.1]\n"]
     (tmp_path / "plan.toml").write_text(text + "".join("[[pose]]\n" + part for part in parts))
     with jax.enable_x64(True):
-        answers = plan(tmp_path / "plan.toml").answers
+        answers = planning.plan(tmp_path / "plan.toml").answers
     assert answers.arcs[0] > 0 and answers.beta_hat[0, 0] == answers.beta_hat[0, 1]
     if beat == "beta_0":
         assert answers.beta_hat[0, 0] == 0.0
@@ -295,12 +293,12 @@ def check_choices(tmp_path):
     for z0 in ("1.4", "1.5", "1.6", '{ choose = "mean" }', '{ choose = "fastest" }'):
         (tmp_path / "plan.toml").write_text(plain.replace("z0 = 1.4", f"z0 = {z0}"))
         with jax.enable_x64(True):
-            found = plan(tmp_path / "plan.toml")
+            found = planning.plan(tmp_path / "plan.toml")
         totals.append(found.answers.duration.sum() if found.answers.arcs[0] else np.inf)
     assert totals[-1] <= min(totals[:-1]) + 1e-9
     (tmp_path / "plan.toml").write_text(plain.replace("epsilon = 0.1", 'epsilon = "best"'))
     with jax.enable_x64(True):
-        best = plan(tmp_path / "plan.toml")
+        best = planning.plan(tmp_path / "plan.toml")
     assert best.answers.arcs[0] > 0 and best.answers.duration.sum() <= totals[0] + 1e-9
 
 
@@ -331,10 +329,10 @@ def test_mistakes(tmp_path, change, words):
 
 def test_mistakes_of_plans(tmp_path):
     """A time function without a free beta-hat refuses one; a point mass refuses all."""
-    code, _, err = planned(tmp_path, 'beat = "beta_0"\n' + SHORT)
+    code, _, err = plan(tmp_path, 'beat = "beta_0"\n' + SHORT)
     assert code == 2 and 'beta_hat: must be absent with beat = "beta_0"' in err
     point = SHORT.replace('"laval-mssm"', '"prototype"').replace('"hypocycloid"', '"hypocycloid-standard"')
-    code, _, err = planned(tmp_path, 'beat = "beta_0"\n' + point)
+    code, _, err = plan(tmp_path, 'beat = "beta_0"\n' + point)
     assert code == 2 and "must be absent for a point mass" in err
 
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from oracles import platform as oracle
-from support.commands import cspr
+from support.commands import cspr, plan
 from support.platforms import (
     FROM_REST,
     MSSM,
@@ -23,7 +23,6 @@ from support.platforms import (
     made,
     margin_of,
     ours,
-    planned,
     random_pose,
     stacked,
 )
@@ -348,7 +347,7 @@ def check_table_3_2(cells):
 
 def test_a_free_beta_hat_needs_no_more_arcs(tmp_path):
     free = "\n".join(line for line in SHORT.splitlines() if not line.startswith("beta_hat"))
-    found = [json.loads(planned(tmp_path, text, "--json")[1]) for text in (SHORT, free)]
+    found = [json.loads(plan(tmp_path, text, "--json")[1]) for text in (SHORT, free)]
     assert found[1]["feasible"] and found[1]["total_duration"] <= found[0]["total_duration"] + 1e-9
     ends = [s["beta_hat"] for s in found[1]["segments"]]
     assert ends[0][1] == ends[1][0] and ends[0][0] == ends[1][1] == -1.0
@@ -356,7 +355,7 @@ def test_a_free_beta_hat_needs_no_more_arcs(tmp_path):
 
 def test_the_motion(tmp_path):
     """Columns, the oracle's numbers, and no jump of acceleration, angular acceleration and tension between segments."""
-    code, out, err = planned(tmp_path, SHORT, "--json", "-o", tmp_path / "motion.csv")
+    code, out, err = plan(tmp_path, SHORT, "--json", "-o", tmp_path / "motion.csv")
     found = json.loads(out)
     assert (code, err) == (0, "") and [s["cable_interference"] for s in found["segments"]] == [False, False]
     heads, *rows = csv.reader((tmp_path / "motion.csv").read_text().splitlines())
@@ -403,7 +402,7 @@ def test_an_upward_z_axis(tmp_path):
     down, q = SHORT, oracle.pose_quaternion([0.0, 1.732, 1.7], (np.pi / 2, -np.pi / 6, 0.0))
     old = next(line for line in text.splitlines() if line.startswith("tilt_torsion"))
     text = text.replace(old, f"quaternion = {(q * [1, 1, -1, -1]).tolist()}")
-    found = [json.loads(planned(tmp_path, t, "--json")[1]) for t in (down, text)]
+    found = [json.loads(plan(tmp_path, t, "--json")[1]) for t in (down, text)]
     for a, b in zip(found[0]["segments"], found[1]["segments"], strict=True):
         assert a["arcs"] == b["arcs"] and a["margin"] == pytest.approx(b["margin"], rel=1e-6)
         assert a["z_lowest"] == pytest.approx(-b["z_lowest"])
@@ -412,7 +411,7 @@ def test_an_upward_z_axis(tmp_path):
 @pytest.mark.soak
 def test_jumps_are_named(tmp_path):
     text = SHORT.replace('"effective-c3"', '"effective"')
-    code, _, err = planned(tmp_path, text)
+    code, _, err = plan(tmp_path, text)
     assert code == 0 and "jump" in err and len(err.splitlines()) == 1
 
 
@@ -431,7 +430,7 @@ def test_jumps_are_named(tmp_path):
 )
 def test_mistakes(tmp_path, change, words):
     assert change[0] in SHORT
-    code, out, err = planned(tmp_path, SHORT.replace(*change, 1), "-o", tmp_path / "motion.csv")
+    code, out, err = plan(tmp_path, SHORT.replace(*change, 1), "-o", tmp_path / "motion.csv")
     assert (code, out) == (2, "") and words in err and len(err.splitlines()) == 1, err
     assert not (tmp_path / "motion.csv").exists()
 
@@ -439,9 +438,9 @@ def test_mistakes(tmp_path, change, words):
 def test_quaternions_that_are_not_unit(tmp_path):
     old = next(line for line in SHORT.splitlines() if line.startswith("tilt_torsion"))
     good = SHORT.replace(old, "quaternion = [0.9659258262890683, 0.0, -0.25881904510252074, 0.0000005]")
-    assert planned(tmp_path, good)[0] == 0
+    assert plan(tmp_path, good)[0] == 0
     bad = SHORT.replace(old, "quaternion = [0.97, 0.0, -0.25881904510252074, 0.0]")
-    code, _, err = planned(tmp_path, bad)
+    code, _, err = plan(tmp_path, bad)
     assert code == 2 and "must have length 1" in err
 
 
@@ -461,5 +460,5 @@ def test_robot_files_that_are_wrong(tmp_path, change, words):
     text = ROBOT.format(base=MSSM.base.tolist(), platform=MSSM.platform.tolist(), inertia=MSSM.inertia.tolist())
     assert change[0] in text
     (tmp_path / "robot.toml").write_text(text.replace(*change, 1))
-    code, _, err = planned(tmp_path, SHORT.replace('"laval-mssm"', '"robot.toml"'))
+    code, _, err = plan(tmp_path, SHORT.replace('"laval-mssm"', '"robot.toml"'))
     assert code == 2 and words in err and len(err.splitlines()) == 1, err

@@ -23,7 +23,6 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.trajectories import platform_segment as segments
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import USUAL, Kind
-from support.commands import cspr
 
 MSSM = oracle.mssm()
 Z0 = 1.4
@@ -36,12 +35,6 @@ LOOSE = {row.name: 0.0 if row.sense == "least" else 1e3 for row in LIMITS}
 HEAD, *PARTS = (Path(__file__).parents[2] / "sweeps" / "table_3_2.toml").read_text("utf-8").split("[[pose]]\n")
 # A plan: rest, the last pose of Table 3.2, rest.
 SHORT = "[[pose]]\n".join([HEAD, PARTS[0], PARTS[-2], PARTS[-1]])
-
-
-def planned(folder, text, *arguments):
-    """Exit code, standard output and standard error of `cspr plan` of a text."""
-    (folder / "plan.toml").write_text(text)
-    return cspr("plan", folder / "plan.toml", *arguments)
 
 
 def ours(robot):
