@@ -33,6 +33,7 @@ def polynomial(coefficients, x: Array) -> Array:
     return value
 
 
+@jax.jit
 def sincospi(x: Array) -> tuple[Array, Array]:
     """sin(pi x) and cos(pi x), by range reduction and a polynomial.
 

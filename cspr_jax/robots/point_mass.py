@@ -264,6 +264,7 @@ def rest_point(z0):
     return xp.stack([xp.zeros_like(z0), xp.zeros_like(z0), z0], axis=-1)
 
 
+@jax.jit
 def spool_radius(robot: Robot) -> Array:
     """Largest distance of a spool from the centroid of all: the size of a robot.
 
@@ -276,6 +277,7 @@ def spool_radius(robot: Robot) -> Array:
     return jnp.max(jnp.linalg.norm(robot.base_points, axis=1))
 
 
+@jax.jit
 def plane_normal(robot: Robot) -> Array:
     """Normal of the spool plane, scaled so that its vertical component is 1.
 

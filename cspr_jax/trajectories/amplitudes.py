@@ -8,6 +8,7 @@ certificate between samples needs.
 import dataclasses
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -57,6 +58,7 @@ _FIELDS = [field.name for field in dataclasses.fields(Amplitude)]
 jax.tree_util.register_dataclass(Amplitude, _FIELDS[:-1], [], drop_fields=["name"])
 
 
+@partial(jax.jit, static_argnames="order")
 def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array, ...]:
     """A and its derivatives with respect to tau.
 

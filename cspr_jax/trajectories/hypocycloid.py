@@ -67,6 +67,7 @@ class Segment:
     twist: Array
 
 
+@jax.jit
 def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: Array) -> Segment:
     """The segment from one point to another.
 
@@ -130,6 +131,7 @@ def duration(segment: Segment, arcs: Array) -> Array:
     return jnp.sqrt(oscillation(segment, arcs).period / segment.rate)
 
 
+@jax.jit
 def swing(segment: Segment, amplitude_values: tuple[Array, ...], arcs: Array, tau: Array) -> tuple[Array, Array]:
     """Closed form of the motion in the plane of the trajectory, at one instant.
 

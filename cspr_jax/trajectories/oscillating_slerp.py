@@ -9,6 +9,7 @@ The angle of the envelope stays within [0, pi], since both of its ends have a sc
 import math
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -43,6 +44,7 @@ class Turn(NamedTuple):
     end_beta_hat: Array
 
 
+@jax.jit
 def turn(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *, odd: Array) -> Turn:
     """The turn between two orientations.
 
@@ -102,6 +104,7 @@ def beat(
     return value, rate, bend
 
 
+@jax.jit
 def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Array, ...]) -> tuple[Array, Array, Array]:
     """The orientation and its first two derivatives in tau, (3.59) to (3.65).
 

@@ -5,8 +5,10 @@ neither an ellipse nor a quaternion: it is a straight swing, and a rotation abou
 """
 
 import math
+from functools import partial
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -62,6 +64,7 @@ class State(NamedTuple):
     spin: Vector
 
 
+@jax.jit
 def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> Instant:
     """Instant common to segments of the same number of arcs.
 
@@ -112,6 +115,7 @@ def squared_duration(segment: PoseSegment, arcs: Array) -> Array:
     return (math.pi * arcs) ** 2 * (1.0 - nu) * (1.0 + nu) / segment.rate
 
 
+@partial(jax.jit, static_argnames="kind")
 def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind, one: Array | None = None) -> State:
     """The state of the platform.
 

@@ -12,6 +12,7 @@ so that the platform stands still at every cusp, not only at the ends as with th
 
 import dataclasses
 import math
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -124,6 +125,7 @@ def _share(segment: PoseSegment, arcs: Array) -> Array:
     return (1.0 - ratio) * (1.0 + ratio)
 
 
+@partial(jax.jit, static_argnames="kind")
 def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: Kind = USUAL) -> State:
     """The state of the platform at one instant.
 

@@ -2,6 +2,7 @@
 
 import math
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -12,6 +13,7 @@ from cspr_jax.robots.point_mass import AT_P0
 UPRIGHT = 1e-12
 
 
+@jax.jit
 def swing_plane(v1: Array, v2: Array, size: Array, normal: Array, odd: Array) -> tuple[Array, Array, Array, Array]:
     """Plane, radii and precession of a swing from one point to another.
 

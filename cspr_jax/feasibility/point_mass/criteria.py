@@ -3,6 +3,7 @@
 import functools
 import itertools
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -41,6 +42,7 @@ def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
     return (robot.n_cables, 1, *(count(row, robot.n_cables) for row in given(limits)))
 
 
+@jax.jit
 def smooth_slacks(
     robot: PointMassRobot, limits: Limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array
 ) -> tuple[Array, ...]:

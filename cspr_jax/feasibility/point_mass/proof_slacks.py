@@ -16,6 +16,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -115,6 +116,7 @@ def count(row: Limit, n_cables: int) -> int:
     return CLOSED[row.name].sides * (n_cables if row.per_cable else 1)
 
 
+@jax.jit
 def limit_slacks(
     robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, now: Instant
 ) -> tuple[list[Array], ...]:

@@ -156,6 +156,7 @@ def _components(segment: Segment, vector: Array, over: Stretch) -> tuple[Bounds,
     )
 
 
+@jax.jit
 def row_bounds(
     segment: Segment, arcs: Array, over: Stretch, tilt: Array, pull: Array | None = None, twist: Array | None = None
 ) -> Bounds:
