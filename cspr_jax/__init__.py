@@ -7,6 +7,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cspr_jax.api.accelerations import available_accelerations as available_accelerations
     from cspr_jax.api.examples import copy_examples as copy_examples
     from cspr_jax.api.examples import list_examples as list_examples
     from cspr_jax.api.lists import list_quantities as list_quantities
@@ -50,6 +51,7 @@ _PUBLIC = {
     "accessible": ("cspr_jax.api.platform_searches", "accessible"),
     "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
     "attainable": ("cspr_jax.api.platform_searches", "attainable"),
+    "available_accelerations": ("cspr_jax.api.accelerations", "available_accelerations"),
     "benchmark": ("cspr_jax.api.speed", "benchmark"),
     "compute": ("cspr_jax.api.sweeps", "compute"),
     "copy_examples": ("cspr_jax.api.examples", "copy_examples"),
@@ -86,6 +88,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "accessible",
     "amplitude",
     "attainable",
+    "available_accelerations",
     "benchmark",
     "compute",
     "copy_examples",

@@ -114,13 +114,14 @@ def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
     return build_robot(spec, TrajectoryKeys(), reference)
 
 
-def kernel_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Any:
+def kernel_robot(spec: RobotFile, keys: TrajectoryKeys, file: object, *, any_cables: bool = False) -> Any:
     """The robot of a file, as the kernels take it; a platform's axes are still those of the file.
 
     Args:
         spec: the robot file's content.
         keys: of the plan or sweep.
         file: named in errors.
+        any_cables: whether there may be more cables than degrees of freedom.
 
     Returns:
         the robot, centred.
@@ -129,12 +130,12 @@ def kernel_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> Any:
         ConfigError: its geometry or inertia cannot be used, or it has more cables than degrees of freedom.
     """
     robot: Any = build_robot(spec, keys, file)
-    if robot.n_cables != robot.dof:
+    if robot.n_cables != robot.dof and not any_cables:
         place, key = spec.placed("base_points", file)
         raise ConfigError(
             place,
             f'{key}: {robot.n_cables} points: must be {robot.dof} for family "{keys.family}" '
-            "(plans and maps of more cables than degrees of freedom do not exist yet)",
+            "(it does not exist yet for more cables than degrees of freedom)",
         )
     return centred(robot)[0]
 
@@ -267,6 +268,7 @@ def build_problem(
     epsilon: float | None = None,
     at: str = "",
     for_bounds: bool = False,
+    any_cables: bool = False,
 ) -> Problem:
     """Robot, limits and amplitude function of a plan or sweep, as the kernels take them.
 
@@ -278,6 +280,7 @@ def build_problem(
         epsilon: stands in for an amplitude function's "best".
         at: prefix of keys of the trajectory in errors.
         for_bounds: whether the amplitude function may be "ideal", which is no motion.
+        any_cables: whether there may be more cables than degrees of freedom.
 
     Returns:
         the problem: its robot is centred; a platform in its reference axes.
@@ -287,7 +290,7 @@ def build_problem(
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     given = build_limits(spec, limits, file)
-    robot = kernel_robot(spec, keys, file)
+    robot = kernel_robot(spec, keys, file, any_cables=any_cables)
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
 
 

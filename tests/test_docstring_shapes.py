@@ -28,6 +28,7 @@ from cspr_jax.robots.platform import PlatformRobot, pairs_apart
 from cspr_jax.robots.point_mass import PointMassRobot, planar_robot
 from cspr_jax.robots.robot import Robot
 from cspr_jax.robots.state import State
+from cspr_jax.robots.wrench_sets import Faces, acceleration_faces
 from cspr_jax.trajectories import hypocycloid, oscillating_slerp, platform_segment
 from cspr_jax.trajectories.amplitudes import Amplitude, named
 from cspr_jax.trajectories.hypocycloid import Segment
@@ -125,7 +126,7 @@ def is_kernel(function) -> bool:
 
 
 KNOWN = {PointMassRobot, PlatformRobot, Robot, Amplitude, Segment, PoseSegment, Turn, Kind, State, Bounds, Limits}
-KNOWN |= {Problem, slacks.Instant, slacks.Stretch, jax.Array, int, bool, tuple}
+KNOWN |= {Problem, Faces, slacks.Instant, slacks.Stretch, jax.Array, int, bool, tuple}
 FUNCTIONS = {name: function for name, function in functions() if is_kernel(function)}
 
 
@@ -160,6 +161,7 @@ def examples(request):
         "pairs": pairs_apart(platform),
         State: State(*[array(3)] * 3, array(3, 3), *[array(3)] * 2, array(4)),
         Bounds: Bounds(*[array(request.param)] * 3),
+        Faces: jax.eval_shape(acceleration_faces, robot, array(3), *[array(request.param)] * 2),
         slacks.Instant: jax.eval_shape(slacks.instant, of_point, amplitude, array(), array()),
         slacks.Stretch: jax.eval_shape(slacks.stretch, of_point, amplitude, *[array()] * 3),
     }
@@ -233,7 +235,8 @@ def traced(function, examples: dict, sizes: Sizes):
 
 def check(function, examples: dict) -> None:
     known = with_problem(examples, function)
-    sizes = Sizes(LETTERS, n_cables=len(known[Problem].robot.base_points), n_pairs=len(known["pairs"]))
+    robot = known[Problem].robot
+    sizes = Sizes(LETTERS, n_cables=len(robot.base_points), dof=robot.dof, n_pairs=len(known["pairs"]))
     found = traced(function, known, sizes)
     text = inspect.getdoc(function).partition("Returns:")[2].partition("Raises:")[0]
     leaves, shapes = jax.tree.leaves(found), SHAPE.findall(text)

@@ -248,7 +248,7 @@ def test_plans_and_maps_of_more_cables_say_that_they_do_not_exist(tmp_path, name
     for command in (["plan", "plan.toml"], ["run", "sweep.toml", "-o", str(tmp_path / "run")]):
         code = main([command[0], str(tmp_path / command[1]), *command[2:]])
         line = capsys.readouterr().err.strip()
-        wanted = f'{path}: base_points: {count} points: must be {freedoms} for family "{family}" (plans and maps'
+        wanted = f'{path}: base_points: {count} points: must be {freedoms} for family "{family}" (it does not exist yet'
         assert code == 2 and wanted in line and len(line.splitlines()) == 1, line
         assert not (tmp_path / "run").exists()
 

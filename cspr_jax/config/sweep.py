@@ -153,7 +153,10 @@ class SweepFile(Table):
     axes: Axes = Field(
         description="[axes] x, y (or radius, azimuth), z and z0 (or inclination), each { start, stop, count } or a list"
     )
-    trajectory: SweepTrajectory = Field(description="[trajectory] with family, amplitude, max_arcs and from")
+    trajectory: SweepTrajectory = Field(
+        default_factory=SweepTrajectory,
+        description="[trajectory] with family, amplitude, max_arcs and from; not of maps whose cells are places",
+    )
     orientations: Orientations | None = Field(
         None,
         description="[orientations] of orientations, orientation-workspace and attainability: definition, divisions, "

@@ -1,6 +1,7 @@
 """Base of all maps of a sweep: robot, limits, amplitude function, and the targets of a grid."""
 
 import abc
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.problem import build_problem
-from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.point_mass import is_planar, plane_normal
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 
@@ -28,15 +29,21 @@ class GridMap(abc.ABC):
         file: named in errors.
         for_bounds: whether the amplitude function may be "ideal", which is no motion.
 
+    Fields:
+        any_cables: whether the robot may have more cables than degrees of freedom.
+
     Raises:
         ConfigError: the robot, the amplitude function or the limits cannot be used.
     """
+
+    any_cables: ClassVar[bool] = False
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Build what all tiles share."""
         self._keys, self._file = keys, file
         self._frame, self._z_axis = frame_of(spec.base_points, spec.z_axis), spec.z_axis
-        self._problem = build_problem(spec, keys.trajectory, keys.limits, file, at="trajectory.", for_bounds=for_bounds)
+        some: dict[str, Any] = {"at": "trajectory.", "for_bounds": for_bounds, "any_cables": self.any_cables}
+        self._problem = build_problem(spec, keys.trajectory, keys.limits, file, **some)
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -133,6 +140,10 @@ class PointMassMap(GridMap):
         if spec.is_platform:
             raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass in this map')
         super().__init__(spec, keys, file, for_bounds=for_bounds)
+
+    def _refuse_out_of_plane(self, grid: Grid) -> None:
+        if is_planar(self._problem.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
+            raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

@@ -8,9 +8,7 @@ import numpy as np
 
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
-from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import PointMassMap
-from cspr_jax.robots.point_mass import is_planar
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.trajectories.transition import depth_for
@@ -49,6 +47,5 @@ class MinimumOscillationsMap(PointMassMap):
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach, or out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
-        if is_planar(self._problem.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
-            raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
+        self._refuse_out_of_plane(grid)
         super().refuse_hopeless(grid)

@@ -31,7 +31,7 @@ class MapKind:
         stored: those that are stored where the sweep file does not say.
         pictured: those of which a picture shows the first that there is, where nobody says which.
         motionless: those that belong to a place or an instant, not to a motion.
-        families: trajectory families that it takes.
+        families: trajectory families that it takes; none: its cells are places, and it knows no motion.
         start: where its motions may start. "rest": at rest in P0, `trajectory.from` says so or is absent; "point": as
             `trajectory.from` or the axes from_x, from_y and from_z say; "pose": as `trajectory.from` says, with an
             orientation or without, at rest in P0 where it is absent.
@@ -87,6 +87,10 @@ _OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessibl
 _OF_ATTAINED = (
     *("attainable", "attainable_fraction", "attainable_volume", "attainable_error", "mean_arcs"),
     *("undecided_fraction", "main_reason", *REFUSALS),
+)
+_OF_ACCELERATIONS = (
+    *("verdict", "acceleration_margin", "static_margin", "closure_margin", "level_acceleration"),
+    *("level_acceleration_max", "upward_acceleration", "downward_acceleration"),
 )
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
@@ -190,6 +194,18 @@ MAP_KINDS: dict[str, MapKind] = {
             families=_OF_PLATFORMS,
             takes=("axes.z0", "orientations", "orientations.values", "limits"),
             cells=16,
+        ),
+        MapKind(
+            name="feasible-acceleration",
+            title="Feasible accelerations",
+            description="accelerations that a point mass on any number of cables can have at each place",
+            implementation="cspr_jax.maps.accelerations:FeasibleAccelerationMap",
+            quantities=_OF_ACCELERATIONS,
+            stored=_OF_ACCELERATIONS,
+            pictured=("acceleration_margin",),
+            motionless=_OF_ACCELERATIONS,
+            families=(),
+            takes=("limits",),
         ),
     )
 }

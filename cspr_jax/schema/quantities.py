@@ -230,6 +230,53 @@ QUANTITIES = {
             )
             for (name, flag), words in zip(REFUSALS.items(), _REFUSED, strict=True)
         ),
+        Quantity(
+            "acceleration_margin",
+            "m s-2",
+            "margin of rest",
+            "Distance of rest from the nearest face of the feasible accelerations: positive inside the wrench-feasible "
+            "workspace, that is with the limits of the tensions.",
+            signed=True,
+        ),
+        Quantity(
+            "static_margin",
+            "m s-2",
+            "margin of rest without limits of tensions",
+            "As `acceleration_margin` without limits of the tensions: positive inside the static workspace.",
+            signed=True,
+        ),
+        Quantity(
+            "closure_margin",
+            "1",
+            "margin of wrench closure",
+            "Positive inside the wrench-closure workspace, where the cables can resist every force; -1 where they do "
+            "not even span the space. Never positive of suspended robots.",
+            signed=True,
+        ),
+        Quantity(
+            "level_acceleration",
+            "m s-2",
+            "level acceleration in every direction",
+            "Largest size of a level acceleration that is feasible in every direction; 0 where rest is not feasible.",
+        ),
+        Quantity(
+            "level_acceleration_max",
+            "m s-2",
+            "largest level acceleration",
+            "In the best direction; 0 where no level acceleration is feasible, infinite where nothing bounds it.",
+        ),
+        Quantity(
+            "upward_acceleration",
+            "m s-2",
+            "largest upward acceleration",
+            "Infinite where nothing bounds it, 0 where rest is not feasible.",
+        ),
+        Quantity(
+            "downward_acceleration",
+            "m s-2",
+            "largest downward acceleration",
+            "Of free fall, where no smallest tension is given; 0 where rest is not feasible.",
+        ),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
 }

@@ -37,7 +37,12 @@ def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
     given = tuple(name for name in _TARGETS[:-1] if getattr(keys.axes, name) is not None)
     if given not in (("x", "y"), ("radius", "azimuth")):
         raise ConfigError(path, f"axes: {', '.join(given) or 'no targets'}: must be x and y, or radius and azimuth")
-    _check_choice(keys.trajectory.family, "trajectory.family", kind.families, path)
+    if kind.families:
+        if "trajectory" not in keys.model_fields_set:
+            raise ConfigError(path, f"trajectory is missing: {SweepFile.model_fields['trajectory'].description}")
+        _check_choice(keys.trajectory.family, "trajectory.family", kind.families, path)
+    elif "family" in keys.trajectory.model_fields_set:
+        raise ConfigError(path, "trajectory.family: must be absent in this map, whose cells are places")
     for name in _SPECIAL:
         if name not in kind.keys and _missing(keys, name) is None:
             raise ConfigError(path, f"{name}: must be absent in this map{_hint(kinds_with(name))}")

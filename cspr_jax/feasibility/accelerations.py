@@ -1,0 +1,169 @@
+"""Feasible accelerations of a point mass on any number of cables: verdicts, margins, and how large they can be.
+
+A place belongs to the static workspace if rest there needs no push, to the wrench-feasible workspace if it keeps the
+limits of the tensions too, to the wrench-closure workspace if the cables can resist any force.
+"""
+
+import itertools
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.robots.limits import NO_LIMITS, Limits
+from cspr_jax.robots.point_mass import PointMassRobot, is_planar, plane_normal
+from cspr_jax.robots.wrench_sets import Faces, acceleration_faces, tension_range
+from cspr_jax.schema.verdicts import Verdict
+
+# Margins nearer to zero than this, over gravity, are undecided.
+TOLERANCE = 1e-9
+# Components of unit normals below this are none.
+LEVEL = 1e-12
+
+
+def faces_at(robot: PointMassRobot, limits: Limits, position: Array) -> Faces:
+    """Faces of the set of feasible accelerations at one place.
+
+    Args:
+        robot: a point mass, centred, z down.
+        limits: smallest and largest tensions count.
+        position: (3,) m.
+
+    Returns:
+        the faces.
+    """
+    return acceleration_faces(robot, position, *tension_range(robot, limits))
+
+
+def verdict(robot: PointMassRobot, faces: Faces, position: Array, acceleration: Array) -> Array:
+    """Verdict of an acceleration at one place.
+
+    Args:
+        robot: a point mass, centred, z down.
+        faces: of that place.
+        position: (3,) m.
+        acceleration: (3,) m/s^2.
+
+    Returns:
+        () flags of `Verdict`; 0 is feasible.
+    """
+    margin = faces.margin(acceleration)
+    doubt = jnp.maximum(TOLERANCE * robot.gravity, faces.rounding(acceleration))
+    broken = faces.slacks(acceleration) < -doubt
+    is_out = margin < -doubt
+    over = is_out & (broken & faces.of_largest).any()
+    slack = is_out & ((broken & ~faces.of_largest).any() | ~over)
+    above = is_out & ~(plane_normal(robot) @ position > 0.0)
+    doubtful = ~is_out & (margin <= doubt)
+    flags = (
+        (slack, Verdict.SLACK_CABLE),
+        (over, Verdict.OVER_TENSION),
+        (~faces.is_regular, Verdict.SINGULAR),
+        (above, Verdict.ABOVE_SPOOLS),
+        (doubtful & faces.is_regular, Verdict.UNDECIDED),
+        (~jnp.isfinite(acceleration).all(), Verdict.NOT_FINITE),
+    )
+    return sum((jnp.where(is_so, flag.value, 0) for is_so, flag in flags), jnp.zeros((), int))
+
+
+class Reach(NamedTuple):
+    """Feasible accelerations at one place, and how large they are; () each.
+
+    Fields:
+        verdict: of rest, flags of `Verdict`.
+        acceleration_margin: distance of rest from the nearest face, m/s^2: of the wrench-feasible workspace.
+        static_margin: the same without limits of the tensions, m/s^2: of the static workspace.
+        closure_margin: of the wrench-closure workspace, a pure number.
+        level_acceleration: largest size of level accelerations that is feasible in every direction, m/s^2.
+        level_acceleration_max: largest size of a feasible level acceleration, m/s^2.
+        upward_acceleration: largest upward acceleration, m/s^2.
+        downward_acceleration: largest downward acceleration, m/s^2.
+    """
+
+    verdict: Array
+    acceleration_margin: Array
+    static_margin: Array
+    closure_margin: Array
+    level_acceleration: Array
+    level_acceleration_max: Array
+    upward_acceleration: Array
+    downward_acceleration: Array
+
+
+def reach(robot: PointMassRobot, limits: Limits, position: Array) -> Reach:
+    """Feasible accelerations at one place.
+
+    Args:
+        robot: a point mass, centred, z down.
+        limits: smallest and largest tensions count.
+        position: (3,) m.
+
+    Returns:
+        the numbers; accelerations from rest are 0 where rest is not feasible, infinite where nothing bounds them.
+    """
+    faces, cone = faces_at(robot, limits, position), faces_at(robot, NO_LIMITS, position)
+    still = jnp.zeros_like(position)
+    slack, margin = faces.slacks(still), faces.margin(still)
+
+    def until(steepness: Array) -> Array:
+        # How far from rest a direction leads, or all directions that approach the faces so steeply.
+        distance = jnp.where(steepness > LEVEL, slack / jnp.where(steepness > LEVEL, steepness, 1.0), jnp.inf)
+        return jnp.where(margin > 0.0, jnp.maximum(jnp.min(distance), 0.0), 0.0)
+
+    across = jnp.linalg.norm(faces.normals[:, :2], axis=1)
+    return Reach(
+        verdict=verdict(robot, faces, position, still),
+        acceleration_margin=margin,
+        static_margin=cone.margin(still),
+        closure_margin=cone.closure,
+        level_acceleration=until(across),
+        level_acceleration_max=_largest_level(faces, is_planar(robot)),
+        upward_acceleration=until(faces.normals[:, 2]),
+        downward_acceleration=until(-faces.normals[:, 2]),
+    )
+
+
+def _largest_level(faces: Faces, planar: bool) -> Array:
+    # The largest size is that of a corner of the level section; 0 where the section is empty.
+    normal, offset = faces.normals[:, :2], faces.offsets
+    first, second = np.array(list(itertools.combinations(range(len(offset)), 2))).T
+    a, b = normal[first], normal[second]
+    determinant = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    crosses = (jnp.abs(determinant) > LEVEL) & jnp.isfinite(offset[first]) & jnp.isfinite(offset[second])
+    p, q = (jnp.where(crosses, offset[which], 0.0) for which in (first, second))
+    corner = jnp.stack([p * b[:, 1] - q * a[:, 1], a[:, 0] * q - b[:, 0] * p], 1)
+    corner = corner / jnp.where(crosses, determinant, 1.0)[:, None]
+    # In a plane corners are points of the line itself.
+    size = jnp.linalg.norm(normal, axis=1)
+    is_line = jnp.isfinite(offset) & (size > LEVEL)
+    alone = normal * (jnp.where(is_line, offset, 0.0) / jnp.where(is_line, size, 1.0) ** 2)[:, None]
+    points, counts = jnp.concatenate([corner, alone]), jnp.concatenate([crosses, is_line])
+    room = TOLERANCE * (1.0 + jnp.linalg.norm(points, axis=1))
+    inside = counts & (points @ normal.T - offset[None] >= -room[:, None]).all(1)
+    # A way along the edge of a face that no other face ends.
+    if planar:
+        along = jnp.array([[1.0, 0.0], [-1.0, 0.0]])
+    else:
+        edge = jnp.stack([-normal[:, 1], normal[:, 0]], axis=1)
+        along = jnp.concatenate([edge, -edge, normal])
+    endless = (along @ normal.T >= -LEVEL).all(1) & (jnp.linalg.norm(along, axis=1) > LEVEL)
+    is_open = endless.any() | ~is_line.any()
+    largest = jnp.max(jnp.where(inside, jnp.linalg.norm(points, axis=1), 0.0))
+    return jnp.where(faces.is_regular, jnp.where(is_open & inside.any(), jnp.inf, largest), 0.0)
+
+
+@jax.jit
+def reaches(robot: PointMassRobot, limits: Limits, positions: Array) -> Reach:
+    """Feasible accelerations at many places.
+
+    Args:
+        robot: a point mass, centred, z down.
+        limits: smallest and largest tensions count.
+        positions: (n, 3) m.
+
+    Returns:
+        the numbers, (n,) each.
+    """
+    return jax.vmap(lambda position: reach(robot, limits, position))(positions)

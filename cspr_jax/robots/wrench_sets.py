@@ -1,0 +1,231 @@
+"""Sets of wrenches that cables can give, as faces: of any number of cables, for two, three or six components.
+
+With tensions between their smallest and their largest the wrenches W t fill a zonotope, without a largest tension a
+cone. Every face of it is parallel to d - 1 independent columns of W, so that the normals to all choices of d - 1
+columns are candidates, each with both signs (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and
+Krut 2010). A candidate bounds nothing where a cable without a largest tension pulls beyond it.
+"""
+
+import dataclasses
+import functools
+import itertools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_acceleration
+from cspr_jax.robots.state import State
+
+# Of unit columns: volumes of d - 1 of them below this span nothing; a column nearer to a plane lies in it.
+FLAT = 1e-12
+# Rounding of a slack, over the size of what it is a difference of; divided by the volume of the face's columns.
+ROUNDING = 1e-14
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Faces:
+    """Set of feasible wrenches, or of accelerations: where no slack is negative.
+
+    Fields:
+        normals: (..., n_faces, n_components) unit normals that point inside; 0 of a face that bounds nothing.
+        offsets: (..., n_faces) N or m/s^2; -inf of a face that bounds nothing.
+        volumes: (..., n_faces) size of the product of the unit columns that span the face, in [0, 1].
+        apex: (..., n_components) what the smallest tensions give.
+        of_largest: (..., n_faces) whether a largest tension is reached on the face.
+        is_regular: (...) whether the set has an inside: the cables span all d components.
+        closure: (...) margin of wrench closure, a pure number in [-1, 1]: positive if the cables, pulled hard enough,
+            resist every wrench. Of every plane that d - 1 unit columns span, the farther columns on its emptier side.
+    """
+
+    normals: Array
+    offsets: Array
+    volumes: Array
+    apex: Array
+    of_largest: Array
+    is_regular: Array
+    closure: Array
+
+    def slacks(self, values: Array) -> Array:
+        """Distances from the planes of the faces.
+
+        Args:
+            values: (..., n_components) wrenches, or accelerations.
+
+        Returns:
+            (..., n_faces) positive inside; inf of a face that bounds nothing.
+        """
+        return jnp.sum(self.normals * values[..., None, :], axis=-1) - self.offsets
+
+    def margin(self, values: Array) -> Array:
+        """Distance to the nearest face.
+
+        Args:
+            values: (..., n_components) wrenches, or accelerations.
+
+        Returns:
+            (...) inside the set the distance from its boundary, inf where it has none; outside of it negative, and no
+            smaller than the distance from the set. Where the cables span less than a plane (of d = 2, a line), the
+            distance from what the smallest tensions give, negative.
+        """
+        slacks = self.slacks(values)
+        spanned = self.is_regular | jnp.isfinite(self.offsets).any(-1)
+        return jnp.where(spanned, jnp.min(slacks, axis=-1), -jnp.linalg.norm(values - self.apex, axis=-1))
+
+    def rounding(self, values: Array) -> Array:
+        """Bound of the rounding error of the smallest slack.
+
+        Args:
+            values: (..., n_components) wrenches, or accelerations.
+
+        Returns:
+            (...) a margin that is nearer to zero is of either sign.
+        """
+        size = jnp.linalg.norm(values, axis=-1)[..., None]
+        offsets = jnp.abs(jnp.where(jnp.isfinite(self.offsets), self.offsets, 0.0))
+        each = ROUNDING * (size + offsets + jnp.linalg.norm(self.apex, axis=-1)[..., None])
+        finite = jnp.isfinite(self.offsets) & (self.volumes > FLAT)
+        smallest = jnp.min(jnp.where(finite, self.slacks(values), jnp.inf), axis=-1, keepdims=True)
+        # A face counts if it may be the nearest one.
+        each = each / jnp.where(finite, self.volumes, 1.0)
+        near = finite & (self.slacks(values) - each <= smallest + each)
+        return jnp.max(jnp.where(near, each, 0.0), axis=-1)
+
+
+@functools.cache
+def _subsets(count: int, size: int) -> np.ndarray:
+    return np.array(list(itertools.combinations(range(count), size))).reshape(-1, size)
+
+
+@functools.cache
+def _level(rows: int, columns: int, size: int) -> tuple[np.ndarray, ...]:
+    # How products of `size` columns follow from those of one column less: parent and last column of each choice of
+    # columns; for each choice of rows the row of the last column, the other rows, and the sign, (n_choices, size) each.
+    smaller = {tuple(s): i for i, s in enumerate(_subsets(columns, size - 1).tolist())}
+    chosen = _subsets(columns, size)
+    parent = np.array([smaller[tuple(s[:-1])] for s in chosen.tolist()])
+    others = {tuple(s): i for i, s in enumerate(_subsets(rows, size - 1).tolist())}
+    row = _subsets(rows, size)
+    rest = np.array([[others[tuple(s[:k] + s[k + 1 :])] for k in range(size)] for s in row.tolist()])
+    sign = np.array([(-1.0) ** (size - 1 - k) for k in range(size)])
+    return parent, chosen[:, -1], row, rest, sign
+
+
+def spanning(count: int, dof: int) -> np.ndarray:
+    """Choices of cables whose directions span a face.
+
+    Args:
+        count: number of cables.
+        dof: d.
+
+    Returns:
+        (n_faces / 2, d - 1) numbers of cables from 0 on; faces of the other sign follow in the same order.
+    """
+    return _subsets(count, dof - 1)
+
+
+def normals_to(matrix: Array) -> Array:
+    """Normals to all choices of d - 1 columns: their generalised cross products.
+
+    Args:
+        matrix: (dof, n_cables) of dof - 1 columns or more.
+
+    Returns:
+        (n_choices, dof) in the order of `spanning`; the product with a column is the determinant of all together.
+    """
+    dof, count = matrix.shape
+    products = matrix.T  # of one column, by row
+    for size in range(2, dof):
+        parent, last, row, rest, sign = _level(dof, count, size)
+        terms = products[parent][:, rest] * matrix.T[last][:, row]
+        products = terms @ sign
+    # Rows that a product leaves out, in the order of `_subsets`: the last first.
+    signs = np.array([(-1.0) ** (dof - 1 - i) for i in range(dof)])
+    return products[:, ::-1] * signs[None]
+
+
+@jax.jit
+def wrench_faces(matrix: Array, tension_min: Array, tension_max: Array) -> Faces:
+    """Faces of the set of wrenches that cables can give.
+
+    Args:
+        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
+        tension_min: (n_cables,) N.
+        tension_max: (n_cables,) N, inf for none.
+
+    Returns:
+        the faces, two for each choice of `spanning`.
+    """
+    dof, count = matrix.shape
+    products = normals_to(matrix)
+    volumes = jnp.linalg.norm(products, axis=1)
+    spans = volumes > FLAT
+    units = products / jnp.where(spans, volumes, 1.0)[:, None]
+    along = units @ matrix
+    own = np.zeros(along.shape, bool)
+    np.put_along_axis(own, spanning(count, dof), True, axis=1)
+    along = jnp.where(own | (jnp.abs(along) <= FLAT), 0.0, along)
+    is_regular = (spans & (along != 0.0).any(1)).any()
+    both = jnp.concatenate([along, -along])
+    offsets = _offset(both, tension_min, tension_max)
+    bounds = jnp.concatenate([spans, spans]) & jnp.isfinite(offsets)
+    farthest = jnp.max(jnp.where(np.concatenate([own, own]), -jnp.inf, both), axis=1)
+    emptier = jnp.min(jnp.where(jnp.concatenate([spans, spans]), farthest, jnp.inf))
+    return Faces(
+        normals=jnp.where(bounds[:, None], jnp.concatenate([units, -units]), 0.0),
+        offsets=jnp.where(bounds, offsets, -jnp.inf),
+        volumes=jnp.concatenate([volumes, volumes]),
+        apex=matrix @ tension_min,
+        of_largest=bounds & (both < 0.0).any(1),
+        is_regular=is_regular,
+        closure=jnp.where(is_regular, emptier, -1.0),
+    )
+
+
+def _offset(along: Array, low: Array, high: Array) -> Array:
+    # The smallest value of a normal's product with a wrench.
+    return jnp.sum(along * jnp.where(along > 0.0, low[None], jnp.where(along < 0.0, high[None], 0.0)), axis=1)
+
+
+@jax.jit
+def acceleration_faces(robot: PointMassRobot, position: Array, tension_min: Array, tension_max: Array) -> Faces:
+    """Faces of the set of accelerations that the cables of a point mass can give at one place.
+
+    Args:
+        robot: a point mass on any number of cables, z down.
+        position: (3,) m.
+        tension_min: (n_cables,) N.
+        tension_max: (n_cables,) N, inf for none.
+
+    Returns:
+        the faces, of vectors in space; of a planar robot their normals have no y.
+    """
+    still = jnp.zeros_like(position)
+    matrix = robot.wrench_matrix(State(position, still, still))
+    faces = wrench_faces(matrix, tension_min / robot.mass, tension_max / robot.mass)
+    if robot.dof == PLANAR:
+        normals, apex = (jnp.stack([x[..., 0], 0.0 * x[..., 0], x[..., 1]], -1) for x in (faces.normals, faces.apex))
+    else:
+        normals, apex = faces.normals, faces.apex
+    falling = -relative_acceleration(robot, still)
+    # Of a face that bounds nothing, -inf stays.
+    return dataclasses.replace(faces, normals=normals, apex=apex + falling, offsets=faces.offsets + normals @ falling)
+
+
+def tension_range(robot: PointMassRobot, limits: Limits) -> tuple[Array, Array]:
+    """Smallest and largest tension of each cable.
+
+    Args:
+        robot: gives the number of cables.
+        limits: what is given.
+
+    Returns:
+        (n_cables,) N: 0 where no smallest tension is given; (n_cables,) N: inf where no largest is.
+    """
+    count = robot.n_cables
+    low = jnp.zeros(count) if limits.tension_min is None else jnp.asarray(limits.tension_min)
+    high = jnp.full(count, jnp.inf) if limits.tension_max is None else jnp.asarray(limits.tension_max)
+    return jnp.broadcast_to(low, (count,)), jnp.broadcast_to(high, (count,))
