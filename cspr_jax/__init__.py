@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from cspr_jax.api.accelerations import available_accelerations as available_accelerations
     from cspr_jax.api.examples import copy_examples as copy_examples
     from cspr_jax.api.examples import list_examples as list_examples
+    from cspr_jax.api.lines import least_time as least_time
+    from cspr_jax.api.lines import straight_line as straight_line
     from cspr_jax.api.lists import list_quantities as list_quantities
     from cspr_jax.api.lists import list_robots as list_robots
     from cspr_jax.api.motions import hypocycloid as hypocycloid
@@ -57,6 +59,7 @@ _PUBLIC = {
     "copy_examples": ("cspr_jax.api.examples", "copy_examples"),
     "hypocycloid": ("cspr_jax.api.motions", "hypocycloid"),
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
+    "least_time": ("cspr_jax.api.lines", "least_time"),
     "list_examples": ("cspr_jax.api.examples", "list_examples"),
     "list_quantities": ("cspr_jax.api.lists", "list_quantities"),
     "list_robots": ("cspr_jax.api.lists", "list_robots"),
@@ -76,6 +79,7 @@ _PUBLIC = {
     "sampled_margin": ("cspr_jax.api.motions", "sampled_margin"),
     "slacks": ("cspr_jax.api.motions", "slacks"),
     "status": ("cspr_jax.api.runs", "status"),
+    "straight_line": ("cspr_jax.api.lines", "straight_line"),
     "table": ("cspr_jax.api.tables", "table"),
     "table_names": ("cspr_jax.api.tables", "table_names"),
     "tensions": ("cspr_jax.api.motions", "tensions"),
@@ -94,6 +98,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "copy_examples",
     "hypocycloid",
     "keep_compiled_code",
+    "least_time",
     "list_examples",
     "list_quantities",
     "list_robots",
@@ -113,6 +118,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "sampled_margin",
     "slacks",
     "status",
+    "straight_line",
     "table",
     "table_names",
     "tensions",

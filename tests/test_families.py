@@ -148,12 +148,13 @@ def test_the_row_is_gone_behind_the_block(tmp_path):
     assert "straight-line" not in FAMILIES
     (tmp_path / "plan.toml").write_text(PLAN.format(last="[0, 0, 1.6]", more=""))
     code, _, err = cspr("plan", tmp_path / "plan.toml")
-    assert code == 2 and 'family = "straight-line": must be "hypocycloid-standard", "transition" or "hyp' in err
+    assert code == 2 and 'family = "straight-line": must be "hypocycloid-standard", "transition", "hyp' in err
 
 
 def test_rows_of_the_package():
-    assert moving(2) == ["transition"]
-    assert moving(3) == ["hypocycloid-standard", "transition"]
+    lines = ["s-curve", "quintic", "cubic"]
+    assert moving(2) == ["transition", *lines]
+    assert moving(3) == ["hypocycloid-standard", "transition", *lines]
     assert moving(6) == ["hypocycloid-standard", "hypocycloid"]
     assert all(row.leg(dof) for row in FAMILIES.values() for dof in row.legs)
 

@@ -146,17 +146,18 @@ def tensions(robot: AnyRobot, state: State) -> Array:
     """Tensions of the cables in a state.
 
     Args:
-        robot: with as many cables as degrees of freedom.
+        robot: a platform with as many cables as degrees of freedom, or a point mass.
         state: in the robot's axes, as motions give it.
 
     Returns:
-        (n_cables,) in cable order, N; negative where a cable would have to push.
+        (n_cables,) in cable order, N; negative where a cable would have to push. Of a point mass on more cables than
+        it needs those that keep farthest from the robot's limits.
 
     Raises:
-        InputError: more cables than degrees of freedom.
+        InputError: a platform on more cables than degrees of freedom.
     """
     own, frame = prepared(robot)
-    return cables.tensions(own, inward(frame, state))
+    return cables.tensions(own, inward(frame, state), robot.limits)
 
 
 def slacks(problem: Problem, motion: Motion, tau) -> Array:

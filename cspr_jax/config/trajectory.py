@@ -93,9 +93,22 @@ class TrajectoryKeys(Table):
     max_arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] = Field(
         30, description="largest number of arcs tried; two arcs are an oscillation"
     )
+    max_acceleration: Positive | None = Field(
+        None, description="straight lines: largest size of the acceleration, m/s^2; absent: taut cables alone bound it"
+    )
+    rule: Literal["optimum", "thesis"] | None = Field(
+        None,
+        description='s-curve: how p and T are found: "optimum", the default, is the least T; "thesis" is the rule of '
+        "Boralugoda's text, Q3 and Q7 on their lines",
+    )
     gravity: Positive | None = Field(None, description="gravity, m/s^2; overrides the robot file's (default 9.81)")
 
     @property
     def families(self) -> tuple[str, ...]:
         """Names of the families in use."""
         return (self.family,)
+
+    @property
+    def takes_amplitude(self) -> bool:
+        """Whether a family in use has an amplitude function, and not a law of its own."""
+        return not all(FAMILIES[name].rests_anywhere for name in self.families)

@@ -13,6 +13,7 @@ from jax import Array
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed
 from cspr_jax.robots import cables
+from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories.motion import Motion
@@ -56,10 +57,10 @@ _NAMES = [field.name for field in dataclasses.fields(Demands)][:-1]
 
 
 @jax.jit
-def _values(robot, arguments) -> Array:
+def _values(robot, limits: Limits, arguments) -> Array:
     def one(motion, tau):
         state = motion.state(tau)
-        force = cables.tensions(robot, state)
+        force = cables.tensions(robot, state, limits)
         length, rate, rate_slope = cables.cable_motion(robot, state)
         extremes = [
             jnp.min(force),
@@ -76,13 +77,14 @@ def _values(robot, arguments) -> Array:
     return jax.vmap(one)(*arguments)
 
 
-def demands(robot: Any, motions: Sequence[Motion], samples: Sequence[int]) -> Demands:
+def demands(robot: Any, motions: Sequence[Motion], samples: Sequence[int], limits: Limits = NO_LIMITS) -> Demands:
     """Demands of motions on the robot, narrowed down where a value is extreme.
 
     Args:
-        robot: centred, with as many cables as degrees of freedom.
+        robot: centred; a platform with as many cables as degrees of freedom.
         motions: n of them, from the centroid of the spools, z down.
         samples: of each motion, equidistant instants from 0 to 1 to begin with.
+        limits: from which the tensions of redundant cables keep away.
 
     Returns:
         the demands.
@@ -98,18 +100,18 @@ def demands(robot: Any, motions: Sequence[Motion], samples: Sequence[int]) -> De
         for first in range(0, len(members), size):
             stage(f"demands of {len(motions)} segments")
             some = members[first : first + size]
-            table[some] = _of_alike(robot, [motions[i] for i in some], count)
+            table[some] = _of_alike(robot, limits, [motions[i] for i in some], count)
     columns = (table * _SIGNS + 0.0).T  # no -0
     return Demands(**dict(zip(_NAMES, columns, strict=True)), samples=np.array(samples))
 
 
-def _of_alike(robot, motions: list[Motion], count: int) -> np.ndarray:
+def _of_alike(robot, limits: Limits, motions: list[Motion], count: int) -> np.ndarray:
     stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf, float) for leaf in leaves]), *motions)
 
     def at(tau: np.ndarray) -> np.ndarray:
         row = np.repeat(np.arange(len(tau)), tau.shape[1])
         items = jax.tree.map(lambda leaf: leaf[row], stacked)
-        values = in_batches(partial(_values, robot), (items, tau.ravel()), size=BATCH)
+        values = in_batches(partial(_values, robot, limits), (items, tau.ravel()), size=BATCH)
         return values.reshape(*tau.shape, -1)
 
     tau = np.linspace(0.0, 1.0, count)

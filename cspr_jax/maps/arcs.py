@@ -6,7 +6,6 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import PointMassMap
-from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.point_mass_arcs import minimum_arcs
 
@@ -34,15 +33,6 @@ class MinimumArcsMap(PointMassMap):
             dtype=self._keys.run.dtype,
         )
         return vars(answers)
-
-    def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # In the kernels' coordinates.
-        start, count = self._keys.trajectory.start, len(cells["z0"])
-        if start is not None and start.rest:
-            return rest_point(np.asarray(cells["z0"]))
-        fixed = start.position if start is not None and start.position is not None else [0.0, 0.0, 0.0]
-        columns = [cells.get(f"from_{name}", np.full(count, fixed[i])) for i, name in enumerate("xyz")]
-        return self._frame.inward(np.stack(columns, axis=1))
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""

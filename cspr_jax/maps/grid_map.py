@@ -11,7 +11,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.problem import build_problem
-from cspr_jax.robots.point_mass import is_planar, plane_normal
+from cspr_jax.robots.point_mass import is_planar, plane_normal, rest_point
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 
@@ -140,6 +140,15 @@ class PointMassMap(GridMap):
         if spec.is_platform:
             raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass in this map')
         super().__init__(spec, keys, file, for_bounds=for_bounds)
+
+    def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
+        # In the kernels' coordinates.
+        start, count = self._keys.trajectory.start, len(next(iter(cells.values())))
+        if start is not None and start.rest:
+            return rest_point(np.asarray(cells["z0"]))
+        fixed = start.position if start is not None and start.position is not None else [0.0, 0.0, 0.0]
+        columns = [cells.get(f"from_{name}", np.full(count, fixed[i])) for i, name in enumerate("xyz")]
+        return self._frame.inward(np.stack(columns, axis=1))
 
     def _refuse_out_of_plane(self, grid: Grid) -> None:
         if is_planar(self._problem.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):

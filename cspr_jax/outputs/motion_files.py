@@ -13,6 +13,7 @@ from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
 from cspr_jax.plans.planning import Plan
 from cspr_jax.robots import cables
+from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import ACROSS, PARTS, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.store.disk import Disk
@@ -36,11 +37,11 @@ SAME_TICK = 1e-6
 
 
 @jax.jit
-def _states(robot, motion: Motion, tau):
+def _states(robot, limits: Limits, motion: Motion, tau):
     def one(t):
         state = motion.state(t)
         length, rate, _ = cables.cable_motion(robot, state)
-        return state, {"length": length, "rate": rate, "tension": cables.tensions(robot, state)}
+        return state, {"length": length, "rate": rate, "tension": cables.tensions(robot, state, limits)}
 
     return jax.vmap(one)(tau)
 
@@ -67,6 +68,8 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         raise ConfigError("samples", f"{plan.keys.samples}: must give at most {LARGEST_ROWS} rows in all")
     duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
+    is_redundant = plan.problem.robot.n_cables > plan.problem.robot.dof
+    limits = plan.problem.limits if is_redundant else NO_LIMITS
     parts = []
     for i, length in enumerate(duration):
         if rate is None:
@@ -76,7 +79,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
             tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
             if i == len(duration) - 1:
                 tau = np.append(tau, 1.0)
-        state, of_cables = jax.tree.map(np.asarray, _states(plan.problem.robot, motions[i], tau))
+        state, of_cables = jax.tree.map(np.asarray, _states(plan.problem.robot, limits, motions[i], tau))
         state = outward(plan.frame, state)
         part = {name: getattr(state, field) for name, field in _FIELDS.items()} | of_cables
         parts.append({"t": starts[i] + tau * length, **part})
@@ -109,7 +112,7 @@ def _feasible_rows(plan: Plan, t: np.ndarray) -> np.ndarray:
     # Of each row, whether its segment is feasible; a row at a boundary belongs to both.
     ends = np.cumsum(plan.answers.duration)
     before, after = (np.searchsorted(ends, t, side).clip(max=len(ends) - 1) for side in ("left", "right"))
-    good = plan.answers.arcs > 0
+    good = plan.is_feasible
     return good[before] & good[after]
 
 
@@ -177,7 +180,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
         "base_points": np.asarray(spec.base_points),
         "mass": spec.mass,
         "z_axis": spec.z_axis,
-        "z0": float(plan.z0),
+        **({"z0": float(plan.z0)} if np.isfinite(plan.z0) else {}),
     }
 
 

@@ -1,6 +1,7 @@
 """A plan as JSON and as a table for people."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from cspr_jax.plans.planning import Plan
@@ -23,7 +24,7 @@ def plan_object(plan: Plan) -> dict[str, Any]:
         "schema": SCHEMA,
         "robot": plan.spec.name,
         "family": plan.keys.family,
-        "amplitude": plan.problem.amplitude.name,
+        "amplitude": plan.problem.amplitude.name if plan.keys.takes_amplitude else None,
         "z0": plan.z0,
         "z_axis": plan.spec.z_axis,
         "gravity": float(plan.problem.robot.gravity),
@@ -34,18 +35,18 @@ def plan_object(plan: Plan) -> dict[str, Any]:
     return _finite(fields)
 
 
-def verdict_text(verdict: int, arcs: int) -> str:
+def verdict_text(verdict: int, feasible: bool) -> str:
     """A verdict as a plan shows it.
 
     Args:
         verdict: flags.
-        arcs: number of arcs found, 0 if none.
+        feasible: whether the segment is; a smaller number of arcs may still be undecided.
 
     Returns:
         "feasible" (proved for point masses, found at refined samples for platforms), "undecided", or the flags joined
         by "+".
     """
-    return "feasible" if arcs > 0 else Verdict(int(verdict)).text
+    return "feasible" if feasible else Verdict(int(verdict)).text
 
 
 # What only some families or robots have.
@@ -59,6 +60,9 @@ _OF_SOME = (
     "cable_distance_min",
     "platform_interference",
     "beta_hat",
+    "acceleration_time",
+    "active",
+    "least_duration",
 )
 
 
@@ -79,7 +83,7 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "margin_bound": float(answers.margin_bound[i]),
         "limit_margin": float(answers.limit_margin[i]),
         "det_sign_constant": bool(asked.depth_min[i] > 0.0),
-        "verdict": verdict_text(answers.verdict[i], arcs),
+        "verdict": verdict_text(answers.verdict[i], bool(plan.is_feasible[i])),
         "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
         "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
         "z_lowest": float(asked.lowest[i]),
@@ -110,38 +114,75 @@ def plan_table(plan: Plan):
     """
     from rich.table import Table  # only a terminal needs it
 
-    title = f"{plan.spec.name}: {', '.join(plan.keys.families)}, {plan.problem.amplitude.name}, z0 = {plan.z0:.6g} m"
+    words = [", ".join(plan.keys.families), plan.problem.amplitude.name if plan.keys.takes_amplitude else ""]
+    words += [f"z0 = {plan.z0:.6g} m"] if math.isfinite(plan.z0) else []
+    title = f"{plan.spec.name}: {', '.join(filter(None, words))}"
     table = Table(title=title, caption=_caption(plan), title_justify="left", caption_justify="left")
     segments = plan_object(plan)["segments"]
-    # Oscillations are counted where every segment has them.
-    swings = all(segment["inclination"] is not None for segment in segments)
-    count = ("oscillations", "v") if swings else ("arcs",)
-    last = "beta-hat" if any(segment["beta_hat"] for segment in segments) else "p → ∞"
-    heads = ("to", "position (m)", *count, "T (s)", "margin", "tension (N)", last, "verdict")
-    for head in heads:
-        table.add_column(head, justify="left" if head in ("position (m)", "verdict") else "right")
-    for i, segment in enumerate(segments):
-        position = ", ".join(f"{round(value, 9) + 0.0:.4g}" for value in plan.points[i + 1])
-        beta_hats = " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
-        fewest = segment["oscillations" if swings else "arcs"]
-        tried = segment["tried_arcs"] // (2 if swings else 1)
-        table.add_row(
-            str(i + 1),
-            f"({position})",
-            str(fewest or f"- ({tried})"),
-            *([_number(segment["inclination"], ".4f")] if swings else []),
-            _number(segment["duration"], ".2f"),
-            _number(segment["margin"], ".4f"),
-            f"{_number(segment['tension_min'], '.3f')} .. {_number(segment['tension_max'], '.3f')}",
-            beta_hats or _number(segment["feasible_at_infinity"], ".4f"),
-            segment["verdict"],
-        )
+    columns = {**_places(plan), **_numbers(segments), "verdict": lambda segment: segment["verdict"]}
+    for head in columns:
+        table.add_column(head, justify="left" if head in ("position (m)", "held back by", "verdict") else "right")
+    for segment in segments:
+        table.add_row(*(column(segment) for column in columns.values()))
     return table
 
 
+Column = Callable[[dict[str, Any]], str]
+
+
+def _places(plan: Plan) -> dict[str, Column]:
+    def position(segment: dict[str, Any]) -> str:
+        return f"({', '.join(f'{round(value, 9) + 0.0:.4g}' for value in plan.points[segment['to']])})"
+
+    return {"to": lambda segment: str(segment["to"]), "position (m)": position}
+
+
+def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
+    # Of lines their times. Oscillations are counted where every segment has them.
+    lines = all(segment["active"] is not None for segment in segments)
+    columns = _times() if lines else _counts(all(segment["inclination"] is not None for segment in segments))
+    columns["tension (N)"] = lambda segment: " .. ".join(
+        _number(segment[name], ".3f") for name in ("tension_min", "tension_max")
+    )
+    if lines:
+        return columns | {"held back by": lambda segment: "; ".join(segment["active"])}
+    if any(segment["beta_hat"] for segment in segments):
+        return columns | {
+            "beta-hat": lambda segment: " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
+        }
+    return columns | {"p → ∞": _of("feasible_at_infinity", ".4f")}
+
+
+def _times() -> dict[str, Column]:
+    return {
+        "p (s)": _of("acceleration_time", ".4f"),
+        "T (s)": _of("duration", ".4f"),
+        "least (s)": _of("least_duration", ".4f"),
+        "margin (m/s²)": _of("margin", ".1e"),
+    }
+
+
+def _counts(swings: bool) -> dict[str, Column]:
+    name = "oscillations" if swings else "arcs"
+
+    def count(segment: dict[str, Any]) -> str:
+        if segment["tried_arcs"] is None:
+            return "-"
+        return str(segment[name] or f"- ({segment['tried_arcs'] // (2 if swings else 1)})")
+
+    inclination = {"v": _of("inclination", ".4f")} if swings else {}
+    return {name: count} | inclination | {"T (s)": _of("duration", ".2f"), "margin": _of("margin", ".4f")}
+
+
+def _of(name: str, form: str) -> Column:
+    return lambda segment: _number(segment[name], form)
+
+
 def _caption(plan: Plan) -> str:
-    total = f"total {plan.answers.duration.sum():.2f} s; z {plan.spec.z_axis}"
-    note = "" if plan.feasible else "; in brackets: none found, the numbers are those of the best candidate"
+    time = float(plan.answers.duration.sum())
+    total = f"total {f'{time:.2f} s' if math.isfinite(time) else 'time unknown'}; z {plan.spec.z_axis}"
+    numbered = not plan.feasible and (plan.answers.tried_arcs > 0).any()
+    note = "; in brackets: none found, the numbers are those of the best candidate" if numbered else ""
     return f"{total}{note}"
 
 

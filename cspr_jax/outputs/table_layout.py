@@ -11,6 +11,8 @@ LEGEND = (
 )
 # Names of JSON cells, as people read them.
 _HEADS = {"feasible_at_infinity": "p to infinity", "T": "T (s)", "proportion": "proportion (%)"}
+# A table of more columns than the first is shown so many columns at a time.
+WIDEST, SIDE_BY_SIDE = 10, 6
 ROUNDING = 1e-9  # of a number and of half a unit of its last digit
 
 
@@ -66,7 +68,13 @@ def grid(title: str, cells: Sequence[Cell], *, transposed: bool = False) -> Any:
     blocks: list[Any] = []
     for name in variants:
         blocks += [Text(name, style="bold")] if name else []
-        blocks.append(_block([cell for cell in cells if cell.variant == name], transposed))
+        own = [cell for cell in cells if cell.variant == name]
+        across = list(dict.fromkeys(cell.row if transposed else cell.column for cell in own))
+        step = SIDE_BY_SIDE if len(across) > WIDEST else len(across)
+        for first in range(0, len(across), step):
+            some = across[first : first + step]
+            part = [cell for cell in own if (cell.row if transposed else cell.column) in some]
+            blocks.append(_block(part, transposed))
     return Group(Text(title, style="italic"), *blocks, Text(LEGEND, style="dim"))
 
 

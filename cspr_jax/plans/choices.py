@@ -16,6 +16,7 @@ from cspr_jax.problem import build_amplitude
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, rest_point, spool_radius
 from cspr_jax.robots.robot import Robot
 from cspr_jax.runtime.stages import within
+from cspr_jax.schema.families import FAMILIES
 from cspr_jax.trajectories import depths
 from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.transition import depth_for, transition, weights
@@ -41,6 +42,8 @@ def chosen_depth(problem: Any, sequence: Sequence) -> float:
     """
     stops = sequence.stops
     keys, path, targets = stops.keys, stops.path, stops.targets
+    if keys.z0 is None and not _needs_depth(stops):
+        return float("nan")
     _check_depth_keys(stops)
     if isinstance(keys.z0, float):
         if keys.z0 > LARGEST_LENGTH:
@@ -68,6 +71,13 @@ def chosen_depth(problem: Any, sequence: Sequence) -> float:
     return z0
 
 
+def _needs_depth(stops: Stops) -> bool:
+    # Rests elsewhere than in P0 need none.
+    keys = stops.keys
+    anywhere = all(FAMILIES[name].rests_anywhere for name in keys.families)
+    return not anywhere or keys.inclination is not None or any(pose.position is None for pose in keys.pose)
+
+
 def _check_depth_keys(stops: Stops) -> None:
     keys, path = stops.keys, stops.path
     if keys.z0 is None and keys.inclination is None:
@@ -82,13 +92,18 @@ def _check_depth_keys(stops: Stops) -> None:
 def _check_rest(robot: Robot, stops: Stops, z0: float) -> None:
     at_rest, near = rest_point(np.asarray(z0)), AT_P0 * float(spool_radius(robot))
     for i, pose in enumerate(stops.poses):
-        if not pose.rest or pose.position is None:
+        if not pose.rest or pose.position is None or _rests_anywhere(stops, i):
             continue
         if np.linalg.norm(stops.frame.inward(pose.position) - at_rest) > near:
             place = [float(f"{value:.12g}") for value in stops.frame.outward(at_rest)]
             raise ConfigError(
                 stops.path, f"pose[{i}].position = {shown(pose.position)}: must be P0 = {place} at rest, or absent"
             )
+
+
+def _rests_anywhere(stops: Stops, i: int) -> bool:
+    segments = range(max(i - 1, 0), min(i + 1, len(stops)))
+    return all(FAMILIES[stops.keys.family_of(segment)].rests_anywhere for segment in segments)
 
 
 def _depth_of_inclination(problem: Problem, stops: Stops) -> float:

@@ -21,7 +21,9 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.choices import best_amplitude, chosen_depth
 from cspr_jax.plans.sequence import Sequence
 from cspr_jax.problem import build_problem
+from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.schema.families import FAMILIES
 from cspr_jax.search.answers import Answers, joined
 from cspr_jax.trajectories.motion import Motion, Placed
 
@@ -105,7 +107,12 @@ class Plan:
     @property
     def feasible(self) -> bool:
         """Whether every segment is feasible: proved for point masses, found at refined samples for platforms."""
-        return bool((self.answers.arcs > 0).all())
+        return bool(self.is_feasible.all())
+
+    @property
+    def is_feasible(self) -> np.ndarray:
+        """Whether each of the n segments is."""
+        return np.concatenate([leg.answers.feasible for leg in self.legs])
 
 
 def plan(path: Path) -> Plan:
@@ -139,7 +146,8 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     """
     spec = resolve_robot(keys.robot, path, path.parent)
     sequence = Sequence(spec, keys, path)
-    problem = build_problem(spec, keys, keys, path, epsilon=FIRST_EPSILON)
+    any_cables = all(FAMILIES[name].any_cables for name in keys.families)
+    problem = build_problem(spec, keys, keys, path, epsilon=FIRST_EPSILON, any_cables=any_cables)
     for leg in sequence.legs:
         leg.check(problem)
     z0 = chosen_depth(problem, sequence)
@@ -159,7 +167,10 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
 def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], samples: int) -> Demands:
     motions = [motion for leg in legs for motion in leg.motions]
     arcs = np.concatenate([leg.answers.tried_arcs for leg in legs])
-    return demands(problem.robot, motions, np.maximum(SAMPLES * arcs, samples) + 1)
+    # Of redundant cables alone the tensions depend on limits, and what is compiled on which are given.
+    is_redundant = problem.robot.n_cables > problem.robot.dof
+    limits = problem.limits if is_redundant else NO_LIMITS
+    return demands(problem.robot, motions, np.maximum(SAMPLES * arcs, samples) + 1, limits)
 
 
 @jax.jit

@@ -7,6 +7,7 @@ import numpy as np
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg
@@ -33,6 +34,7 @@ class Sequence:
     def __init__(self, spec: RobotFile, keys: PlanFile, path: Path) -> None:
         """Refuse poses that are none, and families that do not move the robot."""
         _check_families(spec, keys, path)
+        _check_lines(keys, path)
         _check_poses(spec, keys, path)
         frame, last = frame_of(spec.base_points, spec.z_axis), len(keys.pose) - 1
         self.stops = Stops(spec, keys, path, frame, keys.family, 0, last)
@@ -68,6 +70,13 @@ def _check_families(spec: RobotFile, keys: PlanFile, path: Path) -> None:
         key = "family" if own is None else f"pose[{i + 1}].family"
         names = " or ".join(f'"{name}"' for name in moving(spec.dof))
         raise ConfigError(path, f'{key} = "{family}": must be {names} for {spec.kind} ("{spec.name}")')
+
+
+def _check_lines(keys: PlanFile, path: Path) -> None:
+    lines = [name for name, row in FAMILIES.items() if row.rests_anywhere]
+    for key, families in (("max_acceleration", lines), ("rule", ["s-curve"])):
+        if getattr(keys, key) is not None and not set(keys.families) & set(families):
+            raise ConfigError(path, f"{key}: must be absent unless family = {either(families)}")
 
 
 def _check_poses(spec: RobotFile, keys: PlanFile, path: Path) -> None:

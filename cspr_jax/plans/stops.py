@@ -9,6 +9,7 @@ from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.config.plan import PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.robots.point_mass import rest_point
+from cspr_jax.schema.families import FAMILIES
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,7 +74,12 @@ class Stops:
             (..., n_poses, 3) from the centroid of the spools, z down, m.
         """
         at_rest = rest_point(np.asarray(z0))
-        places = [at_rest if pose.rest else self.frame.inward(pose.position) for pose in self.poses]
+        anywhere = FAMILIES[self.family].rests_anywhere
+        in_p0 = [pose.position is None or (pose.rest and not anywhere) for pose in self.poses]
+        places = [
+            at_rest if rests else self.frame.inward(pose.position)
+            for rests, pose in zip(in_p0, self.poses, strict=True)
+        ]
         return np.stack([np.broadcast_to(place, at_rest.shape) for place in places], axis=-2)
 
     @property

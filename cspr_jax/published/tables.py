@@ -8,7 +8,7 @@ from typing import Any
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.table_layout import Cell, grid
 from cspr_jax.plans.planning import plan
-from cspr_jax.published import chapter_1, chapter_3, table_3_2
+from cspr_jax.published import boralugoda, chapter_1, chapter_3, table_3_2
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.published.chapter_3 import Choice
 from cspr_jax.runtime.stages import within
@@ -96,6 +96,21 @@ TABLES = {
         chapter_3.PUBLISHED["3.4"],
         chapter_3.table_3_4,
         with_choice=True,
+    ),
+    "4.1": Source(
+        "Boralugoda thesis, Table 4.1: solutions of (28) and (29), s",
+        boralugoda.PUBLISHED["4.1"],
+        boralugoda.table_4_1,
+    ),
+    "4.2": Source(
+        "Boralugoda thesis, Table 4.2: path acceleration, slope (1/s^3) and intercept (1/s^2) of each range",
+        boralugoda.PUBLISHED["4.2"],
+        boralugoda.table_4_2,
+    ),
+    "4.3": Source(
+        "Boralugoda thesis, Table 4.3: how far the S-model passes its boundaries, 1/s^2, and the first node without",
+        boralugoda.PUBLISHED["4.3"],
+        boralugoda.table_4_3,
     ),
 }
 

@@ -5,23 +5,31 @@ from typing import TypeAlias
 from jax import Array
 
 from cspr_jax.robots import force_balance, wrench_balance
+from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.state import State
+from cspr_jax.robots.tension_distribution import centred
+from cspr_jax.robots.wrench_sets import tension_range
 
 AnyRobot: TypeAlias = PointMassRobot | PlatformRobot
 
 
-def tensions(robot: AnyRobot, state: State) -> Array:
-    """Cable tensions.
+def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS) -> Array:
+    """Cable tensions; of a point mass on more cables than it needs those that keep farthest from their limits.
 
     Args:
-        robot: z down, with as many cables as degrees of freedom.
+        robot: z down; a platform with as many cables as degrees of freedom.
         state: in the robot's axes.
+        limits: of the tensions of redundant cables; 0 and none where they are not given.
 
     Returns:
-        (n_cables,) in cable order, N; negative where a cable would have to push.
+        (n_cables,) in cable order, N; negative where a cable would have to push. Of redundant cables, where no tensions
+        keep the limits, those of least norm.
     """
+    if isinstance(robot, PointMassRobot) and robot.n_cables > robot.dof:
+        low, high = tension_range(robot, limits)
+        return centred(robot.wrench_matrix(state), robot.inertial_wrench(state), low, high)[0].tensions
     if isinstance(robot, PlatformRobot):
         return wrench_balance.tensions(robot, state)
     return force_balance.tensions(robot, state.position, state.acceleration)

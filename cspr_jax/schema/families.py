@@ -19,12 +19,17 @@ class Family:
         description: for people, without a full stop.
         legs: by degrees of freedom of the robots that it moves, the class that joins poses: "module:Class".
         free_end: whether A''(1) of its amplitude function is free: (1.27) and (1.28) in place of (2.49).
+        rests_anywhere: whether its poses are at rest wherever they are, so that it knows neither P0 nor an amplitude
+            function.
+        any_cables: whether the robot may have more cables than degrees of freedom.
     """
 
     name: str
     description: str
     legs: Mapping[int, str]
     free_end: bool = False
+    rests_anywhere: bool = False
+    any_cables: bool = False
 
     def leg(self, dof: int) -> Any:
         """Class that joins the poses of a robot.
@@ -61,6 +66,20 @@ _ROWS = (
         "hypocycloid",
         "hypocycloids of variable amplitude (3), for platforms",
         {6: _LEGS.format("platform_poses:VariablePoses")},
+    ),
+    *(
+        Family(
+            name,
+            f"straight lines from rest to rest {law}",
+            dict.fromkeys((2, 3), _LEGS.format("timed_lines:TimedLines")),
+            rests_anywhere=True,
+            any_cables=True,
+        )
+        for name, law in (
+            ("s-curve", "by the S-model (Boralugoda), in the least time"),
+            ("quintic", "by a quintic in time, in the least time"),
+            ("cubic", "by a cubic in time, in the least time"),
+        )
     ),
 )
 FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}

@@ -92,6 +92,10 @@ _OF_ACCELERATIONS = (
     *("verdict", "acceleration_margin", "static_margin", "closure_margin", "level_acceleration"),
     *("level_acceleration_max", "upward_acceleration", "downward_acceleration"),
 )
+_OF_LINES = (
+    *("verdict", "duration", "acceleration_time", "least_duration", "duration_ratio", "rest_margin"),
+    *("active_up", "active_down"),
+)
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 
@@ -206,6 +210,18 @@ MAP_KINDS: dict[str, MapKind] = {
             motionless=_OF_ACCELERATIONS,
             families=(),
             takes=("limits",),
+        ),
+        MapKind(
+            name="least-time",
+            title="Least durations along straight lines",
+            description="least duration of the S-model along the straight line to each target, beside the least of all",
+            implementation="cspr_jax.maps.least_time:LeastTimeMap",
+            quantities=_OF_LINES,
+            stored=_OF_LINES,
+            pictured=("duration",),
+            families=("s-curve",),
+            start="point",
+            takes=("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.max_acceleration"),
         ),
     )
 }

@@ -277,6 +277,32 @@ QUANTITIES = {
             "largest downward acceleration",
             "Of free fall, where no smallest tension is given; 0 where rest is not feasible.",
         ),
+        Quantity(
+            "acceleration_time", "s", "time of acceleration p", "Part of the duration of the S-model before it brakes."
+        ),
+        Quantity(
+            "least_duration",
+            "s",
+            "least duration of any motion",
+            "Of all motions along the line: it accelerates at the bound, then brakes at it. No law is faster.",
+        ),
+        Quantity("duration_ratio", "1", "duration over the least one", "Of the law, over that of any motion."),
+        Quantity(
+            "rest_margin",
+            "m s-2",
+            "margin of rest at both ends",
+            "Distance of rest from the nearest face of the feasible accelerations, at the worse of both ends.",
+            signed=True,
+        ),
+        Quantity(
+            "active_up",
+            "1",
+            "bound that holds back the acceleration",
+            "Number of the choice of cables that spans it, from 1 on, in the order of their numbers: of four cables "
+            "1 2, 1 3, 1 4, 2 3, 2 4, 3 4; the next number: the largest acceleration; 0: none.",
+            "int16",
+        ),
+        Quantity("active_down", "1", "bound that holds back the braking", "As `active_up`, while it brakes.", "int16"),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
 }

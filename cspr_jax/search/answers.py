@@ -57,6 +57,11 @@ class Answers:
     limit_margin: np.ndarray
     feasible_at_infinity: np.ndarray
 
+    @property
+    def feasible(self) -> np.ndarray:
+        """Whether each segment is feasible, (n,): proved of point masses, found at refined samples of platforms."""
+        return self.arcs > 0
+
     def details(self, i: int) -> dict[str, Any]:
         """Details of a segment that only this kind of answers has, by their names in a plan's JSON.
 

@@ -17,6 +17,7 @@ _START = ("from_x", "from_y", "from_z")
 _SPECIAL = (
     *(f"axes.{name}" for name in Axes.model_fields if name not in _TARGETS),
     *("trajectory.inclination", "trajectory.beta_hat", "trajectory.beat"),
+    *("trajectory.max_acceleration", "trajectory.rule"),
     *("limits", "orientations", "orientations.values"),
 )
 # More kinds than these are no hint.

@@ -1,0 +1,136 @@
+"""Straight lines of point masses from Python: one motion in pure jax, and least durations of many."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.api.arguments import points_of
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.errors import InputError
+from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
+from cspr_jax.problem import prepared
+from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.schema import labelled
+from cspr_jax.search.least_time import least_times, names_of
+from cspr_jax.trajectories.motion import Placed
+from cspr_jax.trajectories.timed_lines import LAWS, TimedLine, fixed_law, s_curve
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def straight_line(
+    robot: PointMassRobot, start, end, *, duration, law: str = "s-curve", acceleration_time=None
+) -> Placed[TimedLine]:
+    """Motion along a straight line from rest to rest, Boralugoda (7) to (9) and Table 3.2.
+
+    Args:
+        robot: a point mass on any number of cables.
+        start: (3,) in the robot's axes, m.
+        end: (3,) likewise.
+        duration: () T, s.
+        law: "s-curve", "quintic" or "cubic".
+        acceleration_time: () p of the S-curve, s; None: half of the duration.
+
+    Returns:
+        the motion, in the robot's axes.
+
+    Raises:
+        InputError: another kind of robot, or another law.
+    """
+    _check_robot(robot)
+    if law not in LAWS:
+        raise InputError("law", law, "one of " + ", ".join(LAWS))
+    frame, time = prepared(robot)[1], jnp.asarray(duration, float)
+    first, last = (jnp.asarray(frame.inward(point), float) for point in (start, end))
+    ratio = jnp.asarray(0.5) if acceleration_time is None else jnp.asarray(acceleration_time, float) / time
+    shape = s_curve(ratio) if law == "s-curve" else fixed_law(law)
+    return Placed(TimedLine(first, last - first, shape, time), frame)
+
+
+@dataclasses.dataclass(frozen=True)
+class LeastTimeAnswers:
+    """Least durations along n straight lines by the S-model; NumPy arrays, (n,) each.
+
+    Fields:
+        verdict: flags of `Verdict`; 0 where there is a feasible motion, proved.
+        duration: T, s; NaN where there is none, 0 where both ends are one place.
+        acceleration_time: p, s.
+        least_duration: no motion along the line is faster, s.
+        duration_ratio: of the two.
+        rest_margin: smaller one of the margins of rest at both ends, m/s^2.
+        active_up: number of the bound that holds back the acceleration, from 1 on; 0: none.
+        active_down: likewise of the braking.
+        names: of the bounds, the first one's first.
+    """
+
+    verdict: np.ndarray
+    duration: np.ndarray
+    acceleration_time: np.ndarray
+    least_duration: np.ndarray
+    duration_ratio: np.ndarray
+    rest_margin: np.ndarray
+    active_up: np.ndarray
+    active_down: np.ndarray
+    names: tuple[str, ...] = ()
+
+    def to_xarray(self, dims: Mapping[str, np.ndarray] | None = None) -> "xarray.Dataset":
+        """The answers for xarray, with units and long names.
+
+        Args:
+            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
+                None: one dimension "target".
+
+        Returns:
+            the fields over these dimensions.
+
+        Raises:
+            InputError: dimensions of another number of points.
+            ConfigError: xarray is not installed.
+        """
+        return labelled.over({name: x for name, x in vars(self).items() if isinstance(x, np.ndarray)}, dims)
+
+
+def least_time(
+    robot: PointMassRobot, targets: np.ndarray, *, start: np.ndarray, max_acceleration: float | None = None
+) -> LeastTimeAnswers:
+    """Least durations of the S-model along straight lines, from rest to rest, and of any motion along them.
+
+    Args:
+        robot: a point mass on any number of cables, whose spools lie in one plane.
+        targets: (n, 3) in the robot's axes, m.
+        start: (3,) or (n, 3) likewise.
+        max_acceleration: largest size of the acceleration, m/s^2; None: taut cables alone bound it.
+
+    Returns:
+        the answers.
+
+    Raises:
+        InputError: another kind of robot, spools that are not in one plane, shapes that do not fit, values that are not
+            finite.
+    """
+    _check_robot(robot)
+    if not in_one_plane(robot):
+        raise InputError("base_points", robot.base_points.tolist(), "spools in one plane (others do not exist yet)")
+    if max_acceleration is not None and not (np.isfinite(max_acceleration) and max_acceleration > 0.0):
+        raise InputError("max_acceleration", max_acceleration, "a number > 0, m/s^2")
+    ends = points_of("targets", targets)
+    starts = points_of("start", np.atleast_2d(np.asarray(start, float)))
+    if len(starts) not in (1, len(ends)):
+        raise InputError("start", f"shape {starts.shape}", f"finite numbers of shape (3,) or {ends.shape}")
+    if robot.dof == 2 and (ends[:, 1].any() or starts[:, 1].any()):
+        raise InputError("targets", "y not 0", "y = 0: the plane of a planar robot")
+    largest = np.inf if max_acceleration is None else max_acceleration
+    with double_precision():
+        own, frame = prepared(robot)
+        first = np.broadcast_to(frame.inward(starts), ends.shape).copy()
+        answers = least_times(own, first, frame.inward(ends), max_acceleration=largest)
+    return LeastTimeAnswers(**answers._asdict(), names=names_of(robot))
+
+
+def _check_robot(robot: PointMassRobot) -> None:
+    if not isinstance(robot, PointMassRobot):
+        raise InputError("robot", getattr(robot, "name", robot), "a point mass")

@@ -1,0 +1,53 @@
+"""Maps of least durations along straight lines from one place."""
+
+import numpy as np
+
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
+from cspr_jax.maps.grid_map import PointMassMap
+from cspr_jax.schema.tiles import Grid
+from cspr_jax.search.least_time import least_times
+
+
+class LeastTimeMap(PointMassMap):
+    """The least duration of the S-model to each target; see `GridMap`."""
+
+    any_cables = True
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse spools that are not in one plane, and starts that are none."""
+        super().__init__(spec, keys, file)
+        if not in_one_plane(self._problem.robot):
+            place, key = spec.placed("base_points", file)
+            raise ConfigError(place, f"{key}: must lie in one plane in this map (others do not exist yet)")
+        start = keys.trajectory.start
+        if start is not None and start.rest:
+            raise ConfigError(
+                file, "trajectory.from: must be { position = [x, y, z] } in this map, or axes from_x, ..."
+            )
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        keys = self._keys.trajectory
+        largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
+        starts, ends = self._starts(cells), self._targets(cells)
+        return least_times(self._problem.robot, starts, ends, max_acceleration=largest)._asdict()
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""
+        self._refuse_out_of_plane(grid)
+        super().refuse_hopeless(grid)
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        feasible, duration, least = answers["verdict"] == 0, answers["duration"], answers["least_duration"]
+        p = answers["acceleration_time"]
+        return {
+            "a feasible cell without a duration": feasible & ~(duration >= 0.0),
+            "a duration below the least one": feasible & ~(duration >= least * (1.0 - 1e-9)),
+            "a time of acceleration outside of the duration": feasible & ~((p >= 0.0) & (p <= duration)),
+            "an infeasible cell with a duration": ~feasible & np.isfinite(duration),
+            "rest at both ends of a feasible cell is none": feasible & ~(answers["rest_margin"] > 0.0),
+        }

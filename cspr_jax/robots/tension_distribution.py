@@ -1,0 +1,349 @@
+"""Tensions of a robot with more cables than it needs, at one instant: the least ones, and those far from their limits.
+
+All tensions that give a wrench are t = t0 + N^T x: t0 the least of all, N an orthonormal basis of what pulls on
+nothing, so that the least tensions within limits are those of the shortest feasible x. Of one or two components of x
+(d + 1 or d + 2 cables) it is 0, or on the line of one limit the nearest to 0, or where the lines of two limits meet:
+the nearest feasible of all these. Of more, the limit that is kept worst is fixed, again and again, as in the improved
+closed form of Pott (2013); a limit that then holds a tension back is let go again (Goldfarb and Idnani 1983), which
+makes the answer exact, and ends with a proof where there is none.
+
+The largest distance from the limits is that of the set of wrenches: a limit of it is a face, `wrench_sets`.
+"""
+
+import functools
+import itertools
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.arithmetic.elementary import solved
+from cspr_jax.errors import InputError
+from cspr_jax.robots.point_mass import LEVEL, SPATIAL, PointMassRobot, relative_acceleration
+from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning, wrench_faces
+
+# Over the largest tension: a limit counts as kept within this; of the points that are compared, within the other.
+WITHIN, ROUNDING = 1e-9, 1e-11
+# Of a unit vector: what is left of it beside others, below which it depends on them.
+DEPENDENT = 1e-10
+# Steps of the search for the limits that are reached, over the number of cables; random cases take fewer than two.
+LONGEST = 10
+
+
+class Distribution(NamedTuple):
+    """Tensions of all cables at one instant.
+
+    Fields:
+        tensions: (n_cables,) N. Where none are feasible those of least norm, whatever the limits. They may not be
+            finite where the cables do not span all components of a wrench.
+        residual: () size of W t - w, over 1 + that of w.
+        is_within: () whether all limits are kept, to 1e-9 of the largest tension, and W has full rank.
+    """
+
+    tensions: Array
+    residual: Array
+    is_within: Array
+
+
+class _Set(NamedTuple):
+    # All tensions that give a wrench: least + x @ kernel.
+    least: Array  # (n,)
+    kernel: Array  # (r, n) orthonormal rows
+    is_regular: Array  # ()
+
+    def tensions(self, point: Array) -> Array:
+        return self.least + point @ self.kernel
+
+
+@jax.jit
+def least_norm(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> Distribution:
+    """The least tensions within limits.
+
+    Args:
+        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
+        wrench: (dof,) what the cables must supply, N.
+        tension_min: (n_cables,) N.
+        tension_max: (n_cables,) N, inf for none.
+
+    Returns:
+        the feasible tensions whose sum of squares is the smallest: (n_cables,), () residual, () whether feasible.
+
+    Raises:
+        InputError: fewer cables than components.
+    """
+    every = _all_tensions(matrix, wrench)
+    tensions = every.tensions(_shortest(every, tension_min, tension_max))
+    return _checked(matrix, wrench, tension_min, tension_max, every, tensions)
+
+
+@jax.jit
+def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> tuple[Distribution, Array]:
+    """The tensions that are farthest from their limits, of these the least.
+
+    Args:
+        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
+        wrench: (dof,) what the cables must supply, N.
+        tension_min: (n_cables,) N.
+        tension_max: (n_cables,) N, inf for none.
+
+    Returns:
+        the tensions (n_cables,), their residual (), whether they are feasible (); () largest r such that
+        tension_min + r <= t <= tension_max - r, N. Where none are feasible r is negative, -inf where the cables do not
+        span all components. Where r has no limit (cables without largest tensions that pull against each other) it is
+        inf, and the tensions are those of `least_norm`.
+
+    Raises:
+        InputError: fewer cables than components.
+    """
+    every = _all_tensions(matrix, wrench)
+    largest = _largest_distance(matrix, wrench, tension_min, tension_max, every)
+    inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
+    tensions = every.tensions(_shortest(every, tension_min + inwards, tension_max - inwards))
+    found = _checked(matrix, wrench, tension_min, tension_max, every, tensions)
+    return found, jnp.where(every.is_regular, largest, -jnp.inf)
+
+
+def _checked(matrix: Array, wrench: Array, low: Array, high: Array, every: _Set, tensions: Array) -> Distribution:
+    tensions = jnp.where(_keeps(tensions, low, high), tensions, every.least)
+    residual = jnp.linalg.norm(matrix @ tensions - wrench) / (1.0 + jnp.linalg.norm(wrench))
+    return Distribution(tensions, residual, every.is_regular & _keeps(tensions, low, high))
+
+
+def _keeps(tensions: Array, low: Array, high: Array) -> Array:
+    return jnp.max(jnp.abs(_beyond(tensions, low, high))) <= WITHIN * jnp.max(jnp.abs(tensions))
+
+
+def _beyond(tensions: Array, low: Array, high: Array) -> Array:
+    # How far tensions are below their smallest; negative: above their largest.
+    return jnp.maximum(low - tensions, 0.0) - jnp.maximum(tensions - high, 0.0)
+
+
+def _all_tensions(matrix: Array, wrench: Array) -> _Set:
+    dof, count = matrix.shape
+    if count < dof:
+        raise InputError("matrix", None, f"must be {dof} or more, one a cable", fault=f"{count} columns")
+    frame, along, left = _frame(matrix, wrench)
+    return _Set(along[:dof] @ frame[:dof], frame[dof:], jnp.min(left[:dof]) > FLAT * jnp.max(left[:dof]))
+
+
+def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
+    """Orthonormal rows (n, n), those of W first; (n,) their products with tensions; (n,) their lengths at first.
+
+    By Gram and Schmidt, the longest first: of the rows of W, then of the unit vectors (whose products mean nothing).
+    """
+    dof, count = matrix.shape
+    is_row = np.arange(dof + count) < dof
+
+    def take(carry, k):
+        rest, products, frame, along = carry
+        square = jnp.where(is_row == (k < dof), jnp.sum(rest**2, axis=1), -1.0)
+        place = jnp.argmax(square)
+        # What it has lost to rounding of the others, it loses here.
+        again = frame @ rest[place]
+        vector = rest[place] - again @ frame
+        length = jnp.linalg.norm(vector)
+        unit, product = vector / length, (products[place] - jnp.dot(again, along)) / length
+        parts, is_next = rest @ unit, jnp.arange(count) == k
+        rest, products = rest - parts[:, None] * unit[None], products - parts * product
+        frame, along = jnp.where(is_next[:, None], unit[None], frame), jnp.where(is_next, product, along)
+        return (rest, products, frame, along), square[place]
+
+    none = jnp.zeros(count)
+    start = jnp.concatenate([matrix, jnp.eye(count)]), jnp.concatenate([wrench, none]), jnp.zeros((count, count)), none
+    (_, _, frame, along), square = lax.scan(take, start, jnp.arange(count))
+    return frame, along, lax.stop_gradient(jnp.sqrt(square))
+
+
+def _shortest(every: _Set, low: Array, high: Array) -> Array:
+    """The shortest x (r,) within limits; where there is none, one that is not far beyond them."""
+    freedom = every.kernel.shape[0]
+    if freedom == 0:
+        return jnp.zeros(0)
+    if freedom > 2:
+        return _at_limits(every, low, high, _limits_reached(every, low, high))
+    points, is_point = _candidates(every, low, high)
+    tensions = every.least[None] + points @ every.kernel
+    beyond = jnp.max(jnp.abs(_beyond(tensions, low[None], high[None])), axis=1)
+    is_within = is_point & (beyond <= ROUNDING * jnp.max(jnp.abs(tensions), axis=1))
+    # Where the limits leave but one point, rounding can leave none.
+    worse = jnp.where(is_within.any(), jnp.where(is_within, jnp.sum(points**2, axis=1), jnp.inf), beyond)
+    return points[jnp.argmin(jnp.where(is_point, worse, jnp.inf))]
+
+
+def _candidates(every: _Set, low: Array, high: Array) -> tuple[Array, Array]:
+    """Where the shortest of one or two components can be, (k, r), and whether each is a point."""
+    freedom, count = every.kernel.shape
+    rows = jnp.concatenate([every.kernel.T, every.kernel.T])
+    limits = jnp.concatenate([low, high])
+    is_limit = jnp.isfinite(limits)
+    offsets = jnp.where(is_limit, limits, 0.0) - jnp.concatenate([every.least, every.least])
+    square = jnp.sum(rows**2, axis=1)
+    is_line = is_limit & (square > FLAT**2)
+    feet = rows * (offsets / jnp.where(is_line, square, 1.0))[:, None]
+    points, is_point = jnp.concatenate([jnp.zeros((1, freedom)), feet]), jnp.concatenate([np.array([True]), is_line])
+    if freedom == 1:
+        return points, is_point
+    one, other = _pairs(count)
+    turned = jnp.stack([rows[:, 1], -rows[:, 0]], axis=1)
+    product = jnp.sum(rows[one] * turned[other], axis=1)
+    meet = is_line[one] & is_line[other] & (jnp.abs(product) > FLAT)
+    crossings = offsets[one][:, None] * turned[other] - offsets[other][:, None] * turned[one]
+    crossings = crossings / jnp.where(meet, product, 1.0)[:, None]
+    return jnp.concatenate([points, crossings]), jnp.concatenate([is_point, meet])
+
+
+@functools.cache
+def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
+    # Of 2n limits, the smallest tensions first: pairs of two cables.
+    pairs = [pair for pair in itertools.combinations(range(2 * count), 2) if (pair[1] - pair[0]) % count]
+    return np.array(pairs)[:, 0], np.array(pairs)[:, 1]
+
+
+class _Search(NamedTuple):
+    # For the limits that the shortest x reaches. At each step x = pulls @ kernel.T is the shortest for some limits.
+    point: Array  # (r,)
+    pulls: Array  # (n,) of the sign of `sides`, and of that of the limit sought
+    sides: Array  # (n,) 1 held at its smallest tension, -1 at its largest, 0 free
+    sought: Array  # () the cable whose limit is next
+    is_seeking: Array  # ()
+    is_stuck: Array  # ()
+    steps: Array  # ()
+
+
+def _limits_reached(every: _Set, low: Array, high: Array) -> Array:
+    """Limits that the shortest x reaches, (n,): 1 the smallest tension, -1 the largest, 0 none."""
+    every, low, high = lax.stop_gradient((every, low, high))
+    freedom, count = every.kernel.shape
+
+    def is_open(search):
+        tensions = every.tensions(search.point)
+        worst = jnp.max(jnp.abs(_beyond(tensions, low, high)))
+        is_beyond = worst > ROUNDING * jnp.max(jnp.abs(tensions))
+        return (search.is_seeking | is_beyond) & ~search.is_stuck & (search.steps < LONGEST * count)
+
+    none, no = jnp.zeros(count), jnp.asarray(False)
+    start = _Search(jnp.zeros(freedom), none, none, jnp.asarray(0), no, no, jnp.asarray(0))
+    return lax.while_loop(is_open, lambda search: _step(every, low, high, search), start).sides
+
+
+def _step(every: _Set, low: Array, high: Array, search: _Search) -> _Search:
+    """Towards the limit that is sought, until it is reached or one that is held is in the way, and let go."""
+    beyond = _beyond(every.tensions(search.point), low, high)
+    sought = jnp.where(search.is_seeking, search.sought, jnp.argmax(jnp.abs(beyond)))
+    is_sought = jnp.arange(beyond.size) == sought
+    side, distance = jnp.sign(beyond[sought]), jnp.abs(beyond[sought])
+    is_held = search.sides != 0.0
+    way, loss = _projected(every.kernel, is_held, side * every.kernel[:, sought], jnp.zeros_like(beyond))
+    square = jnp.dot(way, way)
+    is_blocked = (is_held.sum() >= way.size) | (square <= DEPENDENT**2)
+    whole = jnp.where(is_blocked, jnp.inf, distance / jnp.where(is_blocked, 1.0, square))
+    losing = is_held & (search.sides * loss > 0.0)
+    until = jnp.where(losing, search.pulls / jnp.where(losing, loss, 1.0), jnp.inf)
+    first = jnp.argmin(until)
+    length = jnp.minimum(whole, until[first])
+    is_stuck, is_reached = jnp.isinf(length), whole <= until[first]
+    length = jnp.where(is_stuck, 0.0, length)
+    let_go = (jnp.arange(beyond.size) == first) & ~is_reached
+    pulls = search.pulls + length * (jnp.where(is_sought, side, 0.0) - loss)
+    sides = jnp.where(is_sought & is_reached & ~is_stuck, side, search.sides)
+    return _Search(
+        point=search.point + jnp.where(is_blocked, 0.0, length) * way,
+        pulls=jnp.where(let_go, 0.0, pulls),
+        sides=jnp.where(let_go, 0.0, sides),
+        sought=sought,
+        is_seeking=~is_reached,
+        is_stuck=is_stuck,
+        steps=search.steps + 1,
+    )
+
+
+def _at_limits(every: _Set, low: Array, high: Array, sides: Array) -> Array:
+    # The shortest x with so many tensions at their limits.
+    limits = jnp.where(sides > 0.0, low, jnp.where(sides < 0.0, high, 0.0))
+    wanted = jnp.where(sides == 0.0, 0.0, limits - every.least)
+    return _projected(every.kernel, sides != 0.0, jnp.zeros(every.kernel.shape[0]), wanted)[0]
+
+
+def _projected(kernel: Array, is_held: Array, vector: Array, wanted: Array) -> tuple[Array, Array]:
+    """The nearest to a vector with given products with columns of the kernel, and what of each column is taken off."""
+    freedom = kernel.shape[0]
+    held = jnp.where(is_held[None], kernel, 0.0)
+    above = jnp.concatenate([jnp.eye(freedom), held], axis=1)
+    below = jnp.concatenate([held.T, jnp.diag(jnp.where(is_held, 0.0, 1.0))], axis=1)
+    right = jnp.concatenate([vector, jnp.where(is_held, wanted, 0.0)])
+    found = solved(jnp.concatenate([above, below]), right[:, None])[0][:, 0]
+    return found[:freedom], found[freedom:]
+
+
+def _largest_distance(matrix: Array, wrench: Array, low: Array, high: Array, every: _Set) -> Array:
+    """Largest r, () N: half of a cable's range, or a face's slack over its way inwards for each newton of r."""
+    dof, count = matrix.shape
+    if count == dof:
+        return jnp.min(jnp.minimum(every.least - low, high - every.least))
+    faces = wrench_faces(*lax.stop_gradient((matrix, low, high)))
+    moves = jnp.sum(jnp.abs(faces.normals @ lax.stop_gradient(matrix)), axis=1)
+    is_face = jnp.isfinite(faces.offsets) & (moves > 0.0)
+    each = jnp.where(is_face, faces.slacks(lax.stop_gradient(wrench)) / jnp.where(is_face, moves, 1.0), jnp.inf)
+    nearest = jnp.argmin(each)
+    # Of that face alone once more, now differentiable: infinite limits have no place in it.
+    half = each.size // 2
+    normal = normals_to(matrix)[nearest % half] * jnp.where(nearest < half, 1.0, -1.0)
+    normal = normal / lax.stop_gradient(jnp.max(jnp.abs(normal)))
+    along = normal @ matrix
+    is_own = (jnp.arange(count)[None] == jnp.asarray(spanning(count, dof))[nearest % half][:, None]).any(0)
+    along = jnp.where(is_own | (jnp.abs(along) <= FLAT), 0.0, along)
+    reached = jnp.where(along > 0.0, low, jnp.where((along < 0.0) & jnp.isfinite(high), high, 0.0))
+    slack = jnp.dot(normal, wrench) - jnp.dot(along, reached)
+    found = jnp.where(is_face[nearest], slack / jnp.sum(jnp.abs(along)), jnp.inf)
+    return jnp.minimum(found, 0.5 * jnp.min(high - low))
+
+
+def is_rectangle(base_points: np.ndarray) -> bool:
+    """Whether spools are the corners of a level rectangle with sides along x and y, in their order around it.
+
+    Args:
+        base_points: (n_cables, 3) m.
+
+    Returns:
+        the claim, to 1e-9 of the diagonal.
+    """
+    points = np.asarray(base_points, float)
+    if points.shape != (4, SPATIAL):
+        return False
+    sides = np.roll(points, -1, axis=0) - points
+    sizes = np.abs(sides[:2])
+    along = 0 if sizes[0, 0] > sizes[0, 1] else 1
+    wanted = np.zeros((2, SPATIAL))
+    wanted[0, along], wanted[1, 1 - along] = sides[0, along], sides[1, 1 - along]
+    small = LEVEL * np.linalg.norm(sizes)
+    is_right = (np.abs(sides - np.concatenate([wanted, -wanted])) <= small).all()
+    return bool(is_right and sizes[0, along] > small and sizes[1, 1 - along] > small)
+
+
+def tension_couples(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
+    """Tension couples T12, T23, T34, T41 of a point mass on four cables, Boralugoda (2019), (30) to (33).
+
+    A couple is the pull of two cables whose spools are the ends of a side, as seen along that side, where both lie in
+    one line. Unlike the tensions they follow from the motion alone: each two opposite ones share the force.
+
+    Args:
+        robot: a point mass whose spools are the corners of a level rectangle, see `is_rectangle`; elsewhere what is
+            returned means nothing.
+        position: (3,) z down, m.
+        acceleration: (3,) m/s^2.
+
+    Returns:
+        (n_cables,) N: each of the cable of that place and the one after. Negative: a push, which cables cannot give.
+        Infinite or NaN in the spool plane.
+    """
+    spools = robot.base_points
+    force = robot.mass * relative_acceleration(robot, acceleration)
+    # From each side across to the opposite one.
+    across = jnp.roll(spools, -2, axis=0) - jnp.roll(spools, -1, axis=0)
+    width = jnp.linalg.norm(across, axis=1)
+    rays = position[None] - spools
+    place, depth = jnp.sum(rays * across, axis=1) / width, rays[:, 2]
+    lift = -force[2] / depth
+    return ((width - place) * lift - across @ force / width) / width * jnp.hypot(place, depth)
