@@ -11,7 +11,8 @@ from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, Swee
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.errors import ExitCode
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
-from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.motion_quantities import SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import AXES, QUANTITIES
 from cspr_jax.schema.verdicts import SENTENCES
 
 EXITS = {

@@ -56,6 +56,13 @@ IMAGES = {
         ("figure_1_9_a1", "figure_1_9_a2", "figure_1_9_a3", "figure_1_9_effective"),
     ),
     "table_2_1": Image("The motion of Table 2.1: path and tensions.", 12, command="plan"),
+    "straight_line": Image(
+        "Boralugoda's test case: path, tensions as far from zero as can be, accelerations, tension couples.",
+        10,
+        command="plan",
+    ),
+    "least_time": Image("Least duration of the S-model from one place to each target.", 10),
+    "feasible_acceleration": Image("Margin of rest with tensions from 1 to 300 N: positive where it can rest.", 10),
     "concepts": Image("From start to target in five arcs, and the pseudotensions; see concepts.md.", 8, command="draw"),
 }
 

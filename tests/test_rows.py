@@ -18,7 +18,8 @@ from support.commands import cspr
 from cspr_jax.config import robot as catalogue
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, register, registered
-from cspr_jax.schema.quantities import AXES, QUANTITIES, Quantity
+from cspr_jax.schema.quantities import AXES, QUANTITIES
+from cspr_jax.schema.quantity import Quantity
 from cspr_jax.store.result import open_result
 from cspr_jax.sweep.definition import read_sweep
 
@@ -131,7 +132,7 @@ def test_its_picture_is_a_file(sweep, tmp_path):
         (("[trajectory]", '[run]\nstore = ["arcs"]\n[trajectory]'), "must be one of spool_distance, nearest_spool in"),
         (("[trajectory]", '[run]\nstore = ["spool_distanc"]\n[trajectory]'), 'did you mean "spool_distance"?'),
         (("spool-distances", "spool-distance"), 'did you mean "spool-distances"? must be "minimum-arcs", "minimum-osc'),
-        (("spool-distances", "spool-distance"), '"feasible-acceleration" or "spool-distances"'),
+        (("spool-distances", "spool-distance"), '"least-time" or "spool-distances"'),
         (("z = [1.1]", "z = [-1.1]"), "every point is above the spool plane"),
     ],
 )

@@ -12,7 +12,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.robots import tension_distribution
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.state import State
-from cspr_jax.robots.tension_distribution import is_rectangle, tension_couples
+from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
 
 # Redundant by 0, 1, 2, more. The soak compiles the others as well.
 SHAPES = [(2, 2), (2, 4), (3, 4), (3, 8), (6, 8)]

@@ -7,7 +7,8 @@ from typing import Any
 from cspr_jax.config.robot import catalogue_names, resolve_robot
 from cspr_jax.problem import fault_at_rest
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.motion_quantities import SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import AXES, QUANTITIES
 
 
 def robots() -> list[dict[str, Any]]:

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.plans.planning import Plan
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
+from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
 from cspr_jax.schema.identity import canonical_json
-from cspr_jax.schema.quantities import ACROSS, PARTS, SEGMENTS, TRAJECTORY, flag_attributes
+from cspr_jax.schema.motion_quantities import ACROSS, PARTS, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
@@ -36,12 +39,15 @@ LARGEST_ROWS = 20_000_000
 SAME_TICK = 1e-6
 
 
-@jax.jit
-def _states(robot, limits: Limits, motion: Motion, tau):
+@partial(jax.jit, static_argnames="with_couples")
+def _states(robot, limits: Limits, motion: Motion, tau, *, with_couples: bool):
     def one(t):
         state = motion.state(t)
         length, rate, _ = cables.cable_motion(robot, state)
-        return state, {"length": length, "rate": rate, "tension": cables.tensions(robot, state, limits)}
+        of_cables = {"length": length, "rate": rate, "tension": cables.tensions(robot, state, limits)}
+        if with_couples:
+            of_cables["tension_couple"] = tension_couples(robot, state.position, state.acceleration)
+        return state, of_cables
 
     return jax.vmap(one)(tau)
 
@@ -55,7 +61,8 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
 
     Returns:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
-        axes; "quaternion", "omega" and "omega_dot" only for a platform.
+        axes; "quaternion", "omega" and "omega_dot" only for a platform, "tension_couple" only for four spools at the
+        corners of a level rectangle.
 
     Raises:
         ConfigError: a rate that is no number > 0, or too many rows.
@@ -70,6 +77,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     is_redundant = plan.problem.robot.n_cables > plan.problem.robot.dof
     limits = plan.problem.limits if is_redundant else NO_LIMITS
+    with_couples = is_redundant and is_rectangle(plan.problem.robot.base_points)
     parts = []
     for i, length in enumerate(duration):
         if rate is None:
@@ -79,7 +87,8 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
             tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
             if i == len(duration) - 1:
                 tau = np.append(tau, 1.0)
-        state, of_cables = jax.tree.map(np.asarray, _states(plan.problem.robot, limits, motions[i], tau))
+        some = _states(plan.problem.robot, limits, motions[i], tau, with_couples=with_couples)
+        state, of_cables = jax.tree.map(np.asarray, some)
         state = outward(plan.frame, state)
         part = {name: getattr(state, field) for name, field in _FIELDS.items()} | of_cables
         parts.append({"t": starts[i] + tau * length, **part})
@@ -100,7 +109,7 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
         StoreError: the disk or the folder refuses.
     """
     columns = rows(plan, rate=rate)
-    if not all(np.isfinite(values).all() for name, values in columns.items() if name != "tension"):
+    if not all(np.isfinite(values).all() for name, values in columns.items() if not name.startswith("tension")):
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
     if path.suffix == ".csv":
         publish(Disk(), path, _csv(columns, None if plan.feasible else _feasible_rows(plan, columns["t"])).encode())
@@ -138,8 +147,9 @@ def _write_hdf5(plan: Plan, path: Path, columns: dict[str, np.ndarray]) -> None:
     numbers = list(range(1, columns["tension"].shape[1] + 1))
     with new_hdf5(path, attributes(plan)) as file:
         scales = {"t": columns["t"], "axis": list(PARTS["axis"]), "cable": numbers, "segment": of_segments["segment"]}
-        if "quaternion" in columns:
-            scales["component"] = list(PARTS["component"])
+        for name, needs in (("component", "quaternion"), ("couple", "tension_couple")):
+            if needs in columns:
+                scales[name] = list(PARTS[name])
         for name, labels in scales.items():
             file[name] = labels
             file[name].make_scale(name)

@@ -21,7 +21,6 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.errors import InputError
-from cspr_jax.robots.point_mass import LEVEL, SPATIAL, PointMassRobot, relative_acceleration
 from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning, wrench_faces
 
 # Over the largest tension: a limit counts as kept within this; of the points that are compared, within the other.
@@ -298,52 +297,3 @@ def _largest_distance(matrix: Array, wrench: Array, low: Array, high: Array, eve
     slack = jnp.dot(normal, wrench) - jnp.dot(along, reached)
     found = jnp.where(is_face[nearest], slack / jnp.sum(jnp.abs(along)), jnp.inf)
     return jnp.minimum(found, 0.5 * jnp.min(high - low))
-
-
-def is_rectangle(base_points: np.ndarray) -> bool:
-    """Whether spools are the corners of a level rectangle with sides along x and y, in their order around it.
-
-    Args:
-        base_points: (n_cables, 3) m.
-
-    Returns:
-        the claim, to 1e-9 of the diagonal.
-    """
-    points = np.asarray(base_points, float)
-    if points.shape != (4, SPATIAL):
-        return False
-    sides = np.roll(points, -1, axis=0) - points
-    sizes = np.abs(sides[:2])
-    along = 0 if sizes[0, 0] > sizes[0, 1] else 1
-    wanted = np.zeros((2, SPATIAL))
-    wanted[0, along], wanted[1, 1 - along] = sides[0, along], sides[1, 1 - along]
-    small = LEVEL * np.linalg.norm(sizes)
-    is_right = (np.abs(sides - np.concatenate([wanted, -wanted])) <= small).all()
-    return bool(is_right and sizes[0, along] > small and sizes[1, 1 - along] > small)
-
-
-def tension_couples(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
-    """Tension couples T12, T23, T34, T41 of a point mass on four cables, Boralugoda (2019), (30) to (33).
-
-    A couple is the pull of two cables whose spools are the ends of a side, as seen along that side, where both lie in
-    one line. Unlike the tensions they follow from the motion alone: each two opposite ones share the force.
-
-    Args:
-        robot: a point mass whose spools are the corners of a level rectangle, see `is_rectangle`; elsewhere what is
-            returned means nothing.
-        position: (3,) z down, m.
-        acceleration: (3,) m/s^2.
-
-    Returns:
-        (n_cables,) N: each of the cable of that place and the one after. Negative: a push, which cables cannot give.
-        Infinite or NaN in the spool plane.
-    """
-    spools = robot.base_points
-    force = robot.mass * relative_acceleration(robot, acceleration)
-    # From each side across to the opposite one.
-    across = jnp.roll(spools, -2, axis=0) - jnp.roll(spools, -1, axis=0)
-    width = jnp.linalg.norm(across, axis=1)
-    rays = position[None] - spools
-    place, depth = jnp.sum(rays * across, axis=1) / width, rays[:, 2]
-    lift = -force[2] / depth
-    return ((width - place) * lift - across @ force / width) / width * jnp.hypot(place, depth)

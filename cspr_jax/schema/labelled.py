@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.schema.quantities import ACROSS, EVERY, PARTS, SEGMENTS, flag_attributes
+from cspr_jax.schema.motion_quantities import ACROSS, PARTS, SEGMENTS
+from cspr_jax.schema.quantities import EVERY, flag_attributes
 
 if TYPE_CHECKING:
     import xarray
@@ -64,15 +65,15 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
         attributes: of the whole dataset.
 
     Returns:
-        the dataset, over "t" with "axis", "component" or "cable", and over "segment".
+        the dataset, over "t" with "axis", "component", "cable" or "couple", and over "segment".
 
     Raises:
         ConfigError: xarray is not installed.
     """
     cables = range(1, arrays["tension"].shape[1] + 1)
     axes: dict[str, Any] = {"t": arrays["t"], **PARTS, "cable": np.array(cables)}
-    if "quaternion" not in arrays:
-        del axes["component"]
+    for part in PARTS.keys() - {ACROSS.get(name) for name in arrays}:
+        del axes[part]
     axes |= {"segment": arrays["segment"]} if "segment" in arrays else {}
     variables = {
         name: (("segment",) if name in SEGMENTS else ("t", ACROSS[name]), values)

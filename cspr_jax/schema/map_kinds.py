@@ -13,8 +13,9 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 from cspr_jax.errors import InputError
-from cspr_jax.schema.quantities import QUANTITIES, REFUSALS, Quantity
+from cspr_jax.schema.quantities import QUANTITIES, REFUSALS
 from cspr_jax.schema.quantities import register as register_quantity
+from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.tiles import LARGEST_TILE
 
 

@@ -1,39 +1,13 @@
 """The one table of everything that a result file can hold: it gives names, units, labels and docs."""
 
-import dataclasses
 from collections import ChainMap
-from typing import Literal
 
 import numpy as np
 
 from cspr_jax.errors import InputError
+from cspr_jax.schema.motion_quantities import HOW, MARGIN, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.verdicts import SENTENCES, Verdict
-
-
-@dataclasses.dataclass(frozen=True)
-class Quantity:
-    """A dataset of a result file, or a coordinate of its axes.
-
-    Fields:
-        name: of the dataset.
-        units: as in UDUNITS; "1" for a pure number.
-        long_name: a short phrase for labels.
-        description: one sentence.
-        kind: "float" (of the run's dtype) or the NumPy name of an integer type.
-        unflagged: of flags of a verdict: what pictures say where none is set; empty: it is no verdict.
-        signed: whether either sign is as good as the other, so that zero is in the middle of a picture's colours.
-        contoured: whether sections of it show where it is a whole number.
-    """
-
-    name: str
-    units: str
-    long_name: str
-    description: str
-    kind: Literal["float", "uint16", "int16"] = "float"
-    unflagged: str = ""
-    signed: bool = False
-    contoured: bool = False
-
 
 AXES = {
     q.name: q
@@ -77,18 +51,11 @@ _REFUSED = (
     "a cable touches the platform on the best motion.",
 )
 
-# What verdicts rest on, and what they are about.
-_HOW = ", proved for point masses, from refined samples for platforms"
-_MARGIN = (
-    "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
-    "or depth below the spools over z0."
-)
-
 QUANTITIES = {
     q.name: q
     for q in (
-        Quantity("arcs", "1", "smallest number of arcs", f"Smallest number of feasible arcs{_HOW}; 0: none.", "int16"),
-        Quantity("verdict", "1", "verdict", f"Bit flags{_HOW}; 0 is feasible.", "uint16", unflagged="feasible"),
+        Quantity("arcs", "1", "smallest number of arcs", f"Smallest number of feasible arcs{HOW}; 0: none.", "int16"),
+        Quantity("verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint16", unflagged="feasible"),
         Quantity(
             "duration",
             "s",
@@ -99,7 +66,7 @@ QUANTITIES = {
             "margin",
             "1",
             "smallest normalised pseudotension",
-            _MARGIN,
+            MARGIN,
         ),
         Quantity(
             "margin_bound",
@@ -306,53 +273,6 @@ QUANTITIES = {
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
 }
-TRAJECTORY = {
-    q.name: q
-    for q in (
-        Quantity("t", "s", "time", "Time since the start of the plan."),
-        Quantity("position", "m", "position", "Position of the effector (x, y, z)."),
-        Quantity("velocity", "m s-1", "velocity", "Velocity of the effector (x, y, z)."),
-        Quantity("acceleration", "m s-2", "acceleration", "Acceleration of the effector (x, y, z)."),
-        Quantity("quaternion", "1", "orientation", "Unit quaternion of the platform (w, x, y, z)."),
-        Quantity("omega", "rad s-1", "angular velocity", "Angular velocity of the platform, fixed axes (x, y, z)."),
-        Quantity("omega_dot", "rad s-2", "angular acceleration", "Its derivative in time, fixed axes (x, y, z)."),
-        Quantity("length", "m", "cable length", "Length of each cable, in cable order."),
-        Quantity("rate", "m s-1", "cable rate", "Rate of each cable's length; positive pays out."),
-        Quantity("tension", "N", "cable tension", "Tension of each cable, in cable order."),
-    )
-}
-# What a motion file holds of each segment of its plan.
-SEGMENTS = {
-    q.name: q
-    for q in (
-        Quantity("segment", "1", "segment", "Number of a segment, in the order of the plan from 1 on.", "int16"),
-        Quantity("segment_start", "s", "start of the segment", "Time since the start of the plan."),
-        Quantity("segment_end", "s", "end of the segment", "Time since the start of the plan."),
-        Quantity(
-            "segment_arcs",
-            "1",
-            "smallest number of arcs",
-            f"Smallest number of feasible arcs, or the plan's own if feasible{_HOW}; 0: none.",
-            "int16",
-        ),
-        Quantity(
-            "segment_tried_arcs",
-            "1",
-            "number of arcs of the motion",
-            "Equal to `segment_arcs` where it is positive, else that of the best candidate.",
-            "int16",
-        ),
-        Quantity("segment_verdict", "1", "verdict", f"Bit flags{_HOW}; 0 is feasible.", "uint16"),
-        Quantity("segment_margin", "1", "margin", _MARGIN),
-    )
-}
-# The second dimension of those over time, and the parts of vectors.
-ACROSS = {
-    **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot"), "axis"),
-    "quaternion": "component",
-    **dict.fromkeys(("length", "rate", "tension"), "cable"),
-}
-PARTS = {"axis": tuple("xyz"), "component": tuple("wxyz")}
 EVERY = ChainMap(AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
 _OWN = frozenset(QUANTITIES)
 

@@ -10,7 +10,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from cspr_jax.schema.quantities import AXES, QUANTITIES, Quantity, flag_attributes
+from cspr_jax.schema.quantities import AXES, QUANTITIES, flag_attributes
+from cspr_jax.schema.quantity import Quantity
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import new_file
 from cspr_jax.store.seal import seal_file

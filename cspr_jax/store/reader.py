@@ -13,7 +13,9 @@ from typing import Any, BinaryIO
 import h5py
 
 from cspr_jax.errors import StoreError
-from cspr_jax.schema.quantities import AXES, QUANTITIES, SEGMENTS, TRAJECTORY, Quantity, register
+from cspr_jax.schema.motion_quantities import SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import AXES, QUANTITIES, register
+from cspr_jax.schema.quantity import Quantity
 from cspr_jax.store import guard
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.netcdf import UNREADABLE, reason
@@ -27,7 +29,7 @@ LARGEST_DATA, DENSEST = 8e9, 50
 _LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
 # Names of parts of vectors, for other programs.
-_MARKS = (b"axis", b"cable", b"component")
+_MARKS = (b"axis", b"cable", b"component", b"couple")
 _LONG = ("settings", "environment_settings", "plan", "robot_settings")
 _TEXTS = (
     *("Conventions", "title", "map", "identity", "z_axis", "robot", "software", "environment", "environments"),

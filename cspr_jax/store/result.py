@@ -12,7 +12,8 @@ from cspr_jax.config.robot import LARGEST_LENGTH, MOST_CABLES, RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, StoreError, one_line, shown
 from cspr_jax.schema import labelled
-from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES, SEGMENTS
+from cspr_jax.schema.motion_quantities import SEGMENTS
+from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES
 from cspr_jax.store.isolated import fetch
 from cspr_jax.store.seal import DamagedError
 
@@ -174,10 +175,18 @@ def _motion(
         raise DamagedError("it is not a result of cspr: it has no quantities with named axes")
     if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= MOST_CABLES:
         raise DamagedError("it is not a motion of two cables or more")
-    for name, most in (("z0", LARGEST_LENGTH), ("mass", LARGEST_MASS)):
+    # Motions of straight lines know no P0.
+    known = {"mass": LARGEST_MASS} | ({"z0": LARGEST_LENGTH} if "z0" in attributes else {})
+    for name, most in known.items():
         if not 1.0 / most <= attributes.get(name, 0.0) <= most:
             raise DamagedError(f"{name} = {shown(attributes.get(name))}: must be a number > 0")
-    widths = {"quaternion": 4, "length": tension.shape[1], "rate": tension.shape[1], "tension": tension.shape[1]}
+    widths = {
+        "quaternion": 4,
+        "tension_couple": 4,
+        "length": tension.shape[1],
+        "rate": tension.shape[1],
+        "tension": tension.shape[1],
+    }
     segments = {name: array for name, array in arrays.items() if name in SEGMENTS}
     for name, array in arrays.items():
         wanted: tuple[int, ...] = (len(time), widths.get(name, 3))
@@ -189,7 +198,7 @@ def _motion(
         if array.shape != wanted or array.dtype != (np.float64 if kind == "float" else kind):
             raise DamagedError(f"{name} has another shape or type than in a motion")
         # The best candidate of a motion that is not feasible may pass a singularity.
-        _check_numbers(name, array, LARGEST_NUMBER, finite=name != "tension")
+        _check_numbers(name, array, LARGEST_NUMBER, finite=name not in ("tension", "tension_couple"))
     if (np.diff(time) < 0.0).any():
         raise DamagedError("its time runs backwards")
     return {"t": time}, {name: array for name, array in arrays.items() if name != "t"}

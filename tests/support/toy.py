@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.schema.map_kinds import MapKind, registered
-from cspr_jax.schema.quantities import Quantity
+from cspr_jax.schema.quantity import Quantity
 
 SWEEP = """schema = 1
 map = "toy"

@@ -18,6 +18,8 @@ LONGEST_LABEL = 80
 PANELS = 6
 # Okabe and Ito: told apart by the colour-blind; the dashes help in grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+# Units as people write them.
+WRITTEN = {"m s-1": "m/s", "m s-2": "m/s²", "rad s-1": "rad/s", "rad s-2": "rad/s²"}
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)))
 
 
@@ -87,7 +89,8 @@ def unit(result: Result, name: str) -> str:
     Returns:
         the unit; empty for a pure number.
     """
-    symbol = "°" if is_angle(result, name) else shortened(result.units[name])
+    units = result.units[name]
+    symbol = "°" if is_angle(result, name) else WRITTEN.get(units, shortened(units))
     return "" if symbol == "1" else symbol
 
 

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cspr_jax.outputs.plots.labels import COLOURS, STYLES, robot_name
+from cspr_jax.schema.motion_quantities import PARTS
 from cspr_jax.store.result import Result
 
 # Of longer plans the lines would hide the rest.
@@ -28,8 +29,13 @@ def motion_figure(result: Result) -> Figure:
     # Of a planar robot, spools and path are in one vertical plane y = constant. Old files lack the spools.
     points = np.vstack([position, result.attributes.get("base_points", np.empty((0, 3)))])
     is_planar = np.ptp(points[:, 1]) <= ONE_PLANE * np.ptp(points[:, 0])
-    places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["tension", "tension"]]
-    heights = [1.2, 1.0]
+    # A file without P0 is of straight lines, whose accelerations are what there is to see.
+    z0 = result.attributes.get("z0")
+    more = [
+        name for name, wanted in (("acceleration", z0 is None), ("couple", "tension_couple" in result.data)) if wanted
+    ]
+    places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["tension", "tension"], *([name] * 2 for name in more)]
+    heights = [1.2, 1.0, *[0.8] * len(more)]
     if "quaternion" in result.data:
         places.insert(1, ["orientation", "orientation"])
         heights.insert(1, 0.8)
@@ -43,10 +49,18 @@ def motion_figure(result: Result) -> Figure:
     if result.attributes.get("z_axis", "down") == "down":
         drawn["xz"].invert_yaxis()
     _tensions(drawn["tension"], time, tension, result.attributes.get("mass"))
-    for name in {"orientation", "tension"} & drawn.keys():
+    if "couple" in drawn:
+        _lines(drawn["couple"], time, result.data["tension_couple"], [f"couple {name}" for name in PARTS["couple"]])
+        drawn["couple"].set_ylabel("tension couple (N)")
+    if "acceleration" in drawn:
+        acceleration = result.data["acceleration"]
+        sizes = np.linalg.norm(acceleration, axis=1)
+        _lines(drawn["acceleration"], time, np.c_[acceleration, sizes], ["x", "y", "z", "size"])
+        drawn["acceleration"].set_ylabel("acceleration (m/s²)")
+    for name in {"orientation", "tension", *more} & drawn.keys():
         _boundaries(drawn[name], result)
-    z_axis, z0 = result.attributes.get("z_axis", "down"), float(result.attributes["z0"])
-    figure.suptitle(f"{robot_name(result)}: z0 = {z0:.4g} m, z axis {z_axis}{_mark(result)}")
+    place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
+    figure.suptitle(f"{robot_name(result)}: {place}z axis {result.attributes.get('z_axis', 'down')}{_mark(result)}")
     return figure
 
 
@@ -59,7 +73,8 @@ def _boundaries(panel: Axes, result: Result) -> None:
 def _mark(result: Result) -> str:
     if result.attributes.get("feasible", 1):
         return ""
-    wrong = np.flatnonzero(result.data.get("segment_arcs", np.empty(0)) == 0) + 1
+    none = result.data.get("segment_arcs", np.empty(0)) == 0
+    wrong = np.flatnonzero(none & (result.data.get("segment_verdict", none) != 0)) + 1
     which = ", ".join(str(number) for number in wrong[:6]) + (", ..." if len(wrong) > 6 else "")
     return f"\nNOT PROVED FEASIBLE: segment{'s' if len(wrong) > 1 else ''} {which}"
 
@@ -73,22 +88,24 @@ def _path(panel: Axes, position: np.ndarray, j: int) -> None:
 
 
 def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:
-    for k, name in enumerate("wxyz"):
-        panel.plot(time, quaternion[:, k], linestyle=STYLES[k], color=COLOURS[k], linewidth=1.0, label=name)
-    panel.set_xlabel("time (s)")
+    _lines(panel, time, quaternion, list("wxyz"), axis=False)
     panel.set_ylabel("quaternion")
-    panel.legend(ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+
+
+def _lines(panel: Axes, time: np.ndarray, values: np.ndarray, names: list[str], *, axis: bool = True) -> None:
+    for k, name in enumerate(names):
+        style, colour = STYLES[k % len(STYLES)], COLOURS[k % len(COLOURS)]
+        panel.plot(time, values[:, k], linestyle=style, color=colour, linewidth=1.0, label=name)
+    if axis:
+        panel.axhline(0.0, color="black", linewidth=0.8)
+    panel.set_xlabel("time (s)")
+    panel.legend(ncols=len(names), loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     panel.margins(x=0.01)
 
 
 def _tensions(panel: Axes, time: np.ndarray, tension: np.ndarray, mass: object) -> None:
-    for k in range(tension.shape[1]):
-        panel.plot(time, tension[:, k], linestyle=STYLES[k], color=COLOURS[k], linewidth=1.0, label=f"cable {k + 1}")
-    panel.axhline(0.0, color="black", linewidth=0.8)
-    panel.set_xlabel("time (s)")
+    _lines(panel, time, tension, [f"cable {k + 1}" for k in range(tension.shape[1])])
     panel.set_ylabel("tension (N)")
-    panel.legend(ncols=tension.shape[1], loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    panel.margins(x=0.01)
     if isinstance(mass, float) and mass > 0.0:
         second = panel.secondary_yaxis(
             "right", functions=(lambda f: np.asarray(f) / mass, lambda a: np.asarray(a) * mass)

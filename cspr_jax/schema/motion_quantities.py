@@ -1,0 +1,69 @@
+"""Quantities of motion files: rows over time, and what there is of each segment."""
+
+from cspr_jax.schema.quantity import Quantity
+
+# What verdicts rest on, and what they are about.
+HOW = ", proved for point masses, from refined samples for platforms"
+MARGIN = (
+    "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
+    "or depth below the spools over z0."
+)
+TRAJECTORY = {
+    q.name: q
+    for q in (
+        Quantity("t", "s", "time", "Time since the start of the plan."),
+        Quantity("position", "m", "position", "Position of the effector (x, y, z)."),
+        Quantity("velocity", "m s-1", "velocity", "Velocity of the effector (x, y, z)."),
+        Quantity("acceleration", "m s-2", "acceleration", "Acceleration of the effector (x, y, z)."),
+        Quantity("quaternion", "1", "orientation", "Unit quaternion of the platform (w, x, y, z)."),
+        Quantity("omega", "rad s-1", "angular velocity", "Angular velocity of the platform, fixed axes (x, y, z)."),
+        Quantity("omega_dot", "rad s-2", "angular acceleration", "Its derivative in time, fixed axes (x, y, z)."),
+        Quantity("length", "m", "cable length", "Length of each cable, in cable order."),
+        Quantity("rate", "m s-1", "cable rate", "Rate of each cable's length; positive pays out."),
+        Quantity(
+            "tension",
+            "N",
+            "cable tension",
+            "Tension of each cable, in cable order; of redundant cables those that keep farthest from their limits.",
+        ),
+        Quantity(
+            "tension_couple",
+            "N",
+            "tension couple",
+            "Joint pull of two neighbouring cables seen along the line of their spools, Boralugoda (30) to (33).",
+        ),
+    )
+}
+# What a motion file holds of each segment of its plan.
+SEGMENTS = {
+    q.name: q
+    for q in (
+        Quantity("segment", "1", "segment", "Number of a segment, in the order of the plan from 1 on.", "int16"),
+        Quantity("segment_start", "s", "start of the segment", "Time since the start of the plan."),
+        Quantity("segment_end", "s", "end of the segment", "Time since the start of the plan."),
+        Quantity(
+            "segment_arcs",
+            "1",
+            "smallest number of arcs",
+            f"Smallest number of feasible arcs, or the plan's own if feasible{HOW}; 0: none.",
+            "int16",
+        ),
+        Quantity(
+            "segment_tried_arcs",
+            "1",
+            "number of arcs of the motion",
+            "Equal to `segment_arcs` where it is positive, else that of the best candidate.",
+            "int16",
+        ),
+        Quantity("segment_verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint16"),
+        Quantity("segment_margin", "1", "margin", MARGIN),
+    )
+}
+# The second dimension of those over time, and the parts of vectors.
+ACROSS = {
+    **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot"), "axis"),
+    "quaternion": "component",
+    **dict.fromkeys(("length", "rate", "tension"), "cable"),
+    "tension_couple": "couple",
+}
+PARTS = {"axis": tuple("xyz"), "component": tuple("wxyz"), "couple": ("12", "23", "34", "41")}

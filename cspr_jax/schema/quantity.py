@@ -1,0 +1,29 @@
+"""Row of the table of quantities."""
+
+import dataclasses
+from typing import Literal
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """A dataset of a result file, or a coordinate of its axes.
+
+    Fields:
+        name: of the dataset.
+        units: as in UDUNITS; "1" for a pure number.
+        long_name: a short phrase for labels.
+        description: one sentence.
+        kind: "float" (of the run's dtype) or the NumPy name of an integer type.
+        unflagged: of flags of a verdict: what pictures say where none is set; empty: it is no verdict.
+        signed: whether either sign is as good as the other, so that zero is in the middle of a picture's colours.
+        contoured: whether sections of it show where it is a whole number.
+    """
+
+    name: str
+    units: str
+    long_name: str
+    description: str
+    kind: Literal["float", "uint16", "int16"] = "float"
+    unflagged: str = ""
+    signed: bool = False
+    contoured: bool = False
