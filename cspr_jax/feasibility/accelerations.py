@@ -154,6 +154,27 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
     return jnp.where(faces.is_regular, jnp.where(is_open & inside.any(), jnp.inf, largest), 0.0)
 
 
+def along(robot: PointMassRobot, limits: Limits, position: Array, direction: Array) -> Array:
+    """Accelerations along a direction that are feasible at one place, Boralugoda (15) to (21) and figure 4.1.
+
+    Args:
+        robot: a point mass, centred, z down.
+        limits: smallest and largest tensions count.
+        position: (3,) m.
+        direction: (3,) of unit length.
+
+    Returns:
+        (2,) the smallest and the largest one, m/s^2; infinite where nothing bounds them, NaN where there is none.
+    """
+    faces = faces_at(robot, limits, position)
+    steep = faces.normals @ direction
+    ends = faces.offsets / jnp.where(jnp.abs(steep) > LEVEL, steep, 1.0)
+    low = jnp.max(jnp.where(steep > LEVEL, ends, -jnp.inf))
+    high = jnp.min(jnp.where(steep < -LEVEL, ends, jnp.inf))
+    beside = (jnp.abs(steep) <= LEVEL) & (faces.offsets > 0.0)
+    return jnp.where((low > high) | beside.any(), jnp.nan, jnp.stack([low, high]))
+
+
 @jax.jit
 def reaches(robot: PointMassRobot, limits: Limits, positions: Array) -> Reach:
     """Feasible accelerations at many places.

@@ -8,10 +8,12 @@ from typing import Any
 
 import h5py
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.accelerations import along
 from cspr_jax.plans.planning import Plan
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
@@ -23,6 +25,7 @@ from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
 from cspr_jax.trajectories.motion import Motion, outward
+from cspr_jax.trajectories.timed_lines import TimedLine
 
 SCHEMA = 2
 # Fields of a state by their names in files.
@@ -35,6 +38,8 @@ _FIELDS = {
     "omega_dot": "angular_acceleration",
 }
 LARGEST_ROWS = 20_000_000
+# What may be infinite on the way of a motion that is finite.
+OPEN = ("tension", "tension_couple", "path_acceleration")
 # A tick that lies so near to the end of a segment, in parts of a tick, is that end.
 SAME_TICK = 1e-6
 
@@ -47,6 +52,10 @@ def _states(robot, limits: Limits, motion: Motion, tau, *, with_couples: bool):
         of_cables = {"length": length, "rate": rate, "tension": cables.tensions(robot, state, limits)}
         if with_couples:
             of_cables["tension_couple"] = tension_couples(robot, state.position, state.acceleration)
+        if isinstance(motion, TimedLine):
+            way = motion.direction / jnp.linalg.norm(motion.direction)
+            least, largest = along(robot, limits, state.position, way)
+            of_cables["path_acceleration"] = jnp.stack([least, way @ state.acceleration, largest])
         return state, of_cables
 
     return jax.vmap(one)(tau)
@@ -62,7 +71,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
     Returns:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
         axes; "quaternion", "omega" and "omega_dot" only for a platform, "tension_couple" only for four spools at the
-        corners of a level rectangle.
+        corners of a level rectangle, "path_acceleration" only where all segments are straight lines.
 
     Raises:
         ConfigError: a rate that is no number > 0, or too many rows.
@@ -92,7 +101,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         state = outward(plan.frame, state)
         part = {name: getattr(state, field) for name, field in _FIELDS.items()} | of_cables
         parts.append({"t": starts[i] + tau * length, **part})
-    names = [name for name in TRAJECTORY if parts[0].get(name) is not None]
+    names = [name for name in TRAJECTORY if all(part.get(name) is not None for part in parts)]
     return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
 
@@ -109,7 +118,7 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
         StoreError: the disk or the folder refuses.
     """
     columns = rows(plan, rate=rate)
-    if not all(np.isfinite(values).all() for name, values in columns.items() if not name.startswith("tension")):
+    if not all(np.isfinite(values).all() for name, values in columns.items() if name not in OPEN):
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
     if path.suffix == ".csv":
         publish(Disk(), path, _csv(columns, None if plan.feasible else _feasible_rows(plan, columns["t"])).encode())
@@ -147,7 +156,8 @@ def _write_hdf5(plan: Plan, path: Path, columns: dict[str, np.ndarray]) -> None:
     numbers = list(range(1, columns["tension"].shape[1] + 1))
     with new_hdf5(path, attributes(plan)) as file:
         scales = {"t": columns["t"], "axis": list(PARTS["axis"]), "cable": numbers, "segment": of_segments["segment"]}
-        for name, needs in (("component", "quaternion"), ("couple", "tension_couple")):
+        needing = (("component", "quaternion"), ("couple", "tension_couple"), ("bound", "path_acceleration"))
+        for name, needs in needing:
             if needs in columns:
                 scales[name] = list(PARTS[name])
         for name, labels in scales.items():

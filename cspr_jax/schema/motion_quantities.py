@@ -32,6 +32,13 @@ TRAJECTORY = {
             "tension couple",
             "Joint pull of two neighbouring cables seen along the line of their spools, Boralugoda (30) to (33).",
         ),
+        Quantity(
+            "path_acceleration",
+            "m s-2",
+            "acceleration along the line",
+            "Along a straight line: the least feasible one at that place, that of the motion, and the largest feasible "
+            "one; infinite where nothing bounds it.",
+        ),
     )
 }
 # What a motion file holds of each segment of its plan.
@@ -65,5 +72,11 @@ ACROSS = {
     "quaternion": "component",
     **dict.fromkeys(("length", "rate", "tension"), "cable"),
     "tension_couple": "couple",
+    "path_acceleration": "bound",
 }
-PARTS = {"axis": tuple("xyz"), "component": tuple("wxyz"), "couple": ("12", "23", "34", "41")}
+PARTS = {
+    "axis": tuple("xyz"),
+    "component": tuple("wxyz"),
+    "couple": ("12", "23", "34", "41"),
+    "bound": ("least", "actual", "largest"),
+}

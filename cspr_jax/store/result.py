@@ -167,6 +167,10 @@ def _map(
     return axes, data
 
 
+# Quantities of a motion that may be infinite.
+_OPEN = ("tension", "tension_couple", "path_acceleration")
+
+
 def _motion(
     attributes: dict[str, Any], arrays: dict[str, np.ndarray]
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
@@ -198,7 +202,7 @@ def _motion(
         if array.shape != wanted or array.dtype != (np.float64 if kind == "float" else kind):
             raise DamagedError(f"{name} has another shape or type than in a motion")
         # The best candidate of a motion that is not feasible may pass a singularity.
-        _check_numbers(name, array, LARGEST_NUMBER, finite=name not in ("tension", "tension_couple"))
+        _check_numbers(name, array, LARGEST_NUMBER, finite=name not in _OPEN)
     if (np.diff(time) < 0.0).any():
         raise DamagedError("its time runs backwards")
     return {"t": time}, {name: array for name, array in arrays.items() if name != "t"}

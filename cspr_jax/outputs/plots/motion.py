@@ -32,7 +32,13 @@ def motion_figure(result: Result) -> Figure:
     # A file without P0 is of straight lines, whose accelerations are what there is to see.
     z0 = result.attributes.get("z0")
     more = [
-        name for name, wanted in (("acceleration", z0 is None), ("couple", "tension_couple" in result.data)) if wanted
+        name
+        for name, wanted in (
+            ("acceleration", z0 is None),
+            ("bounds", "path_acceleration" in result.data),
+            ("couple", "tension_couple" in result.data),
+        )
+        if wanted
     ]
     places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["tension", "tension"], *([name] * 2 for name in more)]
     heights = [1.2, 1.0, *[0.8] * len(more)]
@@ -52,6 +58,8 @@ def motion_figure(result: Result) -> Figure:
     if "couple" in drawn:
         _lines(drawn["couple"], time, result.data["tension_couple"], [f"couple {name}" for name in PARTS["couple"]])
         drawn["couple"].set_ylabel("tension couple (N)")
+    if "bounds" in drawn:
+        _bounds(drawn["bounds"], time, result.data["path_acceleration"])
     if "acceleration" in drawn:
         acceleration = result.data["acceleration"]
         sizes = np.linalg.norm(acceleration, axis=1)
@@ -100,6 +108,20 @@ def _lines(panel: Axes, time: np.ndarray, values: np.ndarray, names: list[str], 
         panel.axhline(0.0, color="black", linewidth=0.8)
     panel.set_xlabel("time (s)")
     panel.legend(ncols=len(names), loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    panel.margins(x=0.01)
+
+
+def _bounds(panel: Axes, time: np.ndarray, values: np.ndarray) -> None:
+    # Feasible between the bounds; those far beyond the motion leave the picture.
+    largest = np.abs(values[:, 1]).max()
+    low, high = (np.clip(np.nan_to_num(values[:, k], nan=0.0), -10.0 * largest, 10.0 * largest) for k in (0, 2))
+    panel.fill_between(time, low, high, color=COLOURS[5], alpha=0.3, linewidth=0.0, label="feasible")
+    panel.plot(time, values[:, 1], color="black", linewidth=1.2, label="along the line")
+    panel.axhline(0.0, color="black", linewidth=0.8)
+    panel.set_ylim(-1.8 * largest, 1.8 * largest)
+    panel.set_xlabel("time (s)")
+    panel.set_ylabel("acceleration\nalong the line (m/s²)")
+    panel.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     panel.margins(x=0.01)
 
 
