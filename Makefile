@@ -30,6 +30,7 @@ bench: $(TESTS)
 	$(BIN)/python benchmarks/million_targets.py
 	$(BIN)/python benchmarks/million_transitions.py
 	$(BIN)/python benchmarks/million_segments.py
+	$(BIN)/python benchmarks/million_lines.py
 	$(BIN)/python benchmarks/attainability.py
 	$(BIN)/python benchmarks/effective_amplitude.py
 	$(BIN)/python benchmarks/store_cost.py

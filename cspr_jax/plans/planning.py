@@ -184,6 +184,8 @@ def _refuse_jumps(problem: Problem, sequence: Sequence, legs: tuple[JoinedLeg, .
     scales = {"position": size, "velocity": np.sqrt(size * gravity), "acceleration": gravity}
     for leg, (before, after) in zip(sequence.legs[1:], itertools.pairwise(legs), strict=True):
         last, first = _ends(before.motions[-1], after.motions[0])
+        if not np.isfinite([np.asarray(values) for values in (*last, *first)]).all():
+            continue  # there is no motion, as its verdict says
         for (name, scale), a, b in zip(scales.items(), last, first, strict=True):
             jump = float(np.abs(np.asarray(a) - np.asarray(b)).max())
             if not jump <= CONTINUOUS * scale:
