@@ -493,3 +493,46 @@ def test_bad_arguments(given, words):
         cspr_jax.straight_line(robot, [1, 1, 1], [2, 2, 2], duration=1.0, law="septic")
     with pytest.raises(InputError, match="point mass"):
         cspr_jax.least_time(cspr_jax.load_robot("laval-mssm"), [[1, 1, 1]], start=[2, 2, 2])
+
+
+def test_what_a_reviewer_broke(tmp_path):
+    """Spools as places, limits of the robot itself, floors of tilted planes, ends that are one place, fastest z0."""
+    robot = cspr_jax.load_robot("boralugoda-rectangle")
+    at_spool = cspr_jax.available_accelerations(robot, [[0, 0, 30], [45, 30, 30]])
+    assert (at_spool.margin([0, 0, 0]) <= 0.0).all() and (at_spool.verdict([5, 5, -50]) & Verdict.SINGULAR).all()
+    limited = cspr_jax.point_mass(
+        oracle.BASE, mass=10.0, z_axis="up", limits=cspr_jax.Limits(tension_max=np.full(4, 20.0))
+    )
+    answers = cspr_jax.least_time(limited, [oracle.END], start=oracle.START, max_acceleration=10.0)
+    assert answers.verdict.tolist() == [Verdict.UNDECIDED.value] and answers.duration[0] == pytest.approx(T, abs=1e-7)
+    near = cspr_jax.least_time(
+        robot, [[20, 20, 5]] * 2, start=[[22, 15, 30 - 3e-12], [22, 15, 30 - 1e-6]], max_acceleration=10
+    )
+    assert near.duration[0] == pytest.approx(near.duration[1], rel=1e-4) and np.isfinite(near.rest_margin).all()
+    above = cspr_jax.least_time(robot, [[20, 15, 32]], start=[20, 15, 7], max_acceleration=10.0)
+    assert above.verdict[0] & Verdict.ABOVE_SPOOLS and np.isnan(above.rest_margin[0])
+    tilted = "robot = { name = 'x', mass = 1, z_axis = 'up', base_points = [[0,0,10],[10,0,15],[10,8,15],[0,8,10]] }\n"
+    text = PLAN.replace('robot = "boralugoda-rectangle"', tilted + "floor = FLOOR").replace(
+        "[1.0, 20.0, 7.0]", "[9, 4, 13.4]"
+    )
+    text = text.replace("[15.0, 28.0, 3.0]", "[9, 6, 13]")
+    assert planned(tmp_path, text.replace("FLOOR", "100.0"), code=1)["segments"][0]["verdict"] == "below_floor"
+    assert planned(tmp_path, text.replace("FLOOR", "0.0"))["segments"][0]["verdict"] == "feasible"
+    assert planned(tmp_path, PLAN.replace("[[pose]]", "tension_min = 0.0\n[[pose]]", 1))["feasible"]
+    code, _, err = plan(tmp_path, PLAN.replace("[15.0, 28.0, 3.0]", "[1, 20, 7.000000000000004]"))
+    assert code == 2 and "pose[1].position: must be another" in err and err.count("\n") == 1
+    outside = PLAN.replace("[15.0, 28.0, 3.0]", "[-1, 20, 3]")
+    code, _, err = plan(tmp_path, outside, "--anyway", "-o", tmp_path / "x.csv", "--rate", 100)
+    assert code == 2 and err.count("\n") == 1 and "not written" in err
+    rest = PLAN.replace("position = [15.0, 28.0, 3.0]", "rest = true")
+    times = [
+        planned(tmp_path, rest.replace("family", f'z0 = {{ choose = "{rule}" }}\nfamily', 1))["total_duration"]
+        for rule in ("fastest", "mean")
+    ]
+    assert times[0] <= times[1] * 1.01  # by search over a grid
+    for line in ("x = [10]\ny = [0]\nz = [10]", "x = [10]\ny = [0]\nz = [10]\nfrom_y = [8]"):
+        sweep = SWEEP.replace("rectangle", "planar-two").replace("x = [-1, 15, 40]\ny = [28, 20]\nz = [3, 7, 31]", line)
+        sweep = sweep if "from_y" in line else sweep.replace("[15, 20, 7]", "[5, 12, 7]")
+        (tmp_path / "s.toml").write_text(sweep.replace("[15, 20, 7]", "[15, 0, 7]"), "utf-8")
+        code, _, err = cspr("run", tmp_path / "s.toml", "-o", tmp_path / "out")
+        assert code == 2 and "y" in err and err.count("\n") == 1

@@ -10,6 +10,7 @@ import numpy as np
 from cspr_jax.api.arguments import points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
+from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
 from cspr_jax.problem import prepared
 from cspr_jax.robots.point_mass import PointMassRobot
@@ -106,7 +107,7 @@ def least_time(
         max_acceleration: largest size of the acceleration, m/s^2; None: taut cables alone bound it.
 
     Returns:
-        the answers.
+        the answers; of a robot with limits, which are not looked at here, undecided ones in place of feasible ones.
 
     Raises:
         InputError: another kind of robot, spools that are not in one plane, shapes that do not fit, values that are not
@@ -127,7 +128,8 @@ def least_time(
     with double_precision():
         own, frame = prepared(robot)
         first = np.broadcast_to(frame.inward(starts), ends.shape).copy()
-        answers = least_times(own, first, frame.inward(ends), max_acceleration=largest)
+        has_limits = bool(given(robot.limits))
+        answers = least_times(own, first, frame.inward(ends), max_acceleration=largest, has_limits=has_limits)
     return LeastTimeAnswers(**answers._asdict(), names=names_of(robot))
 
 

@@ -2,16 +2,28 @@
 
 import numpy as np
 
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.accelerations import TOLERANCE
 from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.accelerations import reach_of
+
+MOST_CABLES = 20
 
 
 class FeasibleAccelerationMap(PointMassMap):
     """The accelerations that are feasible at each place; see `GridMap`."""
 
     any_cables = True
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse more cables than there is room for the corners of their faces."""
+        super().__init__(spec, keys, file)
+        if self._problem.robot.n_cables > MOST_CABLES:
+            place, key = spec.placed("base_points", file)
+            raise ConfigError(place, f"{key}: must be at most {MOST_CABLES} in this map")
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

@@ -1,13 +1,18 @@
 """Maps of least durations along straight lines from one place."""
 
+from typing import Any
+
 import numpy as np
 
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
 from cspr_jax.maps.grid_map import PointMassMap
+from cspr_jax.robots.point_mass import PLANAR
 from cspr_jax.schema.tiles import Grid
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.least_time import least_times
 
 
@@ -23,6 +28,8 @@ class LeastTimeMap(PointMassMap):
             place, key = spec.placed("base_points", file)
             raise ConfigError(place, f"{key}: must lie in one plane in this map (others do not exist yet)")
         start = keys.trajectory.start
+        if spec.planar and start is not None and start.position is not None and start.position[1] != 0.0:
+            raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")
         if start is not None and start.rest:
             raise ConfigError(
                 file, "trajectory.from: must be { position = [x, y, z] } in this map, or axes from_x, ..."
@@ -33,21 +40,25 @@ class LeastTimeMap(PointMassMap):
         keys = self._keys.trajectory
         largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
         starts, ends = self._starts(cells), self._targets(cells)
-        return least_times(self._problem.robot, starts, ends, max_acceleration=largest)._asdict()
+        has_limits = bool(given(self._problem.limits))
+        settings: dict[str, Any] = {"max_acceleration": largest, "has_limits": has_limits}
+        return least_times(self._problem.robot, starts, ends, **settings)._asdict()
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""
         self._refuse_out_of_plane(grid)
+        if self._problem.robot.dof == PLANAR and grid.axes.get("from_y", np.zeros(1)).any():
+            raise ConfigError(self._file, "axes.from_y: must be [0] for a planar robot")
         super().refuse_hopeless(grid)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         feasible, duration, least = answers["verdict"] == 0, answers["duration"], answers["least_duration"]
-        p = answers["acceleration_time"]
+        p, undecided = answers["acceleration_time"], answers["verdict"] == Verdict.UNDECIDED.value
         return {
             "a feasible cell without a duration": feasible & ~(duration >= 0.0),
             "a duration below the least one": feasible & ~(duration >= least * (1.0 - 1e-9)),
             "a time of acceleration outside of the duration": feasible & ~((p >= 0.0) & (p <= duration)),
-            "an infeasible cell with a duration": ~feasible & np.isfinite(duration),
+            "an infeasible cell with a duration": ~feasible & ~undecided & np.isfinite(duration),
             "rest at both ends of a feasible cell is none": feasible & ~(answers["rest_margin"] > 0.0),
         }

@@ -78,6 +78,8 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
     """
     if rate is not None and not 0.0 < rate < float("inf"):
         raise ConfigError("--rate", f"{rate}: must be a number > 0, in Hz")
+    if rate is not None and not np.isfinite(plan.answers.duration).all():
+        raise ConfigError("--rate", "must be absent for a plan with a segment that has no motion; see its verdict")
     if rate is not None and rate * plan.answers.duration.sum() > LARGEST_ROWS:
         raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
     if rate is None and plan.keys.samples * len(plan.answers.duration) > LARGEST_ROWS:
@@ -117,7 +119,8 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
         ConfigError: too many rows, or a best candidate that is not finite.
         StoreError: the disk or the folder refuses.
     """
-    columns = rows(plan, rate=rate)
+    is_motion = np.isfinite(plan.answers.duration).all()
+    columns = rows(plan, rate=rate) if is_motion else {"t": plan.answers.duration}
     if not all(np.isfinite(values).all() for name, values in columns.items() if name not in OPEN):
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
     if path.suffix == ".csv":

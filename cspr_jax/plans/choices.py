@@ -135,7 +135,7 @@ def _fastest_depth(problem: Problem, sequence: Sequence) -> float:
     trial = np.linspace(0.5 * least, max(1.5 * least, safe if np.isfinite(safe) else 0.0), DEPTHS)
     for _ in range(2):
         table = sequence.table(problem, trial)
-        cost = np.where(table["arcs"] > 0, table["duration"], np.inf).sum(1)
+        cost = np.where(table["feasible"], table["duration"], np.inf).sum(1)
         best = int(np.argmin(cost))
         if not np.isfinite(cost[best]):
             worst = np.nan_to_num(table["margin"], nan=-np.inf).min(1)
@@ -163,6 +163,6 @@ def best_amplitude(problem: Any, sequence: Sequence, z0: float) -> tuple[Amplitu
         depth = chosen_depth(trial, sequence) if sequence.stops.keys.inclination == "best" else z0
         with within(f"epsilon {epsilon:.2f} of {EPSILONS[-1]:.2f}"):
             table = sequence.table(trial, np.array([depth]))
-        cost = np.where(table["arcs"] > 0, table["duration"], np.inf).sum()
+        cost = np.where(table["feasible"], table["duration"], np.inf).sum()
         ranked.append((round(float(cost), 9), -float(table["margin"].min()), len(ranked), amplitude, depth))
     return min(ranked)[-2:]

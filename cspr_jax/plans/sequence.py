@@ -46,19 +46,19 @@ class Sequence:
             self.legs.append(leg(Stops(spec, keys, path, frame, family, first, after)))
 
     def table(self, problem: Problem, depths: np.ndarray) -> dict[str, np.ndarray]:
-        """Numbers of arcs, durations and margins for several depths of P0.
+        """Feasibility, durations and margins for several depths of P0.
 
         Args:
             problem: robot, limits and amplitude.
             depths: (n_depths,) m.
 
         Returns:
-            "arcs", "duration" in s and "margin", (n_depths, n_segments) each.
+            "feasible", "duration" in s and "margin", (n_depths, n_segments) each.
         """
         answers = [leg.answers(problem, depths) for leg in self.legs]
         return {
             name: np.hstack([getattr(own, name).reshape(len(depths), -1) for own in answers])
-            for name in ("arcs", "duration", "margin")
+            for name in ("feasible", "duration", "margin")
         }
 
 

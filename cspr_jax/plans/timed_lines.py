@@ -4,12 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.errors import ConfigError, shown
-from cspr_jax.feasibility.limits import given
+from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
+from cspr_jax.feasibility.point_mass.line_limits import open_limits
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg
 from cspr_jax.plans.stops import Stops
+from cspr_jax.robots.point_mass import AT_P0, spool_radius
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.timed_lines import LineAnswers, timed_lines
@@ -25,12 +26,6 @@ class TimedLines(Leg):
         for i, pose in enumerate(stops.poses[1:], start=1):
             if pose.arcs is not None:
                 raise ConfigError(stops.path, f'{stops.name(i)}.arcs: must be absent with family = "{stops.family}"')
-            if pose.position is not None and pose.position == stops.poses[i - 1].position:
-                raise ConfigError(
-                    stops.path,
-                    f"{stops.name(i)}.position = {shown(pose.position)}: must be another than that of "
-                    f"{stops.name(i - 1)}, for a line between them",
-                )
 
     def check(self, problem: Problem) -> None:
         """Refuse spools that are not in one plane; see `Leg.check`."""
@@ -54,6 +49,14 @@ class TimedLines(Leg):
 
     def _solved(self, problem: Problem, z0: float):
         points, keys = self.stops.points(z0), self.stops.keys
+        size = float(spool_radius(problem.robot))
+        for i, apart in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1), start=1):
+            if not apart > AT_P0 * size:
+                raise ConfigError(
+                    self.stops.path,
+                    f"{self.stops.name(i)}.position: must be another than that of {self.stops.name(i - 1)}, for a line "
+                    "between them",
+                )
         largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
         answers, motions = timed_lines(
             problem,
@@ -73,6 +76,7 @@ class TimedLines(Leg):
 
     def warnings(self, problem: Problem) -> list[str]:
         """Say that limits are looked at, not optimised; see `Leg.warnings`."""
-        if not given(problem.limits):
+        if not open_limits(problem.limits):
             return []
-        return [f'limits are checked at samples with family = "{self.stops.family}", and do not change its durations']
+        names = ", ".join(row.name for row in open_limits(problem.limits))
+        return [f'{names}: only looked at in samples with family = "{self.stops.family}": refuted or undecided']

@@ -72,8 +72,9 @@ class Faces:
             distance from what the smallest tensions give, negative.
         """
         slacks = self.slacks(values)
-        spanned = self.is_regular | jnp.isfinite(self.offsets).any(-1)
-        return jnp.where(spanned, jnp.min(slacks, axis=-1), -jnp.linalg.norm(values - self.apex, axis=-1))
+        least, spanned = jnp.min(slacks, axis=-1), jnp.isfinite(self.offsets).any(-1)
+        flat = jnp.where(spanned, jnp.minimum(least, 0.0), -jnp.linalg.norm(values - self.apex, axis=-1))
+        return jnp.where(self.is_regular, least, flat)
 
     def rounding(self, values: Array) -> Array:
         """Bound of the rounding error of the smallest slack.
@@ -160,6 +161,9 @@ def wrench_faces(matrix: Array, tension_min: Array, tension_max: Array) -> Faces
         the faces, two for each choice of `spanning`.
     """
     dof, count = matrix.shape
+    # A cable that ends in its own spool has no direction.
+    has_directions = jnp.isfinite(matrix).all()
+    matrix = jnp.where(jnp.isfinite(matrix), matrix, 0.0)
     products = normals_to(matrix)
     volumes = jnp.linalg.norm(products, axis=1)
     spans = volumes > FLAT
@@ -168,7 +172,7 @@ def wrench_faces(matrix: Array, tension_min: Array, tension_max: Array) -> Faces
     own = np.zeros(along.shape, bool)
     np.put_along_axis(own, spanning(count, dof), True, axis=1)
     along = jnp.where(own | (jnp.abs(along) <= FLAT), 0.0, along)
-    is_regular = (spans & (along != 0.0).any(1)).any()
+    is_regular = has_directions & (spans & (along != 0.0).any(1)).any()
     both = jnp.concatenate([along, -along])
     offsets = _offset(both, tension_min, tension_max)
     bounds = jnp.concatenate([spans, spans]) & jnp.isfinite(offsets)

@@ -16,8 +16,8 @@ BATCH = 4096
 _ROOM = 1 << 22
 
 
-def _size(robot: PointMassRobot) -> int:
-    return max(min(BATCH, _ROOM // robot.n_cables**6), 1)
+def _size(robot: PointMassRobot, power: int) -> int:
+    return max(min(BATCH, _ROOM // robot.n_cables**power), 1)
 
 
 def reach_of(robot: PointMassRobot, limits: Limits, positions: np.ndarray) -> Reach:
@@ -31,7 +31,7 @@ def reach_of(robot: PointMassRobot, limits: Limits, positions: np.ndarray) -> Re
     Returns:
         the numbers, (n,) each.
     """
-    return in_batches(partial(reaches, robot, limits), positions, size=_size(robot))
+    return in_batches(partial(reaches, robot, limits), positions, size=_size(robot, 6))
 
 
 @jax.jit
@@ -50,7 +50,7 @@ def faces_of(robot: PointMassRobot, limits: Limits, positions: np.ndarray) -> Fa
     Returns:
         the faces, leaves (n, ...).
     """
-    return in_batches(partial(_faces, robot, limits), positions, size=BATCH)
+    return in_batches(partial(_faces, robot, limits), positions, size=_size(robot, 3))
 
 
 @jax.jit
@@ -75,4 +75,4 @@ def judged(
     Returns:
         (n,) m/s^2, and (n,) flags of `Verdict`.
     """
-    return in_batches(partial(_judged, robot), (faces, positions, accelerations), size=BATCH)
+    return in_batches(partial(_judged, robot), (faces, positions, accelerations), size=_size(robot, 3))

@@ -1,7 +1,8 @@
 """Least durations along straight lines from rest to rest: arrays of ends in, arrays out.
 
 What the S-model's formulas give is feasible by proof: the bounds of every face are met all along (see
-`feasibility.point_mass.least_time`), with a margin that is far above rounding.
+`feasibility.point_mass.least_time`), with a margin above rounding, but where p / T is so near to 0 or 1 that the digits
+of the shorter part are lost: that is undecided.
 """
 
 from functools import partial
@@ -25,6 +26,8 @@ Rule = Literal["optimum", "thesis"]
 TOLERANCE = 1e-12
 # Over the size of a robot: ends nearer to each other are one place.
 SAME_PLACE = 1e-12
+# Parts of a duration below which their digits are lost.
+SHORT = 1e-6
 
 
 class LeastTimes(NamedTuple):
@@ -36,7 +39,7 @@ class LeastTimes(NamedTuple):
         acceleration_time: p, s.
         least_duration: no motion along the line is faster, s.
         duration_ratio: of the two.
-        rest_margin: smaller one of the margins of rest at both ends, m/s^2.
+        rest_margin: smaller one of the margins of rest at both ends, m/s^2; NaN where an end is not below the spools.
         active_up: number of the bound that holds back the acceleration, from 1 on in the order of `names_of`; 0: none.
         active_down: likewise of the braking.
     """
@@ -79,7 +82,7 @@ def _solved(robot: PointMassRobot, arguments, *, law: str, rule: str):
         resting = -jnp.stack([faces.offset, faces.offset + faces.slope]) / jnp.where(sizes > 0.0, sizes, 1.0)
         rest = jnp.min(jnp.where(faces.bounds[None], resting, jnp.inf))
         depth = jnp.minimum(plane_normal(robot) @ start, plane_normal(robot) @ end)
-        is_bounded = jnp.isfinite(bounds.up).any() & jnp.isfinite(bounds.down).any()
+        is_bounded = jnp.isfinite(bounds.up).any() & jnp.isfinite(bounds.down).any() & faces.bounds.any()
         return least, fastest.least_time(bounds), rest, depth, is_bounded
 
     return jax.vmap(one)(*arguments)
@@ -93,6 +96,7 @@ def least_times(
     law: str = "s-curve",
     rule: Rule = "optimum",
     max_acceleration: float = np.inf,
+    has_limits: bool = False,
 ) -> LeastTimes:
     """Least durations along straight lines.
 
@@ -103,6 +107,7 @@ def least_times(
         law: one of `trajectories.timed_lines.LAWS`.
         rule: of the S-model.
         max_acceleration: largest size of the acceleration, m/s^2.
+        has_limits: whether there are limits, not looked at here: what is feasible but for them is undecided.
 
     Returns:
         the durations.
@@ -112,12 +117,16 @@ def least_times(
     least, bound, rest, depth, is_bounded = in_batches(kernel, (starts, ends, largest), size=BATCH)
     gravity, size = float(np.asarray(robot.gravity)), float(np.abs(np.asarray(robot.base_points)).max())
     is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * size
-    rests = (rest > TOLERANCE * gravity) & (depth > 0.0)
+    rest = np.where(depth > 0.0, rest, np.nan)
+    rests = rest > TOLERANCE * gravity
     possible = rests & ~is_same & is_bounded & np.isfinite(least.duration)
     nothing = np.where(rests & is_same, 0.0, np.nan)
     duration = np.where(possible, least.duration * (1.0 + fastest.LONGER), nothing)
     bound = np.where(possible, bound, nothing)
     verdict = _verdicts(possible | (rests & is_same), rest, depth, is_bounded, TOLERANCE * gravity)
+    is_short = (np.minimum(least.ratio, 1.0 - least.ratio) < SHORT) & (law == "s-curve")
+    doubtful = (verdict == 0) & ~is_same & (is_short | has_limits)
+    verdict = np.where(doubtful, Verdict.UNDECIDED.value, verdict).astype(np.uint16)
     with np.errstate(invalid="ignore"):
         relative = duration / bound
     return LeastTimes(

@@ -1,6 +1,8 @@
 """Straight lines from rest to rest in the least time: arrays of ends in, answers out."""
 
 import dataclasses
+import functools
+import operator
 from functools import partial
 from typing import Any
 
@@ -11,11 +13,10 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.line_faces import LineFaces, line_faces
-from cspr_jax.feasibility.point_mass.line_limits import AT_ENDS, limit_slacks
+from cspr_jax.feasibility.point_mass.line_limits import limit_slacks, open_limits
 from cspr_jax.feasibility.point_mass.line_proof import Proved, smallest_margin
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.least_time import BATCH, TOLERANCE, Rule, least_times, names_of
@@ -88,10 +89,10 @@ def timed_lines(
     faces = in_batches(partial(_faces, robot), (starts, ends), size=BATCH)
     gravity = float(np.asarray(robot.gravity))
     motions, verdicts = [], least.verdict.copy()
-    margin, proved = np.where(least.rest_margin > 0.0, 0.0, least.rest_margin), np.full(count, np.nan)
+    margin, proved = np.minimum(least.rest_margin, 0.0), np.full(count, np.nan)
     rows, room = given(problem.limits), np.full(count, np.inf)
     for i in range(count):
-        time, possible = least.duration[i], least.verdict[i] == 0
+        time, possible = least.duration[i], np.isfinite(least.duration[i])
         ratio = leaf(least.acceleration_time[i] / time if possible else 0.5)
         shape = jax.tree.map(np.asarray, s_curve(ratio) if law == "s-curve" else fixed_law(law))
         motions.append(TimedLine(leaf(starts[i]), leaf(ends[i] - starts[i]), shape, leaf(time)))
@@ -102,7 +103,7 @@ def timed_lines(
         verdicts[i] = _verdict(found, gravity)
         if rows:
             slack = np.asarray(_limit_slacks(problem, motions[i]))
-            room[i], verdicts[i] = slack.min(), verdicts[i] | _broken(rows, slack)
+            room[i], verdicts[i] = slack.min(), verdicts[i] | _broken(problem, slack)
     none, nothing = np.zeros(count, int), np.full(count, np.nan)
     answers = LineAnswers(
         none,
@@ -124,15 +125,11 @@ def timed_lines(
 _limit_slacks = jax.jit(limit_slacks)
 
 
-def _broken(rows: tuple[Limit, ...], slack: np.ndarray) -> int:
+def _broken(problem: Problem, slack: np.ndarray) -> int:
     # A sample refutes; only at ends it proves.
-    flags = 0
-    for row, value in zip(rows, slack, strict=True):
-        if not value > 0.0:
-            flags |= row.flag.value
-        elif row.name not in AT_ENDS:
-            flags |= Verdict.UNDECIDED.value
-    return flags
+    flags = Verdict.UNDECIDED.value if open_limits(problem.limits) else 0
+    broken = [row.flag.value for row, value in zip(given(problem.limits), slack, strict=True) if not value > 0.0]
+    return functools.reduce(operator.or_, broken) if broken else flags
 
 
 def _verdict(found: Proved, gravity: float) -> int:

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_acceleration, spread
+from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_acceleration, spool_radius, spread
 from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning
 
 # Of the size of a robot: spools nearer to a plane than this lie in it.
@@ -82,10 +82,11 @@ def line_faces(robot: PointMassRobot, start: Array, end: Array) -> LineFaces:
         one for each choice of cables that span a face, in the order of `wrench_sets.spanning`.
     """
     at_start, at_end = _normals(robot, start), _normals(robot, end)
-    # Which side the other cables are on does not change below the spools.
-    rays = robot.base_points - start[None]
-    along = at_start @ rays.T
-    scale = jnp.linalg.norm(at_start, axis=1)[:, None] * jnp.linalg.norm(rays, axis=1)[None]
+    # Which side the other cables are on is the same everywhere below the spools: seen from far enough below them.
+    below_all = jnp.zeros_like(start).at[2].set(spool_radius(robot))
+    rays, seen = robot.base_points - below_all[None], _normals(robot, below_all)
+    along = seen @ rays.T
+    scale = jnp.linalg.norm(seen, axis=1)[:, None] * jnp.linalg.norm(rays, axis=1)[None]
     own = np.zeros(along.shape, bool)
     np.put_along_axis(own, spanning(robot.n_cables, robot.dof), True, axis=1)
     share = jnp.where(own, 0.0, along / jnp.where(scale > 0.0, scale, 1.0))
