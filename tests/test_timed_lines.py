@@ -201,27 +201,27 @@ def problem_of(robot):
     return Problem(own, NO_LIMITS, named("quintic")), frame
 
 
-def test_verdicts_are_proved():
+@pytest.mark.parametrize("law", ["s-curve", *(pytest.param(x, marks=pytest.mark.soak) for x in ("quintic", "cubic"))])
+def test_verdicts_are_proved(law):
     """Margins are those of dense samples of another form, of slower motions and of faster ones, which are refuted."""
     rng = np.random.default_rng(8)
-    for law in ("s-curve", "quintic", "cubic"):
-        base, start, end = box(rng)
-        robot = cspr_jax.point_mass(base, mass=10.0, z_axis="up")
-        problem, frame = problem_of(robot)
-        ends = frame.inward(start)[None], frame.inward(end)[None]
-        answers, (motion,) = timed_lines(problem, *ends, law=law, max_acceleration=1e3)
-        assert answers.feasible.all() and 0.0 < answers.margin_bound[0] <= answers.margin[0] < 1e-5
-        faces = jax.tree.map(np.asarray, line_faces(problem.robot, ends[0][0], ends[1][0]))
-        for factor, wanted in ((1.3, 1.0), (0.97, -1.0)):
-            duration = float(motion.time) * factor
-            proved = smallest_margin(faces, motion.law, duration, GRAVITY)
-            assert np.sign(proved.bound) == np.sign(proved.margin)
-            slower = jax.vmap(type(motion)(motion.start, motion.direction, motion.law, duration).state)
-            states = slower(jnp.concatenate([jnp.linspace(0.0, 1.0, 4001), jnp.asarray(motion.breaks())]))
-            places, accelerations = frame.outward(np.asarray(states.position)), frame.turned(states.acceleration)
-            sampled = cspr_jax.available_accelerations(robot, places).margin(np.asarray(accelerations)).min()
-            assert proved.margin <= sampled + 1e-9 and proved.margin == pytest.approx(sampled, rel=1e-3)
-            assert np.sign(sampled) == wanted
+    base, start, end = box(rng)
+    robot = cspr_jax.point_mass(base, mass=10.0, z_axis="up")
+    problem, frame = problem_of(robot)
+    ends = frame.inward(start)[None], frame.inward(end)[None]
+    answers, (motion,) = timed_lines(problem, *ends, law=law, max_acceleration=1e3)
+    assert answers.feasible.all() and 0.0 < answers.margin_bound[0] <= answers.margin[0] < 1e-5
+    faces = jax.tree.map(np.asarray, line_faces(problem.robot, ends[0][0], ends[1][0]))
+    for factor, wanted in ((1.3, 1.0), (0.97, -1.0)):
+        duration = float(motion.time) * factor
+        proved = smallest_margin(faces, motion.law, duration, GRAVITY)
+        assert np.sign(proved.bound) == np.sign(proved.margin)
+        slower = jax.vmap(type(motion)(motion.start, motion.direction, motion.law, duration).state)
+        states = slower(jnp.concatenate([jnp.linspace(0.0, 1.0, 4001), jnp.asarray(motion.breaks())]))
+        places, accelerations = frame.outward(np.asarray(states.position)), frame.turned(states.acceleration)
+        sampled = cspr_jax.available_accelerations(robot, places).margin(np.asarray(accelerations)).min()
+        assert proved.margin <= sampled + 1e-9 and proved.margin == pytest.approx(sampled, rel=1e-3)
+        assert np.sign(sampled) == wanted
 
 
 PLAN = """schema = 1
@@ -320,6 +320,7 @@ def test_a_key_of_lines_is_refused_elsewhere(tmp_path):
         assert code == 2 and "must be absent unless family" in err and err.count("\n") == 1
 
 
+@pytest.mark.soak
 def test_a_line_leads_to_a_transition(tmp_path):
     """A sequence mixes families where position, velocity and acceleration meet: at rest in P0."""
     text = """schema = 1
