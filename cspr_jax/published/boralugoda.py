@@ -121,34 +121,30 @@ def table_4_3() -> dict[Key, float | None]:
 
 def _passed(upper: Line, lower: Line, largest: float) -> tuple[np.ndarray, np.ndarray]:
     # Of each duration and p: by how much s'' is above its boundary at most, and from p on below the other.
-    shape = (len(TIMES), len(PERIODS))
-    over, under = np.full(shape, -np.inf), np.full(shape, -np.inf)
-    for i, time in enumerate(TIMES):
-        for j, p in enumerate(PERIODS):
-            for k, (start, stop, s) in enumerate(_pieces(p / time)):
-                bend = s.deriv(2) / time**2
-                steep = np.polynomial.Polynomial([largest])
-                for line in (upper.start + upper.slope * s, steep):
-                    over[i, j] = max(over[i, j], _largest(bend - line, start, stop))
-                if k >= 2:
-                    gap = max(_largest(line - bend, start, stop) for line in (lower.start + lower.slope * s, -steep))
-                    under[i, j] = max(under[i, j], gap)
-    return over, under
+    time, p = (grid.ravel() for grid in np.meshgrid(TIMES, PERIODS, indexing="ij"))
+    laws = jax.tree.map(np.asarray, jax.vmap(s_curve)(jnp.asarray(p / time)))
+    edges = np.concatenate([np.zeros_like(time)[:, None], laws.knots, np.ones_like(time)[:, None]], axis=1)
+    spans = np.stack([edges[:, :-1] - laws.origins, edges[:, 1:] - laws.origins])
+    s = np.moveaxis(laws.coefficients, -1, 0)  # (4, n, n_pieces) about the origin of each piece
+    bend = np.stack([2.0 * s[2], 6.0 * s[3], 0.0 * s[0], 0.0 * s[0]]) / time[:, None] ** 2
+
+    def beyond(line: Line) -> np.ndarray:
+        constant = np.zeros((4, 1, 1))
+        constant[0] = line.start
+        return bend - line.slope * s - constant
+
+    level, shape = (Line(largest, 0.0), Line(-largest, 0.0)), (len(TIMES), len(PERIODS))
+    over = np.maximum(_largest(beyond(upper), spans), _largest(beyond(level[0]), spans)).max(1)
+    under = np.maximum(_largest(-beyond(lower), spans), _largest(-beyond(level[1]), spans))[:, 2:].max(1)
+    return over.reshape(shape), under.reshape(shape)
 
 
-def _pieces(ratio: float) -> list[tuple[float, float, np.polynomial.Polynomial]]:
-    # The S-model over tau: from, to, and s about zero.
-    law = jax.tree.map(np.asarray, s_curve(jnp.asarray(ratio)))
-    edges = np.concatenate([[0.0], law.knots, [1.0]])
-    shifted = [np.polynomial.Polynomial([-origin, 1.0]) for origin in law.origins]
-    pieces = [np.polynomial.Polynomial(row)(x) for row, x in zip(law.coefficients, shifted, strict=True)]
-    return [(float(edges[i]), float(edges[i + 1]), piece) for i, piece in enumerate(pieces)]
-
-
-def _largest(curve: np.polynomial.Polynomial, start: float, stop: float) -> float:
-    turns = np.asarray(curve.deriv().roots(), complex)
-    inside = [x.real for x in turns.tolist() if abs(x.imag) < 1e-12 and start < x.real < stop]
-    return float(curve(np.array([start, stop, *inside])).max())
+def _largest(curve: np.ndarray, spans: np.ndarray) -> np.ndarray:
+    # Of cubics without a square, (4, n, n_pieces), over their spans, (2, n, n_pieces).
+    square = -curve[1] / np.where(curve[3] != 0.0, 3.0 * curve[3], np.inf)
+    turn = np.sqrt(np.maximum(square, 0.0))
+    places = np.clip(np.stack([spans[0], spans[1], turn, -turn]), spans[0], spans[1])
+    return (curve[0] + places * (curve[1] + places**2 * curve[3])).max(0)
 
 
 _MAX_A = {
