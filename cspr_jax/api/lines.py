@@ -1,9 +1,5 @@
 """Straight lines of point masses from Python: one motion in pure jax, and least durations of many."""
 
-import dataclasses
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
-
 import jax.numpy as jnp
 import numpy as np
 
@@ -14,13 +10,9 @@ from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
 from cspr_jax.problem import prepared
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.schema import labelled
-from cspr_jax.search.least_time import least_times, names_of
+from cspr_jax.search.least_time import LeastTimes, least_times
 from cspr_jax.trajectories.motion import Placed
 from cspr_jax.trajectories.timed_lines import LAWS, TimedLine, fixed_law, s_curve
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def straight_line(
@@ -52,52 +44,9 @@ def straight_line(
     return Placed(TimedLine(first, last - first, shape, time), frame)
 
 
-@dataclasses.dataclass(frozen=True)
-class LeastTimeAnswers:
-    """Least durations along n straight lines by the S-model; NumPy arrays, (n,) each.
-
-    Fields:
-        verdict: flags of `Verdict`; 0 where there is a feasible motion, proved.
-        duration: T, s; NaN where there is none, 0 where both ends are one place.
-        acceleration_time: p, s.
-        least_duration: no motion along the line is faster, s.
-        duration_ratio: of the two.
-        rest_margin: smaller one of the margins of rest at both ends, m/s^2.
-        active_up: number of the bound that holds back the acceleration, from 1 on; 0: none.
-        active_down: likewise of the braking.
-        names: of the bounds, the first one's first.
-    """
-
-    verdict: np.ndarray
-    duration: np.ndarray
-    acceleration_time: np.ndarray
-    least_duration: np.ndarray
-    duration_ratio: np.ndarray
-    rest_margin: np.ndarray
-    active_up: np.ndarray
-    active_down: np.ndarray
-    names: tuple[str, ...] = ()
-
-    def to_xarray(self, dims: Mapping[str, np.ndarray] | None = None) -> "xarray.Dataset":
-        """The answers for xarray, with units and long names.
-
-        Args:
-            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
-                None: one dimension "target".
-
-        Returns:
-            the fields over these dimensions.
-
-        Raises:
-            InputError: dimensions of another number of points.
-            ConfigError: xarray is not installed.
-        """
-        return labelled.over({name: x for name, x in vars(self).items() if isinstance(x, np.ndarray)}, dims)
-
-
 def least_time(
     robot: PointMassRobot, targets: np.ndarray, *, start: np.ndarray, max_acceleration: float | None = None
-) -> LeastTimeAnswers:
+) -> LeastTimes:
     """Least durations of the S-model along straight lines, from rest to rest, and of any motion along them.
 
     Args:
@@ -129,8 +78,7 @@ def least_time(
         own, frame = prepared(robot)
         first = np.broadcast_to(frame.inward(starts), ends.shape).copy()
         has_limits = bool(given(robot.limits))
-        answers = least_times(own, first, frame.inward(ends), max_acceleration=largest, has_limits=has_limits)
-    return LeastTimeAnswers(**answers._asdict(), names=names_of(robot))
+        return least_times(own, first, frame.inward(ends), max_acceleration=largest, has_limits=has_limits)
 
 
 def _check_robot(robot: PointMassRobot) -> None:

@@ -42,7 +42,7 @@ class LeastTimeMap(PointMassMap):
         starts, ends = self._starts(cells), self._targets(cells)
         has_limits = bool(given(self._problem.limits))
         settings: dict[str, Any] = {"max_acceleration": largest, "has_limits": has_limits}
-        return least_times(self._problem.robot, starts, ends, **settings)._asdict()
+        return least_times(self._problem.robot, starts, ends, **settings).arrays()
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""

@@ -5,8 +5,10 @@ What the S-model's formulas give is feasible by proof: the bounds of every face 
 of the shorter part are lost: that is undecided.
 """
 
+import dataclasses
+from collections.abc import Mapping
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 import jax
 import jax.numpy as jnp
@@ -17,8 +19,12 @@ from cspr_jax.feasibility.point_mass import least_time as fastest
 from cspr_jax.feasibility.point_mass.line_faces import line_faces, sides
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
 from cspr_jax.robots.wrench_sets import spanning
+from cspr_jax.schema import labelled
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.timed_lines import fixed_law
+
+if TYPE_CHECKING:
+    import xarray
 
 BATCH = 4096
 Rule = Literal["optimum", "thesis"]
@@ -30,8 +36,9 @@ SAME_PLACE = 1e-12
 SHORT = 1e-6
 
 
-class LeastTimes(NamedTuple):
-    """Least durations along n lines, (n,) each.
+@dataclasses.dataclass(frozen=True)
+class LeastTimes:
+    """Least durations along n lines; NumPy arrays, (n,) each.
 
     Fields:
         verdict: flags of `Verdict`; 0 where there is a feasible motion.
@@ -42,6 +49,7 @@ class LeastTimes(NamedTuple):
         rest_margin: smaller one of the margins of rest at both ends, m/s^2; NaN where an end is not below the spools.
         active_up: number of the bound that holds back the acceleration, from 1 on in the order of `names_of`; 0: none.
         active_down: likewise of the braking.
+        names: of the bounds, the first one's first.
     """
 
     verdict: np.ndarray
@@ -52,6 +60,31 @@ class LeastTimes(NamedTuple):
     rest_margin: np.ndarray
     active_up: np.ndarray
     active_down: np.ndarray
+    names: tuple[str, ...]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The fields that have a value a line.
+
+        Returns:
+            (n,) each, by name.
+        """
+        return {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
+
+    def to_xarray(self, dims: Mapping[str, np.ndarray] | None = None) -> "xarray.Dataset":
+        """The answers for xarray, with units and long names.
+
+        Args:
+            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
+                None: one dimension "target".
+
+        Returns:
+            the fields over these dimensions.
+
+        Raises:
+            InputError: dimensions of another number of points.
+            ConfigError: xarray is not installed.
+        """
+        return labelled.over(self.arrays(), dims)
 
 
 def names_of(robot: PointMassRobot) -> tuple[str, ...]:
@@ -138,6 +171,7 @@ def least_times(
         rest_margin=rest,
         active_up=np.where(possible, least.up + 1, 0).astype(np.int16),
         active_down=np.where(possible, least.down + 1, 0).astype(np.int16),
+        names=names_of(robot),
     )
 
 

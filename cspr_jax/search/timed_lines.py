@@ -19,7 +19,7 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.answers import Answers
-from cspr_jax.search.least_time import BATCH, TOLERANCE, Rule, least_times, names_of
+from cspr_jax.search.least_time import BATCH, TOLERANCE, Rule, least_times
 from cspr_jax.trajectories.timed_lines import TimedLine, fixed_law, s_curve
 
 
@@ -117,7 +117,7 @@ def timed_lines(
         least.acceleration_time,
         least.least_duration,
         np.stack([least.active_up, least.active_down], axis=1),
-        names_of(robot),
+        least.names,
     )
     return answers, motions
 
