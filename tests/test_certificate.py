@@ -21,7 +21,7 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.amplitudes import named
 
-COUNT, SOAK_COUNT = 400, 20_000
+COUNT, SOAK_COUNT = 200, 20_000
 SAMPLES = 20_001
 Z0 = 1.7
 BASES = {"prototype": equilateral(0.26), "tilted": TILTED}

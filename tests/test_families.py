@@ -196,6 +196,7 @@ def test_each_segment_is_that_of_its_own_family(tmp_path):
         assert own.margin[0] == pytest.approx(mixed.margin[i], rel=1e-12)
 
 
+@pytest.mark.soak
 def test_two_families_of_a_platform(tmp_path):
     """Standard hypocycloids and those of variable amplitude meet at poses, with one beta-hat there."""
     (tmp_path / "plan.toml").write_text(

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from oracles import lines as oracle
 
+# The quick tests compare the program with it, and so with each other.
+pytestmark = pytest.mark.soak
+
 G = oracle.GRAVITY
 SIDES = {"x_max": 45.0, "y_max": 30.0, "z_max": 30.0}
 LOAD = {"mass": 10.0, "gravity": G}

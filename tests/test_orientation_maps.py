@@ -223,6 +223,7 @@ def test_a_map_of_what_is_accessible(tmp_path):
     assert "attainable" not in data and (data["accessible"] > 0).all()
 
 
+@pytest.mark.soak
 def test_the_main_reason_may_be_a_limit(tmp_path):
     """Where a limit stands in the way of all, it is named; the others are loose."""
     every = LOOSE | {"tension_max": 0.1}
