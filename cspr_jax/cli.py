@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError, CsprError, ExitCode
-from cspr_jax.outputs.plots.options import add_style
+from cspr_jax.outputs.plots.options import ACCELERATION, add_style
 from cspr_jax.runtime import compile_cache
 from cspr_jax.runtime.progress import progress, waiting
 from cspr_jax.sweep.signals import Prompt, prompt_end, stop_signals
@@ -118,14 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the motion to FILE.csv or FILE.h5")
     plan.add_argument("--anyway", action="store_true", help="write the best candidate's motion if it is not feasible")
     plan.add_argument("--rate", type=float, metavar="HZ", help="rows a second (default: `samples` rows a segment)")
-    plot = add("plot", _plot, "draw a result file, or several maps as lines")
-    plot.add_argument("result", type=Path, nargs="+", help="result or run directory, or motion of `cspr plan -o`")
-    plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
-    plot.add_argument("--quantity", help="quantity of a map (default arcs or oscillations); see `cspr quantities`")
-    plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
-    plot.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
-    plot.add_argument("--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis: nearest point")
-    add_style(plot)
+    _add_plot(add)
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
     table.add_argument("--list", action="store_true", help="list the tables")
@@ -144,6 +137,24 @@ def _parser() -> argparse.ArgumentParser:
         sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
     _add_listings(add)
     return parser
+
+
+def _add_plot(add: Callable[..., argparse.ArgumentParser]) -> None:
+    plot = add("plot", _plot, "draw a result file, or several maps as lines")
+    plot.add_argument("result", type=Path, nargs="+", help="result or run directory, or motion of `cspr plan -o`")
+    plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
+    plot.add_argument(
+        "--quantity",
+        help="quantity of a map (default arcs or oscillations; see `cspr quantities`); of a motion acceleration, "
+        "beside all that are feasible at an instant, or path_acceleration, over the way",
+    )
+    plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
+    plot.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
+    plot.add_argument(
+        "--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis: nearest point; t of a motion"
+    )
+    plot.set_defaults(device=None)
+    add_style(plot)
 
 
 def _add_listings(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -280,6 +291,8 @@ def _plot(options: argparse.Namespace) -> int:
 
     at = selection.places(options.at)
     results = [selection.result_at(path) for path in options.result]
+    if options.quantity == ACCELERATION:  # the one picture that is computed
+        _prepare_jax(options)
     output = options.output or results[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")

@@ -78,6 +78,10 @@ An infeasible or undecided plan is written only with `--anyway`, with the best c
 Its picture says NOT PROVED FEASIBLE and for which segments; its HDF5 file has `feasible = 0` and the verdicts of its
 segments; its CSV file has a last column `feasible`, 1 in the rows of feasible segments and 0 in the others. CSV files
 of feasible plans do not have that column.
+
+`cspr plot FILE.h5` draws path and tensions over time. With `--quantity acceleration` (point masses) it draws all
+accelerations that the cables can give at one instant, `--at t=1.2` or that of the smallest margin, and the motion's
+among them; with `--quantity path_acceleration` (straight lines) that column over the way, between its bounds.
 """
 
 

@@ -31,8 +31,10 @@ def plot(
 
     Args:
         results: of `open_result`, or the path of a result, a run directory or a motion file; or several maps.
-        quantity: which one of a map; None: "arcs", or the first there is.
-        at: fixed values of axes, within their ranges; the nearest point is taken.
+        quantity: which one of a map; None: "arcs", or the first there is. Of a motion "acceleration", beside all that
+            are feasible at the instant `at` (None: that of the smallest margin), or "path_acceleration", over the way
+            along straight lines; None: path and tensions over time.
+        at: fixed values of axes, within their ranges; the nearest point is taken. Of a motion t, s.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
         size: width and height, cm, as (16, 10) or "16x10"; None: what suits the picture.

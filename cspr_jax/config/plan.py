@@ -1,16 +1,17 @@
 """Plan files: a sequence of poses to be reached."""
 
+import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.reading import Table, checked, parse_toml
+from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml
 from cspr_jax.config.robot import LimitTable, Point, Positive
 from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, FamilyName, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import fault
-from cspr_jax.errors import shown
+from cspr_jax.errors import ConfigError, shown
 
 
 class Choice(Table):
@@ -117,6 +118,30 @@ def read_plan(text: str, path: Path) -> PlanFile:
         ConfigError: a mistake in it.
     """
     return plan_keys(parse_toml(text, path), path)
+
+
+def kept_plan(text: str, path: Path) -> PlanFile:
+    """A plan as a motion file keeps it: the text of its file, or JSON where there was none.
+
+    Args:
+        text: what is kept.
+        path: of the motion file, named in errors.
+
+    Returns:
+        its content, limits of [limits] beside the other keys.
+
+    Raises:
+        ConfigError: a mistake in it.
+    """
+    if len(text) > LARGEST_FILE:
+        raise ConfigError(path, f"plan of {len(text)} letters: must be at most {LARGEST_FILE}")
+    if not text.startswith("{"):
+        return read_plan(text, path)
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(path, f"its plan cannot be read: {error}") from error
+    return plan_keys(data, path)
 
 
 def plan_keys(data: dict[str, Any], file: object) -> PlanFile:

@@ -87,7 +87,9 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
     duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     is_redundant = plan.problem.robot.n_cables > plan.problem.robot.dof
-    limits = plan.problem.limits if is_redundant else NO_LIMITS
+    # Of other motions nothing depends on limits, and which there are decides what is compiled.
+    needs_limits = is_redundant or any(isinstance(motion, TimedLine) for motion in motions)
+    limits = plan.problem.limits if needs_limits else NO_LIMITS
     with_couples = is_redundant and is_rectangle(plan.problem.robot.base_points)
     parts = []
     for i, length in enumerate(duration):

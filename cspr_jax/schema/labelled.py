@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.schema.meanings import value_attributes
 from cspr_jax.schema.motion_quantities import ACROSS, PARTS, SEGMENTS
 from cspr_jax.schema.quantities import EVERY, flag_attributes
 
@@ -33,6 +34,7 @@ def dataset(
     variables: Mapping[str, tuple[tuple[str, ...], np.ndarray]],
     axes: Mapping[str, Any],
     attributes: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> "xarray.Dataset":
     """A dataset whose variables and axes bear what the table of quantities says of them.
 
@@ -40,6 +42,7 @@ def dataset(
         variables: names of dimensions and values by name.
         axes: (n,) coordinates by name.
         attributes: of the whole dataset.
+        settings: of a sweep, on which meanings of numbers may depend; None: unknown.
 
     Returns:
         the dataset.
@@ -51,7 +54,7 @@ def dataset(
     import xarray
 
     return xarray.Dataset(
-        {name: (dims, values, _described(name)) for name, (dims, values) in variables.items()},
+        {name: (dims, values, _described(name, settings)) for name, (dims, values) in variables.items()},
         {name: (name, np.asarray(points), _described(name)) for name, points in axes.items()},
         attributes,
     )
@@ -114,9 +117,9 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
     return data
 
 
-def _described(name: str) -> dict[str, Any]:
+def _described(name: str, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
     if name not in EVERY:
         return {}
     quantity = EVERY[name]
     attributes = {"units": quantity.units, "long_name": quantity.long_name, "description": quantity.description}
-    return attributes | (flag_attributes() if name.endswith("verdict") else {})
+    return attributes | (flag_attributes() if name.endswith("verdict") else value_attributes(quantity, settings))

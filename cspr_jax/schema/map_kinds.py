@@ -222,7 +222,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("duration",),
             families=("s-curve",),
             start="point",
-            takes=("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.max_acceleration"),
+            takes=("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.max_acceleration", "limits"),
         ),
     )
 }

@@ -268,8 +268,16 @@ QUANTITIES = {
             "Number of the choice of cables that spans it, from 1 on, in the order of their numbers: of four cables "
             "1 2, 1 3, 1 4, 2 3, 2 4, 3 4; the next number: the largest acceleration; 0: none.",
             "int16",
+            meanings="line-bounds",
         ),
-        Quantity("active_down", "1", "bound that holds back the braking", "As `active_up`, while it brakes.", "int16"),
+        Quantity(
+            "active_down",
+            "1",
+            "bound that holds back the braking",
+            "As `active_up`, while it brakes.",
+            "int16",
+            meanings="line-bounds",
+        ),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
 }

@@ -16,6 +16,7 @@ class Quantity:
         kind: "float" (of the run's dtype) or the NumPy name of an integer type.
         unflagged: of flags of a verdict: what pictures say where none is set; empty: it is no verdict.
         signed: whether either sign is as good as the other, so that zero is in the middle of a picture's colours.
+        meanings: of whole numbers that stand for words: their row of `schema.meanings.MEANINGS`; empty: they do not.
         contoured: whether sections of it show where it is a whole number.
     """
 
@@ -26,4 +27,5 @@ class Quantity:
     kind: Literal["float", "uint16", "int16"] = "float"
     unflagged: str = ""
     signed: bool = False
+    meanings: str = ""
     contoured: bool = False

@@ -73,7 +73,7 @@ def consolidate(
         layout: of the run.
         grid: its axes and tiles.
         shards: one a tile, in order, verified.
-        attributes: of the file; must hold "environment".
+        attributes: of the file; must hold "environment" and "settings".
         between: called before each tile; may raise.
 
     Raises:
@@ -82,7 +82,8 @@ def consolidate(
     digests, environments, near_zero = [], set(), 0
     with new_file(disk, path) as descriptor:
         with open_hdf5(disk, descriptor, attributes) as file:
-            make_datasets(file, grid.axes, layout.store, dtype=layout.dtype, tile=grid.tile)
+            settings = json.loads(attributes["settings"])
+            make_datasets(file, grid.axes, layout.store, dtype=layout.dtype, tile=grid.tile, settings=settings)
             for place, shard in zip(grid.tiling, shards, strict=True):
                 between()
                 for name in layout.store:

@@ -27,7 +27,7 @@ _PLENTY = 64 << 20
 _PER_CHUNK = 256
 # Of a dataset, by this program and by HDF5's dimension scales.
 _ATTRIBUTES = (
-    *("units", "long_name", "description", "flag_masks", "flag_meanings"),
+    *("units", "long_name", "description", "flag_masks", "flag_values", "flag_meanings"),
     *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS"),
 )
 _FILTERS = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}

@@ -3,13 +3,14 @@
 import contextlib
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
+from cspr_jax.schema.meanings import value_attributes
 from cspr_jax.schema.quantities import AXES, QUANTITIES, flag_attributes
 from cspr_jax.schema.quantity import Quantity
 from cspr_jax.store.disk import Disk
@@ -70,7 +71,13 @@ def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterat
 
 
 def make_datasets(
-    file: h5py.File, axes: dict[str, np.ndarray], store: list[str], *, dtype: str, tile: tuple[int, ...]
+    file: h5py.File,
+    axes: dict[str, np.ndarray],
+    store: list[str],
+    *,
+    dtype: str,
+    tile: tuple[int, ...],
+    settings: Mapping[str, Any] | None = None,
 ) -> None:
     """The empty datasets of a result over a grid, with their axes.
 
@@ -80,6 +87,7 @@ def make_datasets(
         store: names of the quantities.
         dtype: of quantities of kind "float".
         tile: chunk shape.
+        settings: of the sweep, on which meanings of numbers may depend; None: unknown.
     """
     for name, points in axes.items():
         scale = file.create_dataset(name, data=points, track_times=False)
@@ -91,6 +99,7 @@ def make_datasets(
         describe(data, QUANTITIES[name])
         if QUANTITIES[name].unflagged:
             set_attributes(data, flag_attributes())
+        set_attributes(data, value_attributes(QUANTITIES[name], settings))
         for i, axis in enumerate(axes):
             data.dims[i].attach_scale(file[axis])
 

@@ -62,9 +62,8 @@ class Result:
             ConfigError: xarray is not installed.
         """
         if self.is_map:
-            return labelled.dataset(
-                {name: (tuple(self.axes), data) for name, data in self.data.items()}, self.axes, self.attributes
-            )
+            variables = {name: (tuple(self.axes), data) for name, data in self.data.items()}
+            return labelled.dataset(variables, self.axes, self.attributes, self.settings)
         return labelled.motion(self.axes | self.data, self.attributes)
 
 

@@ -12,6 +12,8 @@ from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, v
 from cspr_jax.outputs.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.outputs.plots.motion import motion_figure
 from cspr_jax.outputs.plots.notes import notes
+from cspr_jax.outputs.plots.options import ACCELERATION, PATH_ACCELERATION
+from cspr_jax.outputs.plots.path_accelerations import path_figure
 from cspr_jax.outputs.plots.sections import AROUND, POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.schema.map_kinds import MAP_KINDS
@@ -55,7 +57,8 @@ def drawn(
     Args:
         results: of `cspr run`, or one motion of `cspr plan -o`.
         names: of their files.
-        quantity: which one of a map; None: the one that its kind of map is about.
+        quantity: which one of a map; None: the one that its kind of map is about. Of a motion `options` names those
+            that have a picture; None: its path and tensions.
         at: fixed values of axes, within their ranges; the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
@@ -72,14 +75,24 @@ def drawn(
         return _overlay([Path(name) for name in names], results, quantity, at or {}, lines)
     if results[0].is_map:
         return _map_figure(results[0], quantity, at or {}, lines)
-    _refuse_choices(quantity, at, lines)
-    return motion_figure(results[0])
+    return _motion_figure(results[0], names[0], quantity, at or {}, lines)
 
 
-def _refuse_choices(quantity: str | None, at: dict[str, float] | None, lines: str | None) -> None:
-    for key, given in (("--quantity", quantity), ("--at", at), ("--lines", lines)):
-        if given:
-            raise InputError(key, given, "absent for a motion")
+def _motion_figure(result: Result, name: str, quantity: str | None, at: dict[str, float], lines: str | None) -> Figure:
+    if lines is not None:
+        raise InputError("--lines", lines, "absent for a motion")
+    if at and quantity != ACCELERATION:
+        raise InputError("--at", at, f"absent for a motion but with --quantity {ACCELERATION}")
+    if quantity == ACCELERATION:
+        from cspr_jax.outputs.plots.accelerations import acceleration_figure  # it needs jax, as no other picture does
+
+        return acceleration_figure(result, name, at)
+    if quantity == PATH_ACCELERATION and PATH_ACCELERATION in result.data:
+        return path_figure(result, name)
+    if quantity is not None:
+        pictured = [ACCELERATION, *({PATH_ACCELERATION} & result.data.keys())]
+        raise InputError("--quantity", quantity, f"one of {', '.join(pictured)} for this motion, or absent")
+    return motion_figure(result)
 
 
 def _envelope(results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None) -> Figure:

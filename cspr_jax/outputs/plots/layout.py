@@ -26,13 +26,16 @@ def columns_of(count: int) -> int:
     return 2 if count == 4 else min(3, count)
 
 
-def panels(figure: Figure, count: int, *, polar: bool = False) -> tuple[list[Axes], list[Axes], list[Axes]]:
-    """Panels with common axes.
+def panels(
+    figure: Figure, count: int, *, polar: bool = False, same: bool = True
+) -> tuple[list[Axes], list[Axes], list[Axes]]:
+    """Panels with common axes, or common horizontal ones.
 
     Args:
         figure: where.
         count: how many.
         polar: whether in polar coordinates.
+        same: whether their vertical axes are the same.
 
     Returns:
         all of them, those with nothing below, those at the left.
@@ -40,7 +43,7 @@ def panels(figure: Figure, count: int, *, polar: bool = False) -> tuple[list[Axe
     columns = columns_of(count)
     lines = -(-count // columns)
     kind = {"projection": "polar"} if polar else {}
-    grid = figure.subplots(lines, columns, squeeze=False, sharex=not polar, sharey=True, subplot_kw=kind)
+    grid = figure.subplots(lines, columns, squeeze=False, sharex=not polar, sharey=same, subplot_kw=kind)
     every = list(grid.flat[:count])
     bottom = every[max(0, count - columns) :]
     for panel in grid.flat[count:]:

@@ -21,8 +21,7 @@ from cspr_jax.outputs.plots.labels import (
 )
 from cspr_jax.outputs.plots.layout import in_degrees, in_whole_numbers, panels
 from cspr_jax.outputs.plots.notes import table
-from cspr_jax.outputs.plots.reasons import reasons
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.outputs.plots.worded import worded
 from cspr_jax.store.result import Result
 
 LINES = len(COLOURS)
@@ -64,9 +63,7 @@ def line_figure(
     figure.set_layout_engine("constrained")
     every, bottom, left = panels(figure, count)
     drawn = [[_as_drawn(result, name, across, line) for line in lines] for lines in groups.values()]
-    words: list[str] = []
-    if QUANTITIES[name].unflagged:
-        drawn, words = _as_reasons(drawn, name)
+    drawn, words = _in_words(result, name, drawn)
     for panel, heading, lines in zip(every, groups, drawn, strict=True):
         _draw(panel, lines)
         panel.set_title(heading)
@@ -107,10 +104,13 @@ def _draw(panel: Axes, lines: list[Line]) -> None:
     panel.grid(alpha=0.3)
 
 
-def _as_reasons(groups: list[list[Line]], name: str) -> tuple[list[list[Line]], list[str]]:
-    # Flags of verdicts become numbers of reasons, one above the other, with their words.
+def _in_words(result: Result, name: str, groups: list[list[Line]]) -> tuple[list[list[Line]], list[str]]:
+    # What stands for words becomes numbers from 0 on, one above the other, with their words.
     every = [line.values for lines in groups for line in lines]
-    numbers, words, _ = reasons(np.concatenate(every), name)
+    found = worded(result, name, np.concatenate(every))
+    if found is None:
+        return groups, []
+    numbers, words, _ = found
     parts = iter(np.split(numbers, np.cumsum([len(values) for values in every])[:-1]))
     return [[dataclasses.replace(line, values=next(parts)) for line in lines] for lines in groups], words
 

@@ -68,7 +68,7 @@ def motion_figure(result: Result) -> Figure:
     for name in {"orientation", "tension", *more} & drawn.keys():
         _boundaries(drawn[name], result)
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
-    figure.suptitle(f"{robot_name(result)}: {place}z axis {result.attributes.get('z_axis', 'down')}{_mark(result)}")
+    figure.suptitle(f"{robot_name(result)}: {place}z axis {result.attributes.get('z_axis', 'down')}{doubt(result)}")
     return figure
 
 
@@ -78,7 +78,15 @@ def _boundaries(panel: Axes, result: Result) -> None:
         panel.axvline(time, color="black", linewidth=0.8, alpha=0.35)
 
 
-def _mark(result: Result) -> str:
+def doubt(result: Result) -> str:
+    """A line that says which segments of a motion are not proved feasible.
+
+    Args:
+        result: the motion.
+
+    Returns:
+        the line after a line break; empty where all are.
+    """
     if result.attributes.get("feasible", 1):
         return ""
     none = result.data.get("segment_arcs", np.empty(0)) == 0

@@ -2,6 +2,9 @@
 
 import argparse
 
+# Quantities of motions that have a picture of their own.
+ACCELERATION, PATH_ACCELERATION = "acceleration", "path_acceleration"
+
 
 def add_style(parser: argparse.ArgumentParser) -> None:
     """Options of size, resolution and letters; `style.style_of` reads them.

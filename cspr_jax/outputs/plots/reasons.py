@@ -1,9 +1,7 @@
 """Verdicts as colours: one reason a cell, the first of those that its flags name."""
 
 import numpy as np
-from matplotlib.colors import BoundaryNorm, ListedColormap
 
-from cspr_jax.outputs.plots.colours import Scale
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 
@@ -44,18 +42,3 @@ def reasons(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, list[str], lis
     every = [(QUANTITIES[name].unflagged, FEASIBLE_COLOUR), *REASONS.values()]
     words, colours = zip(*(every[number] for number in used), strict=True)
     return np.searchsorted(used, numbers), list(words), list(colours)
-
-
-def reason_scale(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, Scale]:
-    """Verdicts as cells of a map.
-
-    Args:
-        verdicts: (...) flags.
-        name: of the quantity.
-
-    Returns:
-        (...) number of the reason, and the scale of those that occur.
-    """
-    cells, words, colours = reasons(verdicts, name)
-    norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
-    return cells, Scale(ListedColormap(colours), norm, ticks=([float(i) for i in range(len(words))], words))

@@ -13,7 +13,7 @@ from cspr_jax.outputs.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar,
 from cspr_jax.outputs.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
 from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
 from cspr_jax.outputs.plots.marks import mark, marked
-from cspr_jax.outputs.plots.reasons import reason_scale
+from cspr_jax.outputs.plots.worded import word_scale, worded
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
@@ -70,7 +70,10 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
     points = [as_drawn(result, axis, result.axes[axis][order]) for axis, order in zip(across, orders, strict=True)]
     data = as_drawn(result, name, data[np.ix_(*orders, shown)])
     quantity = QUANTITIES[name]
-    cells, scale = reason_scale(data, name) if quantity.unflagged else (data, scale_of(data, signed=quantity.signed))
+    found = worded(result, name, data)
+    cells, scale = (
+        (data, scale_of(data, signed=quantity.signed)) if found is None else (found[0], word_scale(*found[1:]))
+    )
     titles = values(result, over, result.axes[over][shown]) if over is not None else []
     legend: dict[str, Artist] = {"no value": Patch(color=NONE_COLOUR)} if scale.missing else {}
     for k, panel in enumerate(every):

@@ -1,0 +1,208 @@
+"""Diagram of the feasible accelerations at an instant of a motion, Boralugoda figures 2.2, 2.4 and 2.8.
+
+Of a planar robot all of it is in one plane. Of a spatial one there are sections through the actual acceleration: a
+level one, a vertical one in which zero and gravity lie, too, and a vertical one across the nearest face, which is seen
+from its edge there, and the margin in its true size.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from cspr_jax.outputs.plots.acceleration_sets import AccelerationSet, acceleration_set
+from cspr_jax.outputs.plots.half_planes import WINDOW, Plane, Polygon, Window, section, window_around
+from cspr_jax.outputs.plots.labels import COLOURS, robot_name
+from cspr_jax.outputs.plots.motion import doubt
+from cspr_jax.store.result import Result
+
+X, Y, UP = np.eye(3)
+# Level parts of vectors below this, over gravity or the size of a normal, have no direction.
+LEVEL = 1e-6
+# Corners so far away, in sizes of what else is there, are not waited for.
+FAR = 2.0
+_INSIDE: dict[str, Any] = {"facecolor": COLOURS[5], "alpha": 0.3, "linewidth": 0.0}
+_FACE: dict[str, Any] = {"color": "black", "linewidth": 1.2}
+_NEAREST: dict[str, Any] = {"color": COLOURS[1], "linewidth": 2.4, "solid_capstyle": "butt"}
+_MARGIN: dict[str, Any] = {"color": COLOURS[1], "linewidth": 1.4, "linestyle": (0, (2, 1))}
+_MOTION: dict[str, Any] = {"color": "#8c8c8c", "linewidth": 0.6}
+_CABLE: dict[str, Any] = {"color": COLOURS[2], "linewidth": 1.6}
+_GRAVITY: dict[str, Any] = {"color": COLOURS[0], "linewidth": 1.6}
+_ACTUAL: dict[str, Any] = {"color": "black", "linewidth": 1.6}
+_POINT: dict[str, Any] = {"marker": "o", "markersize": 5.0, "color": "black"}
+_CORNER: dict[str, Any] = {"marker": "D", "markersize": 5.0, "color": COLOURS[2], "linestyle": "none"}
+_NUMBER: dict[str, Any] = {
+    "ha": "center",
+    "va": "center",
+    "color": COLOURS[2],
+    "bbox": {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.6},
+}
+
+
+class View(NamedTuple):
+    """A panel.
+
+    Fields:
+        title: of the panel.
+        plane: of the section.
+        labels: of its two axes.
+        is_level: whether the section is.
+        holds_rest: whether zero and free fall lie in it.
+        across_face: whether the nearest face is seen from its edge.
+    """
+
+    title: str
+    plane: Plane
+    labels: tuple[str, str]
+    is_level: bool = False
+    holds_rest: bool = False
+    across_face: bool = False
+
+
+def acceleration_figure(result: Result, file: str, at: dict[str, float]) -> Figure:
+    """The diagram.
+
+    Args:
+        result: a motion of a point mass.
+        file: its name, for errors.
+        at: the instant as "t"; empty: that of the smallest margin.
+
+    Returns:
+        the figure.
+
+    Raises:
+        InputError: a platform, a file without its robot, no such instant, or cables that do not span the space there.
+        ConfigError: a mistake in the plan that the file keeps.
+    """
+    found = acceleration_set(result, file, at)
+    views = _views(found)
+    size = (6.6, 6.0) if len(views) == 1 else (4.2 * len(views), 5.8 if doubt(result) else 5.4)
+    figure = Figure(figsize=size, layout="constrained")
+    legend: dict[str, Artist] = {}
+    for panel, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+        legend |= _draw(panel, found, view, 1.3 if len(views) == 1 else 1.0)
+    figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4)
+    place = f"at ({', '.join(f'{number:.4g}' for number in found.position)}) m"
+    margin = f"margin {found.margin:.3g} m/s² to the face of {found.names[found.nearest]}"
+    axis = f"z axis {result.attributes.get('z_axis', 'down')}"
+    title = f"{robot_name(result)}: feasible accelerations"
+    figure.suptitle(f"{title}\n{found.words}, {place}, {axis}\n{margin}{doubt(result)}")
+    return figure
+
+
+def _views(found: AccelerationSet) -> list[View]:
+    upward = "upward acceleration (m/s²)"
+    if found.is_planar:
+        labels = ("level acceleration, along x (m/s²)", upward)
+        return [View("", Plane(found.actual, X, UP), labels, holds_rest=True, across_face=True)]
+    across = _level(-found.normals[found.nearest], 1.0)
+    along = _level(found.actual, -found.falling[2])
+
+    def vertical(title: str, way: np.ndarray, **others: bool) -> View:
+        label = f"level acceleration, azimuth {np.degrees(np.arctan2(way[1], way[0])):.3g}° (m/s²)"
+        return View(f"vertical, {title}", Plane(found.actual, way, UP), (label, upward), **others)
+
+    labels = ("acceleration along x (m/s²)", "acceleration along y (m/s²)")
+    height = f"{found.actual[2] if abs(found.actual[2]) > LEVEL * abs(found.falling[2]) else 0.0:.3g}"
+    level = View(f"level, upward acceleration {height} m/s²", Plane(found.actual, X, Y), labels, is_level=True)
+    # An acceleration without a level part lies in every vertical section, and so does any in one of a level face.
+    if along is None or across is None or abs(along @ across) > 1.0 - LEVEL:
+        way = next((way for way in (across, along) if way is not None), X)
+        return [level, vertical("across the nearest face", way, holds_rest=True, across_face=True)]
+    return [
+        level,
+        vertical("along the acceleration", along, holds_rest=True),
+        vertical("across the nearest face", across, across_face=True),
+    ]
+
+
+def _level(vector: np.ndarray, size: float) -> np.ndarray | None:
+    # Direction of the level part of a vector; None where that is next to nothing beside a size.
+    part = np.hypot(*vector[:2])
+    return np.array([*vector[:2], 0.0]) / part if part > LEVEL * size else None
+
+
+def _draw(panel: Axes, found: AccelerationSet, view: View, shape: float) -> dict[str, Artist]:
+    seen = view.plane.seen
+    window, polygon = _cut_out(found, view, shape)
+    panel.fill(*polygon.corners.T, **_INSIDE)
+    legend: dict[str, Artist] = {"feasible": Patch(**_INSIDE)}
+    for k, owner in enumerate(polygon.owners):
+        if owner != WINDOW:
+            side = polygon.corners[[k, (k + 1) % len(polygon.owners)]]
+            panel.plot(*side.T, **(_NEAREST if owner == found.nearest else _FACE), zorder=2.5)
+    legend["nearest face"] = Line2D([], [], **_NEAREST)
+    if view.across_face:
+        panel.plot(*seen(np.stack([found.actual, found.foot])).T, **_MARGIN, zorder=3.5)
+    legend["margin"] = Line2D([], [], **_MARGIN)
+    legend["acceleration"] = Line2D([], [], **_POINT | {"linewidth": _ACTUAL["linewidth"]})
+    if _shows_motion(view):
+        panel.plot(*seen(found.motion).T, **_MOTION, zorder=1.5)
+        legend["whole motion" + ("" if found.is_planar else ", projected")] = Line2D([], [], **_MOTION)
+    if view.holds_rest:
+        _arrow(panel, seen(0.0 * X), seen(found.falling), _GRAVITY)
+        _arrow(panel, seen(0.0 * X), seen(found.actual), _ACTUAL)
+    panel.plot(*seen(found.actual), **_POINT, zorder=4.0)
+    legend["gravity"] = Line2D([], [], **_GRAVITY)
+    if found.is_planar:
+        legend["cables"] = _directions(panel, found, view, window)
+    elif view.is_level:
+        legend["cables"] = _corners(panel, found, view)
+    panel.set(xlim=(window.low[0], window.high[0]), ylim=(window.low[1], window.high[1]), aspect="equal")
+    panel.set(xlabel=view.labels[0], ylabel=view.labels[1], title=view.title)
+    panel.grid(alpha=0.3)
+    return legend
+
+
+def _cut_out(found: AccelerationSet, view: View, shape: float) -> tuple[Window, Polygon]:
+    # What is there to see, and as many corners of the section as lie near to it.
+    seen = view.plane.seen
+    points = [seen(np.stack([found.actual, found.foot]))]
+    if not view.is_level:
+        points.append(seen(np.stack([0.0 * X, found.falling, found.apex])))
+    if _shows_motion(view):
+        points.append(seen(found.motion))
+    window = window_around(np.concatenate(points), shape=shape)
+    wide = window_around(np.stack(window), margin=FAR, shape=shape)
+    corners, owners = section(view.plane, found.normals, found.offsets, wide)
+    near = corners[(owners != WINDOW) & (np.roll(owners, 1) != WINDOW)]
+    window = window_around(np.concatenate([*points, near]), shape=shape)
+    return window, section(view.plane, found.normals, found.offsets, window)
+
+
+def _shows_motion(view: View) -> bool:
+    # Across a face only where all of it is in the plane.
+    return view.is_level or view.holds_rest
+
+
+def _directions(panel: Axes, found: AccelerationSet, view: View, window: Window) -> Artist:
+    # Of the cables of a planar robot.
+    size = 0.28 * (window.high - window.low).min()
+    start = view.plane.seen(found.apex)
+    for number, way in enumerate(view.plane.seen(found.cables), start=1):
+        _arrow(panel, start, start + size * way, _CABLE)
+        panel.annotate(str(number), start + 1.14 * size * way, **_NUMBER)
+    return Line2D([], [], **_CABLE)
+
+
+def _corners(panel: Axes, found: AccelerationSet, view: View) -> Artist:
+    # Where the cables' directions meet a level section, the others at their smallest tensions.
+    lengths = (found.actual[2] - found.apex[2]) / found.cables[:, 2]
+    corners = view.plane.seen(found.apex + lengths[:, None] * found.cables)
+    there = (lengths >= 0.0) & (lengths <= found.reach)
+    middle = corners[there].mean(axis=0) if there.any() else np.zeros(2)
+    for number in np.flatnonzero(there):
+        panel.plot(*corners[number], **_CORNER, zorder=3.0)
+        beyond = corners[number] - middle
+        away = 11.0 * beyond / (np.linalg.norm(beyond) or 1.0)
+        panel.annotate(str(number + 1), corners[number], away, textcoords="offset points", **_NUMBER)
+    return Line2D([], [], **_CORNER)
+
+
+def _arrow(panel: Axes, start: np.ndarray, end: np.ndarray, look: dict[str, Any]) -> None:
+    style = {"arrowstyle": "-|>", "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 10.0} | look
+    panel.annotate("", tuple(end), tuple(start), arrowprops=style, zorder=3.0)

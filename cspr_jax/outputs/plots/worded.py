@@ -1,0 +1,58 @@
+"""Quantities whose numbers stand for words, as colours and ticks with these words: verdicts, and bounds by name."""
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
+
+from cspr_jax.outputs.plots.colours import NONE_COLOUR, Scale
+from cspr_jax.outputs.plots.labels import COLOURS
+from cspr_jax.outputs.plots.reasons import reasons
+from cspr_jax.schema.meanings import meanings_of
+from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.store.result import Result
+
+# Okabe and Ito's, too; of more words the colours follow each other.
+MORE = (*COLOURS, "#F0E442", "#000000")
+
+
+def worded(result: Result, name: str, values: np.ndarray) -> tuple[np.ndarray, list[str], list[str]] | None:
+    """What the values of a quantity stand for.
+
+    Args:
+        result: gives the settings, on which the words may depend.
+        name: of the quantity.
+        values: (...) of it.
+
+    Returns:
+        (...) numbers of the words, from 0 on; the words of those that occur; their colours. None: it has no words.
+    """
+    quantity = QUANTITIES[name]
+    if quantity.unflagged:
+        return reasons(values, name)
+    words = meanings_of(quantity, result.settings)
+    return _named(values, words) if words else None
+
+
+def _named(values: np.ndarray, words: tuple[str, ...]) -> tuple[np.ndarray, list[str], list[str]]:
+    # A word has the same colour in all pictures of a sweep, where there are colours for all. 0 stands for none.
+    used = np.unique(values)
+    few = len(words) - 1 <= len(MORE)
+    ranks = used - 1 if few else np.arange(len(used)) - (0 in used)
+    shades = MORE if few else [to_hex(c) for c in matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, len(used)))]
+    known = [words[number] if number < len(words) else f"{number}" for number in used.tolist()]
+    colours = [shades[rank % len(shades)] if number else NONE_COLOUR for number, rank in zip(used, ranks, strict=True)]
+    return np.searchsorted(used, values), known, colours
+
+
+def word_scale(words: list[str], colours: list[str]) -> Scale:
+    """The scale of numbers that stand for words.
+
+    Args:
+        words: of 0, 1, 2, ...
+        colours: theirs.
+
+    Returns:
+        the scale.
+    """
+    norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
+    return Scale(ListedColormap(colours), norm, ticks=([float(i) for i in range(len(words))], words))

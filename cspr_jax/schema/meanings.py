@@ -1,0 +1,67 @@
+"""Meanings of whole numbers that stand for words, as far as these depend on what a sweep asks."""
+
+import itertools
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.quantity import Quantity
+
+
+def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
+    """Bounds of the acceleration along a straight line, as `search.line_durations.names_of` names them from 1 on.
+
+    Args:
+        settings: of a sweep, with its point mass as "robot".
+
+    Returns:
+        the words of 0, 1, 2, ...
+    """
+    robot, limits = settings["robot"], settings.get("limits") or {}
+    chosen = itertools.combinations(range(1, len(robot["base_points"]) + 1), 1 if robot.get("planar") else 2)
+    given = {row.name: limits.get(row.name, robot.get(row.name)) for row in LIMITS if row.of_motion}
+    # A smallest tension of zero is what taut cables ask for anyway.
+    moving = [name for name, value in given.items() if value is not None and np.any(value)]
+    return ("none", *("cables " + ", ".join(map(str, row)) for row in chosen), "max_acceleration", *moving)
+
+
+# More words than these nobody reads, nor can HDF5 keep them beside a dataset.
+MOST = 1000
+# By the name that a quantity's row gives: words of 0, 1, 2, ... for the settings of a sweep.
+MEANINGS: dict[str, Callable[[Mapping[str, Any]], tuple[str, ...]]] = {"line-bounds": line_bounds}
+
+
+def meanings_of(quantity: Quantity, settings: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """Meanings of a quantity's numbers.
+
+    Args:
+        quantity: its row.
+        settings: of a sweep, as its result has them; None: unknown.
+
+    Returns:
+        the words of 0, 1, 2, ...; none where its numbers are numbers, the settings are unknown, or the words too many.
+    """
+    if not quantity.meanings or not settings:
+        return ()
+    words = MEANINGS[quantity.meanings](settings)
+    return words if len(words) <= MOST else ()
+
+
+def value_attributes(quantity: Quantity, settings: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The CF attributes that explain a quantity's numbers.
+
+    Args:
+        quantity: its row.
+        settings: as for `meanings_of`.
+
+    Returns:
+        flag_values and flag_meanings, one word each; empty where `meanings_of` knows none.
+    """
+    words = meanings_of(quantity, settings)
+    if not words:
+        return {}
+    # Words of CF hold letters, digits and underscores, and lie a space apart.
+    meanings = " ".join(word.replace(", ", "_").replace(" ", "_") for word in words)
+    return {"flag_values": np.arange(len(words), dtype=quantity.kind), "flag_meanings": meanings}
