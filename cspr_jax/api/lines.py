@@ -6,11 +6,12 @@ import numpy as np
 from cspr_jax.api.arguments import points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.limits import given
-from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
-from cspr_jax.problem import prepared
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.problem import limits_over, prepared
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.search.least_time import LeastTimes, least_times
+from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.motion import Placed
 from cspr_jax.trajectories.timed_lines import LAWS, TimedLine, fixed_law, s_curve
 
@@ -45,26 +46,31 @@ def straight_line(
 
 
 def least_time(
-    robot: PointMassRobot, targets: np.ndarray, *, start: np.ndarray, max_acceleration: float | None = None
+    robot: PointMassRobot,
+    targets: np.ndarray,
+    *,
+    start: np.ndarray,
+    max_acceleration: float | None = None,
+    limits: Limits | None = None,
 ) -> LeastTimes:
     """Least durations of the S-model along straight lines, from rest to rest, and of any motion along them.
 
     Args:
-        robot: a point mass on any number of cables, whose spools lie in one plane.
+        robot: a point mass on any number of cables.
         targets: (n, 3) in the robot's axes, m.
         start: (3,) or (n, 3) likewise.
         max_acceleration: largest size of the acceleration, m/s^2; None: taut cables alone bound it.
+        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
 
     Returns:
-        the answers; of a robot with limits, which are not looked at here, undecided ones in place of feasible ones.
+        the answers. Feasible ones are proved; with limits, or of spools that are not in one plane, the least duration
+        is that of a search.
 
     Raises:
-        InputError: another kind of robot, spools that are not in one plane, shapes that do not fit, values that are not
-            finite.
+        InputError: another kind of robot, limits that contradict each other, shapes that do not fit, values that are
+            not finite.
     """
     _check_robot(robot)
-    if not in_one_plane(robot):
-        raise InputError("base_points", robot.base_points.tolist(), "spools in one plane (others do not exist yet)")
     if max_acceleration is not None and not (np.isfinite(max_acceleration) and max_acceleration > 0.0):
         raise InputError("max_acceleration", max_acceleration, "a number > 0, m/s^2")
     ends = points_of("targets", targets)
@@ -77,8 +83,8 @@ def least_time(
     with double_precision():
         own, frame = prepared(robot)
         first = np.broadcast_to(frame.inward(starts), ends.shape).copy()
-        has_limits = bool(given(robot.limits))
-        return least_times(own, first, frame.inward(ends), max_acceleration=largest, has_limits=has_limits)
+        problem = Problem(own, limits_over(robot, limits), named("quintic"))
+        return least_times(problem, first, frame.inward(ends), max_acceleration=largest)
 
 
 def _check_robot(robot: PointMassRobot) -> None:

@@ -1,14 +1,10 @@
 """Maps of least durations along straight lines from one place."""
 
-from typing import Any
-
 import numpy as np
 
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.limits import given
-from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
 from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.robots.point_mass import PLANAR
 from cspr_jax.schema.tiles import Grid
@@ -22,11 +18,8 @@ class LeastTimeMap(PointMassMap):
     any_cables = True
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse spools that are not in one plane, and starts that are none."""
+        """Refuse starts that are none."""
         super().__init__(spec, keys, file)
-        if not in_one_plane(self._problem.robot):
-            place, key = spec.placed("base_points", file)
-            raise ConfigError(place, f"{key}: must lie in one plane in this map (others do not exist yet)")
         start = keys.trajectory.start
         if spec.planar and start is not None and start.position is not None and start.position[1] != 0.0:
             raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")
@@ -40,9 +33,7 @@ class LeastTimeMap(PointMassMap):
         keys = self._keys.trajectory
         largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
         starts, ends = self._starts(cells), self._targets(cells)
-        has_limits = bool(given(self._problem.limits))
-        settings: dict[str, Any] = {"max_acceleration": largest, "has_limits": has_limits}
-        return least_times(self._problem.robot, starts, ends, **settings).arrays()
+        return least_times(self._problem, starts, ends, max_acceleration=largest).arrays()
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""

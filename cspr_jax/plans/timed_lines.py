@@ -1,19 +1,16 @@
 """Leg of straight lines from rest to rest: the S-model, the quintic, the cubic."""
 
-from typing import Any
-
 import numpy as np
 
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
-from cspr_jax.feasibility.point_mass.line_limits import open_limits
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg
 from cspr_jax.plans.stops import Stops
 from cspr_jax.robots.point_mass import AT_P0, spool_radius
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.answers import Answers
-from cspr_jax.search.timed_lines import LineAnswers, timed_lines
+from cspr_jax.search.timed_lines import LineAnswers, motions_of, timed_lines
 from cspr_jax.trajectories.motion import Motion
 
 
@@ -28,55 +25,43 @@ class TimedLines(Leg):
                 raise ConfigError(stops.path, f'{stops.name(i)}.arcs: must be absent with family = "{stops.family}"')
 
     def check(self, problem: Problem) -> None:
-        """Refuse spools that are not in one plane; see `Leg.check`."""
-        if not in_one_plane(problem.robot):
+        """Refuse the rule of the text where spools are not in one plane; see `Leg.check`."""
+        if self.stops.keys.rule == "thesis" and not in_one_plane(problem.robot):
             place, key = self.stops.spec.placed("base_points", self.stops.path)
-            raise ConfigError(
-                place, f'{key}: must lie in one plane for family "{self.stops.family}" (others do not exist yet)'
-            )
+            raise ConfigError(place, f'{key}: must lie in one plane with rule = "thesis"')
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the places; see `Leg.join`."""
-        answers, motions = self._solved(problem, z0)
-        return answers, list(motions)
+        starts, ends = self._ends(problem, np.array([z0]))
+        answers = self._solved(problem, starts, ends)
+        return answers, list(motions_of(answers, starts, ends, law=self.stops.family))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
         """Answers for several depths, on which they depend only by rests in P0; see `Leg.answers`."""
-        parts = [self._solved(problem, float(z0))[0] for z0 in depths]
-        columns = [{name: value for name, value in vars(part).items() if name != "names"} for part in parts]
-        every: dict[str, Any] = {name: np.concatenate([column[name] for column in columns]) for name in columns[0]}
-        return LineAnswers(**every, names=parts[0].names)
+        return self._solved(problem, *self._ends(problem, depths))
 
-    def _solved(self, problem: Problem, z0: float):
-        points, keys = self.stops.points(z0), self.stops.keys
+    def _ends(self, problem: Problem, depths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        # Of all lines, (n_depths * n_lines, 3) each.
+        points = np.stack([self.stops.points(float(z0)) for z0 in depths])
         size = float(spool_radius(problem.robot))
-        for i, apart in enumerate(np.linalg.norm(np.diff(points, axis=0), axis=1), start=1):
-            if not apart > AT_P0 * size:
-                raise ConfigError(
-                    self.stops.path,
-                    f"{self.stops.name(i)}.position: must be another than that of {self.stops.name(i - 1)}, for a line "
-                    "between them",
-                )
-        largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
-        answers, motions = timed_lines(
-            problem,
-            points[:-1],
-            points[1:],
-            law=self.stops.family,
-            rule=keys.rule or "optimum",
-            max_acceleration=largest,
-        )
-        for i, verdict in enumerate(answers.verdict):
-            if verdict == Verdict.NOT_FINITE.value:
-                raise ConfigError(
-                    self.stops.path,
-                    f"max_acceleration is missing: nothing else bounds the acceleration up to {self.stops.name(i + 1)}",
-                )
-        return answers, motions
+        apart = np.linalg.norm(np.diff(points, axis=1), axis=2)
+        for i in (np.flatnonzero((apart <= AT_P0 * size).any(0)) + 1).tolist():
+            raise ConfigError(
+                self.stops.path,
+                f"{self.stops.name(i)}.position: must be another than that of {self.stops.name(i - 1)}, for a line "
+                "between them",
+            )
+        return points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
 
-    def warnings(self, problem: Problem) -> list[str]:
-        """Say that limits are looked at, not optimised; see `Leg.warnings`."""
-        if not open_limits(problem.limits):
-            return []
-        names = ", ".join(row.name for row in open_limits(problem.limits))
-        return [f'{names}: only looked at in samples with family = "{self.stops.family}": refuted or undecided']
+    def _solved(self, problem: Problem, starts: np.ndarray, ends: np.ndarray) -> LineAnswers:
+        keys, law = self.stops.keys, self.stops.family
+        largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
+        rule = keys.rule or "optimum"
+        answers = timed_lines(problem, starts, ends, law=law, rule=rule, max_acceleration=largest)
+        unbounded = np.flatnonzero(answers.verdict == Verdict.NOT_FINITE.value)
+        for i in (unbounded % len(self.stops) + 1).tolist():
+            raise ConfigError(
+                self.stops.path,
+                f"max_acceleration is missing: nothing else bounds the acceleration up to {self.stops.name(i)}",
+            )
+        return answers

@@ -43,7 +43,8 @@ def _case() -> tuple[Sides, float]:
     spec = resolve_robot(keys.robot, CASE, CASE.parent)
     start, end = Sequence(spec, keys, CASE).stops.points(float("nan"))
     largest = float(keys.max_acceleration or np.inf) / float(np.linalg.norm(end - start))
-    bounds = sides(line_faces(kernel_robot(spec, keys, CASE, any_cables=True), start, end), jnp.asarray(largest))
+    faces = line_faces(kernel_robot(spec, keys, CASE, any_cables=True), start, end, in_plane=True)
+    bounds = sides(faces, jnp.asarray(largest))
     return jax.tree.map(np.asarray, bounds), largest
 
 

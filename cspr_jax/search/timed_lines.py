@@ -1,26 +1,18 @@
 """Straight lines from rest to rest in the least time: arrays of ends in, answers out."""
 
 import dataclasses
-import functools
-import operator
-from functools import partial
 from typing import Any
 
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.feasibility.limits import given
-from cspr_jax.feasibility.point_mass.line_faces import LineFaces, line_faces
-from cspr_jax.feasibility.point_mass.line_limits import limit_slacks, open_limits
-from cspr_jax.feasibility.point_mass.line_proof import Proved, smallest_margin
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.answers import Answers
-from cspr_jax.search.least_time import BATCH, TOLERANCE, Rule, least_times
-from cspr_jax.trajectories.timed_lines import TimedLine, fixed_law, s_curve
+from cspr_jax.search.fastest_lines import fastest
+from cspr_jax.search.line_durations import Rule, names_of
+from cspr_jax.search.line_verdicts import laws_of
+from cspr_jax.trajectories.timed_lines import TimedLine
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,11 +49,6 @@ class LineAnswers(Answers):
         }
 
 
-@jax.jit
-def _faces(robot: PointMassRobot, arguments) -> LineFaces:
-    return jax.vmap(partial(line_faces, robot))(*arguments)
-
-
 def timed_lines(
     problem: Problem,
     starts: np.ndarray,
@@ -70,11 +57,11 @@ def timed_lines(
     law: str = "s-curve",
     rule: Rule = "optimum",
     max_acceleration: float = np.inf,
-) -> tuple[LineAnswers, list[TimedLine]]:
-    """The fastest motions along straight lines by a law of time.
+) -> LineAnswers:
+    """The fastest motions along straight lines by a law of time, proved.
 
     Args:
-        problem: robot, on spools in one plane.
+        problem: robot and limits.
         starts: (n, 3) from the centroid of the spools, z down, m; at rest.
         ends: (n, 3) likewise, elsewhere.
         law: one of `trajectories.timed_lines.LAWS`.
@@ -82,57 +69,43 @@ def timed_lines(
         max_acceleration: largest size of the acceleration, m/s^2.
 
     Returns:
-        the answers, margins in m/s^2; the motions, not finite where none is feasible.
+        the answers, margins in m/s^2; durations are NaN where there is no motion.
     """
-    robot, count = problem.robot, len(starts)
-    least = least_times(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
-    faces = in_batches(partial(_faces, robot), (starts, ends), size=BATCH)
-    gravity = float(np.asarray(robot.gravity))
-    motions, verdicts = [], least.verdict.copy()
-    margin, proved = np.minimum(least.rest_margin, 0.0), np.full(count, np.nan)
-    rows, room = given(problem.limits), np.full(count, np.inf)
-    for i in range(count):
-        time, possible = least.duration[i], np.isfinite(least.duration[i])
-        ratio = leaf(least.acceleration_time[i] / time if possible else 0.5)
-        shape = jax.tree.map(np.asarray, s_curve(ratio) if law == "s-curve" else fixed_law(law))
-        motions.append(TimedLine(leaf(starts[i]), leaf(ends[i] - starts[i]), shape, leaf(time)))
-        if not possible:
-            continue
-        found = smallest_margin(jax.tree.map(lambda x, i=i: x[i], faces), shape, float(time), gravity)
-        margin[i], proved[i] = found.margin, found.bound
-        verdicts[i] = _verdict(found, gravity)
-        if rows:
-            slack = np.asarray(_limit_slacks(problem, motions[i]))
-            room[i], verdicts[i] = slack.min(), verdicts[i] | _broken(problem, slack)
-    none, nothing = np.zeros(count, int), np.full(count, np.nan)
-    answers = LineAnswers(
-        none,
-        none,
-        verdicts,
-        least.duration,
-        margin,
-        proved,
-        room,
-        nothing,
-        least.acceleration_time,
-        least.least_duration,
-        np.stack([least.active_up, least.active_down], axis=1),
-        least.names,
+    found, own, moves = fastest(
+        problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=True
     )
-    return answers, motions
+    none, nothing = np.zeros(len(starts), int), np.full(len(starts), np.nan)
+    duration = np.where(moves, found.duration, np.nan)
+    return LineAnswers(
+        none,
+        none,
+        own.verdict,
+        duration,
+        own.margin,
+        own.bound,
+        own.room,
+        nothing,
+        np.where(moves, found.ratio, 0.5) * duration,
+        np.where(moves, found.least, np.nan),
+        np.stack([np.where(moves, x + 1, 0) for x in (found.up, found.down)], axis=1),
+        names_of(problem.robot, problem.limits),
+    )
 
 
-_limit_slacks = jax.jit(limit_slacks)
+def motions_of(answers: LineAnswers, starts: np.ndarray, ends: np.ndarray, *, law: str) -> list[TimedLine]:
+    """Motions along straight lines.
 
+    Args:
+        answers: of the lines.
+        starts: (n, 3) from the centroid of the spools, z down, m.
+        ends: (n, 3) likewise.
+        law: one of `trajectories.timed_lines.LAWS`.
 
-def _broken(problem: Problem, slack: np.ndarray) -> int:
-    # A sample refutes; only at ends it proves.
-    flags = Verdict.UNDECIDED.value if open_limits(problem.limits) else 0
-    broken = [row.flag.value for row, value in zip(given(problem.limits), slack, strict=True) if not value > 0.0]
-    return functools.reduce(operator.or_, broken) if broken else flags
-
-
-def _verdict(found: Proved, gravity: float) -> int:
-    if found.bound > TOLERANCE * gravity:
-        return 0
-    return (Verdict.SLACK_CABLE if found.margin < -TOLERANCE * gravity else Verdict.UNDECIDED).value
+    Returns:
+        one each; not finite where there is none.
+    """
+    with np.errstate(invalid="ignore"):
+        ratios = answers.acceleration_time / answers.duration
+    laws = laws_of(law, np.where(np.isfinite(ratios), ratios, 0.5))
+    rows = (starts, ends - starts, laws, answers.duration)
+    return [TimedLine(*jax.tree.map(lambda x, i=i: leaf(x[i]), rows)) for i in range(len(starts))]

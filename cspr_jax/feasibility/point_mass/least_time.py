@@ -140,21 +140,27 @@ def least_of_law(law: Amplitude, sides: Sides) -> Least:
     return Least(jnp.full_like(gain, 0.5), duration, jnp.argmin(up), jnp.argmin(down))
 
 
-def least_time(sides: Sides) -> Array:
+def least_time(sides: Sides, *, everywhere: bool = True) -> Array:
     """Least duration of any motion along a line from rest to rest: it accelerates at the bound, then brakes at it.
 
     Args:
         sides: bounds of a line, those at its ends positive and finite.
+        everywhere: whether each bound is known to hold on all of the line, or nowhere.
 
     Returns:
-        () s.
+        () s; 0 where on a part of the line nothing bounds the acceleration, or a place can be passed only in motion.
     """
     braking = (sides.down + sides.down_slope, -sides.down_slope)  # over s
-    nodes = jnp.concatenate([_crossings(sides.up, sides.up_slope), _crossings(*braking)])
+    parts = [] if everywhere else [sides.first, sides.last]
+    nodes = jnp.concatenate([_crossings(sides.up, sides.up_slope), _crossings(*braking), *parts])
     x = jnp.sort(jnp.concatenate([jnp.array([0.0, 1.0]), nodes]))
     middle = 0.5 * (x[:-1] + x[1:])
-    up, up_slope = _lowest(sides.up, sides.up_slope, middle)
-    down, down_slope = _lowest(*braking, middle)
+    holds = None if everywhere else (sides.first[None] <= middle[:, None]) & (middle[:, None] <= sides.last[None])
+    up, up_slope = _lowest(sides.up, sides.up_slope, middle, holds)
+    down, down_slope = _lowest(*braking, middle, holds)
+    if not everywhere:
+        known = _is_positive(up, up_slope, x) & _is_positive(down, down_slope, x)
+        up, down = jnp.where(known, up, 1.0), jnp.where(known, down, 1.0)
 
     def work(start, slope):
         return (x[1:] - x[:-1]) * (start + slope * middle)
@@ -172,7 +178,13 @@ def least_time(sides: Sides) -> Array:
     late = _time(
         1.0 - jnp.maximum(x, switch)[::-1], 1.0 - x[::-1], lost[::-1][:-1], (down + down_slope)[::-1], -down_slope[::-1]
     )
-    return early + late
+    return early + late if everywhere else jnp.where(known.all(), early + late, 0.0)
+
+
+def _is_positive(start: Array, slope: Array, nodes: Array) -> Array:
+    # Of each interval whether its bound is finite, and positive at both ends.
+    ends = start + slope * nodes[:-1], start + slope * nodes[1:]
+    return jnp.isfinite(start) & ((jnp.minimum(*ends) > 0.0) | (nodes[1:] <= nodes[:-1]))
 
 
 def _crossings(start: Array, slope: Array) -> Array:
@@ -183,9 +195,14 @@ def _crossings(start: Array, slope: Array) -> Array:
     return jnp.clip(place, 0.0, 1.0)
 
 
-def _lowest(start: Array, slope: Array, places: Array) -> tuple[Array, Array]:
-    which = jnp.argmin(start[None] + slope[None] * places[:, None], axis=1)
-    return start[which], slope[which]
+def _lowest(start: Array, slope: Array, places: Array, holds: Array | None) -> tuple[Array, Array]:
+    values = start[None] + slope[None] * places[:, None]
+    if holds is None:
+        which = jnp.argmin(values, axis=1)
+        return start[which], slope[which]
+    values = jnp.where(holds, values, jnp.inf)
+    which = jnp.argmin(values, axis=1)
+    return jnp.where(jnp.isfinite(values.min(1)), start[which], jnp.inf), slope[which]
 
 
 def _time(stops: Array, nodes: Array, energy: Array, start: Array, slope: Array) -> Array:

@@ -2,8 +2,9 @@
 
 On the line X0 + D s the normal to two cables' directions, times their lengths, is affine in s, and its product with D
 does not depend on s at all: n(s) . D = n(0) . D, since each of its changes is normal to D. So every face of the cone of
-feasible accelerations is a straight boundary in the plane of s and s'', Boralugoda (15) to (21), here for any spools
-in one plane. Where they are not, which faces bound the cone can change along the line.
+feasible accelerations is a straight boundary in the plane of s and s'', Boralugoda (15) to (21), here for any spools.
+The product of n(s) with another cable's ray is affine too: a face bounds the cone from where all of them are positive
+to where one no longer is. Of spools in one plane that is everywhere or nowhere below them.
 """
 
 import dataclasses
@@ -32,9 +33,12 @@ class LineFaces:
         steepness: (..., n_faces) n . D.
         offset: (..., n_faces) n . g at the start.
         slope: (..., n_faces) change of n . g from start to end.
-        normal: (..., n_faces, 3) n at the start.
+        normal: (..., n_faces, 3) n at the start, to the side of the other cables.
         turn: (..., n_faces, 3) change of n from start to end.
-        bounds: (..., n_faces) whether it bounds the accelerations.
+        along: (..., n_faces, n_cables) product of n with each ray to a spool at the start; 0 of rays in the face.
+        along_turn: (..., n_faces, n_cables) its change from start to end.
+        first: (..., n_faces) s from which on it bounds the accelerations of taut cables.
+        last: (..., n_faces) s up to which it does; not above `first` if it bounds none.
     """
 
     steepness: Array
@@ -42,7 +46,15 @@ class LineFaces:
     slope: Array
     normal: Array
     turn: Array
-    bounds: Array
+    along: Array
+    along_turn: Array
+    first: Array
+    last: Array
+
+    @property
+    def bounds(self) -> Array:
+        """Whether it bounds the accelerations of taut cables anywhere on the line, (..., n_faces)."""
+        return self.last > self.first
 
 
 def in_one_plane(robot: PointMassRobot) -> bool:
@@ -61,48 +73,70 @@ def in_one_plane(robot: PointMassRobot) -> bool:
     return bool(sizes[robot.dof - 1] <= IN_PLANE * sizes[0])
 
 
-def _normals(robot: PointMassRobot, place: Array) -> Array:
-    # Of rays that keep their lengths.
+def _normals(robot: PointMassRobot, place: Array) -> tuple[Array, Array]:
+    # Of rays that keep their lengths, (n_choices, 3), and their products with the rays, (n_choices, n_cables).
     rays = robot.base_points - place[None]
     if robot.dof == PLANAR:
         level = normals_to(rays[:, [0, 2]].T)
-        return jnp.stack([level[:, 0], jnp.zeros_like(level[:, 0]), level[:, 1]], axis=1)
-    return normals_to(rays.T)
+        normal = jnp.stack([level[:, 0], jnp.zeros_like(level[:, 0]), level[:, 1]], axis=1)
+    else:
+        normal = normals_to(rays.T)
+    size = jnp.linalg.norm(normal, axis=1)[:, None] * jnp.linalg.norm(rays, axis=1)[None]
+    along = normal @ rays.T
+    own = np.zeros(along.shape, bool)
+    np.put_along_axis(own, spanning(robot.n_cables, robot.dof), True, axis=1)
+    return normal, jnp.where(own | (jnp.abs(along) <= FLAT * size), 0.0, along)
 
 
-def line_faces(robot: PointMassRobot, start: Array, end: Array) -> LineFaces:
+def line_faces(robot: PointMassRobot, start: Array, end: Array, *, in_plane: bool) -> LineFaces:
     """Half-planes of a line between two points.
 
     Args:
-        robot: a point mass on spools in one plane, z down.
+        robot: a point mass, z down.
         start: (3,) from the centroid of the spools, m.
         end: (3,) likewise.
+        in_plane: whether the spools are known to lie in one plane, with both points below it: then one side of each
+            face will do.
 
     Returns:
-        one for each choice of cables that span a face, in the order of `wrench_sets.spanning`.
+        one for each choice of cables that span a face, in the order of `wrench_sets.spanning`; those of the other side
+        follow unless `in_plane`.
     """
-    at_start, at_end = _normals(robot, start), _normals(robot, end)
-    # Which side the other cables are on is the same everywhere below the spools: seen from far enough below them.
-    below_all = jnp.zeros_like(start).at[2].set(spool_radius(robot))
-    rays, seen = robot.base_points - below_all[None], _normals(robot, below_all)
-    along = seen @ rays.T
-    scale = jnp.linalg.norm(seen, axis=1)[:, None] * jnp.linalg.norm(rays, axis=1)[None]
-    own = np.zeros(along.shape, bool)
-    np.put_along_axis(own, spanning(robot.n_cables, robot.dof), True, axis=1)
-    share = jnp.where(own, 0.0, along / jnp.where(scale > 0.0, scale, 1.0))
-    above, below = (share > FLAT).any(1), (share < -FLAT).any(1)
-    side = jnp.where(above, 1.0, -1.0)
+    (normal, along), (at_end, along_end) = _normals(robot, start), _normals(robot, end)
+    if in_plane:
+        # Which side the other cables are on is the same everywhere below the spools: seen from far enough below them.
+        _, seen = _normals(robot, jnp.zeros_like(start).at[2].set(spool_radius(robot)))
+        above, below = (seen > 0.0).any(1), (seen < 0.0).any(1)
+        side = jnp.where(above, 1.0, -1.0)[:, None]
+        normal, at_end, along, along_end = side * normal, side * at_end, side * along, side * along_end
+        first, last = jnp.zeros_like(side[:, 0]), jnp.where(above ^ below, 1.0, 0.0)
+    else:
+        normal, at_end, along, along_end = (jnp.concatenate([x, -x]) for x in (normal, at_end, along, along_end))
+        first, last = _bounding(along, along_end)
     free_fall = -relative_acceleration(robot, jnp.zeros_like(start))
-    normal, turn = side[:, None] * at_start, side[:, None] * (at_end - at_start)
-    direction = end - start
+    turn = at_end - normal
     return LineFaces(
-        steepness=normal @ direction,
+        steepness=normal @ (end - start),
         offset=normal @ free_fall,
         slope=turn @ free_fall,
         normal=normal,
         turn=turn,
-        bounds=above ^ below,
+        along=along,
+        along_turn=along_end - along,
+        first=first,
+        last=last,
     )
+
+
+def _bounding(start: Array, end: Array) -> tuple[Array, Array]:
+    # Where no product is negative and some are positive.
+    change = start - end
+    crossing = start / jnp.where(change != 0.0, change, 1.0)
+    first = jnp.max(jnp.where((start < 0.0) & (end > 0.0), crossing, 0.0), axis=1)
+    last = jnp.min(jnp.where((start > 0.0) & (end < 0.0), crossing, 1.0), axis=1)
+    never = ((start <= 0.0) & (end <= 0.0) & ((start < 0.0) | (end < 0.0))).any(1)
+    flat = ((start == 0.0) & (end == 0.0)).all(1)
+    return first, jnp.where(never | flat, first, last)
 
 
 class Sides(NamedTuple):
@@ -113,12 +147,16 @@ class Sides(NamedTuple):
         up_slope: (..., n_faces + 1) its change from start to end.
         down: (..., n_faces + 1) largest -s'' at the end; inf likewise.
         down_slope: (..., n_faces + 1) its change from end to start.
+        first: (..., n_faces + 1) s from which on it holds.
+        last: (..., n_faces + 1) s up to which it holds.
     """
 
     up: Array
     up_slope: Array
     down: Array
     down_slope: Array
+    first: Array
+    last: Array
 
 
 def sides(faces: LineFaces, largest: Array) -> Sides:
@@ -141,4 +179,8 @@ def sides(faces: LineFaces, largest: Array) -> Sides:
         value, slope = jnp.where(wanted, value, jnp.inf), jnp.where(wanted, slope, 0.0)
         return jnp.concatenate([value, largest[None]]), jnp.concatenate([slope, flat[None]])
 
-    return Sides(*with_largest(is_up, start, change), *with_largest(is_down, -(start + change), change))
+    up, up_slope = with_largest(is_up, start, change)
+    down, down_slope = with_largest(is_down, -(start + change), change)
+    always = jnp.ones_like(largest)[None]
+    first, last = jnp.concatenate([faces.first, 0.0 * always]), jnp.concatenate([faces.last, always])
+    return Sides(up, up_slope, down, down_slope, first, last)

@@ -1,0 +1,153 @@
+"""Interval jets: bounds of a function and of its first two derivatives over many blocks at once.
+
+Formulas of +, -, *, ** that are written for arrays take jets as well. Derivatives follow from the rules of products
+and chains, in interval arithmetic. Bounds of the second derivative are what they are for: over a block of width w no
+value lies further below the chord of its ends than w^2 / 8 times the largest second derivative.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+Interval = tuple[np.ndarray, np.ndarray]
+
+
+def _product(a: Interval, b: Interval) -> Interval:
+    corners = [x * y for x in a for y in b]
+    return np.minimum.reduce(corners), np.maximum.reduce(corners)
+
+
+def _sum(a: Interval, b: Interval) -> Interval:
+    return a[0] + b[0], a[1] + b[1]
+
+
+def _square(a: Interval) -> Interval:
+    low, high = a[0] ** 2, a[1] ** 2
+    return np.where((a[0] < 0.0) & (a[1] > 0.0), 0.0, np.minimum(low, high)), np.maximum(low, high)
+
+
+def _scaled(a: Interval, factor: Any) -> Interval:
+    ends = a[0] * factor, a[1] * factor
+    return np.minimum(*ends), np.maximum(*ends)
+
+
+class Jet:
+    """Bounds over blocks.
+
+    Args:
+        value: lower and upper bounds of the values, arrays of the blocks' shape.
+        slope: likewise of the first derivative.
+        bend: likewise of the second one.
+    """
+
+    # Arrays leave products with jets to the jets.
+    __array_ufunc__ = None
+
+    def __init__(self, value: Interval, slope: Interval, bend: Interval) -> None:
+        """Keep them."""
+        self.value, self.slope, self.bend = value, slope, bend
+
+    def _each(self, change: Callable[..., np.ndarray], *others: "Jet") -> "Jet":
+        jets = (self, *others)
+        parts = zip(*((jet.value, jet.slope, jet.bend) for jet in jets), strict=True)
+        return Jet(*((change(*(x[0] for x in part)), change(*(x[1] for x in part))) for part in parts))
+
+    def expanded(self, axis: int) -> "Jet":
+        """The same bounds with one more dimension.
+
+        Args:
+            axis: where, of length 1.
+
+        Returns:
+            the bounds.
+        """
+        return self._each(lambda x: np.expand_dims(x, axis))
+
+    def joined(self, other: "Jet") -> "Jet":
+        """Bounds of two functions side by side in the last dimension.
+
+        Args:
+            other: of the same shape.
+
+        Returns:
+            the bounds.
+        """
+        return self._each(lambda x, y: np.concatenate(np.broadcast_arrays(x, y), axis=-1), other)
+
+    def summed(self) -> "Jet":
+        """Bounds of the sum over the last dimension.
+
+        Returns:
+            the bounds.
+        """
+        return self._each(lambda x: x.sum(-1))
+
+    def __add__(self, other: Any) -> "Jet":
+        """Sum with a jet or with constants."""
+        if not isinstance(other, Jet):
+            return Jet((self.value[0] + other, self.value[1] + other), self.slope, self.bend)
+        return Jet(_sum(self.value, other.value), _sum(self.slope, other.slope), _sum(self.bend, other.bend))
+
+    def __mul__(self, other: Any) -> "Jet":
+        """Product with a jet or with constants."""
+        if not isinstance(other, Jet):
+            return Jet(*(_scaled(x, other) for x in (self.value, self.slope, self.bend)))
+        crossed = _scaled(_product(self.slope, other.slope), 2.0)
+        bend = _sum(_sum(_product(self.bend, other.value), crossed), _product(self.value, other.bend))
+        slope = _sum(_product(self.slope, other.value), _product(self.value, other.slope))
+        return Jet(_product(self.value, other.value), slope, bend)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __neg__(self) -> "Jet":
+        """Opposite."""
+        return self * -1.0
+
+    def __sub__(self, other: Any) -> "Jet":
+        """Difference from a jet or from constants."""
+        return self + -other
+
+    def __rsub__(self, other: Any) -> "Jet":
+        """Difference of constants from this one."""
+        return -self + other
+
+    def __pow__(self, power: float) -> "Jet":
+        """Square, or any other power of a function whose values are positive."""
+        if power == 2:
+            chained = _sum(_square(self.slope), _product(self.value, self.bend))
+            return Jet(_square(self.value), _scaled(_product(self.value, self.slope), 2.0), _scaled(chained, 2.0))
+        low, high = self.value
+        positive = np.where(low > 0.0, low, 0.0), np.where(high > 0.0, high, 0.0)
+
+        def derivative(order: int) -> Interval:
+            factor = np.prod([power - i for i in range(order)])
+            ends = [x ** (power - order) for x in positive]
+            return _scaled((np.minimum(*ends), np.maximum(*ends)), factor)
+
+        with np.errstate(divide="ignore", invalid="ignore"):
+            first = derivative(1)
+            bend = _sum(_product(derivative(2), _square(self.slope)), _product(first, self.bend))
+            return Jet(derivative(0), _product(first, self.slope), bend)
+
+    def __truediv__(self, other: Any) -> "Jet":
+        """Quotient by a jet of positive values, or by constants."""
+        return self * (other**-1.0 if isinstance(other, Jet) else 1.0 / other)
+
+
+def lowest(ends: np.ndarray, jet: Jet) -> np.ndarray:
+    """Lower bounds of a function over blocks.
+
+    Args:
+        ends: (2, ...) its values at both ends of each block, of width 1.
+        jet: bounds over the blocks.
+
+    Returns:
+        (...); -inf where nothing is known.
+    """
+    least = ends.min(0)
+    with np.errstate(invalid="ignore"):
+        low = least - np.maximum(jet.bend[1], 0.0) / 8.0
+        # Where the slope has one sign, no value lies below the lower end.
+        steady = (jet.slope[0] >= 0.0) | (jet.slope[1] <= 0.0)
+    return np.where(steady, least, np.where(np.isnan(low), -np.inf, low))

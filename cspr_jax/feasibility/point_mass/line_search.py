@@ -1,0 +1,151 @@
+"""Least duration along a straight line under any limits, by search over the ratio p / T.
+
+For one law every slack is affine in q = 1 / T^2, so that each instant bounds q from above, or, where the robot could
+not rest, from below. The largest q is looked for at samples, between which a parabola through three of them corrects
+each smallest bound; the ratio is looked for on finer and finer grids.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.feasibility.point_mass.least_time import Least
+from cspr_jax.feasibility.point_mass.line_slacks import Instants, LineSlacks, slacks, tensions_at
+from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
+from cspr_jax.trajectories.timed_lines import s_curve
+
+# Samples of a piece of the S-model, and of half of another law.
+SAMPLES = 33
+HALF = 2 * SAMPLES
+# Ratios looked at first, as logits; then so often between the neighbours of the best one, in parts of their distance.
+LOGITS = np.linspace(-6.0, 6.0, 49)
+FINER, ROUNDS = np.linspace(-1.0, 1.0, 7), 14
+# Parts of a duration by which what a search found is made longer, one after the other, until it is proved.
+LONGER = (1e-7, 1e-6, 1e-5, 1e-3)
+
+
+class Gain(NamedTuple):
+    """Feasible q = 1 / T^2 of one law along a line.
+
+    Fields:
+        high: () largest q, 1/s^2; not above 0 if there is none.
+        low: () smallest q, 1/s^2: 0 unless places are passed at which the robot could not rest.
+        up: number of the row that bounds it in the first half.
+        down: likewise in the second.
+    """
+
+    high: Array
+    low: Array
+    up: Array
+    down: Array
+
+
+def gain(line: LineSlacks, law: Amplitude, edges: Array, middle: Array, largest: Array) -> Gain:
+    """Feasible q of one law.
+
+    Args:
+        line: slacks along it.
+        law: s(tau).
+        edges: (n_pieces + 1,) instants between which the law is smooth.
+        middle: () instant that parts the halves.
+        largest: () largest size of s'', inf for none, 1/s^2.
+
+    Returns:
+        the range; rows count the groups in their order, and at the end the largest acceleration.
+    """
+    share = jnp.linspace(0.0, 1.0, SAMPLES if edges.shape[0] > 2 else 2 * HALF)
+    tau = edges[:-1, None] + jnp.diff(edges)[:, None] * share[None]
+    s, speed, bend = (x[..., None] for x in derivatives(law, tau, order=2))
+    bound, burden = [], []
+    # At rest, and at q = 1: (2, n_pieces, n_samples, 1).
+    both = jnp.asarray([0.0, 1.0])[:, None, None, None]
+    instants = Instants(s[None], both * speed[None] ** 2, both * bend[None])
+    line = jax.tree.map(lambda x: x[None, None, None], line)
+    for name in line.names:
+        tensions = tensions_at(line, name, s[None]) if name in line.low else None
+        still, moving = slacks(line, name, instants, tensions)
+        is_finite = jnp.isfinite(still)
+        bound.append(jnp.where(is_finite, still, 1.0))
+        burden.append(jnp.where(is_finite, still - moving, 0.0))
+    bound.append(jnp.broadcast_to(largest[None, None, None], bend.shape))
+    burden.append(jnp.abs(bend))
+    most, needed = jnp.concatenate(bound, axis=-1), jnp.concatenate(burden, axis=-1)
+    above = jnp.where(needed > 0.0, most / jnp.where(needed > 0.0, needed, 1.0), jnp.inf)
+    above = jnp.where((most < 0.0) & (needed >= 0.0), -1.0, _between(above))
+    below = jnp.where((most < 0.0) & (needed < 0.0), most / jnp.where(needed < 0.0, needed, 1.0), 0.0)
+    first = (tau <= middle)[..., None]
+    up, down = (jnp.min(jnp.where(half, above, jnp.inf), axis=(0, 1)) for half in (first, ~first))
+    return Gain(jnp.minimum(jnp.min(up), jnp.min(down)), jnp.max(below), jnp.argmin(up), jnp.argmin(down))
+
+
+def _between(values: Array) -> Array:
+    # Samples (n_pieces, n_samples, n_rows) that are the smallest of three, lowered to the parabola's vertex.
+    left, middle, right = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    is_low = (middle <= left) & (middle <= right) & jnp.isfinite(left) & jnp.isfinite(right)
+    a, b, c = (jnp.where(is_low, x, 0.0) for x in (left, middle, right))
+    curvature = a - 2.0 * b + c
+    lower = b - (c - a) ** 2 / (8.0 * jnp.where(curvature > 0.0, curvature, 1.0))
+    return values.at[:, 1:-1].set(jnp.where(is_low & (curvature > 0.0), lower, middle))
+
+
+def gain_of_law(line: LineSlacks, ratio: Array, largest: Array, law: Amplitude | None) -> Gain:
+    """Feasible q of one motion.
+
+    Args:
+        line: slacks along it.
+        ratio: () p / T of the S-model.
+        largest: () largest size of s'', inf for none, 1/s^2.
+        law: s(tau) without a parameter; None: the S-model.
+
+    Returns:
+        the range.
+    """
+    if law is not None:
+        return gain(line, law, jnp.asarray([0.0, 1.0]), jnp.asarray(0.5), largest)
+    edges = jnp.stack([0.0 * ratio, 0.5 * ratio, ratio, 0.5 * (1.0 + ratio), jnp.ones_like(ratio)])
+    return gain(line, s_curve(ratio), edges, ratio, largest)
+
+
+def least_by_search(line: LineSlacks, largest: Array, law: Amplitude | None) -> Least:
+    """Least duration along a line under its limits.
+
+    Args:
+        line: slacks along it.
+        largest: () largest size of s'', inf for none, 1/s^2.
+        law: s(tau) without a parameter; None: the S-model.
+
+    Returns:
+        ratio and duration, inf where none was found; the numbers are of rows.
+    """
+    if law is not None:
+        half = jnp.asarray(0.5)
+        return _least(gain_of_law(line, half, largest, law), half)
+
+    def cost(logit):
+        found = gain_of_law(line, jax.nn.sigmoid(logit), largest, None)
+        return jnp.where(found.low <= found.high, -found.high, jnp.maximum(found.low, 0.0)), found
+
+    logits = jnp.asarray(LOGITS)
+    place = logits[jnp.argmin(lax.map(cost, logits)[0])]
+    width = logits[1] - logits[0]
+
+    def finer(_, best):
+        # Between the neighbours of the best one so far.
+        place, width, _ = best
+        points = place + width * jnp.asarray(FINER)
+        costs, found = lax.map(cost, points)
+        i = jnp.argmin(costs)
+        return points[i], width * (FINER[1] - FINER[0]), jax.tree.map(lambda x: x[i], found)
+
+    none = Gain(jnp.zeros_like(place), jnp.zeros_like(place), jnp.asarray(0), jnp.asarray(0))
+    logit, _, found = lax.fori_loop(0, ROUNDS, finer, (place, width, none))
+    return _least(found, jax.nn.sigmoid(logit))
+
+
+def _least(found: Gain, ratio: Array) -> Least:
+    is_feasible = (found.high > 0.0) & (found.low <= found.high)
+    duration = jnp.where(is_feasible, 1.0 / jnp.sqrt(jnp.where(is_feasible, found.high, 1.0)), jnp.inf)
+    return Least(ratio, duration, found.up, found.down)

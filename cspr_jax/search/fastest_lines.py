@@ -1,0 +1,121 @@
+"""Fastest motions along straight lines with their verdicts: formulas first, a search where these break a limit."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.feasibility.limits import given
+from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
+from cspr_jax.feasibility.point_mass.line_search import LONGER
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.line_durations import Durations, Rule, by_cells, by_formula, by_search, moving
+from cspr_jax.search.line_verdicts import TOLERANCE, Verdicts, limits_at_rest, verdicts
+
+# Over the size of a robot: ends nearer to each other are one place.
+SAME_PLACE = 1e-12
+# Parts of a duration below which their digits are lost in what the formulas promise.
+SHORT = 1e-6
+
+
+class Fastest(NamedTuple):
+    """Fastest motions along n lines, (n,) each.
+
+    Fields:
+        durations: finite where there is a motion; 0 where both ends are one place.
+        verdicts: of the motions, or why there is none.
+        moves: whether there is a motion between two places.
+    """
+
+    durations: Durations
+    verdicts: Verdicts
+    moves: np.ndarray
+
+
+def fastest(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    *,
+    law: str,
+    rule: Rule,
+    max_acceleration: float,
+    sharp: bool,
+) -> Fastest:
+    """Fastest motions along straight lines.
+
+    Args:
+        problem: robot, a point mass, centred, z down, and limits.
+        starts: (n, 3) m; at rest.
+        ends: (n, 3) m; at rest.
+        law: one of `trajectories.timed_lines.LAWS`.
+        rule: of the S-model: "thesis" knows no limits, and spools in one plane only.
+        max_acceleration: largest size of the acceleration, m/s^2.
+        sharp: whether margins are wanted, and not verdicts only.
+
+    Returns:
+        the motions.
+    """
+    robot, in_plane = problem.robot, in_one_plane(problem.robot)
+    found = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
+    own, may_move = _at_rest(problem, starts, ends, found)
+    judged = partial(verdicts, problem, law=law, sharp=sharp)
+    if in_plane and not (sharp or given(problem.limits)):
+        is_short = (np.minimum(found.ratio, 1.0 - found.ratio) < SHORT) & (law == "s-curve")
+        own.verdict[may_move & is_short] = Verdict.UNDECIDED.value
+    elif in_plane and may_move.any():
+        some = np.flatnonzero(may_move)
+        own.replace(some, judged(starts[some], ends[some], found.part(some)))
+    some = np.flatnonzero(may_move & ((own.verdict != 0) | ~in_plane))
+    if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(some) > 0:
+        before, places = found.part(some), (starts[some], ends[some])
+        searched = by_search(problem, *places, before, law=law, max_acceleration=max_acceleration)
+        durations, part = _proved(judged, *places, searched, own.verdict[some])
+        own.replace(some, part)
+        found.replace(some, durations)
+    moves = may_move & np.isfinite(found.duration)
+    some = np.flatnonzero(moves & (bool(moving(problem.limits)) | (found.least == 0.0)))
+    if len(some) > 0:
+        cells = by_cells(problem, starts[some], ends[some], max_acceleration)
+        found.least[some] = np.maximum(found.least[some], cells)
+    return Fastest(found, own, moves)
+
+
+def _at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, found: Durations) -> tuple[Verdicts, np.ndarray]:
+    # Why there can be no motion, and where there can be one.
+    doubt = TOLERANCE * float(np.asarray(problem.robot.gravity))
+    size = float(np.abs(np.asarray(problem.robot.base_points)).max())
+    is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * size
+    above, slack = ~(found.depth > 0.0), found.rest < -doubt
+    flags = np.where(above, Verdict.ABOVE_SPOOLS.value, 0) | np.where(above | slack, Verdict.SLACK_CABLE.value, 0)
+    flags |= np.where(flags == 0, limits_at_rest(problem, starts, ends), 0)
+    rests = (flags == 0) & (found.rest > doubt)
+    open_ended = np.where(found.is_bounded, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value)
+    # With limits on places alone the motion is shown all the same.
+    may_move = ~above & (found.rest > doubt) & ~is_same & found.is_bounded
+    verdict = np.where(may_move | (rests & is_same), 0, np.where(flags > 0, flags, open_ended)).astype(np.uint16)
+    nothing = np.full(len(starts), np.nan)
+    margin = np.minimum(np.where(above, np.nan, found.rest), 0.0)
+    return Verdicts(verdict, margin, nothing.copy(), np.full(len(starts), np.inf)), may_move
+
+
+def _proved(
+    judged: Callable[..., Verdicts], starts: np.ndarray, ends: np.ndarray, found: Durations, before: np.ndarray
+) -> tuple[Durations, Verdicts]:
+    # What a search found is made longer until it is proved; without a motion, the flags of the one by formulas stand.
+    nothing = np.full(len(starts), np.nan)
+    flags = np.where(before > 0, before, Verdict.UNDECIDED.value).astype(np.uint16)
+    own = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))
+    durations = found.part(np.arange(len(starts)))
+    durations.duration[~np.isfinite(found.duration)] = np.nan
+    some = np.flatnonzero(np.isfinite(found.duration))
+    for longer in LONGER:
+        if len(some) == 0:
+            break
+        durations.duration[some] = found.duration[some] * (1.0 + longer)
+        part = judged(starts[some], ends[some], durations.part(some))
+        own.replace(some, part)
+        some = some[part.verdict != 0]
+    return durations, own

@@ -1,0 +1,156 @@
+"""Verdicts of motions along straight lines: proved where every slack has a bound above zero, refuted by one below."""
+
+import dataclasses
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.feasibility.accelerations import faces_at
+from cspr_jax.feasibility.limits import given, scales, slack
+from cspr_jax.feasibility.point_mass.line_proof import smallest_slacks
+from cspr_jax.feasibility.point_mass.line_slacks import TAUT
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.line_durations import BATCH, Durations, lines_of
+from cspr_jax.trajectories.amplitudes import Amplitude
+from cspr_jax.trajectories.timed_lines import fixed_law, s_curve
+
+# Over gravity, or the size of a limit: margins nearer to zero are undecided, and rest with a smaller margin is none.
+TOLERANCE = 1e-12
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdicts:
+    """Verdicts of n motions, (n,) each.
+
+    Fields:
+        verdict: flags of `Verdict`; 0 if proved.
+        margin: smallest distance from the faces of taut cables that is attained, m/s^2.
+        bound: proved lower bound of it, m/s^2.
+        room: smallest slack of the limits, without a unit; inf without limits.
+    """
+
+    verdict: np.ndarray
+    margin: np.ndarray
+    bound: np.ndarray
+    room: np.ndarray
+
+    def replace(self, which: np.ndarray, part: "Verdicts") -> None:
+        """Put other verdicts in place of some.
+
+        Args:
+            which: numbers of the motions.
+            part: theirs.
+        """
+        for name, values in vars(part).items():
+            getattr(self, name)[which] = values
+
+
+@jax.jit
+def _s_curves(ratios) -> Amplitude:
+    return jax.vmap(s_curve)(ratios)
+
+
+def laws_of(law: str, ratios: np.ndarray) -> Amplitude:
+    """Laws of time.
+
+    Args:
+        law: one of `trajectories.timed_lines.LAWS`.
+        ratios: (n,) p / T of the S-model.
+
+    Returns:
+        NumPy leaves with a leading dimension n.
+    """
+    if law == "s-curve":
+        return in_batches(_s_curves, ratios, size=BATCH)
+    one = jax.tree.map(np.asarray, fixed_law(law))
+    return jax.tree.map(lambda x: np.broadcast_to(x, (len(ratios), *x.shape)), one)
+
+
+def verdicts(
+    problem: Problem, starts: np.ndarray, ends: np.ndarray, found: Durations, *, law: str, sharp: bool
+) -> Verdicts:
+    """Verdicts of motions whose durations are known.
+
+    Args:
+        problem: robot and limits.
+        starts: (n, 3) m.
+        ends: (n, 3) m, elsewhere.
+        found: finite durations.
+        law: of time.
+        sharp: whether margins are wanted, and not verdicts only.
+
+    Returns:
+        the verdicts.
+    """
+    gravity = float(np.asarray(problem.robot.gravity))
+    lines = lines_of(problem, starts, ends)
+    enough = np.inf if sharp else TOLERANCE
+    proved = smallest_slacks(lines, laws_of(law, found.ratio), found.duration, gravity, enough=enough)
+    doubt = TOLERANCE * np.array([gravity if name in lines.low else 1.0 for name in lines.names])
+    own_flags = {row.name: row.flag.value for row in LIMITS} | {TAUT: Verdict.SLACK_CABLE.value}
+    flags = np.where(proved.attained < -doubt, [own_flags[name] for name in lines.names], 0)
+    room, broken, doubtful = _at_ends(problem, starts, ends)
+    for name, values in zip(lines.names[1:], proved.attained.T[1:], strict=True):
+        room = np.minimum(room, _shown(name, values, gravity))
+    broken |= np.bitwise_or.reduce(flags, axis=1)
+    is_open = (proved.bound <= doubt).any(1) | doubtful
+    verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(np.uint16)
+    return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
+
+
+def _shown(name: str, values: np.ndarray, gravity: float) -> np.ndarray:
+    # Slacks of a limit without a unit.
+    if name == "cable_speed_max":
+        return 1.0 - np.sqrt(np.maximum(1.0 - values, 0.0))
+    return values / gravity if name.startswith("tension") else values
+
+
+def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    # Smallest slack, flags and doubts, (n,) each, of limits on places: lengths are convex in s, depths linear.
+    robot, places = problem.robot, np.stack([starts, ends], axis=1)
+    lengths = np.linalg.norm(places[:, :, None] - np.asarray(robot.base_points), axis=3)
+    each: dict[str, Any] = {"depth": places[..., 2:], "length": lengths}
+    scale: Any = scales(robot.n_cables, robot.mass * robot.gravity, spool_radius(robot))
+    room, flags = np.full(len(starts), np.inf), np.zeros(len(starts), int)
+    for row in given(problem.limits):
+        if not row.of_motion:
+            limit: Any = np.asarray(getattr(problem.limits, row.name))
+            own = np.asarray(slack(row, limit, each[row.quantity], scale)).min((1, 2))
+            room, flags = np.minimum(room, own), flags | np.where(own < -TOLERANCE, row.flag.value, 0)
+    return room, flags, ~(room > TOLERANCE)
+
+
+def limits_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Limits that rest at either end breaks.
+
+    Args:
+        problem: robot and limits.
+        starts: (n, 3) m.
+        ends: (n, 3) m.
+
+    Returns:
+        (n,) flags of `Verdict`.
+    """
+    _, flags, _ = _at_ends(problem, starts, ends)
+    gravity, known = float(np.asarray(problem.robot.gravity)), Limits()
+    for name in ("tension_min", "tension_max"):
+        if getattr(problem.limits, name) is not None:
+            known = dataclasses.replace(known, **{name: getattr(problem.limits, name)})
+            own = problem._replace(limits=known)
+            margins = [in_batches(partial(_at_rest, own), places, size=BATCH) for places in (starts, ends)]
+            row = next(row for row in LIMITS if row.name == name)
+            flags |= np.where(np.min(margins, axis=0) < -TOLERANCE * gravity, row.flag.value, 0)
+    return flags
+
+
+@jax.jit
+def _at_rest(problem: Problem, places):
+    return jax.vmap(lambda x: faces_at(problem.robot, problem.limits, x).margin(jnp.zeros_like(x)))(places)

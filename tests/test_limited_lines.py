@@ -1,0 +1,83 @@
+"""Straight lines under limits and on spools in any layout, against brute force by linear programs."""
+
+import numpy as np
+import pytest
+from oracles import limited_lines as oracle
+
+import cspr_jax
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.problem import limits_over, prepared
+from cspr_jax.search.timed_lines import motions_of, timed_lines
+
+MASS = 10.0
+
+
+def case(rng, *, in_plane=None, every=False):
+    """Spools, two places below them, and limits, some of which bind."""
+    count = 4 if every else int(rng.integers(3, 6))
+    angle = np.sort(rng.uniform(0, 2 * np.pi, count)) if count > 3 else np.arange(3) * 2.1 + rng.uniform(0, 6)
+    base = np.c_[10 * np.cos(angle), 8 * np.sin(angle), np.full(count, 12.0)]
+    if not (rng.integers(2) if in_plane is None else in_plane):
+        base[:, 2] += rng.uniform(-3, 3, count)
+    weights = rng.dirichlet(np.ones(count), 2)
+    places = weights @ base - np.c_[np.zeros((2, 2)), rng.uniform(3, 10, 2)]
+    limits = {
+        "tension_min": rng.uniform(0.2, 3.0),
+        "tension_max": rng.uniform(90.0, 300.0),
+        "cable_speed_max": rng.uniform(1.0, 8.0),
+        "cable_acceleration_max": rng.uniform(1.0, 8.0),
+    }
+    kept = {name: value for name, value in limits.items() if every or rng.integers(2)}
+    return base, *places, kept, float(rng.uniform(3.0, 15.0))
+
+
+def problem_of(base, limits, planar=False):
+    robot = cspr_jax.point_mass(base, mass=MASS, z_axis="up", planar=planar)
+    own, frame = prepared(robot)
+    given = cspr_jax.Limits(**{name: np.full(len(base), value) for name, value in limits.items()})
+    return Problem(own, limits_over(robot, given), None), frame
+
+
+def check(count, seed, **how):
+    """Durations are those of brute force, verdicts hold at dense samples; how many were compared, and how many bind."""
+    rng, compared, bound = np.random.default_rng(seed), 0, 0
+    for _ in range(count):
+        base, start, end, limits, largest = case(rng, **how)
+        problem, frame = problem_of(base, limits)
+        ends = frame.inward(start[None]), frame.inward(end[None])
+        answers = timed_lines(problem, *ends, max_acceleration=largest)
+        wanted, _ = oracle.least_duration(base, MASS, start, end, max_acceleration=largest, **limits)
+        if not np.isfinite(wanted):
+            assert answers.verdict[0] != 0
+            continue
+        assert answers.verdict[0] == 0, (answers.verdict, wanted)
+        assert answers.duration[0] == pytest.approx(wanted, rel=2e-5)
+        assert answers.margin_bound[0] > 0.0 and answers.limit_margin[0] > 0.0
+        assert answers.duration[0] >= answers.least_duration[0]
+        known = {name: value for name, value in limits.items() if name != "cable_acceleration_max"}
+        least = oracle.least_time_bound(base, MASS, start, end, max_acceleration=largest, **known)
+        assert answers.least_duration[0] >= 0.995 * least
+        assert len(known) < len(limits) or answers.least_duration[0] <= least * (1.0 + 1e-6)
+        (motion,) = motions_of(answers, *ends, law="s-curve")
+        law = ("s-curve", float(motion.time), float(answers.acceleration_time[0] / answers.duration[0]))
+        slacks = oracle.margins(base, MASS, start, end, law, samples=41, max_acceleration=largest, **limits)
+        assert min(slacks.values()) > -1e-6
+        compared += 1
+        bound += bool(set(names_at(answers)) & set(limits))
+    return compared, bound
+
+
+def names_at(answers):
+    return answers.details(0)["active"]
+
+
+@pytest.mark.parametrize("in_plane", [True, False])
+def test_durations_are_those_of_brute_force(in_plane):
+    compared, bound = check(1, 3, in_plane=in_plane, every=True)
+    assert compared == bound == 1
+
+
+@pytest.mark.soak
+def test_durations_are_those_of_brute_force_all():
+    compared, bound = check(150, 4)
+    assert compared > 80 and bound > 40
