@@ -60,6 +60,13 @@ def state(robot, rng):
     return State(*map(jnp.asarray, (place, velocity, acceleration, rotation, omega, spin)))
 
 
+@jax.jit
+def wrenches(robot, at):
+    """Wrench matrix, wrench and tensions; of more cables than freedoms no tensions."""
+    pull = tensions(robot, at) if robot.n_cables == robot.dof else None
+    return robot.wrench_matrix(at), robot.inertial_wrench(at), pull
+
+
 def tensions(robot, at):
     if robot.dof == 6:
         return wrench_balance.tensions(robot, at)
@@ -72,14 +79,12 @@ def test_wrenches(name):
     robot, rng = ROBOTS[name], np.random.default_rng(1)
     for _ in range(5):
         at = state(robot, rng)
-        matrix, wrench = np.asarray(robot.wrench_matrix(at)), np.asarray(robot.inertial_wrench(at))
+        matrix, wrench, pull = jax.tree.map(np.asarray, wrenches(robot, at))
         assert matrix.shape == (robot.dof, robot.n_cables) and wrench.shape == (robot.dof,)
-        if robot.n_cables == robot.dof:
-            pull = np.asarray(tensions(robot, at))
-        else:
+        if pull is None:
             pull = np.linalg.lstsq(matrix, wrench, rcond=None)[0]
         np.testing.assert_allclose(matrix @ pull, wrench, atol=1e-11 * (1.0 + np.abs(pull).sum()))
-        rays = np.asarray(robot.base_points - at.position[None])
+        rays = np.asarray(robot.base_points) - np.asarray(at.position)
         if robot.dof == 6:
             rays = rays - np.asarray(robot.platform_points) @ np.asarray(at.rotation).T
         units = rays / np.linalg.norm(rays, axis=1, keepdims=True)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from cspr_jax.config.plan import read_plan
 from cspr_jax.config.reading import read_text
@@ -15,6 +16,7 @@ from cspr_jax.feasibility.point_mass.line_faces import Sides, line_faces, sides
 from cspr_jax.plans.sequence import Sequence
 from cspr_jax.problem import kernel_robot
 from cspr_jax.published.chapter_1 import Key
+from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.trajectories.timed_lines import s_curve
 
 CASE = Path(__file__).with_name("table_4_1.toml")
@@ -43,15 +45,23 @@ def _case() -> tuple[Sides, float]:
     spec = resolve_robot(keys.robot, CASE, CASE.parent)
     start, end = Sequence(spec, keys, CASE).stops.points(float("nan"))
     largest = float(keys.max_acceleration or np.inf) / float(np.linalg.norm(end - start))
-    faces = line_faces(kernel_robot(spec, keys, CASE, any_cables=True), start, end, in_plane=True)
-    bounds = sides(faces, jnp.asarray(largest))
-    return jax.tree.map(np.asarray, bounds), largest
+    robot = kernel_robot(spec, keys, CASE, any_cables=True)
+    return jax.tree.map(np.asarray, _bounds(robot, start, end, jnp.asarray(largest))), largest
+
+
+@jax.jit
+def _bounds(robot: PointMassRobot, start: Array, end: Array, largest: Array) -> Sides:
+    return sides(line_faces(robot, start, end, in_plane=True), largest)
+
+
+_least = jax.jit(least_s_curve)
+_laws = jax.jit(jax.vmap(s_curve))
 
 
 def _active() -> tuple[Line, Line, float]:
     # (24) and (25): the boundaries that hold the least time back, and the largest path acceleration.
     bounds, largest = _case()
-    least = least_s_curve(bounds)
+    least = _least(bounds)
     up, down = int(least.up), int(least.down)
     # Braking is seen from the end.
     slope = float(bounds.down_slope[down])
@@ -85,7 +95,7 @@ def table_4_2() -> dict[Key, float | None]:
     Returns:
         cells.
     """
-    least = least_s_curve(_case()[0])
+    least = _least(_case()[0])
     time, p = float(least.duration), float(least.duration * least.ratio)
     up, down = 8.0 / (p**2 * time), 8.0 / (time * (time - p) ** 2)
     lines = ((up, 0.0), (-up, up * p), (-down, down * p), (down, -down * time))
@@ -123,7 +133,7 @@ def table_4_3() -> dict[Key, float | None]:
 def _passed(upper: Line, lower: Line, largest: float) -> tuple[np.ndarray, np.ndarray]:
     # Of each duration and p: by how much s'' is above its boundary at most, and from p on below the other.
     time, p = (grid.ravel() for grid in np.meshgrid(TIMES, PERIODS, indexing="ij"))
-    laws = jax.tree.map(np.asarray, jax.vmap(s_curve)(jnp.asarray(p / time)))
+    laws = jax.tree.map(np.asarray, _laws(jnp.asarray(p / time)))
     edges = np.concatenate([np.zeros_like(time)[:, None], laws.knots, np.ones_like(time)[:, None]], axis=1)
     spans = np.stack([edges[:, :-1] - laws.origins, edges[:, 1:] - laws.origins])
     s = np.moveaxis(laws.coefficients, -1, 0)  # (4, n, n_pieces) about the origin of each piece

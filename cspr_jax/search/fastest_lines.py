@@ -1,11 +1,12 @@
 """Fastest motions along straight lines with their verdicts: formulas first, a search where these break a limit."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from cspr_jax.arithmetic.batches import in_parts
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
 from cspr_jax.feasibility.point_mass.line_search import LONGER
@@ -14,6 +15,9 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.line_durations import Durations, Rule, by_cells, by_formula, by_search, moving
 from cspr_jax.search.line_verdicts import TOLERANCE, Verdicts, limits_at_rest, verdicts
 
+# Lines that a thread works on at a time, where there is something to search or to prove.
+PART = 256
+Rows = TypeVar("Rows", Durations, Verdicts)
 # Over the size of a robot: ends nearer to each other are one place.
 SAME_PLACE = 1e-12
 # Parts of a duration below which their digits are lost in what the formulas promise.
@@ -58,6 +62,28 @@ def fastest(
     Returns:
         the motions.
     """
+    how: dict[str, Any] = {"law": law, "rule": rule, "max_acceleration": max_acceleration, "sharp": sharp}
+    if len(starts) <= PART or (in_one_plane(problem.robot) and not moving(problem.limits)):
+        return _fastest(problem, starts, ends, **how)
+    parts = in_parts(lambda part: _fastest(problem, starts[part], ends[part], **how), len(starts), PART)
+    durations, own, moves = zip(*parts, strict=True)
+    return Fastest(_joined(Durations, durations), _joined(Verdicts, own), np.concatenate(moves))
+
+
+def _joined(kind: type[Rows], parts: Sequence[Rows]) -> Rows:
+    return kind(*(np.concatenate(columns) for columns in zip(*(vars(part).values() for part in parts), strict=True)))
+
+
+def _fastest(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    *,
+    law: str,
+    rule: Rule,
+    max_acceleration: float,
+    sharp: bool,
+) -> Fastest:
     robot, in_plane = problem.robot, in_one_plane(problem.robot)
     found = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
     own, may_move = _at_rest(problem, starts, ends, found)

@@ -225,10 +225,15 @@ def _by_search(problem: Problem, arguments, *, law: str):
 
 
 def _bounds_of_rows(problem: Problem) -> np.ndarray:
-    # Numbers in `names_of` of the rows of a search: faces of both sides, limits, the largest acceleration.
-    robot = problem.robot
-    faces, cables = 2 * len(spanning(robot.n_cables, robot.dof)), robot.n_cables
-    names, counts = names_of(robot, problem.limits), {"cable_speed_max": cables, "cable_acceleration_max": 2 * cables}
+    # Numbers in `names_of` of what bounds a search, see `line_search.Gain`; faces are of both sides.
+    robot, names = problem.robot, names_of(problem.robot, problem.limits)
+    faces, given = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
+    counts = {"tension_min": faces, "tension_max": faces, "cable_speed_max": robot.n_cables}
+    counts["cable_acceleration_max"] = 2 * robot.n_cables
     rows = [np.tile(np.arange(faces // 2), 2)]
-    rows += [np.full(counts.get(name, faces), names.index(name)) for name in moving(problem.limits)]
+    for name, count in counts.items():
+        if name in given:
+            rows.append(np.full(count, names.index(name)))
+        elif name.startswith("tension"):
+            rows.append(np.full(count, -1))  # none is shifted so
     return np.concatenate([*rows, [names.index("max_acceleration")]])

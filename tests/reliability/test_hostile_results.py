@@ -237,21 +237,28 @@ def files(fifo):
     }
 
 
+class Hostile(dict):
+    """Files, by what is wrong with them; each is made when it is asked for."""
+
+    def __init__(self, folder):
+        super().__init__()
+        os.mkfifo(folder / "fifo")
+        forged(folder / "other.h5", lambda file: file.__setitem__("a", np.zeros(SHAPE, "i2")))
+        self.folder, self.fills = folder, files(folder / "fifo")
+
+    def __missing__(self, name):
+        self[name] = path = self.folder / f"{len(self)}.h5"
+        if self.fills[name] is None:
+            repeated(path)
+            seal(path)
+        else:
+            forged(path, self.fills[name])
+        return path
+
+
 @pytest.fixture(scope="module")
 def hostile(tmp_path_factory):
-    """The files, by what is wrong with them."""
-    folder = tmp_path_factory.mktemp("hostile")
-    os.mkfifo(folder / "fifo")
-    forged(folder / "other.h5", lambda file: file.__setitem__("a", np.zeros(SHAPE, "i2")))
-    found = {}
-    for i, (name, fill) in enumerate(files(folder / "fifo").items()):
-        found[name] = folder / f"{i}.h5"
-        if fill is None:
-            repeated(found[name])
-            seal(found[name])
-        else:
-            forged(found[name], fill)
-    return found
+    return Hostile(tmp_path_factory.mktemp("hostile"))
 
 
 def test_good_ones_are_drawn(tmp_path, monkeypatch):
@@ -267,9 +274,10 @@ def test_good_ones_are_drawn(tmp_path, monkeypatch):
 def test_hostile_files_are_refused(hostile, monkeypatch, step):
     """Every third one, and all in the soak."""
     read_here(monkeypatch)
-    assert len(hostile) >= 60
+    assert len(hostile.fills) >= 60
     faulthandler.dump_traceback_later(300.0, exit=True)  # HDF5 would wait for ever, and Python with it
-    for name, path in list(hostile.items())[::step]:
+    for name in list(hostile.fills)[::step]:
+        path = hostile[name]
         with pytest.raises(StoreError) as raised:
             cspr_jax.open_result(path)
         line = str(raised.value)

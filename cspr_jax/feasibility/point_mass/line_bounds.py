@@ -65,11 +65,8 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
     s = Jet((first, last), (one, one), (none, none))
     away = s - line.nearest
     shortness = (away**2 * line.square[..., None] + line.apart) ** -0.5
-    up = down = np.full((len(lines.square), CELLS), np.inf)
-    for name in lines.low:
-        reach = _reach(line, name, s, shortness)
-        up = np.minimum(up, np.where(line.steepness < 0.0, reach, np.inf).min(-1))
-        down = np.minimum(down, np.where(line.steepness > 0.0, reach, np.inf).min(-1))
+    reach = _reach(line, lines.tightest, s, shortness)
+    up, down = (np.where(sign * line.steepness < 0.0, reach, np.inf).min(-1) for sign in (1.0, -1.0))
     # The rate of a cable over s' grows along the line.
     ends = [(x - line.nearest) * line.square[..., None] for x in (first, last)]
     rates = [x / np.sqrt((x / line.square[..., None]) ** 2 * line.square[..., None] + line.apart) for x in ends]

@@ -21,8 +21,8 @@ from cspr_jax.trajectories.timed_lines import s_curve
 SAMPLES = 33
 HALF = 2 * SAMPLES
 # Ratios looked at first, as logits; then so often between the neighbours of the best one, in parts of their distance.
-LOGITS = np.linspace(-6.0, 6.0, 49)
-FINER, ROUNDS = np.linspace(-1.0, 1.0, 7), 14
+LOGITS = np.linspace(-6.0, 6.0, 33)
+FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
 # Parts of a duration by which what a search found is made longer, one after the other, until it is proved.
 LONGER = (1e-7, 1e-6, 1e-5, 1e-3)
 
@@ -33,7 +33,8 @@ class Gain(NamedTuple):
     Fields:
         high: () largest q, 1/s^2; not above 0 if there is none.
         low: () smallest q, 1/s^2: 0 unless places are passed at which the robot could not rest.
-        up: number of the row that bounds it in the first half.
+        up: number of what bounds it in the first half: a face of taut cables, the same face as smallest tensions shift
+            it, as largest ones do, the rows of the other limits in their order, and at last the largest acceleration.
         down: likewise in the second.
     """
 
@@ -54,31 +55,43 @@ def gain(line: LineSlacks, law: Amplitude, edges: Array, middle: Array, largest:
         largest: () largest size of s'', inf for none, 1/s^2.
 
     Returns:
-        the range; rows count the groups in their order, and at the end the largest acceleration.
+        the range.
     """
     share = jnp.linspace(0.0, 1.0, SAMPLES if edges.shape[0] > 2 else 2 * HALF)
     tau = edges[:-1, None] + jnp.diff(edges)[:, None] * share[None]
     s, speed, bend = (x[..., None] for x in derivatives(law, tau, order=2))
-    bound, burden = [], []
     # At rest, and at q = 1: (2, n_pieces, n_samples, 1).
     both = jnp.asarray([0.0, 1.0])[:, None, None, None]
     instants = Instants(s[None], both * speed[None] ** 2, both * bend[None])
     line = jax.tree.map(lambda x: x[None, None, None], line)
-    for name in line.names:
-        tensions = tensions_at(line, name, s[None]) if name in line.low else None
-        still, moving = slacks(line, name, instants, tensions)
-        is_finite = jnp.isfinite(still)
-        bound.append(jnp.where(is_finite, still, 1.0))
-        burden.append(jnp.where(is_finite, still - moving, 0.0))
-    bound.append(jnp.broadcast_to(largest[None, None, None], bend.shape))
-    burden.append(jnp.abs(bend))
-    most, needed = jnp.concatenate(bound, axis=-1), jnp.concatenate(burden, axis=-1)
+    tensions = tensions_at(line, line.tightest, s[None])
+    rows = [slacks(line, line.tightest, instants, tensions)]
+    rows += [slacks(line, name, instants) for name in line.names if name in line.largest]
+    still, moving = jnp.concatenate(rows, axis=-1)
+    is_finite = jnp.isfinite(still)
+    most = jnp.where(is_finite, still, 1.0)
+    needed = jnp.where(is_finite, still - moving, 0.0)
+    most = jnp.concatenate([most, jnp.broadcast_to(largest[None, None, None], bend.shape)], axis=-1)
+    needed = jnp.concatenate([needed, jnp.abs(bend)], axis=-1)
     above = jnp.where(needed > 0.0, most / jnp.where(needed > 0.0, needed, 1.0), jnp.inf)
     above = jnp.where((most < 0.0) & (needed >= 0.0), -1.0, _between(above))
     below = jnp.where((most < 0.0) & (needed < 0.0), most / jnp.where(needed < 0.0, needed, 1.0), 0.0)
-    first = (tau <= middle)[..., None]
-    up, down = (jnp.min(jnp.where(half, above, jnp.inf), axis=(0, 1)) for half in (first, ~first))
-    return Gain(jnp.minimum(jnp.min(up), jnp.min(down)), jnp.max(below), jnp.argmin(up), jnp.argmin(down))
+    first, numbers = (tau <= middle)[..., None], _numbers(line, tensions, above.shape)
+    halves = [jnp.where(half, above, jnp.inf) for half in (first, ~first)]
+    up, down = (numbers.ravel()[jnp.argmin(half)] for half in halves)
+    return Gain(jnp.min(above), jnp.max(below), up, down)
+
+
+def _numbers(line: LineSlacks, tensions: Array, shape: tuple[int, ...]) -> Array:
+    # Of each sample's rows; a face that is shifted by tensions has another one.
+    low, high = line.low[line.tightest][..., None, :], line.high[line.tightest][..., None, :]
+    pulls = tensions > 0.0
+    by_largest = (pulls & (tensions == high) & (low < high)).any(-1)[0]
+    by_smallest, count = pulls.any(-1)[0] & ~by_largest, by_largest.shape[-1]
+    faces = jnp.where(by_largest, 2 * count, jnp.where(by_smallest, count, 0))
+    others = jnp.full((*shape[:2], shape[2] - count), 2 * count)
+    shift = jnp.concatenate([faces, others], axis=-1)
+    return jnp.arange(shape[2])[None, None] + shift
 
 
 def _between(values: Array) -> Array:

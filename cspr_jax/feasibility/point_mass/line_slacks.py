@@ -68,6 +68,11 @@ class LineSlacks:
         known = {*self.low, *self.largest}
         return tuple(name for name in (TAUT, *(row.name for row in LIMITS)) if name in known)
 
+    @property
+    def tightest(self) -> str:
+        """Group of faces inside which all the others lie."""
+        return [name for name in self.names if name in self.low][-1]
+
 
 def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
     """What slacks along a line depend on.
