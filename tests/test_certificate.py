@@ -198,7 +198,7 @@ def within(key, attained, limit):
 
 def test_verdicts_with_limits_agree_with_dense_samples():
     """Each limit alone at a value that parts the feasible segments, then all of them together."""
-    rng, name, n = np.random.default_rng(25), "prototype", 100
+    rng, name, n = np.random.default_rng(25), "prototype", 60
     starts, ends, arcs = random_points(rng, name, n)
     segments = segments_of(name, starts, ends, arcs)
     points = list(zip(starts, ends, arcs, strict=True))

@@ -202,7 +202,7 @@ def single_precision(count):
 
 
 def test_single_precision_sieve_changes_nothing():
-    single_precision(400)
+    single_precision(150)
 
 
 @pytest.mark.soak

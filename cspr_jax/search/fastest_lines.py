@@ -88,12 +88,12 @@ def _fastest(
     found = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
     own, may_move = _at_rest(problem, starts, ends, found)
     judged = partial(verdicts, problem, law=law, sharp=sharp)
-    if in_plane and not (sharp or given(problem.limits)):
+    if in_plane:
+        # What the formulas promise without limits needs no proof, but where the digits of p or T - p are lost.
         is_short = (np.minimum(found.ratio, 1.0 - found.ratio) < SHORT) & (law == "s-curve")
-        own.verdict[may_move & is_short] = Verdict.UNDECIDED.value
-    elif in_plane and may_move.any():
-        some = np.flatnonzero(may_move)
-        own.replace(some, judged(starts[some], ends[some], found.part(some)))
+        some = np.flatnonzero(may_move & (sharp | bool(given(problem.limits)) | is_short))
+        if len(some) > 0:
+            own.replace(some, judged(starts[some], ends[some], found.part(some)))
     some = np.flatnonzero(may_move & ((own.verdict != 0) | ~in_plane))
     if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(some) > 0:
         before, places = found.part(some), (starts[some], ends[some])

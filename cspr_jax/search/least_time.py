@@ -1,9 +1,8 @@
 """Least durations along straight lines from rest to rest: arrays of ends in, arrays out.
 
 Of spools in one plane and without limits, what the S-model's formulas give is feasible by proof: the bounds of every
-face are met all along (see `feasibility.point_mass.least_time`), with a margin above rounding, but where p / T is so
-near to 0 or 1 that the digits of the shorter part are lost: that is undecided. Otherwise every motion has a proof of
-its own.
+face are met all along (see `feasibility.point_mass.least_time`), with a margin above rounding. Otherwise, and where p
+or T - p is so short that its digits are lost, every motion has a proof of its own.
 """
 
 import dataclasses
