@@ -12,8 +12,8 @@ from cspr_jax.arithmetic.interval_jets import Jet, lowest
 from cspr_jax.feasibility.point_mass.line_slacks import LineSlacks
 
 CELLS = 256
-# Lines that are looked at together.
-TOGETHER = 64
+# Numbers that are looked at together: cells by faces by cables.
+TOGETHER = 1 << 20
 
 
 def least_durations(lines: LineSlacks, largest: np.ndarray) -> np.ndarray:
@@ -26,8 +26,8 @@ def least_durations(lines: LineSlacks, largest: np.ndarray) -> np.ndarray:
     Returns:
         (n,) s.
     """
-    count = len(largest)
-    parts = [slice(i, i + TOGETHER) for i in range(0, count, TOGETHER)]
+    size = max(TOGETHER // (CELLS * max(lines.along[0].size, 1)), 1)
+    parts = [slice(i, i + size) for i in range(0, len(largest), size)]
     return np.concatenate([_least(jax.tree.map(lambda x, part=part: x[part], lines), largest[part]) for part in parts])
 
 

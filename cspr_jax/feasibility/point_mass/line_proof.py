@@ -19,8 +19,9 @@ from cspr_jax.trajectories.amplitudes import Amplitude
 ROUNDS = 64
 # Where bound and attained value agree: of distances over gravity, of others as they are.
 AGREED = 1e-12
-# Blocks that are looked at together, and after which halving ends: what is proved by then is the answer.
-TOGETHER, MOST = 20_000, 2_000_000
+# Numbers that are looked at together, blocks by faces by cables, and blocks after which halving ends: what is proved by
+# then is the answer.
+TOGETHER, MOST = 1 << 20, 2_000_000
 
 
 class Proved(NamedTuple):
@@ -96,9 +97,9 @@ def _of_blocks(
     lines: LineSlacks, laws: Amplitude, durations: np.ndarray, blocks: _Blocks
 ) -> tuple[np.ndarray, np.ndarray]:
     # Of each block a lower bound of each group, and the smaller one of its values at both ends, (n, n_groups) each.
-    parts = []
-    for i in range(0, len(blocks.line), TOGETHER):
-        part = _Blocks(*(x[i : i + TOGETHER] for x in blocks))
+    parts, size = [], max(TOGETHER // max(lines.along[0].size, 1), 1)
+    for i in range(0, len(blocks.line), size):
+        part = _Blocks(*(x[i : i + size] for x in blocks))
         own = jax.tree.map(lambda x, part=part: x[part.line], lines)
         s = _about(np.asarray(laws.coefficients)[part.line, part.piece], part.start, part.width)
         per_time = (1.0 / (part.width * durations[part.line]))[:, None]

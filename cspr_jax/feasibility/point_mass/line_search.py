@@ -24,7 +24,7 @@ HALF = 2 * SAMPLES
 LOGITS = np.linspace(-6.0, 6.0, 33)
 FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
 # Parts of a duration by which what a search found is made longer, one after the other, until it is proved.
-LONGER = (1e-7, 1e-6, 1e-5, 1e-3)
+LONGER = (1e-7, 1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3)
 
 
 class Gain(NamedTuple):
@@ -73,8 +73,10 @@ def gain(line: LineSlacks, law: Amplitude, edges: Array, middle: Array, largest:
     needed = jnp.where(is_finite, still - moving, 0.0)
     most = jnp.concatenate([most, jnp.broadcast_to(largest[None, None, None], bend.shape)], axis=-1)
     needed = jnp.concatenate([needed, jnp.abs(bend)], axis=-1)
-    above = jnp.where(needed > 0.0, most / jnp.where(needed > 0.0, needed, 1.0), jnp.inf)
-    above = jnp.where((most < 0.0) & (needed >= 0.0), -1.0, _between(above))
+    is_known = jnp.concatenate([is_finite, jnp.ones_like(bend, bool)], axis=-1)
+    share = _between(jnp.where(most > 0.0, needed / jnp.where(most > 0.0, most, 1.0), 0.0), is_known & (most > 0.0))
+    above = jnp.where(share > 0.0, 1.0 / jnp.where(share > 0.0, share, 1.0), jnp.inf)
+    above = jnp.where((most <= 0.0) & (needed >= 0.0), -1.0, above)
     below = jnp.where((most < 0.0) & (needed < 0.0), most / jnp.where(needed < 0.0, needed, 1.0), 0.0)
     first, numbers = (tau <= middle)[..., None], _numbers(line, tensions, above.shape)
     halves = [jnp.where(half, above, jnp.inf) for half in (first, ~first)]
@@ -94,14 +96,25 @@ def _numbers(line: LineSlacks, tensions: Array, shape: tuple[int, ...]) -> Array
     return jnp.arange(shape[2])[None, None] + shift
 
 
-def _between(values: Array) -> Array:
-    # Samples (n_pieces, n_samples, n_rows) that are the smallest of three, lowered to the parabola's vertex.
-    left, middle, right = values[:, :-2], values[:, 1:-1], values[:, 2:]
-    is_low = (middle <= left) & (middle <= right) & jnp.isfinite(left) & jnp.isfinite(right)
-    a, b, c = (jnp.where(is_low, x, 0.0) for x in (left, middle, right))
-    curvature = a - 2.0 * b + c
-    lower = b - (c - a) ** 2 / (8.0 * jnp.where(curvature > 0.0, curvature, 1.0))
-    return values.at[:, 1:-1].set(jnp.where(is_low & (curvature > 0.0), lower, middle))
+def _between(values: Array, is_known: Array) -> Array:
+    # Samples (n_pieces, n_samples, n_rows) that are the largest of three, raised to the parabola's vertex. An end of a
+    # piece is raised where the parabola still rises from it.
+    a, b, c = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    three = is_known[:, :-2] & is_known[:, 1:-1] & is_known[:, 2:]
+    is_high, curvature = three & (b >= a) & (b >= c), 2.0 * b - a - c
+    higher = b + (c - a) ** 2 / (8.0 * jnp.where(curvature > 0.0, curvature, 1.0))
+    inner = jnp.where(is_high & (curvature > 0.0), higher, b)
+    first = _from_end(values[:, :3], is_known[:, :3].all(1))
+    last = _from_end(values[:, :-4:-1], is_known[:, :-4:-1].all(1))
+    return jnp.concatenate([first[:, None], inner, last[:, None]], axis=1)
+
+
+def _from_end(values: Array, is_known: Array) -> Array:
+    # Of the three samples at an end, that one first.
+    a, b, c = (values[:, k] for k in range(3))
+    slope, curvature = 0.5 * (4.0 * b - 3.0 * a - c), 2.0 * b - a - c
+    rises = is_known & (slope > 0.0) & (curvature > slope)
+    return jnp.where(rises, a + slope**2 / (2.0 * jnp.where(rises, curvature, 1.0)), a)
 
 
 def gain_of_law(line: LineSlacks, ratio: Array, largest: Array, law: Amplitude | None) -> Gain:
