@@ -24,7 +24,7 @@ HALF = 2 * SAMPLES
 LOGITS = np.linspace(-6.0, 6.0, 33)
 FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
 # Parts of a duration by which what a search found is made longer, one after the other, until it is proved.
-LONGER = (1e-7, 1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3)
+LONGER = (1e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3)
 
 
 class Gain(NamedTuple):
