@@ -22,7 +22,7 @@ from reliability.support import go, sweep_of
 
 # In a call that no signal ends, as compiling is: the main thread waits for a lock that it holds itself.
 STUCK = """
-import contextlib, ctypes, sys, threading
+import contextlib, ctypes, signal, sys, threading
 from cspr_jax import cli
 from cspr_jax.api import sweeps
 def stuck(*_):
@@ -37,6 +37,7 @@ class Tiles:
 cli._robots = stuck
 sweeps._executor = lambda *_: contextlib.nullcontext(Tiles)
 sys.argv[0] = "cspr"
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job inherits it ignored
 sys.exit(cli.main())
 """
 
