@@ -1,0 +1,105 @@
+"""Smallest values of functions over intervals, with a proof: blocks are halved until values and bounds agree."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+ROUNDS = 64
+# Where bound and attained value agree, over the scale of the values.
+AGREED = 1e-12
+# Blocks after which halving ends: what is proved by then is the answer.
+MOST = 2_000_000
+
+
+class Proved(NamedTuple):
+    """Smallest values of n cases, by group of functions.
+
+    Fields:
+        attained: (n, n_groups) a value that is attained.
+        bound: (n, n_groups) none is smaller.
+    """
+
+    attained: np.ndarray
+    bound: np.ndarray
+
+
+class Blocks(NamedTuple):
+    """Parts of the intervals.
+
+    Fields:
+        case: (n_blocks,) number of the case.
+        piece: (n_blocks,) of a function that is made of pieces.
+        start: (n_blocks,) where they begin.
+        width: (n_blocks,).
+    """
+
+    case: np.ndarray
+    piece: np.ndarray
+    start: np.ndarray
+    width: np.ndarray
+
+    def some(self, which) -> "Blocks":
+        """Some of the blocks.
+
+        Args:
+            which: an index of them.
+
+        Returns:
+            these.
+        """
+        return Blocks(*(x[which] for x in self))
+
+    def halved(self) -> "Blocks":
+        """Both halves of each block.
+
+        Returns:
+            twice as many.
+        """
+        half = 0.5 * self.width
+        left, right = (self.case, self.piece, self.start, half), (self.case, self.piece, self.start + half, half)
+        return Blocks(*(np.concatenate(pair) for pair in zip(left, right, strict=True)))
+
+
+def smallest(
+    blocks: Blocks,
+    count: int,
+    values: Callable[[Blocks], tuple[np.ndarray, np.ndarray]],
+    scales: np.ndarray,
+    *,
+    size: int,
+    enough: float = math.inf,
+) -> Proved:
+    """Smallest values over all blocks of each case.
+
+    Args:
+        blocks: that cover the intervals.
+        count: number of cases n.
+        values: gives of blocks a lower bound, and a value that is attained, (n_blocks, n_groups) each.
+        scales: (n_groups,) of the values.
+        size: number of blocks that are given to `values` at a time.
+        enough: bounds above this many scales need not be sharp.
+
+    Returns:
+        the values; inf of a case without blocks.
+    """
+    best = np.full((count, len(scales)), np.inf)
+    done, seen = best.copy(), 0
+    for halvings in range(ROUNDS + 1):
+        low, attained = _of(values, blocks, size)
+        np.minimum.at(best, blocks.case, attained)
+        sharp = (low >= best[blocks.case] - AGREED * scales) | (low > enough * scales)
+        seen += len(low)
+        is_open = ~sharp.all(1) & (seen < MOST) & (halvings < ROUNDS)
+        np.minimum.at(done, blocks.case[~is_open], low[~is_open])
+        if not is_open.any():
+            break
+        blocks = blocks.some(is_open).halved()
+    return Proved(best, done)
+
+
+def _of(values, blocks: Blocks, size: int) -> tuple[np.ndarray, np.ndarray]:
+    parts = [values(blocks.some(slice(i, i + size))) for i in range(0, len(blocks.case), size)]
+    low, attained = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return low, attained

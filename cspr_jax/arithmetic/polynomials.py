@@ -1,0 +1,94 @@
+"""Tables of polynomials: coefficients of the powers of x in the last dimension, the constant one first."""
+
+import math
+from functools import cache
+
+import numpy as np
+
+
+def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Product of polynomials.
+
+    Args:
+        first: (..., n) coefficients.
+        second: (..., m) likewise.
+
+    Returns:
+        (..., n + m - 1).
+    """
+    n, m = first.shape[-1], second.shape[-1]
+    shape = np.broadcast_shapes(first.shape[:-1], second.shape[:-1])
+    found = np.zeros((*shape, n + m - 1))
+    for i in range(n):
+        found[..., i : i + m] += first[..., i, None] * second
+    return found
+
+
+def total(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Sum of polynomials of any degrees.
+
+    Args:
+        first: (..., n) coefficients.
+        second: (..., m) likewise.
+
+    Returns:
+        (..., max(n, m)).
+    """
+    size = max(first.shape[-1], second.shape[-1])
+    return sum(np.concatenate([x, np.zeros((*x.shape[:-1], size - x.shape[-1]))], axis=-1) for x in (first, second))
+
+
+def derivatives(table: np.ndarray, order: int) -> list[np.ndarray]:
+    """Polynomials and their derivatives.
+
+    Args:
+        table: (..., n) coefficients.
+        order: of the last derivative.
+
+    Returns:
+        order + 1 tables: (..., n), (..., n - 1), ...; of constants (..., 1).
+    """
+    found = [table]
+    for _ in range(order):
+        last = found[-1]
+        size = last.shape[-1]
+        found.append(last[..., 1:] * np.arange(1, size) if size > 1 else np.zeros_like(last))
+    return found
+
+
+def over(table: np.ndarray, start: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """Polynomials of another variable: 0 at the start of a block, 1 at its end.
+
+    Args:
+        table: (..., n) coefficients.
+        start: (...) where the blocks begin.
+        width: (...) of the blocks.
+
+    Returns:
+        (..., n).
+    """
+    degree = table.shape[-1] - 1
+    moved = np.zeros(np.broadcast_shapes(table.shape, (*np.shape(start), 1)))
+    for i in range(degree + 1):
+        for j in range(i + 1):
+            moved[..., j] += math.comb(i, j) * table[..., i] * start ** (i - j)
+    return moved * width[..., None] ** np.arange(degree + 1)
+
+
+def bounds(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of polynomials over [0, 1], by their Bernstein coefficients.
+
+    Args:
+        table: (..., n) coefficients.
+
+    Returns:
+        the lower and the upper bounds, (...) each.
+    """
+    coefficients = table @ _weights(table.shape[-1] - 1).T
+    return coefficients.min(-1), coefficients.max(-1)
+
+
+@cache
+def _weights(degree: int) -> np.ndarray:
+    rows = range(degree + 1)
+    return np.array([[math.comb(i, j) / math.comb(degree, j) if j <= i else 0.0 for j in rows] for i in rows])
