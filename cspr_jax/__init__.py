@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cspr_jax.api.accelerations import available_accelerations as available_accelerations
+    from cspr_jax.api.beziers import bezier as bezier
+    from cspr_jax.api.beziers import bezier_durations as bezier_durations
+    from cspr_jax.api.beziers import bezier_verdicts as bezier_verdicts
     from cspr_jax.api.examples import copy_examples as copy_examples
     from cspr_jax.api.examples import list_examples as list_examples
     from cspr_jax.api.lines import least_time as least_time
@@ -55,6 +58,9 @@ _PUBLIC = {
     "attainable": ("cspr_jax.api.platform_searches", "attainable"),
     "available_accelerations": ("cspr_jax.api.accelerations", "available_accelerations"),
     "benchmark": ("cspr_jax.api.speed", "benchmark"),
+    "bezier": ("cspr_jax.api.beziers", "bezier"),
+    "bezier_durations": ("cspr_jax.api.beziers", "bezier_durations"),
+    "bezier_verdicts": ("cspr_jax.api.beziers", "bezier_verdicts"),
     "compute": ("cspr_jax.api.sweeps", "compute"),
     "copy_examples": ("cspr_jax.api.examples", "copy_examples"),
     "hypocycloid": ("cspr_jax.api.motions", "hypocycloid"),
@@ -94,6 +100,9 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "attainable",
     "available_accelerations",
     "benchmark",
+    "bezier",
+    "bezier_durations",
+    "bezier_verdicts",
     "compute",
     "copy_examples",
     "hypocycloid",

@@ -11,12 +11,25 @@ from cspr_jax.errors import InputError
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.problem import limits_over, prepared
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import LARGEST_LENGTH
+from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.pose_targets import REFERENCE
 from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors, named
 from cspr_jax.trajectories.motion import Placed
+
+
+def check_point_mass(robot: Any) -> None:
+    """Refuse what is no point mass.
+
+    Args:
+        robot: what was given.
+
+    Raises:
+        InputError: another kind of robot.
+    """
+    if not isinstance(robot, PointMassRobot):
+        raise InputError("robot", getattr(robot, "name", robot), "a point mass")
 
 
 def amplitude_of(given: str | Amplitude, *, free_end: bool | None = None) -> Amplitude:

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.api.arguments import points_of
+from cspr_jax.api.arguments import check_point_mass, points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.problem import Problem
@@ -35,7 +35,7 @@ def straight_line(
     Raises:
         InputError: another kind of robot, or another law.
     """
-    _check_robot(robot)
+    check_point_mass(robot)
     if law not in LAWS:
         raise InputError("law", law, "one of " + ", ".join(LAWS))
     frame, time = prepared(robot)[1], jnp.asarray(duration, float)
@@ -70,7 +70,7 @@ def least_time(
         InputError: another kind of robot, limits that contradict each other, shapes that do not fit, values that are
             not finite.
     """
-    _check_robot(robot)
+    check_point_mass(robot)
     if max_acceleration is not None and not (np.isfinite(max_acceleration) and max_acceleration > 0.0):
         raise InputError("max_acceleration", max_acceleration, "a number > 0, m/s^2")
     ends = points_of("targets", targets)
@@ -85,8 +85,3 @@ def least_time(
         first = np.broadcast_to(frame.inward(starts), ends.shape).copy()
         problem = Problem(own, limits_over(robot, limits), named("quintic"))
         return least_times(problem, first, frame.inward(ends), max_acceleration=largest)
-
-
-def _check_robot(robot: PointMassRobot) -> None:
-    if not isinstance(robot, PointMassRobot):
-        raise InputError("robot", getattr(robot, "name", robot), "a point mass")

@@ -35,7 +35,8 @@ def total(first: np.ndarray, second: np.ndarray) -> np.ndarray:
         (..., max(n, m)).
     """
     size = max(first.shape[-1], second.shape[-1])
-    return sum(np.concatenate([x, np.zeros((*x.shape[:-1], size - x.shape[-1]))], axis=-1) for x in (first, second))
+    a, b = (np.concatenate([x, np.zeros((*x.shape[:-1], size - x.shape[-1]))], axis=-1) for x in (first, second))
+    return a + b
 
 
 def derivatives(table: np.ndarray, order: int) -> list[np.ndarray]:

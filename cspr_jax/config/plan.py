@@ -28,6 +28,12 @@ Depth = Annotated[
 ]
 
 
+Duration = Annotated[
+    Annotated[Positive, Tag("~number")] | Annotated[Literal["least"], Tag("~least")],
+    Discriminator(lambda value: "~least" if isinstance(value, str) else "~number"),
+]
+
+
 class Pose(Table):
     """One pose of the sequence."""
 
@@ -47,6 +53,9 @@ class Pose(Table):
     arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] | None = Field(
         None, description="fixes the number of arcs of the segment that ends here; 2 n for n oscillations"
     )
+    duration: Duration | None = Field(
+        None, description='bezier: duration of the segment that ends here, s, or "least", the default'
+    )
     family: FamilyName | None = Field(
         None, description="family of the segment that ends here, in place of the plan's; not of the first pose"
     )
@@ -61,6 +70,16 @@ class PlanFile(TrajectoryKeys, LimitTable):
         None,
         description='depth of P0 below the centroid, m, or { choose = "mean" | "conservative" | "fastest" }; '
         "transitions may give the inclination instead",
+    )
+    first_control_point: Point | None = Field(
+        None,
+        description="bezier: second control point of the first segment, [x, y, z], m; absent: the first pose, from "
+        "which the motion then starts without acceleration",
+    )
+    least: Literal["each", "total"] | None = Field(
+        None,
+        description='bezier: what durations "least" minimise: "each", the default, their own, one segment after the '
+        'other, those before it as they are; "total" their sum, by search',
     )
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
     limits: LimitTable | None = Field(

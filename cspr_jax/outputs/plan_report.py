@@ -63,6 +63,8 @@ _OF_SOME = (
     "acceleration_time",
     "active",
     "least_duration",
+    "control_points",
+    "taut_durations",
 )
 
 
@@ -140,12 +142,16 @@ def _places(plan: Plan) -> dict[str, Column]:
 def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     # Of lines their times. Oscillations are counted where every segment has them.
     lines = all(segment["active"] is not None for segment in segments)
-    columns = _times() if lines else _counts(all(segment["inclination"] is not None for segment in segments))
+    beziers = all(segment["control_points"] is not None for segment in segments)
+    swings = all(segment["inclination"] is not None for segment in segments)
+    columns = _times() if lines else _durations() if beziers else _counts(swings)
     columns["tension (N)"] = lambda segment: " .. ".join(
         _number(segment[name], ".3f") for name in ("tension_min", "tension_max")
     )
     if lines:
         return columns | {"held back by": lambda segment: "; ".join(segment["active"])}
+    if beziers:
+        return columns
     if any(segment["beta_hat"] for segment in segments):
         return columns | {
             "beta-hat": lambda segment: " .. ".join(f"{value:.3f}" for value in segment["beta_hat"] or ())
@@ -160,6 +166,16 @@ def _times() -> dict[str, Column]:
         "least (s)": _of("least_duration", ".4f"),
         "margin (m/s²)": _of("margin", ".1e"),
     }
+
+
+def _durations() -> dict[str, Column]:
+    def taut(segment: dict[str, Any]) -> str:
+        ends = [
+            (_number(low, ".4f"), "∞" if high is None else f"{high:.4f}") for low, high in segment["taut_durations"]
+        ]
+        return ", ".join(f"{low} .. {high}" for low, high in ends) or "none"
+
+    return {"T (s)": _of("duration", ".4f"), "taut for T (s)": taut, "margin": _of("margin", ".1e")}
 
 
 def _counts(swings: bool) -> dict[str, Column]:

@@ -73,8 +73,14 @@ def _check_families(spec: RobotFile, keys: PlanFile, path: Path) -> None:
 
 
 def _check_lines(keys: PlanFile, path: Path) -> None:
-    lines = [name for name, row in FAMILIES.items() if row.rests_anywhere]
-    for key, families in (("max_acceleration", lines), ("rule", ["s-curve"])):
+    lines = [name for name, row in FAMILIES.items() if row.any_cables]
+    known = (
+        ("max_acceleration", lines),
+        ("rule", ["s-curve"]),
+        ("first_control_point", ["bezier"]),
+        ("least", ["bezier"]),
+    )
+    for key, families in known:
         if getattr(keys, key) is not None and not set(keys.families) & set(families):
             raise ConfigError(path, f"{key}: must be absent unless family = {either(families)}")
 
@@ -83,6 +89,8 @@ def _check_poses(spec: RobotFile, keys: PlanFile, path: Path) -> None:
     if keys.beat is not None and not spec.is_platform:
         raise ConfigError(path, f'beat = "{keys.beat}": must be absent for {spec.kind}')
     for i, pose in enumerate(keys.pose):
+        if pose.duration is not None and (i == 0 or keys.family_of(i - 1) != "bezier"):
+            raise ConfigError(path, f'pose[{i}].duration: must be absent unless family = "bezier" leads there')
         if pose.position is None and not pose.rest:
             raise ConfigError(path, f"pose[{i}].position is missing: [x, y, z] in m, or rest = true")
         for key in () if spec.is_platform else ("tilt_torsion", "quaternion", "beta_hat"):

@@ -24,16 +24,33 @@ def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) 
     Raises:
         InputError: more cables.
     """
+    rows, arms = adjugate(robot)
+    return (rows + jnp.cross(position, arms)) @ relative_acceleration(robot, acceleration)
+
+
+def adjugate(robot: PointMassRobot) -> tuple[Array, Array]:
+    """Adjugate of the structure matrix M, affine in the position.
+
+    Pseudotensions are (rows + position x arms) (p'' - g).
+
+    Args:
+        robot: a point mass on three cables, or on two in a plane.
+
+    Returns:
+        rows: (n_cables, 3) m^2, planar m; arms: (n_cables, 3) m, planar 1; both of the sign of `pseudotensions`.
+
+    Raises:
+        InputError: more cables.
+    """
     check_determined(robot)
-    if is_planar(robot):
-        adjugate = _planar_adjugate(robot.base_points - position[None])
-        side = jnp.sign(robot.base_points[1, 0] - robot.base_points[0, 0])
-        return side * (adjugate @ relative_acceleration(robot, acceleration))
     a = robot.base_points
+    if is_planar(robot):
+        sides = jnp.sign(a[1, 0] - a[0, 0]) * jnp.asarray([1.0, -1.0])
+        across = sides[:, None] * jnp.asarray([[0.0, 1.0, 0.0]])
+        return jnp.cross(across, a[::-1]), across
     following, preceding = jnp.roll(a, -1, axis=0), jnp.roll(a, -2, axis=0)
-    adjugate = jnp.cross(position, following - preceding) + jnp.cross(following, preceding)
-    area = jnp.cross(a[1] - a[0], a[2] - a[0])[2]
-    return -jnp.sign(area) * (adjugate @ relative_acceleration(robot, acceleration))
+    sign = -jnp.sign(jnp.cross(a[1] - a[0], a[2] - a[0])[2])
+    return sign * jnp.cross(following, preceding), sign * (following - preceding)
 
 
 def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:

@@ -81,6 +81,12 @@ _ROWS = (
             ("cubic", "by a cubic in time, in the least time"),
         )
     ),
+    Family(
+        "bezier",
+        "Bezier curves of the second order, at rest in every pose (launch paper)",
+        dict.fromkeys((2, 3), _LEGS.format("beziers:Beziers")),
+        rests_anywhere=True,
+    ),
 )
 FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 # Of answers with a value at either end of a segment.
 ENDS = ("start", "target")
+CONTROL_POINTS = ("start", "middle", "end")
 
 
 def need_xarray() -> None:
@@ -90,7 +91,8 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
     """Answers over the product of some dimensions.
 
     Args:
-        arrays: (n,), or (n, 2) for both ends of a segment, by name.
+        arrays: (n,), (n, 2) for both ends of a segment, or (n, 3, 3) for its control points, by name; what is no
+            number is left out.
         dims: coordinates by name, the last one varying fastest; None: one dimension "target".
 
     Returns:
@@ -106,12 +108,16 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
     if any(points.ndim != 1 for points in axes.values()) or math.prod(shape) != count:
         given = {name: list(points.shape) for name, points in axes.items()}
         raise InputError("dims", given, f"lists of coordinates whose product has {count} points")
-    both = {"end": ENDS} if any(values.ndim > 1 for values in arrays.values()) else {}
+    numbers = {name: values for name, values in arrays.items() if values.dtype != object}
+    both = {"end": ENDS} if any(values.ndim == 2 for values in numbers.values()) else {}
+    controls = {"control_point": CONTROL_POINTS, "axis": PARTS["axis"]}
+    third = controls if any(values.ndim == 3 for values in numbers.values()) else {}
+    own: dict[int, dict[str, Any]] = {1: {}, 2: both, 3: third}
     variables = {
-        name: ((*axes, *both) if values.ndim > 1 else tuple(axes), values.reshape(*shape, *values.shape[1:]))
-        for name, values in arrays.items()
+        name: ((*axes, *own[values.ndim]), values.reshape(*shape, *values.shape[1:]))
+        for name, values in numbers.items()
     }
-    data = dataset(variables, axes | both)
+    data = dataset(variables, axes | both | third)
     if "beta_hat" in data and both:
         data["beta_hat"].attrs = {"units": "1", "long_name": "beta-hat"}  # the table's is at the target alone
     return data

@@ -13,7 +13,8 @@ from cspr_jax.feasibility.point_mass.line_search import LONGER
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.line_durations import Durations, Rule, by_cells, by_formula, by_search, moving
-from cspr_jax.search.line_verdicts import TOLERANCE, Verdicts, limits_at_rest, verdicts
+from cspr_jax.search.line_verdicts import TOLERANCE, limits_at_rest, verdicts
+from cspr_jax.search.proved_verdicts import Verdicts
 
 # Lines that a thread works on at a time, where there is something to search or to prove.
 PART = 256

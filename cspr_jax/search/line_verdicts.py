@@ -19,38 +19,12 @@ from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.line_durations import BATCH, Durations, lines_of
+from cspr_jax.search.proved_verdicts import Verdicts, plain_slack
 from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.timed_lines import fixed_law, s_curve
 
 # Over gravity, or the size of a limit: margins nearer to zero are undecided, and rest with a smaller margin is none.
 TOLERANCE = 1e-12
-
-
-@dataclasses.dataclass(frozen=True)
-class Verdicts:
-    """Verdicts of n motions, (n,) each.
-
-    Fields:
-        verdict: flags of `Verdict`; 0 if proved.
-        margin: smallest distance from the faces of taut cables that is attained, m/s^2.
-        bound: proved lower bound of it, m/s^2.
-        room: smallest slack of the limits, without a unit; inf without limits.
-    """
-
-    verdict: np.ndarray
-    margin: np.ndarray
-    bound: np.ndarray
-    room: np.ndarray
-
-    def replace(self, which: np.ndarray, part: "Verdicts") -> None:
-        """Put other verdicts in place of some.
-
-        Args:
-            which: numbers of the motions.
-            part: theirs.
-        """
-        for name, values in vars(part).items():
-            getattr(self, name)[which] = values
 
 
 @jax.jit
@@ -99,18 +73,11 @@ def verdicts(
     flags = np.where(proved.attained < -doubt, [own_flags[name] for name in lines.names], 0)
     room, broken, doubtful = _at_ends(problem, starts, ends)
     for name, values in zip(lines.names[1:], proved.attained.T[1:], strict=True):
-        room = np.minimum(room, _shown(name, values, gravity))
+        room = np.minimum(room, plain_slack(name, values / gravity if name.startswith("tension") else values))
     broken |= np.bitwise_or.reduce(flags, axis=1)
     is_open = (proved.bound <= doubt).any(1) | doubtful
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(np.uint16)
     return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
-
-
-def _shown(name: str, values: np.ndarray, gravity: float) -> np.ndarray:
-    # Slacks of a limit without a unit.
-    if name == "cable_speed_max":
-        return 1.0 - np.sqrt(np.maximum(1.0 - values, 0.0))
-    return values / gravity if name.startswith("tension") else values
 
 
 def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -86,6 +86,6 @@ def _at_end(s: np.ndarray, end: int, per_time: np.ndarray) -> Instants:
 
 
 def _during(s: np.ndarray, per_time: np.ndarray) -> Instants:
-    ranges = [tuple(x[:, None] for x in bounds(table)) for table in derivatives(s, 4)]
+    ranges = [bounds(table[:, None]) for table in derivatives(s, 4)]
     speed = Jet(*ranges[1:4]) ** 2 * per_time**2
     return Instants(Jet(*ranges[:3]), speed, Jet(*ranges[2:]) * per_time**2)

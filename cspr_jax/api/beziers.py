@@ -1,0 +1,144 @@
+"""Bezier segments of point masses from Python: one motion in pure jax, verdicts and feasible durations of many."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.api.arguments import check_point_mass, kernel_problem, points_of
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.errors import InputError
+from cspr_jax.feasibility.point_mass.bezier_durations import Ends
+from cspr_jax.feasibility.point_mass.bezier_margins import depths_of
+from cspr_jax.problem import prepared
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
+from cspr_jax.robots.robot import check_determined
+from cspr_jax.search.bezier_durations import feasible_durations
+from cspr_jax.search.bezier_verdicts import verdicts
+from cspr_jax.trajectories.bezier import Bezier
+from cspr_jax.trajectories.motion import Placed
+
+
+@dataclasses.dataclass(frozen=True)
+class BezierVerdicts:
+    """Verdicts of n Bezier segments, (n,) each.
+
+    Fields:
+        verdict: flags of `Verdict`; 0 if proved.
+        margin: smallest pseudotension over its value at rest in P0, or smallest depth below the spools over that of the
+            start, on the whole segment.
+        margin_bound: proved lower bound of it: the margin less its rounding error.
+        limit_margin: smallest slack of the limits that is attained, without a unit; inf without limits.
+    """
+
+    verdict: np.ndarray
+    margin: np.ndarray
+    margin_bound: np.ndarray
+    limit_margin: np.ndarray
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Whether each segment is proved feasible, (n,)."""
+        return self.verdict == 0
+
+
+def bezier(robot: PointMassRobot, start, control_point, end, *, duration) -> Placed[Bezier]:
+    """Motion along a Bezier curve of the second order from rest to rest, launch paper (9), (13).
+
+    Args:
+        robot: a point mass on any number of cables.
+        start: (3,) first control point in the robot's axes, m.
+        control_point: (3,) second one, likewise.
+        end: (3,) third one, likewise.
+        duration: () T, s.
+
+    Returns:
+        the motion, in the robot's axes.
+
+    Raises:
+        InputError: another kind of robot.
+    """
+    check_point_mass(robot)
+    own, frame = prepared(robot)
+    first, middle, last = (jnp.asarray(frame.inward(point), float) for point in (start, control_point, end))
+    return Placed(Bezier(first, middle, last, jnp.asarray(duration, float), plane_normal(own) @ first), frame)
+
+
+def bezier_verdicts(
+    robot: PointMassRobot, starts, control_points, ends, *, durations, limits: Limits | None = None
+) -> BezierVerdicts:
+    """Verdicts of Bezier segments: exact for taut cables, proved for limits.
+
+    Args:
+        robot: a point mass on three cables, or on two in a plane.
+        starts: (n, 3) first control points in the robot's axes, m.
+        control_points: (n, 3) second ones, likewise.
+        ends: (n, 3) third ones, likewise.
+        durations: (n,) s, positive.
+        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+
+    Returns:
+        the verdicts.
+
+    Raises:
+        InputError: another kind of robot, limits that contradict each other, shapes that do not fit, values that are
+            not finite.
+    """
+    check_point_mass(robot)
+    names = ("starts", "control_points", "ends")
+    points = _points(robot, dict(zip(names, (starts, control_points, ends), strict=True)))
+    times = np.asarray(durations, float)
+    if times.shape != (len(points[0]),) or not ((times > 0.0) & np.isfinite(times)).all():
+        raise InputError("durations", f"shape {times.shape}", f"finite numbers > 0 of shape ({len(points[0])},)")
+    with double_precision():
+        problem, frame = kernel_problem(robot, "quintic", limits, free_end=None)
+        first, middle, last = (np.asarray(frame.inward(x)) for x in points)
+        own = verdicts(problem, Bezier(first, middle, last, times, depths_of(problem.robot, first)))
+        return BezierVerdicts(own.verdict, own.margin, own.bound, own.room)
+
+
+def bezier_durations(
+    robot: PointMassRobot, starts, ends, *, control_points=None, accelerations=None
+) -> list[np.ndarray]:
+    """Durations of Bezier segments that keep every cable taut below the spools, by roots of polynomials.
+
+    Args:
+        robot: a point mass on three cables, or on two in a plane.
+        starts: (n, 3) first control points in the robot's axes, m.
+        ends: (n, 3) third ones, likewise.
+        control_points: (n, 3) second ones, likewise; None: they follow from the accelerations, (15).
+        accelerations: (n, 3) at the starts, in the robot's axes, m/s^2; None: zero.
+
+    Returns:
+        of each segment (n_intervals, 2): both ends of each interval, proved feasible; the last one is inf where any
+        longer duration is feasible; s.
+
+    Raises:
+        InputError: another kind of robot, shapes that do not fit, values that are not finite, control points and
+            accelerations both.
+    """
+    check_point_mass(robot)
+    check_determined(robot)
+    if control_points is not None and accelerations is not None:
+        raise InputError("accelerations", "given", "absent beside control_points")
+    given = {"starts": starts, "ends": ends}
+    given |= {} if control_points is None else {"control_points": control_points}
+    given |= {} if accelerations is None else {"accelerations": accelerations}
+    points = dict(zip(given, _points(robot, given), strict=True))
+    with double_precision():
+        own, frame = prepared(robot)
+        first, last = (np.asarray(frame.inward(points[name])) for name in ("starts", "ends"))
+        middle = first if control_points is None else np.asarray(frame.inward(points["control_points"]))
+        turn = np.zeros_like(first) if accelerations is None else np.asarray(frame.turned(points["accelerations"]))
+        return feasible_durations(own, Ends(first, last, middle, turn), depths_of(own, first))
+
+
+def _points(robot: PointMassRobot, given: dict[str, object]) -> list[np.ndarray]:
+    found = [points_of(name, points) for name, points in given.items()]
+    for name, points in zip(given, found, strict=True):
+        if points.shape != found[0].shape:
+            raise InputError(name, f"shape {points.shape}", f"finite numbers of shape {found[0].shape}")
+        if robot.dof == 2 and points[:, 1].any():
+            raise InputError(name, "y not 0", "y = 0: the plane of a planar robot")
+    return found

@@ -1,0 +1,81 @@
+"""Leg of Bezier segments, at rest in every pose."""
+
+import dataclasses
+
+import numpy as np
+
+from cspr_jax.errors import ConfigError, shown
+from cspr_jax.feasibility.point_mass.bezier_margins import depths_of
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.plans.leg import Leg, each
+from cspr_jax.plans.stops import Stops
+from cspr_jax.robots.point_mass import AT_P0, spool_radius
+from cspr_jax.search.answers import Answers
+from cspr_jax.search.bezier_sequences import Anchored, least_total
+from cspr_jax.search.beziers import answers_of, joined_segments
+from cspr_jax.trajectories.bezier import end_acceleration
+from cspr_jax.trajectories.motion import Motion
+
+# Accelerations that count as none, over gravity.
+AT_REST = 1e-9
+
+
+class Beziers(Leg):
+    """Any places, joined by Bezier segments; see `Leg`."""
+
+    def __init__(self, stops: Stops) -> None:
+        """Refuse numbers of arcs, of which a segment has none."""
+        super().__init__(stops)
+        for i, pose in enumerate(stops.poses[1:], start=1):
+            if pose.arcs is not None:
+                raise ConfigError(stops.path, f'{stops.name(i)}.arcs: must be absent with family = "bezier"')
+        if stops.keys.least == "total" and None not in self._durations:
+            raise ConfigError(stops.path, 'least = "total": must be absent where every duration is given')
+
+    def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
+        """Join the places; see `Leg.join`."""
+        points, stops = self._points(problem, z0), self.stops
+        given = stops.keys.first_control_point if stops.first == 0 else None
+        first = points[0] if given is None else np.asarray(stops.frame.inward(given))
+        # Of P0, else of the first pose.
+        depth = z0 if np.isfinite(z0) else float(depths_of(problem.robot, points[:1])[0])
+        durations = self._durations
+        if stops.keys.least == "total":
+            sequence = Anchored(points, np.asarray(0), first, np.asarray(depth))
+            durations = least_total(problem, sequence, durations).tolist()
+        segments = joined_segments(problem, points, durations, first, depth)
+        answers, motions = answers_of(problem, segments), segments.motions
+        self._check_rests(problem, motions, first - points[0])
+        shown_points = np.asarray(stops.frame.outward(answers.control_points))
+        return dataclasses.replace(answers, control_points=shown_points), each(motions, len(self))
+
+    @property
+    def _durations(self) -> list[float | None]:
+        given = (pose.duration for pose in self.stops.poses[1:])
+        return [time if isinstance(time, float) else None for time in given]
+
+    def _points(self, problem: Problem, z0: float) -> np.ndarray:
+        points, stops = self.stops.points(z0), self.stops
+        near = np.linalg.norm(np.diff(points, axis=0), axis=1) <= AT_P0 * float(spool_radius(problem.robot))
+        for i in (np.flatnonzero(near) + 1).tolist():
+            if stops.keys.first_control_point is None or stops.first > 0:
+                raise ConfigError(
+                    stops.path,
+                    f"{stops.name(i)}.position: must be another than that of {stops.name(i - 1)}, for a segment that "
+                    "starts without acceleration",
+                )
+        return points
+
+    def _check_rests(self, problem: Problem, motions, first: np.ndarray) -> None:
+        # A pose at rest has no acceleration.
+        times = np.asarray(motions.time)[:, None]
+        ends = end_acceleration(motions.middle, motions.end, times)
+        starts = (np.pi / times[:1]) ** 2 * first[None]
+        sizes = np.linalg.norm(np.concatenate([starts, ends]), axis=1)
+        for i in np.flatnonzero(sizes > AT_REST * float(problem.robot.gravity)).tolist():
+            if self.stops.poses[i].rest:
+                raise ConfigError(
+                    self.stops.path,
+                    f"{self.stops.name(i)}.rest = {shown(True)}: must be absent where the acceleration is not zero: "
+                    f"it is {sizes[i]:.3g} m/s^2",
+                )

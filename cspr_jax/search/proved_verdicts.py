@@ -1,0 +1,46 @@
+"""Verdicts that rest on a proof, whatever the trajectory family."""
+
+import dataclasses
+
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdicts:
+    """Verdicts of n motions, (n,) each.
+
+    Fields:
+        verdict: flags of `Verdict`; 0 if proved.
+        margin: smallest slack of taut cables that is attained: of lines a distance from faces, m/s^2; of Bezier
+            segments without a unit, the depth below the spools included.
+        bound: proved lower bound of it.
+        room: smallest slack of the limits, without a unit; inf without limits.
+    """
+
+    verdict: np.ndarray
+    margin: np.ndarray
+    bound: np.ndarray
+    room: np.ndarray
+
+    def replace(self, which: np.ndarray, part: "Verdicts") -> None:
+        """Put other verdicts in place of some.
+
+        Args:
+            which: numbers of the motions.
+            part: theirs.
+        """
+        for name, values in vars(part).items():
+            getattr(self, name)[which] = values
+
+
+def plain_slack(name: str, values: np.ndarray) -> np.ndarray:
+    """Slack of a limit as it is shown.
+
+    Args:
+        name: of the limit.
+        values: (...) as it is proved: of speeds 1 - (rate / limit)^2.
+
+    Returns:
+        (...) of speeds 1 - rate / limit.
+    """
+    return 1.0 - np.sqrt(np.maximum(1.0 - values, 0.0)) if name == "cable_speed_max" else values

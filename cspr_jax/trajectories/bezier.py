@@ -1,0 +1,82 @@
+"""Bezier curves of the second order run through by half a cosine, from rest to rest (launch paper, section 3.1).
+
+With c = cos(pi tau), from 1 to -1, the position is A c^2 + B c + C, (17), and with w = pi / T the acceleration
+w^2 (2 A - B c - 4 A c^2), (18). At the start it is w^2 (middle - start), at the end w^2 (middle - end): where two
+segments meet, both are the same (15).
+"""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.robots.state import State
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Bezier:
+    """Motion along a Bezier curve of the second order; see `Motion`. Numbers of jax, or of NumPy for many at a time.
+
+    Fields:
+        start: (3,) first control point, from the centroid of the spools, z down, m.
+        middle: (3,) second one, which the curve does not pass in general, m.
+        end: (3,) third one, m.
+        time: () duration T, s.
+        z0: () depth at which slacks are normalised, m.
+    """
+
+    start: Any
+    middle: Any
+    end: Any
+    time: Any
+    z0: Any
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return self.time
+
+    def state(self, tau: Array) -> State:
+        """State, (17) and (18); see `Motion.state`."""
+        sine, c = sincospi(jnp.asarray(tau, float))
+        square, slope, rest = powers(self.start, self.middle, self.end)
+        w = np.pi / self.time
+        velocity = -w * sine * (2.0 * square * c + slope)
+        acceleration = w**2 * (2.0 * square - slope * c - 4.0 * square * c**2)
+        return State(square * c**2 + slope * c + rest, velocity, acceleration)
+
+    def breaks(self) -> Array:
+        """None; see `Motion.breaks`."""
+        return jnp.zeros(0)
+
+
+def powers(start: Any, middle: Any, end: Any) -> tuple[Any, Any, Any]:
+    """Coefficients of the powers of c = cos(pi tau) in the position, (17).
+
+    Args:
+        start: (..., 3) first control point, m.
+        middle: (..., 3) second one.
+        end: (..., 3) third one.
+
+    Returns:
+        those of c^2, c and 1, (..., 3) each, m.
+    """
+    return 0.25 * (start - 2.0 * middle + end), 0.5 * (start - end), 0.25 * (start + 2.0 * middle + end)
+
+
+def end_acceleration(middle: Any, end: Any, duration: Any) -> Any:
+    """Acceleration at the end of a segment, with which the next one starts: (8), (15).
+
+    Args:
+        middle: (..., 3) second control point, m.
+        end: (..., 3) third one, m.
+        duration: (..., 1) s.
+
+    Returns:
+        (..., 3) m/s^2.
+    """
+    return (np.pi / duration) ** 2 * (middle - end)
