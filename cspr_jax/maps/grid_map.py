@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.config.equivalents import no_equivalent
 from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
@@ -117,7 +118,7 @@ class PlatformMap(GridMap):
         """Refuse a point mass."""
         if not spec.is_platform:
             raise ConfigError(
-                file, f'robot "{spec.name}" is a point mass: must be a platform on six cables in this map'
+                file, f'robot "{spec.name}" is {spec.kind}: must be a platform on six cables in this map'
             )
         super().__init__(spec, keys, file)
 
@@ -138,7 +139,8 @@ class PointMassMap(GridMap):
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Refuse a platform."""
         if spec.is_platform:
-            raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass in this map')
+            why = no_equivalent(spec)
+            raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass in this map{why}')
         super().__init__(spec, keys, file, for_bounds=for_bounds)
 
     def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
