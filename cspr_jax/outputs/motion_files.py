@@ -164,7 +164,12 @@ def _write_hdf5(plan: Plan, path: Path, columns: dict[str, np.ndarray]) -> None:
     numbers = list(range(1, columns["tension"].shape[1] + 1))
     with new_hdf5(path, attributes(plan)) as file:
         scales = {"t": columns["t"], "axis": list(PARTS["axis"]), "cable": numbers, "segment": of_segments["segment"]}
-        needing = (("component", "quaternion"), ("each", "tension_each"), ("couple", "tension_couple"), ("bound", "path_acceleration"))
+        needing = (
+            ("component", "quaternion"),
+            ("each", "tension_each"),
+            ("couple", "tension_couple"),
+            ("bound", "path_acceleration"),
+        )
         for name, needs in needing:
             if needs in columns:
                 scales[name] = list(PARTS[name])

@@ -10,7 +10,6 @@ NumPy alone, since files are checked without jax.
 """
 
 import dataclasses
-import itertools
 
 import numpy as np
 
@@ -92,7 +91,7 @@ def parallel_pairs(base_points, platform_points) -> ParallelPairs:
         raise _fault(f"{len(base)} cables")
     room = TOLERANCE * float(np.linalg.norm(base - base.mean(0), axis=1).max())
     cables = _matched(base - platform, room)
-    shares = np.array([_shares(platform, *pair, room) for pair in cables.tolist()])
+    shares = np.array([_shares(platform, first, second, room) for first, second in cables.tolist()])
     exits = (shares[:, :, None] * base[cables]).sum(1)
     if is_on_line(exits):
         raise _fault("the three cables of the equivalent leave from points on one line, or from the same one")
@@ -143,7 +142,9 @@ def _shares(platform: np.ndarray, first: int, second: int, room: float) -> tuple
     if not beside <= room:
         raise _fault(f"the mass centre lies {beside:.3g} m beside the line of {names} (at most {room:.2g} m)")
     if not TOLERANCE < place < 1.0 - TOLERANCE:
-        raise _fault(f"the mass centre does not lie between {names}: it is {place:.3g} of the way from one to the other")
+        raise _fault(
+            f"the mass centre does not lie between {names}: it is {place:.3g} of the way from one to the other"
+        )
     return 1.0 - place, place
 
 

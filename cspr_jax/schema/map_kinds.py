@@ -100,6 +100,7 @@ _OF_LINES = (
     *("verdict", "duration", "acceleration_time", "least_duration", "duration_ratio", "rest_margin"),
     *("active_up", "active_down"),
 )
+_OF_LENGTHS = ("sigma_p", "sigma_r")
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 
@@ -235,6 +236,17 @@ MAP_KINDS: dict[str, MapKind] = {
             freedoms=(2, 3),
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.max_acceleration", "limits"),
+        ),
+        MapKind(
+            name="sensitivity",
+            title="Sensitivity to errors of the cable lengths",
+            description="largest displacement, and turn of a platform, that errors of the cable lengths cause",
+            implementation="cspr_jax.maps.sensitivity:SensitivityMap",
+            quantities=_OF_LENGTHS,
+            stored=_OF_LENGTHS,
+            pictured=("sigma_p",),
+            motionless=_OF_LENGTHS,
+            families=(),
         ),
     )
 }
