@@ -97,7 +97,7 @@ def test_the_comparison_sees_most_places():
 def test_cables_of_a_pair_have_one_length():
     robot = random_pairs(3)
     equivalent = cspr_jax.three_cable_equivalent(made(robot))
-    place = robot["exits"].mean(0) + [0.4, -0.3, 1.2]
+    place = robot["exits"].mean(0) + np.array([0.4, -0.3, 1.2])
     lengths = np.linalg.norm(place + robot["platform"] - robot["centre"] - robot["base"], axis=1)
     pairs = parallel_pairs(robot["base"], robot["platform"] - robot["centre"])
     of_three = np.linalg.norm(place - equivalent.base_points, axis=1)
@@ -139,8 +139,8 @@ def radial():
 
 WRONG = {
     "bent": (bent(3, [0.0, 0.0, 1e-3]), "cables 3 and 4 are not parallel: base_points[2] - base_points[3] and "),
-    "beside": ((LAUNCH_BASE, LAUNCH_PLATFORM + [0.01, 0.0, 0.0]), "the mass centre lies 0.00866 m beside the line of"),
-    "above": ((LAUNCH_BASE, LAUNCH_PLATFORM + [0, 0, 0.2]), "the mass centre lies 0.2 m beside the line of platform_"),
+    "beside": ((LAUNCH_BASE, LAUNCH_PLATFORM + 0.01 * np.eye(3)[0]), "the mass centre lies 0.00866 m beside the"),
+    "above": ((LAUNCH_BASE, LAUNCH_PLATFORM + 0.2 * np.eye(3)[2]), "the mass centre lies 0.2 m beside the line of"),
     "line": ((LAUNCH_BASE * [1, 0, 0] + LAUNCH_PLATFORM * [0, 1, 0], LAUNCH_PLATFORM), "points on one line"),
     "turning": (radial(), "the pairs let the platform turn"),
     "seven": ((np.vstack([LAUNCH_BASE, [0, 0, 1]]), np.vstack([LAUNCH_PLATFORM, [0, 0, 1]])), "7 cables"),

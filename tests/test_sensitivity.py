@@ -85,7 +85,7 @@ def test_the_closed_form_is_that_of_all_six_rows(seed):
 def test_three_winches_move_it_as_far_as_six_and_do_not_turn_it():
     """Errors that are equal in a pair: the same largest displacement, no turn."""
     given_robot = random_pairs(4)
-    place = given_robot["exits"].mean(0) + [0.3, 0.2, 1.4]
+    place = given_robot["exits"].mean(0) + np.array([0.3, 0.2, 1.4])
     base, points = given_robot["base"], given_robot["platform"] - given_robot["centre"]
     signs = np.empty((8, 6))
     signs[:, given_robot["pairs"]] = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))[:, :, None]
