@@ -243,9 +243,11 @@ def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
     low, high = values.get("tension_min"), values.get("tension_max")
     if low is not None and high is not None and not (low < high).all():
         pair = int(np.argmin(high - low))
-        allowed = "below tension_max, both over the shares of the two cables"
+        allowed = "must be below tension_max, each over the cable's share of it"
         first, second = (pairs.cables[pair] + 1).tolist()
-        raise InputError("tension_min", f"{low[pair]:.6g} N of the pair of cables {first} and {second}", allowed)
+        raise InputError(
+            "tension_min", None, allowed, fault=f"{low[pair]:.6g} N of the pair of cables {first} and {second}"
+        )
     return dataclasses.replace(limits, **values)
 
 
