@@ -29,12 +29,16 @@ if TYPE_CHECKING:
     from cspr_jax.api.platform_searches import accessible as accessible
     from cspr_jax.api.platform_searches import attainable as attainable
     from cspr_jax.api.platform_searches import minimum_pose_arcs as minimum_pose_arcs
+    from cspr_jax.api.robots import parallel_pair_robot as parallel_pair_robot
     from cspr_jax.api.robots import platform as platform
     from cspr_jax.api.robots import point_mass as point_mass
+    from cspr_jax.api.robots import three_cable_equivalent as three_cable_equivalent
     from cspr_jax.api.runs import status as status
     from cspr_jax.api.runs import verify as verify
     from cspr_jax.api.searches import minimum_arcs as minimum_arcs
     from cspr_jax.api.searches import minimum_oscillations as minimum_oscillations
+    from cspr_jax.api.sensitivities import encoder_error as encoder_error
+    from cspr_jax.api.sensitivities import sensitivity as sensitivity
     from cspr_jax.api.speed import benchmark as benchmark
     from cspr_jax.api.sweeps import compute as compute
     from cspr_jax.api.sweeps import run as run
@@ -63,6 +67,7 @@ _PUBLIC = {
     "bezier_verdicts": ("cspr_jax.api.beziers", "bezier_verdicts"),
     "compute": ("cspr_jax.api.sweeps", "compute"),
     "copy_examples": ("cspr_jax.api.examples", "copy_examples"),
+    "encoder_error": ("cspr_jax.api.sensitivities", "encoder_error"),
     "hypocycloid": ("cspr_jax.api.motions", "hypocycloid"),
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
     "least_time": ("cspr_jax.api.lines", "least_time"),
@@ -75,6 +80,7 @@ _PUBLIC = {
     "minimum_oscillations": ("cspr_jax.api.searches", "minimum_oscillations"),
     "minimum_pose_arcs": ("cspr_jax.api.platform_searches", "minimum_pose_arcs"),
     "open_result": ("cspr_jax.store.result", "open_result"),
+    "parallel_pair_robot": ("cspr_jax.api.robots", "parallel_pair_robot"),
     "plan": ("cspr_jax.api.plans", "plan"),
     "platform": ("cspr_jax.api.robots", "platform"),
     "platform_motion": ("cspr_jax.api.motions", "platform_motion"),
@@ -83,12 +89,14 @@ _PUBLIC = {
     "point_mass_robot": ("cspr_jax.robots.point_mass", "point_mass_robot"),
     "run": ("cspr_jax.api.sweeps", "run"),
     "sampled_margin": ("cspr_jax.api.motions", "sampled_margin"),
+    "sensitivity": ("cspr_jax.api.sensitivities", "sensitivity"),
     "slacks": ("cspr_jax.api.motions", "slacks"),
     "status": ("cspr_jax.api.runs", "status"),
     "straight_line": ("cspr_jax.api.lines", "straight_line"),
     "table": ("cspr_jax.api.tables", "table"),
     "table_names": ("cspr_jax.api.tables", "table_names"),
     "tensions": ("cspr_jax.api.motions", "tensions"),
+    "three_cable_equivalent": ("cspr_jax.api.robots", "three_cable_equivalent"),
     "transition": ("cspr_jax.api.motions", "transition"),
     "verify": ("cspr_jax.api.runs", "verify"),
 }
@@ -105,6 +113,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "bezier_verdicts",
     "compute",
     "copy_examples",
+    "encoder_error",
     "hypocycloid",
     "keep_compiled_code",
     "least_time",
@@ -117,6 +126,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "minimum_oscillations",
     "minimum_pose_arcs",
     "open_result",
+    "parallel_pair_robot",
     "plan",
     "platform",
     "platform_motion",
@@ -125,12 +135,14 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "point_mass_robot",
     "run",
     "sampled_margin",
+    "sensitivity",
     "slacks",
     "status",
     "straight_line",
     "table",
     "table_names",
     "tensions",
+    "three_cable_equivalent",
     "transition",
     "verify",
 ]

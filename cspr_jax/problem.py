@@ -17,6 +17,7 @@ from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.limits import NO_LIMITS, Limits
+from cspr_jax.robots.parallel_pairs import ParallelPairs
 from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
 from cspr_jax.robots.reference_pose import aligned, reference_pose
@@ -149,6 +150,7 @@ def fault_at_rest(spec: RobotFile) -> str | None:
     Returns:
         the reason; None if it hangs with every cable taut.
     """
+    spec = spec.equivalent() if spec.translation_only else spec
     if len(spec.base_points) > spec.dof:
         return "not known: more cables than degrees of freedom share the weight in many ways"
     try:
@@ -212,10 +214,41 @@ def build_limits(spec: RobotFile, keys: LimitKeys, file: object) -> Limits:
     Raises:
         ConfigError: a smallest tension that is not below the largest, or a list of another length.
     """
+    pairs = spec.pairs
     try:
-        return _limits(spec, vars(keys), vars(spec), "")
+        limits = _limits(spec, vars(keys), vars(spec), "", len(spec.as_written.base_points))
+        return limits if pairs is None else pair_limits(limits, pairs)
     except InputError as error:
         raise ConfigError(file, str(error)) from error
+
+
+def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
+    """Limits of the three cables that stand for pairs of six.
+
+    Args:
+        limits: of the six cables; the floor is that of the effector.
+        pairs: the pairs.
+
+    Returns:
+        the limits, (3,) each.
+
+    Raises:
+        InputError: of some pair no tension is within the limits of both cables.
+    """
+    values = {
+        row.name: leaf(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
+        for row in LIMITS
+        if row.per_cable and (value := getattr(limits, row.name)) is not None
+    }
+    low, high = values.get("tension_min"), values.get("tension_max")
+    if low is not None and high is not None and not (low < high).all():
+        pair = int(np.argmin(high - low))
+        allowed = "must be below tension_max, each over the cable's share of it"
+        first, second = (pairs.cables[pair] + 1).tolist()
+        raise InputError(
+            "tension_min", None, allowed, fault=f"{low[pair]:.6g} N of the pair of cables {first} and {second}"
+        )
+    return dataclasses.replace(limits, **values)
 
 
 def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None) -> Limits:
@@ -235,9 +268,9 @@ def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None) ->
     return _limits(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
 
 
-def _limits(robot, given: Mapping[str, Any], own: Mapping[str, Any], at: str) -> Limits:
-    # What is given over the robot's own; `robot` has base_points and z_axis of its file.
-    n_cables, values = len(robot.base_points), dict[str, Any]()
+def _limits(robot, given: Mapping[str, Any], own: Mapping[str, Any], at: str, n_cables: int | None = None) -> Limits:
+    # What is given over the robot's own; `robot` has base_points and z_axis of its file. n_cables: limits are of those.
+    n_cables, values = n_cables or len(robot.base_points), dict[str, Any]()
     for row in LIMITS:
         value = given.get(row.name)
         value = own.get(row.name) if value is None else value

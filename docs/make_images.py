@@ -90,6 +90,9 @@ IMAGES = {
         ("least_time",),
     ),
     "feasible_acceleration": Image("Margin of rest with tensions from 1 to 300 N: positive where it can rest.", 10),
+    "launch_sensitivity": Image(
+        "Largest displacement of the launch robot over the largest error of a cable; infinite on z = 0 (theory.md).", 10
+    ),
     "concepts": Image("From start to target in five arcs, and the pseudotensions; see concepts.md.", 8, command="draw"),
 }
 

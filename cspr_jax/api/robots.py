@@ -1,6 +1,11 @@
-"""Robots from Python: made of numbers, as a robot file has them."""
+"""Robots from Python: made of numbers, as a robot file has them, or of other robots."""
 
+import numpy as np
+
+from cspr_jax.errors import InputError
+from cspr_jax.problem import pair_limits
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.parallel_pairs import parallel_pairs
 from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot, planar_robot, point_mass_robot
 
@@ -78,4 +83,80 @@ def platform(
         name=name,
         z_axis=z_axis,
         limits=limits,
+    )
+
+
+def parallel_pair_robot(
+    spool_radius: float,
+    platform_radius: float,
+    *,
+    mass: float,
+    inertia=None,
+    gravity: float = STANDARD_GRAVITY,
+    z_axis: Axis = "down",
+    name: str = "robot",
+    limits: Limits | None = None,
+) -> PlatformRobot:
+    """A platform on six cables in three parallel pairs, Machines 11 (2), 2023, 224, (30) and (31).
+
+    Args:
+        spool_radius: R, of the circle through the middles of the pairs' spools, a level equilateral triangle; m.
+        platform_radius: r, of the circle through the points of the platform; m.
+        mass: kg, positive.
+        inertia: (3, 3) about the mass centre, platform axes, kg m^2; None: of a uniform disc of that radius.
+        gravity: m/s^2, positive.
+        z_axis: where z points, "down" or "up".
+        name: for people.
+        limits: limits beyond taut cables; None: none.
+
+    Returns:
+        the robot; `three_cable_equivalent` is the point mass that it is as long as one winch drives each pair.
+
+    Raises:
+        InputError: a radius that is not positive, or what a robot file with these numbers would be refused for.
+    """
+    for key, value in (("spool_radius", spool_radius), ("platform_radius", platform_radius)):
+        if not (np.isfinite(value) and value > 0.0):
+            raise InputError(key, value, "a finite number > 0, in m")
+    places, half = 2.0 * np.pi / 3.0 * np.arange(3.0), 0.5 * platform_radius
+    middles = spool_radius * np.stack([np.cos(places), np.sin(places), 0.0 * places], axis=1)
+    high = np.sqrt(3.0) * half
+    firsts = np.array([[-half, -high, 0.0], [platform_radius, 0.0, 0.0], [-half, high, 0.0]])
+    points = np.stack([firsts, -firsts], axis=1)
+    disc = 0.25 * mass * platform_radius**2 * np.diag([1.0, 1.0, 2.0])
+    return platform_robot(
+        (middles[:, None] + points).reshape(6, 3),
+        points.reshape(6, 3),
+        mass=mass,
+        inertia=disc if inertia is None else inertia,
+        gravity=gravity,
+        name=name,
+        z_axis=z_axis,
+        limits=limits,
+    )
+
+
+def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
+    """The point mass on three cables that a platform on six in parallel pairs is; see `robots.parallel_pairs`.
+
+    Args:
+        robot: its platform axes are parallel to the fixed ones where the cables of its pairs are parallel.
+
+    Returns:
+        the robot, in the same axes; its tensions are those of the pairs, and its limits keep those of all six cables.
+
+    Raises:
+        InputError: cables that are no such pairs, a mass centre that is not between the points of a pair, or limits
+            that contradict each other.
+    """
+    if not isinstance(robot, PlatformRobot):
+        raise InputError("robot", getattr(robot, "name", robot), "a platform on six cables")
+    pairs = parallel_pairs(robot.base_points, robot.platform_points)
+    return point_mass_robot(
+        pairs.exit_points,
+        mass=float(robot.mass),
+        gravity=float(robot.gravity),
+        name=robot.name,
+        z_axis=robot.z_axis,
+        limits=pair_limits(robot.limits, pairs),
     )

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Discriminator, Field, PrivateAttr, Tag, create_model, model_validator
 
 from cspr_jax.config.kinds import refuse_other_kinds
@@ -10,6 +11,7 @@ from cspr_jax.config.reading import Table, checked, read_toml
 from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.robots.parallel_pairs import ParallelPairs, parallel_pairs
 from cspr_jax.schema.limits import LIMITS
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
@@ -100,10 +102,17 @@ class RobotFile(LimitKeys):
         description='motions of the effector, R rotations and T translations: "2T" of a planar robot, "3T" of a point '
         'mass, "3R3T" of a rigid platform; the other keys tell which',
     )
+    translation_only: bool | None = Field(
+        None,
+        description="rigid platform on six cables in three parallel pairs, each with one winch: true: it only "
+        "translates, and is planned and swept as the point mass on three cables that it is then",
+    )
     mass: Positive = Field(description="mass of the effector, kg, at most 1e9")
     gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
     z_axis: Literal["down", "up"] = Field("down", description='direction of the z axis, "down" or "up"')
     _file: Path | None = PrivateAttr(None)  # it was read from; None for a table of another file
+    # Of a point mass on three cables that stand for the pairs of six: the robot that it is the equivalent of.
+    _platform: "RobotFile | None" = PrivateAttr(None)
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
 
     @property
@@ -124,6 +133,8 @@ class RobotFile(LimitKeys):
     @property
     def kind(self) -> str:
         """Kind of robot, for people."""
+        if self._platform is not None:
+            return "a platform that only translates"
         return {2: "a planar robot", 3: "a point mass", 6: "a platform"}[self.dof]
 
     @model_validator(mode="after")
@@ -146,6 +157,59 @@ class RobotFile(LimitKeys):
         if self.planar and count == self.dof:
             _check_level(self.base_points)
         return self
+
+    @model_validator(mode="after")
+    def _translates(self) -> "RobotFile":
+        if self.translation_only:
+            try:
+                self.parallel_pairs()
+            except InputError as error:
+                raise fault("translation_only", True, f"absent: {error.fault}") from error
+        return self
+
+    def parallel_pairs(self) -> ParallelPairs:
+        """Pairs of a platform's cables, `robots.parallel_pairs`.
+
+        Returns:
+            the pairs.
+
+        Raises:
+            InputError: why there are none.
+        """
+        if self.platform_points is None:
+            raise InputError("platform_points", None, "given", fault="it has no platform_points")
+        points = np.asarray(self.platform_points) - np.asarray(self.centre_of_mass or [0.0, 0.0, 0.0])
+        return parallel_pairs(self.base_points, points)
+
+    @property
+    def as_written(self) -> "RobotFile":
+        """The robot of the file, also where this one is its equivalent."""
+        return self._platform or self
+
+    @property
+    def pairs(self) -> ParallelPairs | None:
+        """Of an equivalent the pairs that its cables stand for; its limits are still those of the six cables."""
+        return None if self._platform is None else self._platform.parallel_pairs()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Plain values of what decides about motions: the file's keys; of an equivalent, translation_only too."""
+        return self.as_written.model_dump(mode="json", exclude_none=True)
+
+    def equivalent(self) -> "RobotFile":
+        """The point mass on three cables that this platform on six in parallel pairs is.
+
+        Returns:
+            a robot with the spools of `robots.parallel_pairs`, the same name, mass, axes and file.
+
+        Raises:
+            InputError: why it is none.
+        """
+        exits = self.parallel_pairs().exit_points.tolist()
+        absent = dict.fromkeys(("platform_points", "inertia", "centre_of_mass", "pattern", "translation_only"))
+        found = self.model_copy(update={"base_points": exits, **absent})
+        found._platform = self.model_copy(update={"translation_only": True})
+        return found
 
     @model_validator(mode="after")
     def _one_a_cable(self) -> "RobotFile":

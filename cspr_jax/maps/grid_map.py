@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.config.equivalents import no_equivalent
 from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
@@ -78,6 +79,10 @@ class GridMap(abc.ABC):
         """
         self._refuse_out_of_reach(self._targets(self._corners(grid, _OF_TARGETS)), "axes")
 
+    def _refuse_out_of_plane(self, grid: Grid) -> None:
+        if is_planar(self._problem.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
+            raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
+
     def _targets(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates. Radius and azimuth are about the vertical through the centroid of the spools.
         if "radius" not in cells:
@@ -116,9 +121,7 @@ class PlatformMap(GridMap):
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a point mass."""
         if not spec.is_platform:
-            raise ConfigError(
-                file, f'robot "{spec.name}" is a point mass: must be a platform on six cables in this map'
-            )
+            raise ConfigError(file, f'robot "{spec.name}" is {spec.kind}: must be a platform on six cables in this map')
         super().__init__(spec, keys, file)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -138,7 +141,8 @@ class PointMassMap(GridMap):
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Refuse a platform."""
         if spec.is_platform:
-            raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass in this map')
+            why = no_equivalent(spec)
+            raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass in this map{why}')
         super().__init__(spec, keys, file, for_bounds=for_bounds)
 
     def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
@@ -149,10 +153,6 @@ class PointMassMap(GridMap):
         fixed = start.position if start is not None and start.position is not None else [0.0, 0.0, 0.0]
         columns = [cells.get(f"from_{name}", np.full(count, fixed[i])) for i, name in enumerate("xyz")]
         return self._frame.inward(np.stack(columns, axis=1))
-
-    def _refuse_out_of_plane(self, grid: Grid) -> None:
-        if is_planar(self._problem.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
-            raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

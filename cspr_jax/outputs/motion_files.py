@@ -39,7 +39,7 @@ _FIELDS = {
 }
 LARGEST_ROWS = 20_000_000
 # What may be infinite on the way of a motion that is finite.
-OPEN = ("tension", "tension_couple", "path_acceleration")
+OPEN = ("tension", "tension_each", "tension_couple", "path_acceleration")
 # A tick that lies so near to the end of a segment, in parts of a tick, is that end.
 SAME_TICK = 1e-6
 
@@ -70,8 +70,9 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
 
     Returns:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
-        axes; "quaternion", "omega" and "omega_dot" only for a platform, "tension_couple" only for four spools at the
-        corners of a level rectangle, "path_acceleration" only where all segments are straight lines.
+        axes; "quaternion", "omega" and "omega_dot" only for a platform, "tension_each" (n, 6) only for one that only
+        translates, "tension_couple" only for four spools at the corners of a level rectangle, "path_acceleration" only
+        where all segments are straight lines.
 
     Raises:
         ConfigError: a rate that is no number > 0, or too many rows.
@@ -91,7 +92,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
     needs_limits = is_redundant or any(isinstance(motion, TimedLine) for motion in motions)
     limits = plan.problem.limits if needs_limits else NO_LIMITS
     with_couples = is_redundant and is_rectangle(plan.problem.robot.base_points)
-    parts = []
+    pairs, parts = plan.spec.pairs, []
     for i, length in enumerate(duration):
         if rate is None:
             tau = np.linspace(0.0, 1.0, plan.keys.samples)
@@ -104,6 +105,8 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         state, of_cables = jax.tree.map(np.asarray, some)
         state = outward(plan.frame, state)
         part = {name: getattr(state, field) for name, field in _FIELDS.items()} | of_cables
+        if pairs is not None:
+            part["tension_each"] = pairs.tensions(part["tension"])
         parts.append({"t": starts[i] + tau * length, **part})
     names = [name for name in TRAJECTORY if all(part.get(name) is not None for part in parts)]
     return {name: np.concatenate([part[name] for part in parts]) for name in names}
@@ -161,7 +164,12 @@ def _write_hdf5(plan: Plan, path: Path, columns: dict[str, np.ndarray]) -> None:
     numbers = list(range(1, columns["tension"].shape[1] + 1))
     with new_hdf5(path, attributes(plan)) as file:
         scales = {"t": columns["t"], "axis": list(PARTS["axis"]), "cable": numbers, "segment": of_segments["segment"]}
-        needing = (("component", "quaternion"), ("couple", "tension_couple"), ("bound", "path_acceleration"))
+        needing = (
+            ("component", "quaternion"),
+            ("each", "tension_each"),
+            ("couple", "tension_couple"),
+            ("bound", "path_acceleration"),
+        )
         for name, needs in needing:
             if needs in columns:
                 scales[name] = list(PARTS[name])
@@ -201,7 +209,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
         "family": plan.keys.family,
         "plan": plan.text,
         "robot": spec.name,
-        "robot_settings": canonical_json(spec.model_dump(mode="json", exclude_none=True)),
+        "robot_settings": canonical_json(spec.settings),
         "base_points": np.asarray(spec.base_points),
         "mass": spec.mass,
         "z_axis": spec.z_axis,

@@ -198,6 +198,10 @@ def _caption(plan: Plan) -> str:
     time = float(plan.answers.duration.sum())
     total = f"total {f'{time:.2f} s' if math.isfinite(time) else 'time unknown'}; z {plan.spec.z_axis}"
     numbered = not plan.feasible and (plan.answers.tried_arcs > 0).any()
+    pairs = plan.spec.pairs
+    if pairs is not None:
+        named = ", ".join("-".join(map(str, pair)) for pair in (pairs.cables + 1).tolist())
+        total += f"; tensions of the pairs of cables {named}"
     note = "; in brackets: none found, the numbers are those of the best candidate" if numbered else ""
     return f"{total}{note}"
 

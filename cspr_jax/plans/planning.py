@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
@@ -53,7 +54,7 @@ class Plan:
     """A planned sequence.
 
     Fields:
-        spec: the robot as its file has it.
+        spec: the robot as its file has it; or its equivalent, `config.equivalents`.
         keys: the plan file.
         problem: robot, limits, amplitude function; centred.
         z0: m.
@@ -144,7 +145,8 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     Raises:
         ConfigError: a mistake in it.
     """
-    spec = resolve_robot(keys.robot, path, path.parent)
+    legs_of = [FAMILIES[name].legs for name in keys.families]
+    spec = as_moved(resolve_robot(keys.robot, path, path.parent), legs_of)
     sequence = Sequence(spec, keys, path)
     any_cables = all(FAMILIES[name].any_cables for name in keys.families)
     problem = build_problem(spec, keys, keys, path, epsilon=FIRST_EPSILON, any_cables=any_cables)

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.config.equivalents import no_equivalent
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.wording import either
@@ -13,6 +14,8 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg
 from cspr_jax.plans.stops import Stops
 from cspr_jax.schema.families import FAMILIES, moving
+
+POINT_MASS = 3  # degrees of freedom
 
 
 class Sequence:
@@ -69,7 +72,8 @@ def _check_families(spec: RobotFile, keys: PlanFile, path: Path) -> None:
             continue
         key = "family" if own is None else f"pose[{i + 1}].family"
         names = " or ".join(f'"{name}"' for name in moving(spec.dof))
-        raise ConfigError(path, f'{key} = "{family}": must be {names} for {spec.kind} ("{spec.name}")')
+        why = no_equivalent(spec) if POINT_MASS in FAMILIES[family].legs else ""
+        raise ConfigError(path, f'{key} = "{family}": must be {names} for {spec.kind} ("{spec.name}"){why}')
 
 
 def _check_lines(keys: PlanFile, path: Path) -> None:

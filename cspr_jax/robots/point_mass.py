@@ -16,15 +16,13 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.robot import Robot
+from cspr_jax.robots.spool_plane import SMALLEST_LEVEL_RATIO, is_on_line, is_vertical
 from cspr_jax.robots.state import State
 
 STANDARD_GRAVITY = 9.81
 # Degrees of freedom of a point mass in space, and in the plane y = 0.
 SPATIAL, PLANAR = 3, 2
-# Below these ratios spools count as lying on a line, and their plane as vertical.
-SMALLEST_AREA_RATIO = 1e-6
 LARGEST_LENGTH = 1e6  # m; beyond, products of lengths lose their meaning
-SMALLEST_LEVEL_RATIO = 1e-3
 # Two spools count as level if their heights differ by less than this part of their distance.
 LEVEL = 1e-9
 # Of the size of a robot: points nearer to P0 than this are at rest there, and points nearer to a line through P0 on it.
@@ -111,9 +109,7 @@ def point_mass_robot(
     points = checked_points("base_points", base_points, SPATIAL)
     check_numbers(mass, gravity)
     check_axis(z_axis)
-    # The product of both spreads from above, over that of both in space: how far the plane is from vertical.
-    spreads, level = spread(points), spread(points[:, :2])
-    if not level[0] * level[1] > SMALLEST_LEVEL_RATIO * spreads[0] * spreads[1]:
+    if is_vertical(points):
         raise InputError("base_points", points.tolist(), "spools whose plane is not vertical")
     return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis)
 
@@ -178,23 +174,9 @@ def checked_points(key: str, given, least: int) -> np.ndarray:
         raise InputError(key, given, f"{least} points or more of three coordinates, at most 1e6 m")
     if len(points) < least:
         raise InputError(key, given, f"must be {least} or more, one a cable", fault=f"{len(points)} points")
-    if least > PLANAR:
-        sizes = spread(points)
-        if not sizes[1] > SMALLEST_AREA_RATIO * sizes[0]:
-            raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
+    if least > PLANAR and is_on_line(points):
+        raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
     return points
-
-
-def spread(points: np.ndarray) -> np.ndarray:
-    """Spread of points about their centroid along their principal axes.
-
-    Args:
-        points: (n, m).
-
-    Returns:
-        (min(n, m),) singular values, the largest first.
-    """
-    return np.linalg.svd(points - points.mean(0), compute_uv=False)
 
 
 def relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:

@@ -42,6 +42,8 @@ class MapKind:
         definitions: of the accessible set that it takes.
         is_over_orientations: whether its grid has axes over all orientations besides those of the sweep file.
         cells: of a tile, at most, where the sweep file does not say.
+        freedoms: degrees of freedom of the robots that it moves, by which `config.equivalents` finds which robot that
+            is; none: robots go to its class as their files have them.
     """
 
     name: str
@@ -60,6 +62,7 @@ class MapKind:
     definitions: tuple[str, ...] = ("grid", "scan", "equal-volume")
     is_over_orientations: bool = False
     cells: int = LARGEST_TILE
+    freedoms: tuple[int, ...] = ()
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -97,6 +100,7 @@ _OF_LINES = (
     *("verdict", "duration", "acceleration_time", "least_duration", "duration_ratio", "rest_margin"),
     *("active_up", "active_down"),
 )
+_OF_LENGTHS = ("sigma_p", "sigma_r")
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 
@@ -112,6 +116,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
             pictured=("arcs",),
             families=("hypocycloid-standard",),
+            freedoms=(3,),
             start="point",
             needs=("axes.z0",),
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "limits"),
@@ -128,6 +133,7 @@ MAP_KINDS: dict[str, MapKind] = {
             ),
             pictured=("oscillations",),
             families=("transition",),
+            freedoms=(2, 3),
             takes=("limits",),
             one_of=_DEPTHS,
         ),
@@ -141,6 +147,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("lower_envelope",),
             motionless=_OF_INSTANTS,
             families=("transition",),
+            freedoms=(2, 3),
             needs=("axes.tau",),
             takes=("axes.cable", "limits"),
             one_of=_DEPTHS,
@@ -154,6 +161,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
+            freedoms=(6,),
             start="pose",
             needs=("axes.z0",),
             takes=(
@@ -170,6 +178,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
+            freedoms=(6,),
             takes=("axes.z0", "orientations", "orientations.values", "limits"),
             definitions=("grid",),
             is_over_orientations=True,
@@ -184,6 +193,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("accessible_volume",),
             motionless=_OF_PLACES,
             families=_OF_PLATFORMS,
+            freedoms=(6,),
             takes=("orientations",),
             cells=64,  # a cell takes long
         ),
@@ -197,6 +207,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("attainable_fraction", "accessible_volume"),
             motionless=_OF_PLACES,
             families=_OF_PLATFORMS,
+            freedoms=(6,),
             takes=("axes.z0", "orientations", "orientations.values", "limits"),
             cells=16,
         ),
@@ -210,6 +221,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("acceleration_margin",),
             motionless=_OF_ACCELERATIONS,
             families=(),
+            freedoms=(2, 3),
             takes=("limits",),
         ),
         MapKind(
@@ -221,8 +233,20 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_OF_LINES,
             pictured=("duration",),
             families=("s-curve",),
+            freedoms=(2, 3),
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.max_acceleration", "limits"),
+        ),
+        MapKind(
+            name="sensitivity",
+            title="Sensitivity to errors of the cable lengths",
+            description="largest displacement, and turn of a platform, that errors of the cable lengths cause",
+            implementation="cspr_jax.maps.sensitivity:SensitivityMap",
+            quantities=_OF_LENGTHS,
+            stored=_OF_LENGTHS,
+            pictured=("sigma_p",),
+            motionless=_OF_LENGTHS,
+            families=(),
         ),
     )
 }

@@ -14,13 +14,14 @@ def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
     """Bounds of the acceleration along a straight line, as `search.line_durations.names_of` names them from 1 on.
 
     Args:
-        settings: of a sweep, with its point mass as "robot".
+        settings: of a sweep, with its point mass as "robot", or a platform that translates on three pairs of cables.
 
     Returns:
         the words of 0, 1, 2, ...
     """
     robot, limits = settings["robot"], settings.get("limits") or {}
-    chosen = itertools.combinations(range(1, len(robot["base_points"]) + 1), 1 if robot.get("planar") else 2)
+    count = 3 if robot.get("translation_only") else len(robot["base_points"])
+    chosen = itertools.combinations(range(1, count + 1), 1 if robot.get("planar") else 2)
     given = {row.name: limits.get(row.name, robot.get(row.name)) for row in LIMITS if row.of_motion}
     # A smallest tension of zero is what taut cables ask for anyway.
     moving = [name for name, value in given.items() if value is not None and np.any(value)]

@@ -27,6 +27,13 @@ TRAJECTORY = {
             "Tension of each cable, in cable order; of redundant cables those that keep farthest from their limits.",
         ),
         Quantity(
+            "tension_each",
+            "N",
+            "tension of each of six cables",
+            "Of a platform that only translates, in cable order: the shares of `tension`, which is then, as `length` "
+            "and `rate`, that of each pair with its winch, in the order of the first cable of each.",
+        ),
+        Quantity(
             "tension_couple",
             "N",
             "tension couple",
@@ -71,10 +78,12 @@ ACROSS = {
     **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot"), "axis"),
     "quaternion": "component",
     **dict.fromkeys(("length", "rate", "tension"), "cable"),
+    "tension_each": "each",
     "tension_couple": "couple",
     "path_acceleration": "bound",
 }
 PARTS = {
+    "each": tuple("123456"),
     "axis": tuple("xyz"),
     "component": tuple("wxyz"),
     "couple": ("12", "23", "34", "41"),

@@ -278,6 +278,20 @@ QUANTITIES = {
             "int16",
             meanings="line-bounds",
         ),
+        Quantity(
+            "sigma_p",
+            "m m-1",
+            "sensitivity of the position",
+            "Largest displacement over the largest error of a cable length, Machines 11 (2), 2023, 224, (7); at "
+            "least 1, infinite where the cables do not hold the effector.",
+        ),
+        Quantity(
+            "sigma_r",
+            "rad m-1",
+            "sensitivity of the orientation",
+            "Largest turn over the largest error of a cable length, errors of all cables independent; NaN for point "
+            "masses.",
+        ),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
 }

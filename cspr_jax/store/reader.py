@@ -29,7 +29,7 @@ LARGEST_DATA, DENSEST = 8e9, 50
 _LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
 # Names of parts of vectors, for other programs.
-_MARKS = (b"axis", b"cable", b"component", b"couple", b"bound")
+_MARKS = (b"axis", b"cable", b"component", b"each", b"couple", b"bound")
 _LONG = ("settings", "environment_settings", "plan", "robot_settings")
 _TEXTS = (
     *("Conventions", "title", "map", "identity", "z_axis", "robot", "software", "environment", "environments"),

@@ -167,7 +167,7 @@ def _map(
 
 
 # Quantities of a motion that may be infinite.
-_OPEN = ("tension", "tension_couple", "path_acceleration")
+_OPEN = ("tension", "tension_each", "tension_couple", "path_acceleration")
 
 
 def _motion(
@@ -185,6 +185,7 @@ def _motion(
             raise DamagedError(f"{name} = {shown(attributes.get(name))}: must be a number > 0")
     widths = {
         "quaternion": 4,
+        "tension_each": 6,
         "tension_couple": 4,
         "length": tension.shape[1],
         "rate": tension.shape[1],

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax import __version__
+from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import checked, parse_toml, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
@@ -37,7 +38,7 @@ class Sweep:
         file: where it was read.
         kind: of its map.
         keys: its content.
-        robot: its robot.
+        robot: its robot, or the equivalent that its map moves, `config.equivalents`.
         grid: its axes and tiles.
         store: quantities to keep.
         settings: everything that decides the result's numbers.
@@ -106,6 +107,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     robot = resolve_robot(keys.robot, path, path.parent)
     kind = MAP_KINDS[keys.map]
     check_map(kind, keys, path)
+    robot = as_moved(robot, [kind.freedoms]) if kind.freedoms else robot
     own = _orientation_axes(keys) if kind.is_over_orientations else {}
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
     counts |= {name: len(points) for name, points in own.items()}
@@ -122,7 +124,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     axes |= own
     # What is not given decides nothing: a key that a later version adds leaves old identities as they are.
     settings = keys.model_dump(mode="json", by_alias=True, exclude_none=True)
-    settings |= {"robot": robot.model_dump(mode="json", exclude_none=True), "dimensions": list(axes)}
+    settings |= {"robot": robot.settings, "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
     return Sweep(path, kind, keys, robot, Grid(axes, tile), store, settings, text)
 

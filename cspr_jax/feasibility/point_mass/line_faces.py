@@ -15,7 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_acceleration, spool_radius, spread
+from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_acceleration, spool_radius
+from cspr_jax.robots.spool_plane import spread
 from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning
 
 # Of the size of a robot: spools nearer to a plane than this lie in it.

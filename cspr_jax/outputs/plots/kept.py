@@ -19,7 +19,7 @@ def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]
         quantity: that is asked for, for errors.
 
     Returns:
-        the robot as its file has it, and the plan.
+        the robot that was planned, and the plan.
 
     Raises:
         InputError: the file keeps none, as those of earlier versions.
@@ -30,4 +30,5 @@ def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]
         fault = f'"{quantity}" of a motion that keeps no robot and no plan'
         raise InputError("--quantity", quantity, "must be of one that `cspr plan -o` writes now", fault=fault)
     # The settings were checked when the file was read.
-    return checked(RobotFile, json.loads(settings), file), kept_plan(text, Path(file))
+    spec = checked(RobotFile, json.loads(settings), file)
+    return spec.equivalent() if spec.translation_only else spec, kept_plan(text, Path(file))

@@ -19,7 +19,10 @@ PANELS = 6
 # Okabe and Ito: told apart by the colour-blind; the dashes help in grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 # Units as people write them.
-WRITTEN = {"m s-1": "m/s", "m s-2": "m/s²", "rad s-1": "rad/s", "rad s-2": "rad/s²"}
+WRITTEN = {
+    **{"m s-1": "m/s", "m s-2": "m/s²", "rad s-1": "rad/s", "rad s-2": "rad/s²"},
+    **{"m m-1": "m/m", "rad m-1": "rad/m"},
+}
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)))
 
 

@@ -54,7 +54,9 @@ def motion_figure(result: Result) -> Figure:
             _path(drawn[name], position, j)
     if result.attributes.get("z_axis", "down") == "down":
         drawn["xz"].invert_yaxis()
-    _tensions(drawn["tension"], time, tension, result.attributes.get("mass"))
+    word = "pair" if "tension_each" in result.data else "cable"
+    names = [f"{word} {k + 1}" for k in range(tension.shape[1])]
+    _tensions(drawn["tension"], time, tension, names, result.attributes.get("mass"))
     if "couple" in drawn:
         _lines(drawn["couple"], time, result.data["tension_couple"], [f"couple {name}" for name in PARTS["couple"]])
         drawn["couple"].set_ylabel("tension couple (N)")
@@ -133,8 +135,8 @@ def _bounds(panel: Axes, time: np.ndarray, values: np.ndarray) -> None:
     panel.margins(x=0.01)
 
 
-def _tensions(panel: Axes, time: np.ndarray, tension: np.ndarray, mass: object) -> None:
-    _lines(panel, time, tension, [f"cable {k + 1}" for k in range(tension.shape[1])])
+def _tensions(panel: Axes, time: np.ndarray, tension: np.ndarray, names: list[str], mass: object) -> None:
+    _lines(panel, time, tension, names)
     panel.set_ylabel("tension (N)")
     if isinstance(mass, float) and mass > 0.0:
         second = panel.secondary_yaxis(

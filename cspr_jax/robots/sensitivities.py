@@ -1,0 +1,98 @@
+"""Sensitivity of an effector to errors of its cable lengths, Machines 11 (2), 2023, 224, (7), at one place.
+
+With K the rates of the cable lengths over velocity and angular velocity, one row (e, b x e) a cable, a small error
+d rho of the lengths moves the effector by K^-1 d rho. The largest displacement of all errors up to one unit in each
+cable is the induced norm (infinity, 2) of the upper rows of K^-1, sigma_p; the largest turn that of the lower rows,
+sigma_r. A norm is convex, so that its largest value over the cube of errors lies at a corner: the maximum over all
+signs is exact. (The text's J has the other sign in its lower rows; no norm sees it.)
+
+No sigma_p is below d / sqrt(n) for n cables and d translations: the mean square over the corners is the squared
+Frobenius norm of the upper rows, and of those that invert n unit vectors e no sum of squares is below d^2 / n. So it is
+at least sqrt 3 with three cables, where only cables at right angles reach it.
+"""
+
+import itertools
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.elementary import solved
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.robot import Robot, check_determined
+from cspr_jax.robots.wrench_balance import at_rest, is_regular, normalised_determinant
+
+_TRANSLATIONS = 3
+
+
+class Sensitivities(NamedTuple):
+    """Sensitivities to errors of the cable lengths; infinite where the cables do not hold the effector.
+
+    Fields:
+        sigma_p: () largest displacement over the largest error of a cable, m/m.
+        sigma_r: () largest turn of a platform over that error, rad/m; NaN for a point mass.
+    """
+
+    sigma_p: Array
+    sigma_r: Array
+
+
+def sensitivities(robot: Robot, position: Array, rotation: Array | None = None) -> Sensitivities:
+    """Sensitivities of any robot with as many cables as degrees of freedom, errors of all of them independent.
+
+    Args:
+        robot: the robot.
+        position: (3,) m.
+        rotation: (3, 3) of a platform; None for a point mass.
+
+    Returns:
+        the sensitivities.
+
+    Raises:
+        InputError: more cables than degrees of freedom.
+    """
+    check_determined(robot)
+    turn = jnp.eye(_TRANSLATIONS) if rotation is None else rotation
+    rates = -robot.wrench_matrix(at_rest(position, turn)).T
+    inverse, determinant = solved(rates, jnp.eye(robot.dof))
+    if isinstance(robot, PlatformRobot):
+        determinant = normalised_determinant(robot, position, turn)
+    return _of_inverse(inverse[:_TRANSLATIONS], inverse[_TRANSLATIONS:], determinant)
+
+
+def pair_sensitivities(exit_points: Array, along: Array, size: Array, position: Array) -> Sensitivities:
+    """Sensitivities of a platform on three parallel pairs of cables in closed form, as (A1) and (A2).
+
+    Of a pair with shares 1 - lambda and lambda, whose points are d apart, the rows of K give
+    (1 - lambda) rho' + lambda rho'' = e . p' and rho'' - rho' = (d x e) . omega. Independent errors of six lengths move
+    the platform as far as those of three winches: the weighted means of both reach the same cube, whatever the shares.
+    Their differences turn it, up to twice the error of each; errors of winches alone, equal in a pair, turn it not.
+
+    Args:
+        exit_points: (3, 3) spools of the equivalent, m.
+        along: (3, 3) from the first point of each pair on the platform to the second, d, m.
+        size: () root of the mean square distance of the platform points from the mass centre, m.
+        position: (3,) of the mass centre, m.
+
+    Returns:
+        the sensitivities, as of six independent errors.
+    """
+    cables = position[None] - exit_points
+    units = cables / jnp.linalg.norm(cables, axis=1, keepdims=True)
+    translation, first = solved(units, jnp.eye(_TRANSLATIONS))
+    rotation, second = solved(jnp.cross(along, units), jnp.eye(_TRANSLATIONS))
+    return _of_inverse(translation, 2.0 * rotation, first * second / size**3)
+
+
+def _of_inverse(translations: Array, rotations: Array, determinant: Array) -> Sensitivities:
+    held = is_regular(jnp.abs(determinant))
+    sigma_p, sigma_r = (jnp.where(held, _largest(rows), jnp.inf) for rows in (translations, rotations))
+    return Sensitivities(sigma_p, sigma_r if len(rotations) else jnp.full_like(sigma_p, jnp.nan))
+
+
+def _largest(rows: Array) -> Array:
+    # Opposite corners give the same length: the last sign stays.
+    count = rows.shape[1]
+    signs = np.array([(*some, 1.0) for some in itertools.product((-1.0, 1.0), repeat=count - 1)])
+    return jnp.max(jnp.linalg.norm(signs @ rows.T, axis=1))

@@ -1,0 +1,85 @@
+"""Sensitivities of a robot at many places: arrays in, answers out."""
+
+from functools import partial
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.rotations import matrix
+from cspr_jax.errors import InputError
+from cspr_jax.robots.parallel_pairs import ParallelPairs, parallel_pairs
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.robots.robot import check_determined
+from cspr_jax.robots.sensitivities import Sensitivities, pair_sensitivities, sensitivities
+
+BATCH = 8192  # places at a time
+
+
+@jax.jit
+def _of_point_mass(robot: PointMassRobot, places) -> Sensitivities:
+    return jax.vmap(partial(sensitivities, robot))(places)
+
+
+@jax.jit
+def _of_platform(robot: PlatformRobot, poses) -> Sensitivities:
+    return jax.vmap(lambda place, turn: sensitivities(robot, place, matrix(turn)))(*poses)
+
+
+@jax.jit
+def _of_pairs(geometry, places) -> Sensitivities:
+    exits, along, size = geometry
+    return jax.vmap(partial(pair_sensitivities, exits, along, size))(places)
+
+
+class SensitivitySearch:
+    """The sensitivities of a robot.
+
+    A platform whose cables are in three parallel pairs stands as its file has it, where they are parallel; another one
+    in its reference orientation.
+
+    Args:
+        robot: centred; a platform in the axes of its file.
+
+    Raises:
+        InputError: more cables than degrees of freedom.
+    """
+
+    def __init__(self, robot: PointMassRobot | PlatformRobot) -> None:
+        """Find how a platform stands."""
+        check_determined(robot)
+        self._robot, self._pairs = robot, None
+        if isinstance(robot, PlatformRobot):
+            self._pairs = _pairs(robot)
+            self._robot = robot if self._pairs is not None else aligned(robot)[0]
+
+    def __call__(self, positions: np.ndarray, quaternions: np.ndarray | None = None) -> Sensitivities:
+        """Sensitivities at places.
+
+        Args:
+            positions: (n, 3) in the kernels' coordinates, m.
+            quaternions: (n, 4) orientations of a platform from how it stands; None: that.
+
+        Returns:
+            (n,) each.
+        """
+        robot, pairs = self._robot, self._pairs
+        if isinstance(robot, PointMassRobot):
+            return in_batches(partial(_of_point_mass, robot), positions, size=BATCH)
+        if quaternions is None and pairs is not None:
+            points = np.asarray(robot.platform_points)
+            first, second = points[pairs.cables[:, 0]], points[pairs.cables[:, 1]]
+            geometry = (leaf(pairs.exit_points), leaf(second - first), leaf(np.sqrt((points**2).sum(1).mean())))
+            return in_batches(partial(_of_pairs, geometry), positions, size=BATCH)
+        turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(positions), 1)) if quaternions is None else quaternions
+        return in_batches(partial(_of_platform, robot), (positions, turns), size=BATCH)
+
+
+def _pairs(robot: PlatformRobot) -> ParallelPairs | None:
+    try:
+        return parallel_pairs(robot.base_points, robot.platform_points)
+    except InputError:
+        return None
