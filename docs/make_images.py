@@ -90,6 +90,9 @@ IMAGES = {
         ("least_time",),
     ),
     "feasible_acceleration": Image("Margin of rest with tensions from 1 to 300 N: positive where it can rest.", 10),
+    "bezier_sequence": Image(
+        "Bezier segments through places outside the footprint, the least total time.", 10, command="plan"
+    ),
     "launch_sensitivity": Image(
         "Largest displacement of the launch robot over the largest error of a cable; infinite on z = 0 (theory.md).", 10
     ),

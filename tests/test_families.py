@@ -152,7 +152,7 @@ def test_the_row_is_gone_behind_the_block(tmp_path):
 
 
 def test_rows_of_the_package():
-    lines = ["s-curve", "quintic", "cubic"]
+    lines = ["s-curve", "quintic", "cubic", "bezier"]
     assert moving(2) == ["transition", *lines]
     assert moving(3) == ["hypocycloid-standard", "transition", *lines]
     assert moving(6) == ["hypocycloid-standard", "hypocycloid"]
