@@ -1,0 +1,118 @@
+"""Least value of a smooth objective under smallest margins: many places looked at, the best improved, and proved."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from cspr_jax.arithmetic.batches import in_batches
+
+# Gives of arguments and unknowns (n,) the objective () and the margins (n_margins,).
+Parts = Callable[[Any, Array], tuple[Array, Array]]
+LOOKED_AT, IMPROVED, BATCH = 4096, 8, 512
+# Smallest margins asked for, one after the other until the answer is proved.
+MARGINS = (1e-9, 1e-7, 1e-5, 1e-3)
+STEPS, AGREED = 200, 1e-12
+
+
+class Judged(NamedTuple):
+    """Judgement of one place.
+
+    Fields:
+        feasible: whether it is proved feasible.
+        margin: smallest margin.
+    """
+
+    feasible: bool
+    margin: float
+
+
+@partial(jax.jit, static_argnums=0)
+def _screened(parts: Parts, given: Any, places: Array) -> tuple[Array, Array]:
+    def one(x):
+        value, margins = parts(given, x)
+        return value, jnp.min(margins)
+
+    return jax.vmap(one)(places)
+
+
+@partial(jax.jit, static_argnums=0)
+def _both(parts: Parts, given: Any, x: Array) -> tuple[Array, Array]:
+    return parts(given, x)
+
+
+@partial(jax.jit, static_argnums=0)
+def _slopes(parts: Parts, given: Any, x: Array) -> tuple[Array, Array]:
+    return jax.jacfwd(lambda own: parts(given, own))(x)
+
+
+def least(
+    parts: Parts, given: Any, low: np.ndarray, high: np.ndarray, judged: Callable[[np.ndarray], Judged]
+) -> np.ndarray:
+    """Unknowns with the least objective among feasible ones: a local minimum, or the best of several.
+
+    Args:
+        parts: a function of a module, as it is compiled once.
+        given: its first argument.
+        low: (n,) smallest unknowns.
+        high: (n,) largest ones.
+        judged: proves or refutes a place.
+
+    Returns:
+        (n,) feasible if any place that was improved is; else the one with the largest margin.
+    """
+    share = qmc.Halton(len(low), seed=0).random(LOOKED_AT)
+    places = low + (high - low) * share
+    value, margin = in_batches(partial(_screened, parts, given), places, size=BATCH)
+    usable = np.isfinite(value) & np.isfinite(margin)
+    margin = np.where(usable, margin, -np.inf)
+    # Those that are feasible and have a small objective first, then those that come nearest.
+    order = np.lexsort((np.where(margin > 0.0, value, -margin), margin <= 0.0))
+    best, own = places[order[0]], judged(places[order[0]])
+    size = float(value[order[0]])
+    for start in places[order[:IMPROVED]]:
+        found = _improved(parts, given, start, list(zip(low, high, strict=True)), judged)
+        other, length = judged(found), float(_both(parts, given, jnp.asarray(found))[0])
+        if (other.feasible, -length if other.feasible else other.margin) > (
+            own.feasible,
+            -size if own.feasible else own.margin,
+        ):
+            best, own, size = found, other, length
+    return best
+
+
+def _improved(
+    parts: Parts,
+    given: Any,
+    start: np.ndarray,
+    bounds: list[tuple[float, float]],
+    judged: Callable[[np.ndarray], Judged],
+) -> np.ndarray:
+    def of(function, which: int) -> Callable[[np.ndarray], np.ndarray]:
+        return lambda x: np.asarray(function(parts, given, jnp.asarray(x))[which])
+
+    found = start
+    for margin in MARGINS:
+        limit = {"type": "ineq", "fun": lambda x, m=margin: of(_both, 1)(x) - m, "jac": of(_slopes, 1)}
+        with np.errstate(all="ignore"):
+            answer = minimize(
+                of(_both, 0),
+                found,
+                jac=of(_slopes, 0),
+                method="SLSQP",
+                bounds=bounds,
+                constraints=[limit],
+                options={"maxiter": STEPS, "ftol": AGREED},
+            )
+        if not np.isfinite(answer.x).all():
+            break
+        found = answer.x
+        if judged(found).feasible:
+            break
+    return found
