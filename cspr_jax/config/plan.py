@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from cspr_jax.config.kinds import refuse_other_kinds
+from cspr_jax.config.launch import LaunchTable
 from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml
 from cspr_jax.config.robot import LimitTable, Point, Positive
 from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, FamilyName, Quaternion, TiltTorsion, TrajectoryKeys
@@ -85,6 +86,7 @@ class PlanFile(TrajectoryKeys, LimitTable):
     limits: LimitTable | None = Field(
         None, description="[limits], as in a sweep: the same keys as here, each in one of the two places"
     )
+    launch: LaunchTable | None = Field(None, description="bezier: [launch], an object that is released on the way")
     pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
         description="the poses in their order, at least two [[pose]] tables"
     )
@@ -109,6 +111,26 @@ class PlanFile(TrajectoryKeys, LimitTable):
     def _first_family(self) -> "PlanFile":
         if self.pose[0].family is not None:
             raise fault("pose[0].family", self.pose[0].family, "absent: no segment ends at the first pose")
+        return self
+
+    @model_validator(mode="after")
+    def _launched(self) -> "PlanFile":
+        if self.launch is None:
+            return self
+        last = len(self.pose) - 2
+        if self.launch.segment > last or self.family_of(self.launch.segment) != "bezier":
+            allowed = f'from 0 to {last}, a pose from which family = "bezier" leads on'
+            raise fault("launch.segment", self.launch.segment, allowed)
+        end = self.pose[self.launch.segment + 1]
+        for key, value in (("position", end.position), ("rest", end.rest or None)):
+            if value is not None:
+                name = f"pose[{self.launch.segment + 1}].{key}"
+                raise fault(name, value, "absent: the segment of the launch ends where it follows from the launch")
+        if self.first_control_point is not None or self.least == "each":
+            key = "least" if self.first_control_point is None else "first_control_point"
+            raise fault(
+                key, getattr(self, key), "absent beside [launch], from which accelerations and durations follow"
+            )
         return self
 
     @model_validator(mode="after")

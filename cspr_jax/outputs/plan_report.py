@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from cspr_jax.plans.planning import Plan
+from cspr_jax.plans.released import released
 from cspr_jax.schema.verdicts import Verdict
 
 SCHEMA = 1
@@ -32,6 +33,9 @@ def plan_object(plan: Plan) -> dict[str, Any]:
         "total_duration": float(plan.answers.duration.sum()),
         "feasible": plan.feasible,
     }
+    launch = released(plan)
+    if launch is not None:
+        fields["launch"] = launch.to_dict()
     return _finite(fields)
 
 

@@ -1,23 +1,37 @@
-"""Leg of Bezier segments, at rest in every pose."""
+"""Leg of Bezier segments, at rest in every pose; an object may be released on one of them."""
 
 import dataclasses
+from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.point_mass.bezier_margins import depths_of
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg, each
+from cspr_jax.plans.released import question_of
 from cspr_jax.plans.stops import Stops
 from cspr_jax.robots.point_mass import AT_P0, spool_radius
 from cspr_jax.search.answers import Answers
-from cspr_jax.search.bezier_sequences import Anchored, least_total
+from cspr_jax.search.bezier_sequences import Anchored, least_total, segments_of
 from cspr_jax.search.beziers import answers_of, joined_segments
+from cspr_jax.search.launches import launched
 from cspr_jax.trajectories.bezier import end_acceleration
 from cspr_jax.trajectories.motion import Motion
 
 # Accelerations that count as none, over gravity.
 AT_REST = 1e-9
+
+
+class _Chosen(NamedTuple):
+    # Places, durations (None: the least, one after the other) and first control point; the release, if there is one.
+    points: np.ndarray
+    durations: list[float | None]
+    first: np.ndarray
+    release: float = np.nan
+    flight_time: float = np.nan
 
 
 class Beziers(Leg):
@@ -31,23 +45,39 @@ class Beziers(Leg):
                 raise ConfigError(stops.path, f'{stops.name(i)}.arcs: must be absent with family = "bezier"')
         if stops.keys.least == "total" and None not in self._durations:
             raise ConfigError(stops.path, 'least = "total": must be absent where every duration is given')
+        launch = stops.keys.launch
+        # Of the segment of the launch, if it is one of these.
+        self._at = None if launch is None or not 0 <= launch.segment - stops.first < len(self) else launch.segment
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the places; see `Leg.join`."""
-        points, stops = self._points(problem, z0), self.stops
-        given = stops.keys.first_control_point if stops.first == 0 else None
-        first = points[0] if given is None else np.asarray(stops.frame.inward(given))
+        points, frame = self._points(problem, z0), self.stops.frame
         # Of P0, else of the first pose.
         depth = z0 if np.isfinite(z0) else float(depths_of(problem.robot, points[:1])[0])
-        durations = self._durations
+        chosen = self._chosen(problem, points, depth)
+        segments = joined_segments(problem, chosen.points, chosen.durations, chosen.first, depth)
+        answers, motions = answers_of(problem, segments), segments.motions
+        self._check_rests(problem, motions, chosen.first - points[0])
+        if self._at is not None:
+            answers.release[self._at - self.stops.first] = chosen.release
+            answers.flight_time[self._at - self.stops.first] = chosen.flight_time
+        shown_points = np.asarray(frame.outward(answers.control_points))
+        return dataclasses.replace(answers, control_points=shown_points), each(motions, len(self))
+
+    def _chosen(self, problem: Problem, points: np.ndarray, depth: float) -> _Chosen:
+        stops, durations, launch = self.stops, self._durations, self.stops.keys.launch
+        if launch is not None and self._at is not None:
+            question = question_of(stops, points, depth, float(problem.robot.gravity))
+            found = launched(problem, question, durations, launch.choose)
+            first = segments_of(found.sequence, jnp.asarray(found.durations)).middle[0]
+            places, times, first = jax.tree.map(np.asarray, (found.sequence.points, found.durations, first))
+            return _Chosen(places, times.tolist(), first, float(found.release), float(found.time))
+        given = stops.keys.first_control_point if stops.first == 0 else None
+        first = points[0] if given is None else np.asarray(stops.frame.inward(given))
         if stops.keys.least == "total":
             sequence = Anchored(points, np.asarray(0), first, np.asarray(depth))
             durations = least_total(problem, sequence, durations).tolist()
-        segments = joined_segments(problem, points, durations, first, depth)
-        answers, motions = answers_of(problem, segments), segments.motions
-        self._check_rests(problem, motions, first - points[0])
-        shown_points = np.asarray(stops.frame.outward(answers.control_points))
-        return dataclasses.replace(answers, control_points=shown_points), each(motions, len(self))
+        return _Chosen(points, durations, first)
 
     @property
     def _durations(self) -> list[float | None]:

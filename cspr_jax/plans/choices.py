@@ -75,7 +75,9 @@ def _needs_depth(stops: Stops) -> bool:
     # Rests elsewhere than in P0 need none.
     keys = stops.keys
     anywhere = all(FAMILIES[name].rests_anywhere for name in keys.families)
-    return not anywhere or keys.inclination is not None or any(pose.position is None for pose in keys.pose)
+    return (
+        not anywhere or keys.inclination is not None or any(pose.position is None and pose.rest for pose in keys.pose)
+    )
 
 
 def _check_depth_keys(stops: Stops) -> None:

@@ -161,7 +161,11 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     frame = sequence.stops.frame
     asked = _demands(problem, legs, keys.samples)
     asked = dataclasses.replace(asked, lowest=frame.height(asked.lowest))
-    points = frame.outward(sequence.stops.points(z0))
+    points = np.array(frame.outward(sequence.stops.points(z0)))
+    if keys.launch is not None:  # whose segment ends where it follows from the launch
+        motions = [motion for leg in legs for motion in leg.motions]
+        end = motions[keys.launch.segment].state(jnp.asarray(1.0)).position
+        points[keys.launch.segment + 1] = frame.outward(np.asarray(end))
     warnings = tuple(dict.fromkeys(line for leg in sequence.legs for line in leg.warnings(problem)))
     return Plan(spec, keys, problem, z0, frame, points, legs, asked, warnings)
 

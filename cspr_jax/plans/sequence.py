@@ -95,7 +95,8 @@ def _check_poses(spec: RobotFile, keys: PlanFile, path: Path) -> None:
     for i, pose in enumerate(keys.pose):
         if pose.duration is not None and (i == 0 or keys.family_of(i - 1) != "bezier"):
             raise ConfigError(path, f'pose[{i}].duration: must be absent unless family = "bezier" leads there')
-        if pose.position is None and not pose.rest:
+        follows = keys.launch is not None and i == keys.launch.segment + 1
+        if pose.position is None and not pose.rest and not follows:
             raise ConfigError(path, f"pose[{i}].position is missing: [x, y, z] in m, or rest = true")
         for key in () if spec.is_platform else ("tilt_torsion", "quaternion", "beta_hat"):
             if getattr(pose, key) is not None:

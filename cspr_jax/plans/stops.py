@@ -85,5 +85,5 @@ class Stops:
     @property
     def targets(self) -> np.ndarray:
         """Poses that are not at rest, (n, 3) from the centroid of the spools, z down, m."""
-        moving = [pose.position for pose in self.poses if not pose.rest]
+        moving = [pose.position for pose in self.poses if not pose.rest and pose.position is not None]
         return self.frame.inward(np.asarray(moving, float).reshape(-1, 3))

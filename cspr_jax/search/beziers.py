@@ -22,10 +22,14 @@ class BezierAnswers(Answers):
         control_points: (n, 3, 3) start, middle and end; m.
         taut_durations: (n,) of each segment, those that keep every cable taut, with the segments before it as they
             are: [[least, largest], ...] in s, inf where any longer duration does.
+        release: (n,) when an object is released, after the start of the segment, s; NaN where none is.
+        flight_time: (n,) time of its flight, s; NaN likewise.
     """
 
     control_points: np.ndarray
     taut_durations: np.ndarray
+    release: np.ndarray
+    flight_time: np.ndarray
 
     @property
     def feasible(self) -> np.ndarray:
@@ -115,4 +119,6 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
         np.full(count, np.nan),
         np.stack([motions.start, motions.middle, motions.end], axis=1),
         intervals,
+        np.full(count, np.nan),
+        np.full(count, np.nan),
     )

@@ -1,0 +1,46 @@
+"""The [launch] table of a plan: an object is released on a Bezier segment and flies to a target."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from cspr_jax.config.reading import Table
+from cspr_jax.config.robot import Point, Positive
+from cspr_jax.config.wording import fault
+
+
+class LaunchTable(Table):
+    """Launch of an object."""
+
+    segment: Annotated[int, Field(ge=0)] = Field(
+        description="number of the pose at which the segment of the release starts; the next pose has no position, "
+        "since it follows from the launch"
+    )
+    target: Point = Field(description="where the object is to arrive, [x, y, z], m")
+    point: Point | None = Field(None, description="place of the release, [x, y, z], m; absent: follows from velocity")
+    velocity: Point | None = Field(
+        None, description="velocity at the target, [x, y, z], m/s; absent: follows from point and the flight's time"
+    )
+    time: Positive | None = Field(None, description="time of the flight, s; absent: see choose")
+    choose: Literal["energy", "time"] | None = Field(
+        None,
+        description='in place of time: "energy", the least kinetic energy at the release, or "time", the earliest '
+        "landing, by search",
+    )
+    release: Positive | None = Field(
+        None, description="when the object is released, after the start of the segment, s; absent: chosen by search"
+    )
+
+    @model_validator(mode="after")
+    def _one_parabola(self) -> "LaunchTable":
+        if self.point is None and self.velocity is None:
+            raise fault("point", None, "the place of the release, or velocity at the target: one of them")
+        if self.point is not None and self.velocity is not None:
+            for name in ("time", "choose"):
+                if getattr(self, name) is not None:
+                    raise fault(name, getattr(self, name), "absent beside point and velocity, which tell it")
+            return self
+        if (self.time is None) == (self.choose is None):
+            allowed = 'a time of flight, or choose = "energy" or "time": one of them'
+            raise fault("time", self.time, allowed)
+        return self
