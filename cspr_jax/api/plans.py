@@ -88,7 +88,8 @@ class Plan(planning.Plan):
             ConfigError: xarray is not installed, or too many rows.
         """
         labelled.need_xarray()
-        arrays = self.rows(rate) | motion_files.segments(self)
+        with double_precision():
+            arrays = self.rows(rate) | motion_files.segments(self) | motion_files.flight(self)
         return labelled.motion(arrays, motion_files.attributes(self))
 
 

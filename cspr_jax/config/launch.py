@@ -8,6 +8,19 @@ from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Point, Positive
 from cspr_jax.config.wording import fault
 
+Size = Annotated[float, Field(ge=0.0, le=1e3)]
+
+
+class ErrorTable(Table):
+    """Errors of a launch, whose scatter is computed."""
+
+    release: Size = Field(0.0, description="standard deviation of the instant of release, s")
+    cable_length: Size = Field(0.0, description="standard deviation of the length of each cable at the release, m")
+    cable_speed: Size = Field(0.0, description="standard deviation of the rate of each cable's length, m/s")
+    encoder: Size = Field(0.0, description="largest error of each length by the resolution of its encoder, m")
+    throws: Annotated[int, Field(ge=2, le=1_000_000)] = Field(10_000, description="number of throws of the sample")
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="seed of the sample")
+
 
 class LaunchTable(Table):
     """Launch of an object."""
@@ -30,6 +43,8 @@ class LaunchTable(Table):
     release: Positive | None = Field(
         None, description="when the object is released, after the start of the segment, s; absent: chosen by search"
     )
+
+    errors: ErrorTable | None = Field(None, description="[launch.errors], errors whose scatter is computed")
 
     @model_validator(mode="after")
     def _one_parabola(self) -> "LaunchTable":

@@ -7,7 +7,7 @@ from typing import Any
 from cspr_jax.config.robot import catalogue_names, resolve_robot
 from cspr_jax.problem import fault_at_rest
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.motion_quantities import SEGMENTS, TRAJECTORY
+from cspr_jax.schema.motion_quantities import FLIGHT, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.quantities import AXES, QUANTITIES
 
 
@@ -51,7 +51,7 @@ def quantities() -> list[dict[str, Any]]:
     Returns:
         group, name, units and description of each.
     """
-    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY, "segment": SEGMENTS}
+    groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY, "segment": SEGMENTS, "flight": FLIGHT}
     return [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
 
 

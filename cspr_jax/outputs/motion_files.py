@@ -15,11 +15,12 @@ from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.accelerations import along
 from cspr_jax.plans.planning import Plan
+from cspr_jax.plans.released import released
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
 from cspr_jax.schema.identity import canonical_json
-from cspr_jax.schema.motion_quantities import ACROSS, PARTS, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT, FLIGHT_DIMS, PARTS, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.quantities import flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
@@ -38,6 +39,8 @@ _FIELDS = {
     "omega_dot": "angular_acceleration",
 }
 LARGEST_ROWS = 20_000_000
+# Rows of the flight of a released object.
+FLIGHT_ROWS = 101
 # What may be infinite on the way of a motion that is finite.
 OPEN = ("tension", "tension_each", "tension_couple", "path_acceleration")
 # A tick that lies so near to the end of a segment, in parts of a tick, is that end.
@@ -188,6 +191,44 @@ def _write_hdf5(plan: Plan, path: Path, columns: dict[str, np.ndarray]) -> None:
             if name != "segment":
                 data.dims[0].attach_scale(file["segment"])
         set_attributes(file["segment_verdict"], flag_attributes())
+        _write_flight(file, flight(plan))
+
+
+def _write_flight(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
+    if "landing" in columns:
+        file["level"] = list(PARTS["level"])
+        file["level"].make_scale("level")
+    for name, values in columns.items():
+        data = file.create_dataset(name, data=values)
+        describe(data, FLIGHT[name])
+        if FLIGHT_DIMS[name] == (name,):
+            data.make_scale(name)
+    for name in columns:
+        for i, scale in enumerate(FLIGHT_DIMS[name]):
+            if scale != name:
+                file[name].dims[i].attach_scale(file[scale])
+
+
+def flight(plan: Plan) -> dict[str, np.ndarray]:
+    """Flight of the object that a plan releases, and the landings of a sample of throws.
+
+    Args:
+        plan: the plan.
+
+    Returns:
+        by the names of `schema.motion_quantities.FLIGHT`, in the axes of the robot file; none without a launch.
+    """
+    own = released(plan)
+    if own is None or not np.isfinite(own.flight_time):
+        return {}
+    time = np.linspace(0.0, own.flight_time, FLIGHT_ROWS)
+    down = plan.frame.turned(np.array([0.0, 0.0, float(plan.problem.robot.gravity)]))
+    position = own.position + own.velocity * time[:, None] + 0.5 * down * time[:, None] ** 2
+    columns = {"flight_t": own.time + time, "flight_position": position}
+    if own.scatter is not None:
+        count = len(own.scatter.landings)
+        columns |= {"throw": np.arange(1.0, count + 1.0), "landing": own.scatter.landings}
+    return columns
 
 
 def attributes(plan: Plan) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.plans.stops import Stops
+from cspr_jax.search.landings import LaunchErrors, Scatter, Throw, scatter
 from cspr_jax.search.launches import Launch
 from cspr_jax.trajectories.launch import flown
 
@@ -27,6 +28,7 @@ class Released:
         landing: (3,) where the flight ends, m.
         flight_time: s.
         tension_min: smallest tension on the segment, N.
+        scatter: of the landings, of a plan that names errors.
     """
 
     segment: int
@@ -37,6 +39,7 @@ class Released:
     landing: np.ndarray
     flight_time: float
     tension_min: float
+    scatter: Scatter | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The launch as a plan's JSON has it.
@@ -44,7 +47,7 @@ class Released:
         Returns:
             plain values.
         """
-        return {
+        own = {
             "segment": self.segment,
             "release": {"position": self.position.tolist(), "velocity": self.velocity.tolist(), "time": self.time},
             "control_points": self.control_points.tolist(),
@@ -52,6 +55,7 @@ class Released:
             "flight_time": self.flight_time,
             "tension_min": self.tension_min,
         }
+        return own if self.scatter is None else own | {"scatter": self.scatter.to_dict()}
 
 
 def question_of(stops: Stops, points: np.ndarray, depth: float, gravity: float) -> Launch:
@@ -127,6 +131,11 @@ def released(plan: Any) -> Released | None:
     motion, answers = leg.motions[at], leg.answers
     release, flight_time = float(answers.release[at]), float(answers.flight_time[at])
     state = motion.state(np.asarray(release / float(motion.time)))
+    table = plan.keys.launch.errors
+    spread = None
+    if table is not None:
+        throw = Throw(motion, np.asarray(release), np.asarray(plan.frame.inward(plan.keys.launch.target)))
+        spread = scatter(plan.problem.robot, throw, LaunchErrors(**vars(table)))
     landing, _ = flown(state.position, state.velocity, plan.problem.robot.gravity, flight_time)
     return Released(
         segment=segment,
@@ -137,4 +146,5 @@ def released(plan: Any) -> Released | None:
         landing=np.asarray(plan.frame.outward(np.asarray(landing))),
         flight_time=flight_time,
         tension_min=float(plan.demands.tension_min[segment]),
+        scatter=spread,
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.meanings import value_attributes
-from cspr_jax.schema.motion_quantities import ACROSS, PARTS, SEGMENTS
+from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT_DIMS, PARTS, SEGMENTS
 from cspr_jax.schema.quantities import EVERY, flag_attributes
 
 if TYPE_CHECKING:
@@ -76,11 +76,13 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
     """
     cables = range(1, arrays["tension"].shape[1] + 1)
     axes: dict[str, Any] = {"t": arrays["t"], **PARTS, "cable": np.array(cables)}
-    for part in PARTS.keys() - {ACROSS.get(name) for name in arrays}:
+    used = {ACROSS.get(name) for name in arrays} | {part for name in arrays for part in FLIGHT_DIMS.get(name, ())}
+    for part in PARTS.keys() - used:
         del axes[part]
-    axes |= {"segment": arrays["segment"]} if "segment" in arrays else {}
+    axes |= {name: arrays[name] for name in ("segment", "flight_t", "throw") if name in arrays}
+    own = dict.fromkeys(SEGMENTS, ("segment",)) | FLIGHT_DIMS
     variables = {
-        name: (("segment",) if name in SEGMENTS else ("t", ACROSS[name]), values)
+        name: (own[name] if name in own else ("t", ACROSS[name]), values)
         for name, values in arrays.items()
         if name not in axes
     }

@@ -73,6 +73,28 @@ SEGMENTS = {
         Quantity("segment_margin", "1", "margin", MARGIN),
     )
 }
+# What it holds of an object that the plan releases, and the dimensions of each.
+FLIGHT = {
+    q.name: q
+    for q in (
+        Quantity("flight_t", "s", "time of the flight", "Time since the start of the plan, from the release on."),
+        Quantity("flight_position", "m", "position of the object", "Position of the released object (x, y, z)."),
+        Quantity("throw", "1", "throw", "Number of a throw of the sample of errors, from 1 on."),
+        Quantity(
+            "landing",
+            "m",
+            "landing",
+            "Place (x, y) at the height of the target of each throw of the sample, over that of the target; NaN where "
+            "the object never comes there.",
+        ),
+    )
+}
+FLIGHT_DIMS = {
+    "flight_t": ("flight_t",),
+    "flight_position": ("flight_t", "axis"),
+    "throw": ("throw",),
+    "landing": ("throw", "level"),
+}
 # The second dimension of those over time, and the parts of vectors.
 ACROSS = {
     **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot"), "axis"),
@@ -85,6 +107,7 @@ ACROSS = {
 PARTS = {
     "each": tuple("123456"),
     "axis": tuple("xyz"),
+    "level": tuple("xy"),
     "component": tuple("wxyz"),
     "couple": ("12", "23", "34", "41"),
     "bound": ("least", "actual", "largest"),

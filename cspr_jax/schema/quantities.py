@@ -5,7 +5,7 @@ from collections import ChainMap
 import numpy as np
 
 from cspr_jax.errors import InputError
-from cspr_jax.schema.motion_quantities import HOW, MARGIN, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.motion_quantities import FLIGHT, HOW, MARGIN, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.verdicts import SENTENCES, Verdict
 
@@ -295,7 +295,7 @@ QUANTITIES = {
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
 }
-EVERY = ChainMap(AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
+EVERY = ChainMap(AXES, QUANTITIES, TRAJECTORY, SEGMENTS, FLIGHT)
 _OWN = frozenset(QUANTITIES)
 
 
@@ -308,7 +308,7 @@ def register(quantity: Quantity) -> None:
     Raises:
         InputError: another quantity, or a coordinate, has that name.
     """
-    tables = (AXES, QUANTITIES, TRAJECTORY, SEGMENTS)
+    tables = (AXES, QUANTITIES, TRAJECTORY, SEGMENTS, FLIGHT)
     known = next((table[quantity.name] for table in tables if quantity.name in table), quantity)
     if known != quantity:
         raise InputError("quantity", quantity.name, "a name that no other quantity or axis has")

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import h5py
 
 from cspr_jax.errors import StoreError
-from cspr_jax.schema.motion_quantities import SEGMENTS, TRAJECTORY
+from cspr_jax.schema.motion_quantities import FLIGHT, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.quantities import AXES, QUANTITIES, register
 from cspr_jax.schema.quantity import Quantity
 from cspr_jax.store import guard
@@ -29,7 +29,7 @@ LARGEST_DATA, DENSEST = 8e9, 50
 _LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
 # Names of parts of vectors, for other programs.
-_MARKS = (b"axis", b"cable", b"component", b"each", b"couple", b"bound")
+_MARKS = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level")
 _LONG = ("settings", "environment_settings", "plan", "robot_settings")
 _TEXTS = (
     *("Conventions", "title", "map", "identity", "z_axis", "robot", "software", "environment", "environments"),
@@ -60,7 +60,7 @@ def serve() -> None:
 def _result(out: BinaryIO) -> None:
     with h5py.File(FILE, "r") as file:
         attributes = _attributes(file)
-        tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS)
+        tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS, FLIGHT)
         datasets = guard.datasets(file, [name for table in tables for name in table])
         marks = [name for name in _MARKS if "map" not in attributes and file.id.links.exists(name)]
         guard.refuse_others(file, len(datasets) + len(marks), len(attributes))

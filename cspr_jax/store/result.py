@@ -12,7 +12,7 @@ from cspr_jax.config.robot import LARGEST_LENGTH, MOST_CABLES, RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, StoreError, one_line, shown
 from cspr_jax.schema import labelled
-from cspr_jax.schema.motion_quantities import SEGMENTS
+from cspr_jax.schema.motion_quantities import FLIGHT_DIMS, PARTS, SEGMENTS
 from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES
 from cspr_jax.store.isolated import fetch
 from cspr_jax.store.seal import DamagedError
@@ -167,7 +167,7 @@ def _map(
 
 
 # Quantities of a motion that may be infinite.
-_OPEN = ("tension", "tension_each", "tension_couple", "path_acceleration")
+_OPEN = ("tension", "tension_each", "tension_couple", "path_acceleration", "landing")
 
 
 def _motion(
@@ -196,6 +196,9 @@ def _motion(
         wanted: tuple[int, ...] = (len(time), widths.get(name, 3))
         if name == "t":
             wanted = (len(time),)
+        elif name in FLIGHT_DIMS:
+            first, *rest = FLIGHT_DIMS[name]
+            wanted = (arrays[first].size if first in arrays else -1, *(len(PARTS[part]) for part in rest))
         elif name in segments:
             wanted = (segments["segment"].size if "segment" in segments else -1,)
         kind = EVERY[name].kind

@@ -9,10 +9,11 @@ from matplotlib.figure import Figure
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
 from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, value, values
+from cspr_jax.outputs.plots.landings import landing_figure
 from cspr_jax.outputs.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.outputs.plots.motion import motion_figure
 from cspr_jax.outputs.plots.notes import notes
-from cspr_jax.outputs.plots.options import ACCELERATION, PATH_ACCELERATION
+from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION
 from cspr_jax.outputs.plots.path_accelerations import path_figure
 from cspr_jax.outputs.plots.sections import AROUND, POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
@@ -89,8 +90,10 @@ def _motion_figure(result: Result, name: str, quantity: str | None, at: dict[str
         return acceleration_figure(result, name, at)
     if quantity == PATH_ACCELERATION and PATH_ACCELERATION in result.data:
         return path_figure(result, name)
+    if quantity == LANDING and LANDING in result.data:
+        return landing_figure(result)
     if quantity is not None:
-        pictured = [ACCELERATION, *({PATH_ACCELERATION} & result.data.keys())]
+        pictured = [ACCELERATION, *(name for name in (PATH_ACCELERATION, LANDING) if name in result.data)]
         raise InputError("--quantity", quantity, f"one of {', '.join(pictured)} for this motion, or absent")
     return motion_figure(result)
 

@@ -34,6 +34,7 @@ def motion_figure(result: Result) -> Figure:
     more = [
         name
         for name, wanted in (
+            ("velocity", "flight_position" in result.data),
             ("acceleration", z0 is None),
             ("bounds", "path_acceleration" in result.data),
             ("couple", "tension_couple" in result.data),
@@ -52,6 +53,8 @@ def motion_figure(result: Result) -> Figure:
     for name, j in (("xy", 1), ("xz", 2)):
         if name in drawn:
             _path(drawn[name], position, j)
+            if "flight_position" in result.data:
+                _flight(drawn[name], result.data["flight_position"], j)
     if result.attributes.get("z_axis", "down") == "down":
         drawn["xz"].invert_yaxis()
     word = "pair" if "tension_each" in result.data else "cable"
@@ -62,6 +65,9 @@ def motion_figure(result: Result) -> Figure:
         drawn["couple"].set_ylabel("tension couple (N)")
     if "bounds" in drawn:
         _bounds(drawn["bounds"], time, result.data["path_acceleration"])
+    if "velocity" in drawn:
+        _lines(drawn["velocity"], time, result.data["velocity"], ["x", "y", "z"])
+        drawn["velocity"].set_ylabel("velocity (m/s)")
     if "acceleration" in drawn:
         acceleration = result.data["acceleration"]
         sizes = np.linalg.norm(acceleration, axis=1)
@@ -103,6 +109,15 @@ def _path(panel: Axes, position: np.ndarray, j: int) -> None:
     panel.set_ylabel(f"{'xyz'[j]} (m)")
     panel.set_aspect("equal", adjustable="datalim")
     panel.grid(alpha=0.3)
+
+
+def _flight(panel: Axes, position: np.ndarray, j: int) -> None:
+    # Of a released object.
+    panel.plot(position[:, 0], position[:, j], color=COLOURS[1], linewidth=1.2, linestyle="--", label="flight")
+    for row, marker, name in ((0, "o", "release"), (-1, "x", "landing")):
+        place = position[row, 0], position[row, j]
+        panel.plot(*place, linestyle="", marker=marker, markersize=6, color=COLOURS[1], label=name)
+    panel.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
 
 
 def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:

@@ -3,7 +3,7 @@
 import argparse
 
 # Quantities of motions that have a picture of their own.
-ACCELERATION, PATH_ACCELERATION = "acceleration", "path_acceleration"
+ACCELERATION, PATH_ACCELERATION, LANDING = "acceleration", "path_acceleration", "landing"
 
 
 def add_style(parser: argparse.ArgumentParser) -> None:
