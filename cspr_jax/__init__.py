@@ -49,12 +49,14 @@ if TYPE_CHECKING:
     from cspr_jax.robots.point_mass import point_mass_robot as point_mass_robot
     from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
     from cspr_jax.schema.verdicts import Verdict as Verdict
+    from cspr_jax.search.landings import LaunchErrors as LaunchErrors
     from cspr_jax.store.result import open_result as open_result
     from cspr_jax.trajectories.amplitudes import named as amplitude
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "LaunchErrors": ("cspr_jax.search.landings", "LaunchErrors"),
     "Limits": ("cspr_jax.robots.limits", "Limits"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
     "accessible": ("cspr_jax.api.platform_searches", "accessible"),
@@ -101,6 +103,7 @@ _PUBLIC = {
     "verify": ("cspr_jax.api.runs", "verify"),
 }
 __all__ = [  # as `_PUBLIC`, for those that read it without running it
+    "LaunchErrors",
     "Limits",
     "Verdict",
     "accessible",

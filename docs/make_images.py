@@ -93,6 +93,19 @@ IMAGES = {
     "bezier_sequence": Image(
         "Bezier segments through places outside the footprint, the least total time.", 10, command="plan"
     ),
+    "launch": Image("The launch of the paper: path, flight, tensions, velocity, acceleration.", 20, command="plan"),
+    "landing": Image(
+        "Where it lands, of 10,000 throws with errors of the release and of the cables (the paper's Fig. 15 has 30).",
+        20,
+        "--quantity landing",
+        ("launch",),
+        "plan",
+    ),
+    "launch_scatter": Image(
+        "Distance from the target over the jitter of the release, beside the paper's 30 throws; nothing is fitted.",
+        60,
+        command="draw",
+    ),
     "launch_sensitivity": Image(
         "Largest displacement of the launch robot over the largest error of a cable; infinite on z = 0 (theory.md).", 10
     ),

@@ -58,7 +58,7 @@ def test_the_segment_passes_the_release_with_its_velocity(seed):
 
 def test_the_launch_of_the_text(tmp_path):
     """Its release, its flight, and a landing within 1e-9 m, from the forces of the cables in the motion file."""
-    body = text(LAUNCH | {"release": "0.59"}, more="tension_min = 0.05\nsamples = 2000\n")
+    body = text(LAUNCH | {"release": "0.59"}, more="samples = 1500\n")
     answer = planned(tmp_path, body)
     launch = answer["launch"]
     assert launch["segment"] == 3 and launch["control_points"] == answer["segments"][3]["control_points"]
@@ -66,7 +66,7 @@ def test_the_launch_of_the_text(tmp_path):
     np.testing.assert_allclose(launch["release"]["velocity"], [0.3, 0.4, (-0.875 + GRAVITY / 8.0) / 0.5], atol=1e-12)
     before = sum(segment["duration"] for segment in answer["segments"][:3])
     assert launch["release"]["time"] == pytest.approx(before + 0.59, abs=1e-12)
-    assert launch["tension_min"] == answer["segments"][3]["tension_min"] > 0.1
+    assert launch["tension_min"] == answer["segments"][3]["tension_min"] > 0.4
     np.testing.assert_allclose(launch["landing"], [0.15, 0.05, -1.675], atol=1e-9)
     assert "scatter" not in launch
     file = tmp_path / "motion.h5"

@@ -13,7 +13,9 @@ from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs import motion_files, plan_report
 from cspr_jax.plans import planning
+from cspr_jax.plans.released import scattered
 from cspr_jax.schema import labelled
+from cspr_jax.search.landings import LaunchErrors, Scatter
 
 if TYPE_CHECKING:
     import xarray
@@ -74,6 +76,23 @@ class Plan(planning.Plan):
         """
         with double_precision():
             return plan_report.plan_object(self)
+
+    def scatter(self, errors: LaunchErrors) -> Scatter:
+        """Scatter of the landings of the object that the plan launches.
+
+        Args:
+            errors: of the release and of the cables.
+
+        Returns:
+            the landings of a sample of throws, with their covariance, and that of small errors by derivatives.
+
+        Raises:
+            ConfigError: a plan that launches nothing.
+        """
+        if self.keys.launch is None:
+            raise ConfigError(NAME, "launch is missing: nothing is released")
+        with double_precision():
+            return scattered(self, errors)
 
     def to_xarray(self, rate: float | None = None) -> "xarray.Dataset":
         """The motion for xarray, with units and long names.

@@ -123,19 +123,10 @@ def released(plan: Any) -> Released | None:
     """
     if plan.keys.launch is None:
         return None
-    at = segment = plan.keys.launch.segment
-    for leg in plan.legs:
-        if at < len(leg.motions):
-            break
-        at -= len(leg.motions)
-    motion, answers = leg.motions[at], leg.answers
+    segment = plan.keys.launch.segment
+    motion, answers, at = _launching(plan)
     release, flight_time = float(answers.release[at]), float(answers.flight_time[at])
     state = motion.state(np.asarray(release / float(motion.time)))
-    table = plan.keys.launch.errors
-    spread = None
-    if table is not None:
-        throw = Throw(motion, np.asarray(release), np.asarray(plan.frame.inward(plan.keys.launch.target)))
-        spread = scatter(plan.problem.robot, throw, LaunchErrors(**vars(table)))
     landing, _ = flown(state.position, state.velocity, plan.problem.robot.gravity, flight_time)
     return Released(
         segment=segment,
@@ -146,5 +137,32 @@ def released(plan: Any) -> Released | None:
         landing=np.asarray(plan.frame.outward(np.asarray(landing))),
         flight_time=flight_time,
         tension_min=float(plan.demands.tension_min[segment]),
-        scatter=spread,
+        scatter=None
+        if plan.keys.launch.errors is None
+        else scattered(plan, LaunchErrors(**vars(plan.keys.launch.errors))),
     )
+
+
+def scattered(plan: Any, errors: LaunchErrors) -> Scatter:
+    """Scatter of the landings of a plan's launch.
+
+    Args:
+        plan: a `Plan` with a launch.
+        errors: their sizes.
+
+    Returns:
+        the scatter.
+    """
+    motion, answers, at = _launching(plan)
+    target = np.asarray(plan.frame.inward(plan.keys.launch.target))
+    return scatter(plan.problem.robot, Throw(motion, np.asarray(answers.release[at]), target), errors)
+
+
+def _launching(plan: Any) -> tuple[Any, Any, int]:
+    # Motion of the launching segment, answers of its leg, and its number there.
+    at = plan.keys.launch.segment
+    for leg in plan.legs:
+        if at < len(leg.motions):
+            return leg.motions[at], leg.answers, at
+        at -= len(leg.motions)
+    raise IndexError(plan.keys.launch.segment)

@@ -8,8 +8,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from scipy.optimize import minimize
-from scipy.stats import qmc
 
 from cspr_jax.arithmetic.batches import in_batches
 
@@ -67,6 +65,8 @@ def least(
     Returns:
         (n,) feasible if any place that was improved is; else the one with the largest margin.
     """
+    from scipy.stats import qmc  # it takes a second to import
+
     share = qmc.Halton(len(low), seed=0).random(LOOKED_AT)
     places = low + (high - low) * share
     value, margin = in_batches(partial(_screened, parts, given), places, size=BATCH)
@@ -94,6 +94,8 @@ def _improved(
     bounds: list[tuple[float, float]],
     judged: Callable[[np.ndarray], Judged],
 ) -> np.ndarray:
+    from scipy.optimize import minimize  # likewise
+
     def of(function, which: int) -> Callable[[np.ndarray], np.ndarray]:
         return lambda x: np.asarray(function(parts, given, jnp.asarray(x))[which])
 
