@@ -1,10 +1,13 @@
 """Straight lines under limits and on spools in any layout, against brute force by linear programs."""
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from oracles import limited_lines as oracle
 
 import cspr_jax
+from cspr_jax import Verdict
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.problem import limits_over, prepared
 from cspr_jax.search.timed_lines import motions_of, timed_lines
@@ -81,3 +84,53 @@ def test_durations_are_those_of_brute_force(in_plane):
 def test_durations_are_those_of_brute_force_all():
     compared, bound = check(150, 4)
     assert compared > 80 and bound > 40
+
+
+RECTANGLE = [[0, 0, 30], [45, 0, 30], [45, 30, 30], [0, 30, 30]]
+
+
+def least(spools, start, end, **limits):
+    robot = cspr_jax.point_mass(spools, mass=10.0, z_axis="up", limits=cspr_jax.Limits(**limits))
+    return cspr_jax.least_time(robot, [end], start=start, max_acceleration=10.0)
+
+
+@pytest.mark.parametrize("height", [3.0, 0.5, 0.02])
+def test_a_line_beside_a_spool(height):
+    """A cable that gets short accelerates for an instant: slow enough, every line is feasible, and no faster one."""
+    spool, limit = np.array([20.0, 15.0, 10.0]), 5.0
+    start, end = np.array([12.3, 15.0, 10.0 + height]), np.array([29.1, 15.0, 10.0 + height])
+    found = least([*RECTANGLE, spool], start, end, cable_acceleration_max=limit)
+    assert found.verdict[0] == 0
+
+    def largest(duration):
+        robot = cspr_jax.point_mass(RECTANGLE, mass=10.0, z_axis="up")
+        share = found.acceleration_time[0] / found.duration[0]
+        motion = cspr_jax.straight_line(robot, start, end, duration=duration, acceleration_time=share * duration)
+        tau = jnp.linspace(0.0, 1.0, 200_001)
+        position, velocity, acceleration = (np.asarray(x) for x in jax.jit(jax.vmap(motion.state))(tau)[:3])
+        ray = position - spool
+        length = np.linalg.norm(ray, axis=1)
+        rate = (ray * velocity).sum(1) / length
+        return np.abs(((velocity**2).sum(1) + (ray * acceleration).sum(1) - rate**2) / length).max()
+
+    assert largest(found.duration[0]) <= limit < largest(found.duration[0] * (1.0 - 1e-3))
+
+
+def test_rest_that_breaks_a_limit_says_which():
+    """Whatever the layout of the spools: it was undecided where they are not in one plane."""
+    for spools in (RECTANGLE, [*RECTANGLE[:2], [45, 30, 31], RECTANGLE[3]]):
+        for limits, flag in (
+            ({"tension_max": 20.0}, Verdict.OVER_TENSION),
+            ({"tension_min": 100.0}, Verdict.SLACK_CABLE),
+            ({"cable_length_max": 20.0}, Verdict.CABLE_TOO_LONG),
+            ({"floor": 5.0}, Verdict.BELOW_FLOOR),
+        ):
+            assert least(spools, [1, 20, 7], [15, 28, 3], **limits).verdict[0] == flag
+
+
+@pytest.mark.parametrize("limits", [{}, {"cable_acceleration_max": 5.0}])
+def test_a_line_through_a_spool_is_singular(limits):
+    spools = [*RECTANGLE, [20, 15, 10]]
+    for start, end in (([15, 15, 9], [25, 15, 11]), ([20, 15, 5], [20, 15, 15]), ([20, 15, 5], [20, 15, 10])):
+        found = least(spools, start, end, **limits)
+        assert found.verdict[0] == Verdict.SINGULAR and np.isnan(found.duration[0])

@@ -303,3 +303,14 @@ def test_rectangles():
     moved[2, 0] += 1e-3
     others = [RECTANGLE @ turn, RECTANGLE[[0, 2, 1, 3]], tilted, moved, flat, np.zeros((4, 3)), RECTANGLE[[0, 1, 1, 0]]]
     assert not any(map(is_rectangle, [*others, RECTANGLE[:3], equilateral(1.0)]))
+
+
+@pytest.mark.parametrize("count", [5, 8, 9])
+def test_what_is_not_finite_ends_the_search(count):
+    """Of a plan without a motion; one such instant among many once kept the search from ending."""
+    rng = np.random.default_rng(count)
+    matrices, wrenches = rng.normal(size=(512, 3, count)), rng.normal(size=(512, 3))
+    matrices[0] = np.nan
+    none, endless = np.zeros(count), np.full(count, np.inf)
+    found = jax.jit(jax.vmap(tension_distribution.least_norm, (0, 0, None, None)))(matrices, wrenches, none, endless)
+    assert not np.isfinite(found.tensions[0]).any() and np.isfinite(found.tensions[1:]).all()

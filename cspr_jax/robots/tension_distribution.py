@@ -223,7 +223,9 @@ def _limits_reached(every: _Set, low: Array, high: Array) -> Array:
         return (search.is_seeking | is_beyond) & ~search.is_stuck & (search.steps < LONGEST * count)
 
     none, no = jnp.zeros(count), jnp.asarray(False)
-    start = _Search(jnp.zeros(freedom), none, none, jnp.asarray(0), no, no, jnp.asarray(0))
+    # What is not finite is never within limits.
+    is_lost = ~(jnp.isfinite(every.least).all() & jnp.isfinite(every.kernel).all())
+    start = _Search(jnp.zeros(freedom), none, none, jnp.asarray(0), no, is_lost, jnp.asarray(0))
     return lax.while_loop(is_open, lambda search: _step(every, low, high, search), start).sides
 
 

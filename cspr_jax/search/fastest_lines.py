@@ -21,6 +21,10 @@ PART = 256
 Rows = TypeVar("Rows", Durations, Verdicts)
 # Over the size of a robot: ends nearer to each other are one place.
 SAME_PLACE = 1e-12
+# Likewise: lines that pass a spool nearer than this go through it.
+THROUGH = 1e-9
+# What rest at an end already breaks: no motion has it there, or starts there.
+NO_MOTION = (Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.SINGULAR).value
 # Parts of a duration below which their digits are lost in what the formulas promise.
 SHORT = 1e-6
 
@@ -87,7 +91,7 @@ def _fastest(
 ) -> Fastest:
     robot, in_plane = problem.robot, in_one_plane(problem.robot)
     found = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
-    own, may_move = _at_rest(problem, starts, ends, found)
+    own, may_move, in_place = _at_rest(problem, starts, ends, found)
     judged = partial(verdicts, problem, law=law, sharp=sharp)
     if in_plane:
         # What the formulas promise without limits needs no proof, but where the digits of p or T - p are lost.
@@ -95,7 +99,8 @@ def _fastest(
         some = np.flatnonzero(may_move & (sharp | bool(given(problem.limits)) | is_short))
         if len(some) > 0:
             own.replace(some, judged(starts[some], ends[some], found.part(some)))
-    some = np.flatnonzero(may_move & ((own.verdict != 0) | ~in_plane))
+    # Where a place breaks a limit, no other motion mends it.
+    some = np.flatnonzero(may_move & in_place & ((own.verdict != 0) | ~in_plane))
     if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(some) > 0:
         before, places = found.part(some), (starts[some], ends[some])
         searched = by_search(problem, *places, before, law=law, max_acceleration=max_acceleration)
@@ -110,22 +115,35 @@ def _fastest(
     return Fastest(found, own, moves)
 
 
-def _at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, found: Durations) -> tuple[Verdicts, np.ndarray]:
-    # Why there can be no motion, and where there can be one.
+def _at_rest(
+    problem: Problem, starts: np.ndarray, ends: np.ndarray, found: Durations
+) -> tuple[Verdicts, np.ndarray, np.ndarray]:
+    # Why there can be no motion, where there can be one, and where both ends keep the limits on places.
     doubt = TOLERANCE * float(np.asarray(problem.robot.gravity))
     size = float(np.abs(np.asarray(problem.robot.base_points)).max())
     is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * size
     above, slack = ~(found.depth > 0.0), found.rest < -doubt
     flags = np.where(above, Verdict.ABOVE_SPOOLS.value, 0) | np.where(above | slack, Verdict.SLACK_CABLE.value, 0)
     flags |= np.where(flags == 0, limits_at_rest(problem, starts, ends), 0)
+    flags |= np.where(_touches(problem, starts, ends), Verdict.SINGULAR.value, 0)
     rests = (flags == 0) & (found.rest > doubt)
     open_ended = np.where(found.is_bounded, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value)
-    # With limits on places alone the motion is shown all the same.
-    may_move = ~above & (found.rest > doubt) & ~is_same & found.is_bounded
+    # With limits on places alone the motion of the formulas is shown all the same.
+    no_motion = NO_MOTION if in_one_plane(problem.robot) else ~0
+    may_move = ~above & (found.rest > doubt) & ~is_same & found.is_bounded & ((flags & no_motion) == 0)
     verdict = np.where(may_move | (rests & is_same), 0, np.where(flags > 0, flags, open_ended)).astype(np.uint16)
     nothing = np.full(len(starts), np.nan)
     margin = np.minimum(np.where(above, np.nan, found.rest), 0.0)
-    return Verdicts(verdict, margin, nothing.copy(), np.full(len(starts), np.inf)), may_move
+    return Verdicts(verdict, margin, nothing.copy(), np.full(len(starts), np.inf)), may_move, flags == 0
+
+
+def _touches(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    # Whether lines pass through a spool, where a cable has no direction.
+    spools, way = np.asarray(problem.robot.base_points), (ends - starts)[:, None]
+    rays, square = spools[None] - starts[:, None], (way**2).sum(2)
+    part = np.clip((rays * way).sum(2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    apart = np.linalg.norm(rays - part[..., None] * way, axis=2)
+    return (apart <= THROUGH * np.abs(spools).max()).any(1)
 
 
 def _proved(

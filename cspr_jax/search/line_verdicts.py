@@ -75,7 +75,7 @@ def verdicts(
     for name, values in zip(lines.names[1:], proved.attained.T[1:], strict=True):
         room = np.minimum(room, plain_slack(name, values / gravity if name.startswith("tension") else values))
     broken |= np.bitwise_or.reduce(flags, axis=1)
-    is_open = (proved.bound <= doubt).any(1) | doubtful
+    is_open = ~(proved.bound > doubt).all(1) | doubtful
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(np.uint16)
     return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
 

@@ -24,7 +24,9 @@ HALF = 2 * SAMPLES
 LOGITS = np.linspace(-6.0, 6.0, 33)
 FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
 # Parts of a duration by which what a search found is made longer, one after the other, until it is proved.
-LONGER = (1e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3)
+LONGER = (1e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
+# Where a cable is short its acceleration has a peak: so many distances to both sides of it, on the line, and samples.
+BESIDE, HALVINGS = np.linspace(-2.0, 2.0, SAMPLES), 45
 
 
 class Gain(NamedTuple):
@@ -74,14 +76,65 @@ def gain(line: LineSlacks, law: Amplitude, edges: Array, middle: Array, largest:
     most = jnp.concatenate([most, jnp.broadcast_to(largest[None, None, None], bend.shape)], axis=-1)
     needed = jnp.concatenate([needed, jnp.abs(bend)], axis=-1)
     is_known = jnp.concatenate([is_finite, jnp.ones_like(bend, bool)], axis=-1)
-    share = _between(jnp.where(most > 0.0, needed / jnp.where(most > 0.0, most, 1.0), 0.0), is_known & (most > 0.0))
-    above = jnp.where(share > 0.0, 1.0 / jnp.where(share > 0.0, share, 1.0), jnp.inf)
-    above = jnp.where((most <= 0.0) & (needed >= 0.0), -1.0, above)
+    above = _above(most, needed, is_known)
     below = jnp.where((most < 0.0) & (needed < 0.0), most / jnp.where(needed < 0.0, needed, 1.0), 0.0)
     first, numbers = (tau <= middle)[..., None], _numbers(line, tensions, above.shape)
     halves = [jnp.where(half, above, jnp.inf) for half in (first, ~first)]
     up, down = (numbers.ravel()[jnp.argmin(half)] for half in halves)
-    return Gain(jnp.min(above), jnp.max(below), up, down)
+    found = Gain(jnp.min(above), jnp.max(below), up, down)
+    if "cable_acceleration_max" not in line.largest:
+        return found
+    count = rows[0].shape[-1]
+    return _with_peaks(found, halves, _near_spools(line, law), middle, 3 * count)
+
+
+def _above(most: Array, needed: Array, is_known: Array) -> Array:
+    # Largest q of samples (n_pieces, n_samples, n_rows) whose slack is most - q needed.
+    share = _between(jnp.where(most > 0.0, needed / jnp.where(most > 0.0, most, 1.0), 0.0), is_known & (most > 0.0))
+    above = jnp.where(share > 0.0, 1.0 / jnp.where(share > 0.0, share, 1.0), jnp.inf)
+    return jnp.where((most <= 0.0) & (needed >= 0.0), -1.0, above)
+
+
+def _near_spools(line: LineSlacks, law: Amplitude) -> tuple[Array, Array]:
+    """Largest q by the limits of motion beside where each cable is shortest.
+
+    Args:
+        line: of one line, its leaves without dimensions in front.
+        law: s(tau).
+
+    Returns:
+        (n_cables, n_samples, n_rows) 1/s^2, and tau (n_cables, n_samples, 1).
+    """
+    line = jax.tree.map(lambda x: x[0, 0, 0], line)
+    beside = line.nearest[:, None] + jnp.sqrt(line.apart / line.square)[:, None] * BESIDE[None]
+    s = jnp.clip(beside, 0.0, 1.0)
+
+    def halved(_, ends):
+        low, high = ends
+        middle = 0.5 * (low + high)
+        is_before = derivatives(law, middle, order=0)[0] < s
+        return jnp.where(is_before, middle, low), jnp.where(is_before, high, middle)
+
+    tau, _ = lax.fori_loop(0, HALVINGS, halved, (jnp.zeros_like(s), jnp.ones_like(s)))
+    way, speed, bend = (x[..., None] for x in derivatives(law, tau, order=2))
+    at = Instants(way, speed**2, bend)
+    line = jax.tree.map(lambda x: x[None, None], line)
+    rows = jnp.concatenate([slacks(line, name, at) for name in line.names if name in line.largest], axis=-1)
+    # Parabolas want equal distances.
+    is_even = (beside == s)[..., None] & jnp.isfinite(rows)
+    return _above(jnp.ones_like(rows), 1.0 - rows, is_even), tau[..., None]
+
+
+def _with_peaks(found: Gain, halves: list[Array], peaks: tuple[Array, Array], middle: Array, first_row: int) -> Gain:
+    # What holds back either half, and how far, with the peaks beside spools.
+    above, tau = peaks
+    numbers = jnp.broadcast_to(jnp.arange(above.shape[-1])[None, None] + first_row, above.shape).ravel()
+    sides = [jnp.where(half, above, jnp.inf) for half in (tau <= middle, tau > middle)]
+    names = [
+        jnp.where(jnp.min(own) < jnp.min(half), numbers[jnp.argmin(own)], name)
+        for own, half, name in zip(sides, halves, (found.up, found.down), strict=True)
+    ]
+    return Gain(jnp.minimum(found.high, jnp.min(above)), found.low, *names)
 
 
 def _numbers(line: LineSlacks, tensions: Array, shape: tuple[int, ...]) -> Array:

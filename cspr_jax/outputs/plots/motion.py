@@ -127,7 +127,8 @@ def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:
 
 def _lines(panel: Axes, time: np.ndarray, values: np.ndarray, names: list[str], *, axis: bool = True) -> None:
     for k, name in enumerate(names):
-        style, colour = STYLES[k % len(STYLES)], COLOURS[k % len(COLOURS)]
+        # Behind the last colour another style begins.
+        style, colour = STYLES[(k + k // len(COLOURS)) % len(STYLES)], COLOURS[k % len(COLOURS)]
         panel.plot(time, values[:, k], linestyle=style, color=colour, linewidth=1.0, label=name)
     if axis:
         panel.axhline(0.0, color="black", linewidth=0.8)
