@@ -15,6 +15,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.robots.force_balance import cable_motion
 from cspr_jax.robots.point_mass import PointMassRobot, is_planar
 from cspr_jax.trajectories.bezier import Bezier
@@ -129,8 +130,8 @@ def _moving(robot: PointMassRobot, place: Array, rates: Array) -> Array:
     rays = place[None] - robot.base_points
     units = rays / jnp.linalg.norm(rays, axis=1, keepdims=True)
     if not is_planar(robot):
-        return jnp.linalg.solve(units, rates)
-    x, z = jnp.linalg.solve(units[:, jnp.array([0, 2])], rates)
+        return solved(units, rates[:, None])[0][:, 0]
+    x, z = solved(units[:, np.array([0, 2])], rates[:, None])[0][:, 0]
     return jnp.stack([x, jnp.zeros_like(x), z])
 
 
