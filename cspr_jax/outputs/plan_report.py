@@ -123,8 +123,9 @@ def plan_table(plan: Plan):
     words = [", ".join(plan.keys.families), plan.problem.amplitude.name if plan.keys.takes_amplitude else ""]
     words += [f"z0 = {plan.z0:.6g} m"] if math.isfinite(plan.z0) else []
     title = f"{plan.spec.name}: {', '.join(filter(None, words))}"
-    table = Table(title=title, caption=_caption(plan), title_justify="left", caption_justify="left")
-    segments = plan_object(plan)["segments"]
+    whole = plan_object(plan)
+    caption, segments = _caption(plan) + _launch(whole.get("launch")), whole["segments"]
+    table = Table(title=title, caption=caption, title_justify="left", caption_justify="left")
     columns = {**_places(plan), **_numbers(segments), "verdict": lambda segment: segment["verdict"]}
     for head in columns:
         table.add_column(head, justify="left" if head in ("position (m)", "held back by", "verdict") else "right")
@@ -208,6 +209,26 @@ def _caption(plan: Plan) -> str:
         total += f"; tensions of the pairs of cables {named}"
     note = "; in brackets: none found, the numbers are those of the best candidate" if numbered else ""
     return f"{total}{note}"
+
+
+def _launch(launch: dict[str, Any] | None) -> str:
+    # Of an object that is released, a line of its own; another one of where throws land.
+    if launch is None:
+        return ""
+    release = launch["release"]
+    if None in (release["time"], launch["flight_time"]):
+        return "\nno launch"
+    places = [
+        ", ".join(f"{round(x, 9) + 0.0:.4g}" for x in place) for place in (release["position"], launch["landing"])
+    ]
+    speed = math.dist(release["velocity"], (0.0, 0.0, 0.0))
+    line = f"\nreleased after {release['time']:.4f} s at ({places[0]}) m with {speed:.3f} m/s"
+    line += f"; lands {launch['flight_time']:.4f} s later at ({places[1]}) m"
+    if "scatter" in launch:
+        found = launch["scatter"]
+        sizes = [1e3 * found[name] for name in ("mean_error", "standard_deviation")]
+        line += f"\n{found['throws']} throws land {sizes[0]:.2f} ± {sizes[1]:.2f} mm from the target"
+    return line
 
 
 def _number(value: float | None, form: str) -> str:
