@@ -264,7 +264,6 @@ def _plan(options: argparse.Namespace) -> int:
     with waiting():
         _prepare_jax(options)
         from cspr_jax.api import plans
-        from cspr_jax.outputs.plan_report import plan_table
 
         plan = plans.plan(options.plan)
     feasible = plan.feasible
@@ -274,7 +273,7 @@ def _plan(options: argparse.Namespace) -> int:
     if options.json:
         _print_json(plan.to_dict())
     else:
-        _print(plan_table(plan))
+        _print(plan.to_table())
     if options.output is not None and (feasible or options.anyway):
         with waiting():
             plan.save(options.output, options.rate, anyway=True)

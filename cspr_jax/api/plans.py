@@ -77,6 +77,15 @@ class Plan(planning.Plan):
         with double_precision():
             return plan_report.plan_object(self)
 
+    def to_table(self) -> Any:
+        """The plan as `cspr plan` prints it.
+
+        Returns:
+            a table of rich.
+        """
+        with double_precision():
+            return plan_report.plan_table(self)
+
     def scatter(self, errors: LaunchErrors) -> Scatter:
         """Scatter of the landings of the object that the plan launches.
 
