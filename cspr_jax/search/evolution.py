@@ -1,0 +1,151 @@
+"""Least value of an objective under smallest margins, for many questions at once: differential evolution.
+
+A fixed set of places is looked at in groups, and the best of each group are a population. Each generation moves every
+member towards one of the best and along the difference of two others, and keeps what is no worse: so the steps shrink
+with the population and lie along the valleys it lies in. Smallest margins have kinks, which a search by gradients would
+get stuck on. Every question sees the same places and moves: answers are repeatable, and do not depend on what is asked
+beside them.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+from scipy.stats import qmc
+
+from cspr_jax.arithmetic.batches import in_batches, in_parts
+
+# Gives of arguments, a question and unknowns (d,) in [0, 1] the objective () >= 0 and the smallest margin ().
+Parts = Callable[[Any, Any, Array], tuple[Array, Array]]
+# Places in a group, generations for each member, and members for each of the best ones; measured.
+GROUP, GENERATIONS, LED = 64, 2, 10
+# Range of the lengths of steps, and chance of an unknown to take part in one.
+STEPS, CHANCE = (0.4, 0.9), 0.9
+# Questions at a time, and at most in a thread.
+BATCH, PART = 16, 256
+
+
+class Moves(NamedTuple):
+    """Moves of all generations.
+
+    Fields:
+        leader: (n_generations, n) which of the best ones it is moved towards.
+        first: (n_generations, n) number of the member that another one's difference starts at.
+        second: (n_generations, n) of the one that it ends at.
+        step: (n_generations, n, 1) length.
+        taken: (n_generations, n, d) which unknowns take part.
+    """
+
+    leader: Any
+    first: Any
+    second: Any
+    step: Any
+    taken: Any
+
+
+class Evolved(NamedTuple):
+    """Best places found, of each margin that was asked for.
+
+    Fields:
+        place: (..., n_asked, d) in [0, 1].
+        margin: (..., n_asked) smallest margin there.
+    """
+
+    place: Any
+    margin: Any
+
+
+def moves_of(unknowns: int, population: int) -> Moves:
+    """Moves, the same ones for all questions.
+
+    Args:
+        unknowns: d.
+        population: n, at least 2.
+
+    Returns:
+        the moves.
+    """
+    random = np.random.default_rng(0)
+    shape = (GENERATIONS * population, population)
+    # Of a permutation and the same one rolled, no two members are one.
+    first = random.permuted(np.tile(np.arange(population), (shape[0], 1)), axis=1)
+    taken = random.random((*shape, unknowns)) < CHANCE
+    np.put_along_axis(taken, random.integers(unknowns, size=(*shape, 1)), True, axis=2)
+    leader = random.integers(_leaders(population), size=shape)
+    return Moves(leader, first, np.roll(first, 1, axis=1), random.uniform(*STEPS, (*shape, 1)), taken)
+
+
+def _leaders(population: int) -> int:
+    return max(population // LED, 1)
+
+
+@partial(jax.jit, static_argnums=0)
+def _evolved(parts: Parts, given: Any, asked: Array, places: Array, moves: Moves, questions: Any) -> Evolved:
+    def of(question: Any, own: Array) -> tuple[Array, Array]:
+        value, margin = jax.vmap(lambda x: parts(given, question, x))(own)
+        usable = (value * 0.0 == 0.0) & (margin * 0.0 == 0.0)
+        return jnp.where(usable, value, jnp.inf), jnp.where(usable, margin, -jnp.inf)
+
+    def generation(state, move: Moves):
+        question, wanted, own, rank, margin = state
+        good = own[lax.top_k(-rank, _leaders(len(own)))[1]][move.leader]
+        moved = own + move.step * (good - own + own[move.first] - own[move.second])
+        # Half of the way to the bound where a step goes beyond it.
+        moved = jnp.where(moved < 0.0, 0.5 * own, jnp.where(moved > 1.0, 0.5 * (own + 1.0), moved))
+        moved = jnp.where(move.taken, moved, own)
+        value, other = of(question, moved)
+        new = _rank(value, other, wanted)
+        better = new <= rank
+        kept = (jnp.where(better[:, None], moved, own), jnp.where(better, new, rank), jnp.where(better, other, margin))
+        return (question, wanted, *kept), None
+
+    def one(question: Any) -> Evolved:
+        value, margin = of(question, places)
+
+        def track(wanted: Array) -> Evolved:
+            rank = _rank(value, margin, wanted)
+            groups = jnp.arange(len(places)).reshape(-1, GROUP)
+            at = jnp.take_along_axis(groups, jnp.argmin(rank[groups], axis=1)[:, None], axis=1)[:, 0]
+            state = (question, wanted, places[at], rank[at], margin[at])
+            _, _, own, rank, margins = lax.scan(generation, state, moves)[0]
+            best = jnp.argmin(rank)
+            return Evolved(own[best], margins[best])
+
+        return jax.vmap(track)(asked)
+
+    return jax.vmap(one)(questions)
+
+
+def _rank(value: Array, margin: Array, wanted: Array) -> Array:
+    # Places with the margin first, by their objective; then the others, by their margin. The least is the best.
+    return jnp.where(margin >= wanted, -1.0 - 1.0 / (1.0 + value), -margin)
+
+
+def evolved(
+    parts: Parts, given: Any, questions: Any, *, unknowns: int, asked: tuple[float, ...], population: int
+) -> Evolved:
+    """Best places of many questions.
+
+    Args:
+        parts: a function of a module, as it is compiled once.
+        given: its first argument.
+        questions: pytree of NumPy arrays (n, ...).
+        unknowns: d.
+        asked: margins, below 1, at which the objective is to be least; inf: the margin is to be largest.
+        population: members of it; one twice as large takes four times as long.
+
+    Returns:
+        NumPy arrays (n, n_asked, ...); where no place found has the margin, the one with the largest.
+    """
+    places = qmc.Halton(unknowns, seed=0).random(GROUP * population)
+    kernel = partial(_evolved, parts, given, np.asarray(asked), places, moves_of(unknowns, population))
+
+    def part(some: slice) -> Evolved:
+        return in_batches(kernel, jax.tree.map(lambda x: x[some], questions), size=BATCH)
+
+    found = in_parts(part, len(jax.tree.leaves(questions)[0]), PART)
+    return jax.tree.map(lambda *pieces: np.concatenate(pieces), *found)
