@@ -208,5 +208,6 @@ def _judged(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[
     parts = [slice(i, i + BATCH) for i in range(0, len(motions.time), BATCH)]
     own = [verdicts(problem, jax.tree.map(lambda x, s=some: x[s], motions)) for some in parts]
     verdict = np.concatenate([x.verdict for x in own])
-    margin = np.concatenate([np.minimum(x.margin, x.room) for x in own])
+    # Above the spools the room under limits of tensions is not known, and the depth is what misses.
+    margin = np.concatenate([np.where(np.isneginf(x.room), x.margin, np.minimum(x.margin, x.room)) for x in own])
     return verdict.reshape(shape), np.where(np.isnan(margin), -np.inf, margin).reshape(shape)
