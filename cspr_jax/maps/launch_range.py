@@ -36,7 +36,14 @@ class LaunchRangeMap(FromPlacesMap):
         return vars(launch_range(self._problem, *some).placed(self._frame))
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse starts that are all out of reach; see `GridMap.refuse_hopeless`. Objects may land anywhere."""
+        """Refuse starts that are all out of reach, since objects may land anywhere; see `GridMap.refuse_hopeless`.
+
+        Args:
+            grid: the grid.
+
+        Raises:
+            ConfigError: what is wrong with all of them.
+        """
         self._refuse_out_of_plane(grid)
         self._refuse_out_of_reach(self._starts(self._corners(grid, _START)), "trajectory.from")
 

@@ -47,18 +47,6 @@ class Moves(NamedTuple):
     taken: Any
 
 
-class Evolved(NamedTuple):
-    """Best places found, of each margin that was asked for.
-
-    Fields:
-        place: (..., n_asked, d) in [0, 1].
-        margin: (..., n_asked) smallest margin there.
-    """
-
-    place: Any
-    margin: Any
-
-
 def moves_of(unknowns: int, population: int) -> Moves:
     """Moves, the same ones for all questions.
 
@@ -84,40 +72,41 @@ def _leaders(population: int) -> int:
 
 
 @partial(jax.jit, static_argnums=0)
-def _evolved(parts: Parts, given: Any, asked: Array, places: Array, moves: Moves, questions: Any) -> Evolved:
-    def of(question: Any, own: Array) -> tuple[Array, Array]:
-        value, margin = jax.vmap(lambda x: parts(given, question, x))(own)
-        usable = (value * 0.0 == 0.0) & (margin * 0.0 == 0.0)
-        return jnp.where(usable, value, jnp.inf), jnp.where(usable, margin, -jnp.inf)
+def _evolved(parts: Parts, given: Any, asked: Array, places: Array, moves: Moves, questions: Any) -> Array:
+    def one(question: Any) -> Array:
+        judged = partial(_judged, parts, given, question)
+        value, margin = judged(places)
 
-    def generation(state, move: Moves):
-        question, wanted, own, rank, margin = state
-        good = own[lax.top_k(-rank, _leaders(len(own)))[1]][move.leader]
-        moved = own + move.step * (good - own + own[move.first] - own[move.second])
-        # Half of the way to the bound where a step goes beyond it.
-        moved = jnp.where(moved < 0.0, 0.5 * own, jnp.where(moved > 1.0, 0.5 * (own + 1.0), moved))
-        moved = jnp.where(move.taken, moved, own)
-        value, other = of(question, moved)
-        new = _rank(value, other, wanted)
-        better = new <= rank
-        kept = (jnp.where(better[:, None], moved, own), jnp.where(better, new, rank), jnp.where(better, other, margin))
-        return (question, wanted, *kept), None
-
-    def one(question: Any) -> Evolved:
-        value, margin = of(question, places)
-
-        def track(wanted: Array) -> Evolved:
+        def search(wanted: Array, own: Moves) -> Array:
             rank = _rank(value, margin, wanted)
             groups = jnp.arange(len(places)).reshape(-1, GROUP)
             at = jnp.take_along_axis(groups, jnp.argmin(rank[groups], axis=1)[:, None], axis=1)[:, 0]
-            state = (question, wanted, places[at], rank[at], margin[at])
-            _, _, own, rank, margins = lax.scan(generation, state, moves)[0]
-            best = jnp.argmin(rank)
-            return Evolved(own[best], margins[best])
+            members, rank = lax.scan(partial(_generation, judged, wanted), (places[at], rank[at]), own)[0]
+            return members[jnp.argmin(rank)]
 
-        return jax.vmap(track)(asked)
+        return jax.vmap(search)(asked, moves)
 
     return jax.vmap(one)(questions)
+
+
+def _judged(parts: Parts, given: Any, question: Any, places: Array) -> tuple[Array, Array]:
+    value, margin = jax.vmap(lambda x: parts(given, question, x))(places)
+    usable = (value * 0.0 == 0.0) & (margin * 0.0 == 0.0)
+    return jnp.where(usable, value, jnp.inf), jnp.where(usable, margin, -jnp.inf)
+
+
+def _generation(
+    judged: Callable[[Array], tuple[Array, Array]], wanted: Array, state: tuple[Array, Array], move: Moves
+) -> tuple[tuple[Array, Array], None]:
+    own, rank = state
+    good = own[lax.top_k(-rank, _leaders(len(own)))[1]][move.leader]
+    moved = own + move.step * (good - own + own[move.first] - own[move.second])
+    # Half of the way to the bound where a step goes beyond it.
+    moved = jnp.where(moved < 0.0, 0.5 * own, jnp.where(moved > 1.0, 0.5 * (own + 1.0), moved))
+    moved = jnp.where(move.taken, moved, own)
+    new = _rank(*judged(moved), wanted)
+    better = new <= rank
+    return (jnp.where(better[:, None], moved, own), jnp.where(better, new, rank)), None
 
 
 def _rank(value: Array, margin: Array, wanted: Array) -> Array:
@@ -127,7 +116,7 @@ def _rank(value: Array, margin: Array, wanted: Array) -> Array:
 
 def evolved(
     parts: Parts, given: Any, questions: Any, *, unknowns: int, asked: tuple[float, ...], population: int
-) -> Evolved:
+) -> np.ndarray:
     """Best places of many questions.
 
     Args:
@@ -139,13 +128,15 @@ def evolved(
         population: members of it; one twice as large takes four times as long.
 
     Returns:
-        NumPy arrays (n, n_asked, ...); where no place found has the margin, the one with the largest.
+        (n, n_asked, d) in [0, 1]; where no place found has the margin, the one with the largest.
     """
     places = qmc.Halton(unknowns, seed=0).random(GROUP * population)
-    kernel = partial(_evolved, parts, given, np.asarray(asked), places, moves_of(unknowns, population))
+    own = moves_of(unknowns, population)
+    # Each search its own ones: what one misses, another one may find.
+    moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(asked))]), own)
+    kernel = partial(_evolved, parts, given, np.asarray(asked), places, moves)
 
-    def part(some: slice) -> Evolved:
+    def part(some: slice) -> np.ndarray:
         return in_batches(kernel, jax.tree.map(lambda x: x[some], questions), size=BATCH)
 
-    found = in_parts(part, len(jax.tree.leaves(questions)[0]), PART)
-    return jax.tree.map(lambda *pieces: np.concatenate(pieces), *found)
+    return np.concatenate(in_parts(part, len(jax.tree.leaves(questions)[0]), PART))

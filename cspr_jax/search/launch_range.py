@@ -135,8 +135,8 @@ class LaunchRange:
         return labelled.over(vars(self), dims)
 
 
-def _shot(given: tuple[Problem, Bounds], question: Question, x: Array) -> Shot:
-    problem, bounds = given
+def _shot(known: tuple[Problem, Bounds], question: Question, x: Array) -> Shot:
+    problem, bounds = known
     own = bounds.low + (bounds.high - bounds.low) * x
     position, (flight, duration), share = own[:3], jnp.exp(own[3:5]), own[5]
     velocity = aimed(position, question.target, problem.robot.gravity, flight)
@@ -144,16 +144,16 @@ def _shot(given: tuple[Problem, Bounds], question: Question, x: Array) -> Shot:
     return Shot(position, velocity, flight, share, Bezier(question.start, middle, end, duration, question.z0))
 
 
-def _energy(given: tuple[Problem, Bounds], question: Question, x: Array) -> tuple[Array, Array]:
+def _energy(known: tuple[Problem, Bounds], question: Question, x: Array) -> tuple[Array, Array]:
     # Kinetic energy at the release over weight and size of the robot, and the smallest margin.
-    robot, shot = given[0].robot, _shot(given, question, x)
-    margins = margins_of(given[0], jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], shot.motion), SAMPLES)
+    robot, shot = known[0].robot, _shot(known, question, x)
+    margins = margins_of(known[0], jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], shot.motion), SAMPLES)
     return 0.5 * jnp.sum(shot.velocity**2) / (robot.gravity * spool_radius(robot)), jnp.min(margins)
 
 
 @jax.jit
-def _shots(given: tuple[Problem, Bounds], cases: tuple[Question, Array]) -> Shot:
-    return jax.vmap(lambda question, x: _shot(given, question, x))(*cases)
+def _shots(known: tuple[Problem, Bounds], cases: tuple[Question, Array]) -> Shot:
+    return jax.vmap(lambda question, x: _shot(known, question, x))(*cases)
 
 
 def launch_range(
@@ -173,18 +173,18 @@ def launch_range(
     """
     question = Question(starts, targets, depths_of(problem.robot, starts))
     asked = (np.inf, *(SAMPLED if given(problem.limits) else EXACT))
-    found = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, asked=asked, population=population)
+    places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, asked=asked, population=population)
     parts = [slice(i, i + TOGETHER) for i in range(0, len(starts), TOGETHER)]
-    own = [_answers((problem, bounds), jax.tree.map(lambda x, s=some: x[s], (question, found.place))) for some in parts]
+    own = [_answers((problem, bounds), jax.tree.map(lambda x, s=some: x[s], (question, places))) for some in parts]
     return LaunchRange(**{name: np.concatenate([vars(part)[name] for part in own]) for name in vars(own[0])})
 
 
-def _answers(given: tuple[Problem, Bounds], cases: tuple[Question, np.ndarray]) -> LaunchRange:
+def _answers(known: tuple[Problem, Bounds], cases: tuple[Question, np.ndarray]) -> LaunchRange:
     # Of every place and margin asked for one candidate, in one row: the margins change fastest.
     count, tracks, _ = cases[1].shape
     question = jax.tree.map(lambda x: np.repeat(x, tracks, axis=0), cases[0])
-    shots = in_batches(lambda some: _shots(given, some), (question, cases[1].reshape(count * tracks, -1)), size=BATCH)
-    verdict, margin = _judged(given[0], shots.motion, (count, tracks))
+    shots = in_batches(lambda some: _shots(known, some), (question, cases[1].reshape(count * tracks, -1)), size=BATCH)
+    verdict, margin = _judged(known[0], shots.motion, (count, tracks))
     speed = np.linalg.norm(shots.velocity, axis=1).reshape(count, tracks)
     slowest = np.where(verdict == 0, speed, np.inf).argmin(1)
     largest, each, is_found = margin.argmax(1), np.arange(count), (verdict == 0).any(1)
