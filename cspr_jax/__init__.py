@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from cspr_jax.api.beziers import bezier_verdicts as bezier_verdicts
     from cspr_jax.api.examples import copy_examples as copy_examples
     from cspr_jax.api.examples import list_examples as list_examples
+    from cspr_jax.api.launches import launch_range as launch_range
     from cspr_jax.api.lines import least_time as least_time
     from cspr_jax.api.lines import straight_line as straight_line
     from cspr_jax.api.lists import list_quantities as list_quantities
@@ -72,6 +73,7 @@ _PUBLIC = {
     "encoder_error": ("cspr_jax.api.sensitivities", "encoder_error"),
     "hypocycloid": ("cspr_jax.api.motions", "hypocycloid"),
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
+    "launch_range": ("cspr_jax.api.launches", "launch_range"),
     "least_time": ("cspr_jax.api.lines", "least_time"),
     "list_examples": ("cspr_jax.api.examples", "list_examples"),
     "list_quantities": ("cspr_jax.api.lists", "list_quantities"),
@@ -119,6 +121,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "encoder_error",
     "hypocycloid",
     "keep_compiled_code",
+    "launch_range",
     "least_time",
     "list_examples",
     "list_quantities",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
+from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.plan import Choice, PlanFile, Pose
 from cspr_jax.config.robot import LimitTable, RobotFile
 from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepTrajectory
@@ -35,6 +36,7 @@ FILES = {
         ("[trajectory]", SweepTrajectory),
         ("trajectory.from", From),
         ("[orientations]", Orientations),
+        ("[launch]", LaunchSearch),
         ("[limits]", LimitTable),
         ("[run]", Run),
     ],

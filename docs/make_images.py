@@ -109,6 +109,9 @@ IMAGES = {
     "launch_sensitivity": Image(
         "Largest displacement of the launch robot over the largest error of a cable; infinite on z = 0 (theory.md).", 10
     ),
+    "launch_range": Image(
+        "Where the launch robot can throw to, 1.675 m below its spools, and the least speed of the release.", 40
+    ),
     "concepts": Image("From start to target in five arcs, and the pseudotensions; see concepts.md.", 8, command="draw"),
 }
 

@@ -1,11 +1,11 @@
-"""The [launch] table of a plan: an object is released on a Bezier segment and flies to a target."""
+"""The [launch] tables: of a plan, where an object is released on a Bezier segment, and of maps of such launches."""
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from cspr_jax.config.reading import Table
-from cspr_jax.config.robot import Point, Positive
+from cspr_jax.config.robot import Coordinate, Point, Positive
 from cspr_jax.config.wording import fault
 
 Size = Annotated[float, Field(ge=0.0, le=1e3)]
@@ -59,3 +59,31 @@ class LaunchTable(Table):
             allowed = 'a time of flight, or choose = "energy" or "time": one of them'
             raise fault("time", self.time, allowed)
         return self
+
+
+Interval = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
+_OF_RELEASES = "least and largest {} of the release, [least, largest], m; absent: {}"
+_ASIDE = "from twice the robot's size on one side of the centroid of the spools to as far on the other"
+
+
+class LaunchSearch(Table):
+    """Where maps of launches look for a release."""
+
+    release_x: Interval | None = Field(None, description=_OF_RELEASES.format("x", _ASIDE))
+    release_y: Interval | None = Field(None, description=_OF_RELEASES.format("y", "likewise"))
+    release_z: Interval | None = Field(
+        None, description=_OF_RELEASES.format("z", "from the centroid down to four times the robot's size below it")
+    )
+    max_duration: Positive | None = Field(
+        None, description="longest segment tried, s; absent: 40 times the root of the robot's size over gravity"
+    )
+    population: Annotated[int, Field(ge=16, le=512)] = Field(
+        64, description="launches that the search of a cell improves; one twice as large takes four times as long"
+    )
+
+    @field_validator("release_x", "release_y", "release_z")
+    @classmethod
+    def _ordered(cls, ends: list[float] | None) -> list[float] | None:
+        if ends is not None and not ends[0] <= ends[1]:
+            raise ValueError("[least, largest], the first not above the second")
+        return ends

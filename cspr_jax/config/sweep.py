@@ -4,6 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
+from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import Coordinate, LimitTable, Point
@@ -161,6 +162,9 @@ class SweepFile(Table):
         None,
         description="[orientations] of orientations, orientation-workspace and attainability: definition, divisions, "
         "values",
+    )
+    launch: LaunchSearch | None = Field(
+        None, description="[launch] of launch-range: where a release is looked for, and how thoroughly"
     )
     limits: LimitTable = Field(default_factory=LimitTable, description="[limits]")
     run: Run = Field(default_factory=Run, description="[run] dtype, tile, store")

@@ -2,31 +2,16 @@
 
 import numpy as np
 
-from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import SweepFile
-from cspr_jax.errors import ConfigError
-from cspr_jax.maps.grid_map import PointMassMap
-from cspr_jax.robots.point_mass import PLANAR
+from cspr_jax.maps.from_places import FromPlacesMap
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.least_time import least_times
 
 
-class LeastTimeMap(PointMassMap):
+class LeastTimeMap(FromPlacesMap):
     """The least duration of the S-model to each target; see `GridMap`."""
 
     any_cables = True
-
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse starts that are none."""
-        super().__init__(spec, keys, file)
-        start = keys.trajectory.start
-        if spec.planar and start is not None and start.position is not None and start.position[1] != 0.0:
-            raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")
-        if start is not None and start.rest:
-            raise ConfigError(
-                file, "trajectory.from: must be { position = [x, y, z] } in this map, or axes from_x, ..."
-            )
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -38,8 +23,6 @@ class LeastTimeMap(PointMassMap):
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""
         self._refuse_out_of_plane(grid)
-        if self._problem.robot.dof == PLANAR and grid.axes.get("from_y", np.zeros(1)).any():
-            raise ConfigError(self._file, "axes.from_y: must be [0] for a planar robot")
         super().refuse_hopeless(grid)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

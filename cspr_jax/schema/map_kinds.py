@@ -100,6 +100,10 @@ _OF_LINES = (
     *("verdict", "duration", "acceleration_time", "least_duration", "duration_ratio", "rest_margin"),
     *("active_up", "active_down"),
 )
+_OF_LAUNCHES = (
+    *("verdict", "release_speed", "largest_margin", "duration", "release_time", "flight_time"),
+    *("release_x", "release_y", "release_z"),
+)
 _OF_LENGTHS = ("sigma_p", "sigma_r")
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
@@ -236,6 +240,20 @@ MAP_KINDS: dict[str, MapKind] = {
             freedoms=(2, 3),
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.max_acceleration", "limits"),
+        ),
+        MapKind(
+            name="launch-range",
+            title="Range of launches",
+            description="least speed with which an object, released on one Bezier segment, reaches each landing place",
+            implementation="cspr_jax.maps.launch_range:LaunchRangeMap",
+            quantities=_OF_LAUNCHES,
+            stored=_OF_LAUNCHES,
+            pictured=("release_speed",),
+            families=("bezier",),
+            freedoms=(2, 3),
+            start="point",
+            takes=("axes.from_x", "axes.from_y", "axes.from_z", "launch", "limits"),
+            cells=1024,  # a cell takes long
         ),
         MapKind(
             name="sensitivity",

@@ -279,6 +279,30 @@ QUANTITIES = {
             meanings="line-bounds",
         ),
         Quantity(
+            "largest_margin",
+            "1",
+            "largest margin of the segments tried",
+            "Largest smallest slack, of taut cables, depth and limits, that a launch to the cell was found to have; "
+            "below 0 no launch was found, which is no proof that there is none.",
+            signed=True,
+        ),
+        Quantity(
+            "release_speed",
+            "m s-1",
+            "least speed at the release",
+            "Of the feasible launches found; NaN where none was.",
+        ),
+        Quantity(
+            "release_time", "s", "time of the release", "After the start of the segment, of the launch of least speed."
+        ),
+        Quantity("flight_time", "s", "time of the flight", "From the release to the landing, at the least speed."),
+        *(
+            Quantity(
+                f"release_{name}", "m", f"{name} of the release", "Place of the release of the launch of least speed."
+            )
+            for name in "xyz"
+        ),
+        Quantity(
             "sigma_p",
             "m m-1",
             "sensitivity of the position",

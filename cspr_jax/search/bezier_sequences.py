@@ -62,12 +62,13 @@ def segments_of(sequence: Anchored, durations: Array) -> Bezier:
     return Bezier(starts, middles, ends, durations, jnp.full_like(durations, sequence.z0))
 
 
-def margins_of(problem: Problem, segments: Bezier) -> Array:
+def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Array:
     """Margins of segments for a search: exact ones of taut cables and of the depth, sampled ones of limits.
 
     Args:
         problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
         segments: leaves with a leading dimension n.
+        samples: instants of a segment at which limits are asked for.
 
     Returns:
         (n * n_slacks,) without a unit.
@@ -78,7 +79,7 @@ def margins_of(problem: Problem, segments: Bezier) -> Array:
         found = jnp.append(own.taut, own.below)
         if not given(problem.limits):
             return found
-        tau = jnp.linspace(0.0, 1.0, SAMPLES)
+        tau = jnp.linspace(0.0, 1.0, samples)
         limits = jax.vmap(lambda t: slacks(problem, motion, t)[len(found) :])(tau)
         return jnp.append(found, jnp.min(limits, axis=0))
 

@@ -1,0 +1,142 @@
+"""Least value of an objective under smallest margins, for many questions at once: differential evolution.
+
+A fixed set of places is looked at in groups, and the best of each group are a population. Each generation moves every
+member towards one of the best and along the difference of two others, and keeps what is no worse: so the steps shrink
+with the population and lie along the valleys it lies in. Smallest margins have kinks, which a search by gradients would
+get stuck on. Every question sees the same places and moves: answers are repeatable, and do not depend on what is asked
+beside them.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+from scipy.stats import qmc
+
+from cspr_jax.arithmetic.batches import in_batches, in_parts
+
+# Gives of arguments, a question and unknowns (d,) in [0, 1] the objective () >= 0 and the smallest margin ().
+Parts = Callable[[Any, Any, Array], tuple[Array, Array]]
+# Places in a group, generations for each member, and members for each of the best ones; measured.
+GROUP, GENERATIONS, LED = 64, 2, 10
+# Range of the lengths of steps, and chance of an unknown to take part in one.
+STEPS, CHANCE = (0.4, 0.9), 0.9
+# Questions at a time, and at most in a thread.
+BATCH, PART = 16, 256
+
+
+class Moves(NamedTuple):
+    """Moves of all generations.
+
+    Fields:
+        leader: (n_generations, n) which of the best ones it is moved towards.
+        first: (n_generations, n) number of the member that another one's difference starts at.
+        second: (n_generations, n) of the one that it ends at.
+        step: (n_generations, n, 1) length.
+        taken: (n_generations, n, d) which unknowns take part.
+    """
+
+    leader: Any
+    first: Any
+    second: Any
+    step: Any
+    taken: Any
+
+
+def moves_of(unknowns: int, population: int) -> Moves:
+    """Moves, the same ones for all questions.
+
+    Args:
+        unknowns: d.
+        population: n, at least 2.
+
+    Returns:
+        the moves.
+    """
+    random = np.random.default_rng(0)
+    shape = (GENERATIONS * population, population)
+    # Of a permutation and the same one rolled, no two members are one.
+    first = random.permuted(np.tile(np.arange(population), (shape[0], 1)), axis=1)
+    taken = random.random((*shape, unknowns)) < CHANCE
+    np.put_along_axis(taken, random.integers(unknowns, size=(*shape, 1)), True, axis=2)
+    leader = random.integers(_leaders(population), size=shape)
+    return Moves(leader, first, np.roll(first, 1, axis=1), random.uniform(*STEPS, (*shape, 1)), taken)
+
+
+def _leaders(population: int) -> int:
+    return max(population // LED, 1)
+
+
+@partial(jax.jit, static_argnums=0)
+def _evolved(parts: Parts, given: Any, asked: Array, places: Array, moves: Moves, questions: Any) -> Array:
+    def one(question: Any) -> Array:
+        judged = partial(_judged, parts, given, question)
+        value, margin = judged(places)
+
+        def search(wanted: Array, own: Moves) -> Array:
+            rank = _rank(value, margin, wanted)
+            groups = jnp.arange(len(places)).reshape(-1, GROUP)
+            at = jnp.take_along_axis(groups, jnp.argmin(rank[groups], axis=1)[:, None], axis=1)[:, 0]
+            members, rank = lax.scan(partial(_generation, judged, wanted), (places[at], rank[at]), own)[0]
+            return members[jnp.argmin(rank)]
+
+        return jax.vmap(search)(asked, moves)
+
+    return jax.vmap(one)(questions)
+
+
+def _judged(parts: Parts, given: Any, question: Any, places: Array) -> tuple[Array, Array]:
+    value, margin = jax.vmap(lambda x: parts(given, question, x))(places)
+    usable = (value * 0.0 == 0.0) & (margin * 0.0 == 0.0)
+    return jnp.where(usable, value, jnp.inf), jnp.where(usable, margin, -jnp.inf)
+
+
+def _generation(
+    judged: Callable[[Array], tuple[Array, Array]], wanted: Array, state: tuple[Array, Array], move: Moves
+) -> tuple[tuple[Array, Array], None]:
+    own, rank = state
+    good = own[lax.top_k(-rank, _leaders(len(own)))[1]][move.leader]
+    moved = own + move.step * (good - own + own[move.first] - own[move.second])
+    # Half of the way to the bound where a step goes beyond it.
+    moved = jnp.where(moved < 0.0, 0.5 * own, jnp.where(moved > 1.0, 0.5 * (own + 1.0), moved))
+    moved = jnp.where(move.taken, moved, own)
+    new = _rank(*judged(moved), wanted)
+    better = new <= rank
+    return (jnp.where(better[:, None], moved, own), jnp.where(better, new, rank)), None
+
+
+def _rank(value: Array, margin: Array, wanted: Array) -> Array:
+    # Places with the margin first, by their objective; then the others, by their margin. The least is the best.
+    return jnp.where(margin >= wanted, -1.0 - 1.0 / (1.0 + value), -margin)
+
+
+def evolved(
+    parts: Parts, given: Any, questions: Any, *, unknowns: int, asked: tuple[float, ...], population: int
+) -> np.ndarray:
+    """Best places of many questions.
+
+    Args:
+        parts: a function of a module, as it is compiled once.
+        given: its first argument.
+        questions: pytree of NumPy arrays (n, ...).
+        unknowns: d.
+        asked: margins, below 1, at which the objective is to be least; inf: the margin is to be largest.
+        population: members of it; one twice as large takes four times as long.
+
+    Returns:
+        (n, n_asked, d) in [0, 1]; where no place found has the margin, the one with the largest.
+    """
+    places = qmc.Halton(unknowns, seed=0).random(GROUP * population)
+    own = moves_of(unknowns, population)
+    # Each search its own ones: what one misses, another one may find.
+    moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(asked))]), own)
+    kernel = partial(_evolved, parts, given, np.asarray(asked), places, moves)
+
+    def part(some: slice) -> np.ndarray:
+        return in_batches(kernel, jax.tree.map(lambda x: x[some], questions), size=BATCH)
+
+    return np.concatenate(in_parts(part, len(jax.tree.leaves(questions)[0]), PART))
