@@ -26,7 +26,7 @@ FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
 # Parts of a duration by which what a search found is made longer, one after the other, until it is proved.
 LONGER = (1e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
 # Where a cable is short its acceleration has a peak: so many distances to both sides of it, on the line, and samples.
-BESIDE, HALVINGS = np.linspace(-2.0, 2.0, SAMPLES), 45
+BESIDE, HALVINGS = np.linspace(-1.5, 1.5, 4 * SAMPLES - 3), 45
 
 
 class Gain(NamedTuple):
@@ -90,7 +90,8 @@ def gain(line: LineSlacks, law: Amplitude, edges: Array, middle: Array, largest:
 
 def _above(most: Array, needed: Array, is_known: Array) -> Array:
     # Largest q of samples (n_pieces, n_samples, n_rows) whose slack is most - q needed.
-    share = _between(jnp.where(most > 0.0, needed / jnp.where(most > 0.0, most, 1.0), 0.0), is_known & (most > 0.0))
+    is_known &= most > 0.0
+    share = _between(jnp.where(most > 0.0, needed / jnp.where(most > 0.0, most, 1.0), 0.0), is_known)
     above = jnp.where(share > 0.0, 1.0 / jnp.where(share > 0.0, share, 1.0), jnp.inf)
     return jnp.where((most <= 0.0) & (needed >= 0.0), -1.0, above)
 
@@ -106,8 +107,7 @@ def _near_spools(line: LineSlacks, law: Amplitude) -> tuple[Array, Array]:
         (n_cables, n_samples, n_rows) 1/s^2, and tau (n_cables, n_samples, 1).
     """
     line = jax.tree.map(lambda x: x[0, 0, 0], line)
-    beside = line.nearest[:, None] + jnp.sqrt(line.apart / line.square)[:, None] * BESIDE[None]
-    s = jnp.clip(beside, 0.0, 1.0)
+    s = jnp.clip(line.nearest[:, None] + jnp.sqrt(line.apart / line.square)[:, None] * BESIDE[None], 0.0, 1.0)
 
     def halved(_, ends):
         low, high = ends
@@ -120,9 +120,8 @@ def _near_spools(line: LineSlacks, law: Amplitude) -> tuple[Array, Array]:
     at = Instants(way, speed**2, bend)
     line = jax.tree.map(lambda x: x[None, None], line)
     rows = jnp.concatenate([slacks(line, name, at) for name in line.names if name in line.largest], axis=-1)
-    # Parabolas want equal distances.
-    is_even = (beside == s)[..., None] & jnp.isfinite(rows)
-    return _above(jnp.ones_like(rows), 1.0 - rows, is_even), tau[..., None]
+    # No parabolas here: knots of the law lie between these samples.
+    return _above(jnp.ones_like(rows), 1.0 - rows, jnp.zeros_like(rows, bool)), tau[..., None]
 
 
 def _with_peaks(found: Gain, halves: list[Array], peaks: tuple[Array, Array], middle: Array, first_row: int) -> Gain:
