@@ -69,7 +69,13 @@ def test_one_segment_after_the_other(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "limit", ["tension_min = 0.5", "tension_max = 3.0", "cable_speed_max = 0.4", "cable_acceleration_max = 3.0"]
+    "limit",
+    [
+        "tension_min = 0.5",
+        pytest.param("tension_max = 3.0", marks=pytest.mark.soak),
+        pytest.param("cable_speed_max = 0.4", marks=pytest.mark.soak),
+        pytest.param("cable_acceleration_max = 3.0", marks=pytest.mark.soak),
+    ],
 )
 def test_the_least_duration_under_limits(tmp_path, limit):
     (free,) = planned(tmp_path, text([None], places=PLACES[:2]))["segments"]

@@ -128,6 +128,7 @@ def test_tiles_change_no_bit(result, tmp_path):
         assert np.array_equal(values, other.data[name], equal_nan=True), name
 
 
+@pytest.mark.soak
 def test_a_limit_shrinks_the_range(tmp_path):
     """Of the six cables each, half of what a pair pulls."""
     where = {"x": [0.0, 0.9], "y": [0.4, 0.8]}

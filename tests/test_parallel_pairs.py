@@ -223,7 +223,7 @@ def test_without_the_key_it_stays_a_platform_where_platforms_move():
 THREE = inline([LAUNCH_BASE[i : i + 2].mean(0) for i in (0, 2, 4)])
 
 
-@pytest.mark.parametrize("family", ["transition", "s-curve"])
+@pytest.mark.parametrize("family", [pytest.param("transition", marks=pytest.mark.soak), "s-curve"])
 def test_a_plan_is_that_of_the_equivalent(tmp_path, family):
     limits = "" if family == "transition" else "max_acceleration = 2.0"
     text = PLAN.replace("z0 = 0.6\n", "" if family == "s-curve" else "z0 = 0.6\n")
