@@ -131,6 +131,21 @@ def test_the_least_energy_and_the_earliest_landing(tmp_path):
     assert feasible.sum() > 200 and (at * time + flight)[feasible].min() > landing["time"] * (1.0 - 1e-6)
 
 
+def test_a_launch_before_the_last_segment(tmp_path):
+    """The motion goes on to another place, with the acceleration with which the launching segment ends."""
+    body = text(LAUNCH | {"segment": "1"}, places=PLACES[:2], duration="")
+    body = body.replace("[launch]", "[[pose]]\nposition = [0.05, 0.0, -0.7]\n[launch]")
+    answer = planned(tmp_path, body)
+    control = np.array([segment["control_points"] for segment in answer["segments"]])
+    times = np.array([segment["duration"] for segment in answer["segments"]])
+    for i in range(2):
+        wanted = control[i, 2] + (control[i, 1] - control[i, 2]) * (times[i + 1] / times[i]) ** 2
+        np.testing.assert_allclose(control[i + 1, 1], wanted, atol=1e-11)
+    np.testing.assert_allclose(control[2, 2], [0.05, 0.0, -0.7], atol=1e-15)
+    np.testing.assert_allclose(answer["launch"]["landing"], [0.15, 0.05, -1.675], atol=1e-9)
+    assert answer["launch"]["control_points"] == answer["segments"][1]["control_points"] and answer["feasible"]
+
+
 def test_a_velocity_at_the_target(tmp_path):
     launch = {"segment": "3", "target": "[0.15, 0.05, -1.675]", "velocity": "[0.3, 0.4, -4.2]", "time": "0.45"}
     answer = planned(tmp_path, alone(launch, duration="duration = 1.5\n"))["launch"]
