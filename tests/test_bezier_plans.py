@@ -106,6 +106,14 @@ def test_the_least_total(tmp_path):
     assert given["segments"][1]["duration"] == 1.1 and given["total_duration"] > answer["total_duration"]
 
 
+@pytest.mark.parametrize("least", ["each", pytest.param("total", marks=pytest.mark.soak)])
+def test_slow_winches(tmp_path, least):
+    """However slow the cables, there is a duration."""
+    body = text([None], places=PLACES[:2], more=f'least = "{least}"\ncable_speed_max = 0.003\n')
+    answer = planned(tmp_path, body)
+    assert answer["feasible"] and answer["total_duration"] > 50.0
+
+
 def test_without_a_feasible_duration_the_nearest_is_shown(tmp_path):
     """A start without acceleration to beyond the footprint: there is none, whatever the duration."""
     (segment,) = planned(tmp_path, text([None], places=[[0, 0, -0.6], [0.9, 0, -0.6]]), code=1)["segments"]

@@ -242,9 +242,55 @@ def test_scatter_in_files_and_pictures(tmp_path):
     assert cspr_jax.plan(tmp_path / "plan.toml").to_dict()["launch"]["scatter"] == answer
 
 
+def test_scatter_is_in_the_axes_of_the_file(tmp_path):
+    """The same robot and launch with z up and z down; along a jitter alone landings lie along their slope in time."""
+    up = alone(LAUNCH | {"release": "0.59"}) + "[launch.errors]\nrelease = 1e-4\nthrows = 200\nseed = 3\n"
+    robot = f'[robot]\nname = "three"\nmass = 1.0\ngravity = 9.80665\nbase_points = {SPOOLS.tolist()}\n'
+    down = up.replace('robot = "launch-robot"\n', "").replace("-1.2", "1.2").replace("-0.8", "0.8")
+    down = down.replace("-1.675", "1.675") + robot
+    first, second = (planned(tmp_path, body)["launch"]["scatter"] for body in (up, down))
+    for name in ("covariance", "covariance_first_order", "mean"):
+        np.testing.assert_allclose(first[name], second[name], rtol=1e-9, atol=1e-16)
+    start, middle, end = (np.array(x) for x in planned(tmp_path, up)["launch"]["control_points"])
+
+    def landing(late):
+        position, velocity, _ = (x[-1] for x in halfway([start, middle, end], 1.6, 0.59 + late))
+        fall = np.roots([-0.5 * GRAVITY, velocity[2], position[2] + 1.675]).max()
+        return (position + velocity * fall)[:2]
+
+    slope = (landing(1e-6) - landing(-1e-6)) / 2e-6
+    np.testing.assert_allclose(first["covariance_first_order"], 1e-8 * np.outer(slope, slope), rtol=1e-5)
+
+
+def test_a_launch_from_p0(tmp_path):
+    """The pose that follows from the launch is no rest in P0."""
+    launch = {"segment": "0", "point": "[0, 0, -0.6]", "target": "[0.1, 0.05, -1.6]", "time": "0.5"}
+    both = [planned(tmp_path, text(launch, places=PLACES[:1], more=more, duration="")) for more in ("", "z0 = 0.5\n")]
+    assert both[0]["launch"]["control_points"] == both[1]["launch"]["control_points"]
+
+
+def test_a_planar_robot_stays_in_its_plane(tmp_path):
+    robot = '[robot]\nname = "two"\nmass = 1.0\nplanar = true\nbase_points = [[-1.0, 0, 0], [1.0, 0, 0]]\n'
+    head = 'schema = 1\nfamily = "bezier"\n'
+    launch = (
+        "[[pose]]\nposition = [0, 0, 1]\n[[pose]]\nduration = 1.5\n[launch]\nsegment = 0\ntarget = [0.5, {y}, 3.0]\n"
+    )
+    launch += "time = 0.6\npoint = [0.1, 0.0, 1.2]\n"
+    assert plan(tmp_path, head + launch.format(y="0.0") + robot)[0] in (0, 1)
+    code, _, err = plan(tmp_path, head + launch.format(y="0.4") + robot)
+    assert code == 2 and "launch.target = [0.5, 0.4, 3.0]: must have y = 0" in err
+    poses = (
+        "first_control_point = [0.0, 0.1, 1.0]\n[[pose]]\nposition = [0, 0, 1]\n[[pose]]\nposition = [0.3, 0, 1.2]\n"
+    )
+    code, _, err = plan(tmp_path, head + poses + robot)
+    assert code == 2 and "first_control_point = [0.0, 0.1, 1.0]: must have y = 0" in err
+
+
 @pytest.mark.parametrize(
     ("change", "line"),
     [
+        ({"time": "1e-300"}, "launch.time"),
+        ({"release": "1e-12"}, "launch.release"),
         ({"segment": "4"}, "launch.segment = 4"),
         ({"segment": "-1"}, "launch.segment"),
         ({"target": "[0, 1]"}, "launch.target"),
@@ -282,6 +328,7 @@ def test_one_line_says_what_is_wrong(tmp_path, change, line):
         (text(LAUNCH).replace('"bezier"', '"quintic"'), "launch.segment"),
         (text(LAUNCH | {"segment": "2"}), "pose[3].position"),
         (text(LAUNCH).replace("[launch]", "[lunch]"), "did you mean launch"),
+        (text(LAUNCH).replace("[launch]", "[[pose]]\nrest = true\nfamily = 'quintic'\n[launch]"), "pose[5].family"),
     ],
 )
 def test_what_does_not_go_with_a_launch(tmp_path, body, line):

@@ -9,6 +9,7 @@ from cspr_jax.config.robot import Coordinate, Point, Positive
 from cspr_jax.config.wording import fault
 
 Size = Annotated[float, Field(ge=0.0, le=1e3)]
+Seconds = Annotated[float, Field(ge=1e-6, le=1e6)]
 
 
 class ErrorTable(Table):
@@ -34,13 +35,13 @@ class LaunchTable(Table):
     velocity: Point | None = Field(
         None, description="velocity at the target, [x, y, z], m/s; absent: follows from point and the flight's time"
     )
-    time: Positive | None = Field(None, description="time of the flight, s; absent: see choose")
+    time: Seconds | None = Field(None, description="time of the flight, s; absent: see choose")
     choose: Literal["energy", "time"] | None = Field(
         None,
         description='in place of time: "energy", the least kinetic energy at the release, or "time", the earliest '
         "landing, by search",
     )
-    release: Positive | None = Field(
+    release: Seconds | None = Field(
         None, description="when the object is released, after the start of the segment, s; absent: chosen by search"
     )
 

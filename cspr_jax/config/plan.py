@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.launch import LaunchTable
+from cspr_jax.config.launch import LaunchTable, Seconds
 from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml
 from cspr_jax.config.robot import LimitTable, Point, Positive
 from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, FamilyName, Quaternion, TiltTorsion, TrajectoryKeys
@@ -30,7 +30,7 @@ Depth = Annotated[
 
 
 Duration = Annotated[
-    Annotated[Positive, Tag("~number")] | Annotated[Literal["least"], Tag("~least")],
+    Annotated[Seconds, Tag("~number")] | Annotated[Literal["least"], Tag("~least")],
     Discriminator(lambda value: "~least" if isinstance(value, str) else "~number"),
 ]
 
@@ -121,7 +121,10 @@ class PlanFile(TrajectoryKeys, LimitTable):
         if self.launch.segment > last or self.family_of(self.launch.segment) != "bezier":
             allowed = f'from 0 to {last}, a pose from which family = "bezier" leads on'
             raise fault("launch.segment", self.launch.segment, allowed)
-        end = self.pose[self.launch.segment + 1]
+        end, after = self.pose[self.launch.segment + 1], self.launch.segment + 1
+        if after <= last and self.family_of(after) != "bezier":
+            allowed = '"bezier": behind the segment of the launch the acceleration goes on'
+            raise fault(f"pose[{after + 1}].family", shown(self.family_of(after)), allowed)
         for key, value in (("position", end.position), ("rest", end.rest or None)):
             if value is not None:
                 name = f"pose[{self.launch.segment + 1}].{key}"
@@ -129,7 +132,7 @@ class PlanFile(TrajectoryKeys, LimitTable):
         if self.first_control_point is not None or self.least == "each":
             key = "least" if self.first_control_point is None else "first_control_point"
             raise fault(
-                key, getattr(self, key), "absent beside [launch], from which accelerations and durations follow"
+                key, shown(getattr(self, key)), "absent beside [launch], from which accelerations and durations follow"
             )
         return self
 

@@ -86,9 +86,12 @@ class Beziers(Leg):
 
     def _points(self, problem: Problem, z0: float) -> np.ndarray:
         points, stops = self.stops.points(z0), self.stops
+        if self._at is not None:  # where it follows from the launch
+            points[self._at - stops.first + 1] = np.nan
         near = np.linalg.norm(np.diff(points, axis=0), axis=1) <= AT_P0 * float(spool_radius(problem.robot))
         for i in (np.flatnonzero(near) + 1).tolist():
-            if stops.keys.first_control_point is None or stops.first > 0:
+            given = stops.keys.first_control_point if stops.first == 0 else None
+            if given is None or given == stops.poses[0].position:
                 raise ConfigError(
                     stops.path,
                     f"{stops.name(i)}.position: must be another than that of {stops.name(i - 1)}, for a segment that "

@@ -155,7 +155,11 @@ def scattered(plan: Any, errors: LaunchErrors) -> Scatter:
     """
     motion, answers, at = _launching(plan)
     target = np.asarray(plan.frame.inward(plan.keys.launch.target))
-    return scatter(plan.problem.robot, Throw(motion, np.asarray(answers.release[at]), target), errors)
+    found = scatter(plan.problem.robot, Throw(motion, np.asarray(answers.release[at]), target), errors)
+    # Axes of the file are turned against those of the kernels about x.
+    signs = np.asarray(plan.frame.turned(np.ones(3)))[:2]
+    both = np.outer(signs, signs)
+    return Scatter(found.landings * signs, found.covariance * both, found.first_order * both)
 
 
 def _launching(plan: Any) -> tuple[Any, Any, int]:

@@ -90,6 +90,7 @@ def _check_lines(keys: PlanFile, path: Path) -> None:
 
 
 def _check_poses(spec: RobotFile, keys: PlanFile, path: Path) -> None:
+    _check_plane(spec, keys, path)
     if keys.beat is not None and not spec.is_platform:
         raise ConfigError(path, f'beat = "{keys.beat}": must be absent for {spec.kind}')
     for i, pose in enumerate(keys.pose):
@@ -103,3 +104,12 @@ def _check_poses(spec: RobotFile, keys: PlanFile, path: Path) -> None:
                 raise ConfigError(path, f"pose[{i}].{key}: must be absent for {spec.kind}")
         if spec.planar and pose.position is not None and pose.position[1] != 0.0:
             raise ConfigError(path, f"pose[{i}].position = {shown(pose.position)}: must have y = 0: a planar robot")
+
+
+def _check_plane(spec: RobotFile, keys: PlanFile, path: Path) -> None:
+    given = {"first_control_point": keys.first_control_point}
+    if keys.launch is not None:
+        given |= {f"launch.{name}": getattr(keys.launch, name) for name in ("point", "target", "velocity")}
+    for key, value in given.items():
+        if spec.planar and value is not None and value[1] != 0.0:
+            raise ConfigError(path, f"{key} = {shown(value)}: must have y = 0: a planar robot")

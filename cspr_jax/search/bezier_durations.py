@@ -12,7 +12,7 @@ from cspr_jax.feasibility.point_mass.bezier_durations import Ends, critical_dura
 from cspr_jax.feasibility.point_mass.bezier_margins import smallest_margins
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.force_balance import adjugate
-from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
+from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, spool_radius
 from cspr_jax.search.bezier_verdicts import BATCH, verdicts
 from cspr_jax.search.proved_verdicts import Verdicts
 from cspr_jax.trajectories.bezier import Bezier
@@ -22,6 +22,8 @@ HALVINGS = 60
 # Durations tried in each interval of taut ones where limits count, in geometric progression up to so many times the
 # first.
 TRIED, WIDEST = 129, 100.0
+# Over the time that the largest speed or acceleration of the cables takes for the way.
+AMPLE = 20.0
 
 
 @jax.jit
@@ -122,7 +124,8 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
         return verdicts(problem, motions)
 
     for first, last in intervals:
-        times = np.geomspace(first, min(last, WIDEST * first), TRIED)
+        widest = max(WIDEST * first, slowest(problem, np.concatenate([ends.start, ends.end])))
+        times = np.geomspace(first, min(last, widest), TRIED)
         good = np.flatnonzero(judged(times).verdict == 0)
         if len(good):
             return _narrowed(judged, times, int(good[0]))
@@ -133,6 +136,24 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
     times = times[np.isfinite(times)]
     own = judged(times)
     return float(times[np.argmax(np.nan_to_num(np.minimum(own.margin, own.room), nan=-np.inf))])
+
+
+def slowest(problem: Problem, points: np.ndarray) -> float:
+    """Duration that is long enough for what limits the speed of the cables.
+
+    Args:
+        problem: gives the limits.
+        points: (n + 1, 3) of the way, m; what is not known yet is NaN.
+
+    Returns:
+        s; 0 without such limits.
+    """
+    way = float(np.nansum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    way = way or float(spool_radius(problem.robot))
+    speed, acceleration = problem.limits.cable_speed_max, problem.limits.cable_acceleration_max
+    by_speed = 0.0 if speed is None else way / float(np.min(np.asarray(speed)))
+    by_acceleration = 0.0 if acceleration is None else np.sqrt(way / float(np.min(np.asarray(acceleration))))
+    return AMPLE * max(by_speed, by_acceleration)
 
 
 def _narrowed(judged, times: np.ndarray, first: int) -> float:

@@ -16,6 +16,7 @@ from cspr_jax.feasibility.point_mass.bezier_margins import smallest_margins
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.slacks import slacks
 from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.search.bezier_durations import slowest
 from cspr_jax.search.bezier_verdicts import verdicts
 from cspr_jax.search.constrained import Judged, least
 from cspr_jax.trajectories.bezier import Bezier
@@ -101,17 +102,19 @@ def judged(problem: Problem, segments: Bezier) -> Judged:
     return Judged(bool((own.verdict == 0).all()), float(worst))
 
 
-def duration_bounds(problem: Problem) -> tuple[float, float]:
+def duration_bounds(problem: Problem, points: np.ndarray) -> tuple[float, float]:
     """Logarithms of the shortest and of the longest duration that searches look at.
 
     Args:
-        problem: gives the size of the robot.
+        problem: gives the size of the robot, and limits of its speed.
+        points: (n + 1, 3) of the sequence, m; what is not known yet is NaN.
 
     Returns:
         of s.
     """
     unit = np.sqrt(float(spool_radius(problem.robot)) / float(problem.robot.gravity))
-    return float(np.log(SHORTEST * unit)), float(np.log(LONGEST * unit))
+    longest = max(LONGEST * unit, slowest(problem, points))
+    return float(np.log(SHORTEST * unit)), float(np.log(longest))
 
 
 def _parts(arguments, x: Array) -> tuple[Array, Array]:
@@ -139,7 +142,8 @@ def least_total(problem: Problem, sequence: Anchored, durations: list[float | No
         own[free] = np.exp(x)
         return own
 
-    shortest, longest = (np.full(len(free), bound) for bound in duration_bounds(problem))
+    bounds = duration_bounds(problem, np.asarray(sequence.points))
+    shortest, longest = (np.full(len(free), bound) for bound in bounds)
     found = least(
         _parts,
         (problem, sequence, jnp.asarray(known), free),

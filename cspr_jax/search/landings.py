@@ -107,7 +107,9 @@ def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
         (2,) x and y over those of the target, m; NaN where the object never comes to its height.
     """
     count = robot.n_cables
-    state = throw.motion.state((throw.release + errors[0]) / throw.motion.time)
+    # Before the segment and behind it the effector is at rest there, for an instant.
+    share = jnp.clip((throw.release + errors[0]) / throw.motion.time, 0.0, 1.0)
+    state = throw.motion.state(share)
     lengths, rates, _ = cable_motion(robot, *state[:3])
     position = _placed(robot, state.position, lengths + errors[1 : count + 1])
     velocity = _moving(robot, position, rates + errors[count + 1 :])
@@ -154,7 +156,7 @@ def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatte
         errors: their sizes.
 
     Returns:
-        the scatter, with axes as the kernels have them: x and y as in the robot file.
+        the scatter, in the axes of the kernels.
     """
     count, random = robot.n_cables, np.random.default_rng(errors.seed)
     # In this order, so that a sample of one kind of error is that of a larger one, scaled.

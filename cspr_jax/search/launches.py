@@ -131,7 +131,7 @@ def _searched(problem: Problem, launch: Launch, durations: list[float | None], p
     known = jnp.asarray([1.0 if time is None else time for time in durations])
     free = np.array([i for i, time in enumerate(durations) if time is None], int)
     arguments: Any = (problem, launch, known, free)
-    shortest, longest = duration_bounds(problem)
+    shortest, longest = duration_bounds(problem, np.asarray(launch.points))
     bounds = [(shortest, longest)] * len(free)
     bounds += [(EARLIEST, LATEST)] if launch.release is None else []
     bounds += [(shortest, longest)] if launch.time is None else []

@@ -58,7 +58,7 @@ def bounds_of(
     inner = np.sort(frame.inward(corners), axis=0)
     if problem.robot.dof == PLANAR and inner[:, 1].any():
         raise InputError("release_y", releases[1], "[0, 0], or absent: a planar robot")
-    short, long = duration_bounds(problem)
+    short, long = duration_bounds(problem, np.zeros((2, 3)))
     if longest is not None and not np.log(longest) > short:
         raise InputError("max_duration", longest, f"above {shown(float(np.exp(short)))} s, for a robot of this size")
     last = long if longest is None else min(np.log(longest), long)

@@ -134,6 +134,6 @@ def _dot(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
 
 def _positive_roots(tables: list[np.ndarray]) -> np.ndarray:
     # Roots that rounding has moved off the real axis count: what is between roots is tested anyway.
-    found = np.concatenate([np.roots(table[::-1]) for table in tables])
+    found = np.concatenate([np.roots(table[::-1]) for table in tables if np.isfinite(table).all()])
     near = np.abs(found.imag) <= 1e-3 * np.abs(found)
     return np.unique(found.real[near & (found.real > 0.0) & np.isfinite(found)])
