@@ -138,6 +138,7 @@ def test_a_limit_shrinks_the_range(tmp_path):
     assert (bound.data["verdict"][~still] & (Verdict.OVER_TENSION | Verdict.SLACK_CABLE).value).all()
 
 
+@pytest.mark.soak
 def test_a_floor_takes_away_margin(tmp_path):
     where = {"x": [0.0, 0.7], "y": [0.4, 0.9]}
     free = mapped(tmp_path / "free", **where)
