@@ -244,6 +244,7 @@ def test_gradients_of_the_exact_margin():
 def test_what_is_no_segment_is_refused():
     robot = cspr_jax.point_mass(SPOOLS, mass=1.0)
     one = np.array([[0.0, 0.0, 1.0]])
+    assert cspr_jax.bezier_verdicts(robot, one, one, one, durations=[1.0]).to_xarray().margin.dims == ("target",)
     with pytest.raises(InputError, match="durations"):
         cspr_jax.bezier_verdicts(robot, one, one, one, durations=[0.0])
     with pytest.raises(InputError, match="control_points"):

@@ -14,6 +14,7 @@ from cspr_jax.problem import prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
 from cspr_jax.robots.robot import check_determined
+from cspr_jax.schema.labelled import Columns
 from cspr_jax.search.bezier_durations import feasible_durations
 from cspr_jax.search.bezier_verdicts import verdicts
 from cspr_jax.trajectories.bezier import Bezier
@@ -21,7 +22,7 @@ from cspr_jax.trajectories.motion import Placed
 
 
 @dataclasses.dataclass(frozen=True)
-class BezierVerdicts:
+class BezierVerdicts(Columns):
     """Verdicts of n Bezier segments, (n,) each.
 
     Fields:

@@ -125,6 +125,34 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
     return data
 
 
+class Columns:
+    """Answers whose fields are columns: arrays with a value for each of n cases."""
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The fields that are arrays.
+
+        Returns:
+            (n, ...) each, by name.
+        """
+        return {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
+
+    def to_xarray(self, dims: Mapping[str, Any] | None = None) -> "xarray.Dataset":
+        """The answers for xarray, with units and long names.
+
+        Args:
+            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
+                None: one dimension "target".
+
+        Returns:
+            the fields over these dimensions; those of both ends of a segment over "end", too.
+
+        Raises:
+            InputError: dimensions of another number of points.
+            ConfigError: xarray is not installed.
+        """
+        return over(self.arrays(), dims)
+
+
 def _described(name: str, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
     if name not in EVERY:
         return {}

@@ -6,8 +6,8 @@ margin is reported. Answers of platforms (`search.platform_answers`) rest on ref
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -18,13 +18,10 @@ from cspr_jax.feasibility.point_mass import criteria
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, prove
 from cspr_jax.feasibility.point_mass.margins import margins
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.schema import labelled
+from cspr_jax.schema.labelled import Columns
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
-
-if TYPE_CHECKING:
-    import xarray
 
 # Segments computed at a time where little is computed for each.
 BATCH = 4096
@@ -34,7 +31,7 @@ Said = TypeVar("Said", bound="Answers")
 
 
 @dataclasses.dataclass(frozen=True)
-class Answers:
+class Answers(Columns):
     """One answer a segment.
 
     Fields:
@@ -72,24 +69,6 @@ class Answers:
             plain values.
         """
         return {}
-
-    def to_xarray(self, dims: Mapping[str, np.ndarray] | None = None) -> "xarray.Dataset":
-        """The answers for xarray, with units and long names.
-
-        Args:
-            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
-                None: one dimension "target".
-
-        Returns:
-            the fields over these dimensions; those of both ends of a segment over "end", too.
-
-        Raises:
-            InputError: dimensions of another number of points.
-            ConfigError: xarray is not installed.
-        """
-        return labelled.over(
-            {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}, dims
-        )
 
 
 def joined(parts: list[Said]) -> Said:

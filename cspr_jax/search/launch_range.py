@@ -5,8 +5,7 @@ released on it. All else follows: the velocity of the release (26), the control 
 """
 
 import dataclasses
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,16 +18,13 @@ from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.bezier_margins import depths_of
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.point_mass import spool_radius
-from cspr_jax.schema import labelled
+from cspr_jax.schema.labelled import Columns
 from cspr_jax.search.bezier_sequences import margins_of
 from cspr_jax.search.bezier_verdicts import BATCH, verdicts
 from cspr_jax.search.evolution import evolved
 from cspr_jax.search.release_bounds import Bounds
 from cspr_jax.trajectories.bezier import Bezier
 from cspr_jax.trajectories.launch import aimed, through
-
-if TYPE_CHECKING:
-    import xarray
 
 UNKNOWNS, POPULATION = 6, 64
 # Margins of the launch of least speed: exact ones of taut cables; limits are sampled, and only then proved.
@@ -70,7 +66,7 @@ class Shot(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class LaunchRange:
+class LaunchRange(Columns):
     """Launches to n landing places, (n,) each; NaN where no launch is proved feasible, but for the first two.
 
     Fields:
@@ -117,22 +113,6 @@ class LaunchRange:
         """
         x, y, z = frame.outward(self.releases).T
         return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)
-
-    def to_xarray(self, dims: Mapping[str, np.ndarray] | None = None) -> "xarray.Dataset":
-        """The answers for xarray, with units and long names.
-
-        Args:
-            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
-                None: one dimension "target".
-
-        Returns:
-            the fields over these dimensions.
-
-        Raises:
-            InputError: dimensions of another number of points.
-            ConfigError: xarray is not installed.
-        """
-        return labelled.over(vars(self), dims)
 
 
 def _shot(known: tuple[Problem, Bounds], question: Question, x: Array) -> Shot:

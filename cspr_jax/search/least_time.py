@@ -6,23 +6,18 @@ or T - p is so short that its digits are lost, every motion has a proof of its o
 """
 
 import dataclasses
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.schema import labelled
+from cspr_jax.schema.labelled import Columns
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.fastest_lines import fastest
 from cspr_jax.search.line_durations import Rule, names_of
 
-if TYPE_CHECKING:
-    import xarray
-
 
 @dataclasses.dataclass(frozen=True)
-class LeastTimes:
+class LeastTimes(Columns):
     """Least durations along n lines; NumPy arrays, (n,) each.
 
     Fields:
@@ -46,30 +41,6 @@ class LeastTimes:
     active_up: np.ndarray
     active_down: np.ndarray
     names: tuple[str, ...]
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """The fields that have a value a line.
-
-        Returns:
-            (n,) each, by name.
-        """
-        return {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
-
-    def to_xarray(self, dims: Mapping[str, np.ndarray] | None = None) -> "xarray.Dataset":
-        """The answers for xarray, with units and long names.
-
-        Args:
-            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
-                None: one dimension "target".
-
-        Returns:
-            the fields over these dimensions.
-
-        Raises:
-            InputError: dimensions of another number of points.
-            ConfigError: xarray is not installed.
-        """
-        return labelled.over(self.arrays(), dims)
 
 
 def least_times(
