@@ -94,9 +94,8 @@ def least(spools, start, end, **limits):
     return cspr_jax.least_time(robot, [end], start=start, max_acceleration=10.0)
 
 
-@pytest.mark.parametrize(
-    "height", [pytest.param(3.0, marks=pytest.mark.soak), 0.5, pytest.param(0.02, marks=pytest.mark.soak)]
-)
+@pytest.mark.soak
+@pytest.mark.parametrize("height", [3.0, 0.5, 0.02])
 def test_a_line_beside_a_spool(height):
     """A cable that gets short accelerates for an instant: slow enough, every line is feasible, and no faster one."""
     spool, limit = np.array([20.0, 15.0, 10.0]), 5.0

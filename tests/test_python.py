@@ -15,7 +15,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.outputs.plan_report import plan_object
 
 OF_THREE = [name for name in catalogue_names() if len(read_robot(CATALOGUE / f"{name}.toml").base_points) == 3]
-SOME = ("prototype", "laval-large")
+SOME = ("prototype",)
 FILES = {
     "off-centre": "base_points = [[311.3, -42.8, 7.9], [309.6, -41.9, 8.25], [309.1, -43.8, 8.05]]\nmass = 1.7\n",
     "up": 'z_axis = "up"\nmass = 1.7\nbase_points = [[1.3, 0.2, 3.1], [-0.4, 1.1, 2.75], [-0.9, -0.8, 2.95]]\n',

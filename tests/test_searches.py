@@ -45,6 +45,7 @@ def test_transitions_are_those_of_a_plan(amplitude):
     np.testing.assert_allclose(reached(found), [target], atol=1e-12)
 
 
+@pytest.mark.soak
 def test_poses_are_those_of_a_plan():
     """One pose with the preferred beta-hat, as in a plan of one segment that fixes the same."""
     robot = cspr_jax.load_robot("laval-mssm")

@@ -56,7 +56,7 @@ def balance(base, p, acceleration):
     return np.linalg.solve(units.transpose(0, 2, 1), pulled[..., None])[..., 0]
 
 
-SOME = {("transition-prototype", "A1"), ("transition-planar", "A1")}
+SOME = {("transition-planar", "A1")}
 
 
 @pytest.mark.parametrize(

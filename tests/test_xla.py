@@ -137,6 +137,7 @@ def test_damaged_entries_are_removed_with_one_line(tmp_path):
     assert {entry.name: entry.stat().st_mtime_ns for entry in whole.iterdir()} == entries
 
 
+@pytest.mark.soak
 def test_a_disk_that_takes_no_entry_is_told_once(tmp_path):
     """Files may have a kilobyte: each write fails half-way, as on a full disk; no half is kept."""
     limit = "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))"

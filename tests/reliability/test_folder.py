@@ -51,6 +51,7 @@ def run_there(hostile, tmp_path, x, environment):
     assert executors.SAFE_PATH not in os.environ
 
 
+@pytest.mark.soak
 def test_a_folder_full_of_modules(hostile, tmp_path, monkeypatch):
     """The trial of a flag, the command, and a worker."""
     folder, marks = hostile
