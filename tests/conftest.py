@@ -8,9 +8,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-# Before jax makes its objects: the collector's passes over them take a tenth of the tests' time.
-gc.set_threshold(200_000, 20, 50)
-
 import jax
 import numpy as np
 import pytest
@@ -20,6 +17,8 @@ from xdist.scheduler import LoadScopeScheduling
 from cspr_jax.arithmetic import batches, elementary
 from cspr_jax.robots import point_mass
 
+# Passes of Python's collector over the objects of jax take a tenth of the time.
+gc.set_threshold(200_000, 20, 50)
 # Compiled code is kept from run to run beside the packages that it belongs to; XLA's key is the program. What tests
 # start finds it by the environment.
 BESIDE = sys.prefix if sys.prefix != sys.base_prefix else tempfile.gettempdir()
