@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from cspr_jax.api.tables import table as table
     from cspr_jax.api.tables import table_names as table_names
     from cspr_jax.problem import load_robot as load_robot
+    from cspr_jax.robots.cables import with_cables as with_cables
     from cspr_jax.robots.limits import Limits as Limits
     from cspr_jax.robots.point_mass import point_mass_robot as point_mass_robot
     from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
@@ -103,6 +104,7 @@ _PUBLIC = {
     "three_cable_equivalent": ("cspr_jax.api.robots", "three_cable_equivalent"),
     "transition": ("cspr_jax.api.motions", "transition"),
     "verify": ("cspr_jax.api.runs", "verify"),
+    "with_cables": ("cspr_jax.robots.cables", "with_cables"),
 }
 __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "LaunchErrors",
@@ -151,6 +153,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "three_cable_equivalent",
     "transition",
     "verify",
+    "with_cables",
 ]
 
 

@@ -66,7 +66,7 @@ class Lines(Leg):
         return sampled_answers(problem, motions), motions
 
 
-FAMILY = Family("straight-line", "straight lines at a mean speed", {3: "straight_lines:Lines"})
+FAMILY = Family("straight-line", "straight lines at a mean speed", {"3T": "straight_lines:Lines"})
 '''
 PLAN = """schema = 1
 robot = "prototype"
