@@ -9,7 +9,8 @@ import numpy as np
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
-from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, resolve_robot
+from cspr_jax.config.limits import LimitKeys, LimitTable
+from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.feasibility.given_limits import check_bounded, limits_of

@@ -1,25 +1,24 @@
 """Robot files and the catalogue."""
 
-import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Discriminator,
-    Field,
-    PlainSerializer,
-    PrivateAttr,
-    Tag,
-    create_model,
-    model_validator,
-)
+from pydantic import Field, PrivateAttr, model_validator
 
+from cspr_jax.config.formats.table import ENDINGS, Imported, format_of, parted, read
 from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.reading import Table, checked, read_toml
+from cspr_jax.config.limits import (
+    LARGEST_LENGTH,
+    MOST_CABLES,
+    LimitKeys,
+    NotNegativePerCable,
+    PerCableDirection,
+    Point,
+    Positive,
+    Row,
+)
+from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import ConfigError, InputError, shown
@@ -28,86 +27,6 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
-
-# Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.point_mass`, with jax.
-LARGEST_LENGTH = 1e6
-MOST_CABLES = 1000
-Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
-Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
-Row = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
-Positive = Annotated[float, Field(gt=0, le=1e9)]
-NotNegative = Annotated[float, Field(ge=0, le=1e9)]
-
-
-def _infinite(value: Any) -> Any:
-    # JSON has no infinity: results and lists keep the word.
-    return math.inf if value == "inf" else value
-
-
-def _bounded(value: float) -> float:
-    if value > 1e9 and not math.isinf(value):
-        raise ValueError("at most 1e9, or inf")
-    return value
-
-
-Bound = Annotated[
-    float,
-    Field(gt=0, allow_inf_nan=True),
-    BeforeValidator(_infinite),
-    AfterValidator(_bounded),
-    PlainSerializer(lambda value: "inf" if math.isinf(value) else value, when_used="json"),
-]
-
-
-def _variant(value: Any) -> str:
-    return "~each" if isinstance(value, list) else "~one"
-
-
-def _variant_of_vectors(value: Any) -> str:
-    return "~each" if isinstance(value, list) and value and isinstance(value[0], list) else "~one"
-
-
-def _one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) -> Any:
-    several = Annotated[list[each], Field(min_length=1, max_length=MOST_CABLES), Tag("~each")]
-    return Annotated[Annotated[one, Tag("~one")] | several, Discriminator(variant)]
-
-
-Direction = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
-# Of types that are made here mypy asks nothing.
-PerCable: Any = _one_or_each(Positive, Positive)
-NotNegativePerCable: Any = _one_or_each(NotNegative, NotNegative)
-TensionPerCable: Any = _one_or_each(Positive, Bound)
-PerCableDirection: Any = _one_or_each(Direction, Direction, _variant_of_vectors)
-
-
-def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
-    keys: dict[str, Any] = {}
-    for row in LIMITS:
-        if row.per_cable == per_cable:
-            kind = (NotNegativePerCable if row.from_zero else PerCable) if per_cable else Coordinate
-            kind = TensionPerCable if row.name == "tension_max" else kind
-            text = f"{row.description}{', one number or one a cable' * per_cable}, {row.unit}"
-            keys[row.name] = (kind | None, Field(None, description=text))
-    return keys
-
-
-# Their fields are rows of `schema.limits.LIMITS`; of a base that it does not know mypy asks nothing.
-_Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=True))
-
-
-class LimitKeys(_Cables):
-    """Limits beyond taut cables; a plan's or a sweep's stand over those of the robot file."""
-
-
-_Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(per_cable=False))
-
-
-class LimitTable(_Heights):
-    """Limits of all motions of the file."""
-
-    if TYPE_CHECKING:
-        floor: float | None = None
-
 
 LEAST = "least numbers of cables are " + ", ".join(f"{row.dof} ({row.description})" for row in PATTERNS.values())
 BODIES = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if row.is_body)
@@ -164,7 +83,13 @@ class RobotFile(LimitKeys):
         description="axes about which pulleys swivel, in the direction in which the cables enter them: one vector "
         "[x, y, z] or one a cable (default: straight up)",
     )
+    _notes: tuple[str, ...] = PrivateAttr(())  # of what a file of another program says besides
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out of a file of another program, one line each."""
+        return self._notes
 
     @property
     def is_platform(self) -> bool:
@@ -356,6 +281,12 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
         return checked(RobotFile, reference, file, at="robot")
     if not isinstance(reference, str):
         raise ConfigError(file, f"robot = {shown(reference)}: must be a catalogue name, a path, or a [robot] table")
+    name, cable_set = parted(reference)
+    if format_of(name) is not None:
+        path = directory / name
+        if not path.is_file():
+            raise ConfigError(file, f"robot = {shown(reference)}: no such file: must be a catalogue name, or a path")
+        return read_foreign(path, cable_set)[0]
     if reference.endswith(".toml") or "/" in reference:
         path = directory / reference
         if not path.is_file():
@@ -365,7 +296,30 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
         return read_robot(CATALOGUE / f"{reference}.toml")
     hint = did_you_mean(reference, catalogue_names())
     names = ", ".join(catalogue_names())
-    raise ConfigError(file, f"robot = {shown(reference)}: {hint}must be one of {names}, or a path to a .toml file")
+    raise ConfigError(
+        file,
+        f"robot = {shown(reference)}: {hint}must be one of {names}, or a path to a .toml file, or one of another "
+        f"program ({', '.join(ENDINGS)})",
+    )
+
+
+def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, Imported]:
+    """A robot file of another program, `config.formats`.
+
+    Args:
+        path: the file, with an ending that a format has.
+        cable_set: which set of cables, where the file has several; None: its default.
+
+    Returns:
+        the robot, and what it was read from.
+
+    Raises:
+        ConfigError: a mistake in it, or what no robot file can say.
+    """
+    found = read(path, cable_set)
+    spec = checked(RobotFile, found.keys, path)
+    spec._file, spec._notes = path, found.warnings
+    return spec, found
 
 
 def read_robot(path: Path) -> RobotFile:

@@ -10,6 +10,7 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.limits import NO_LIMITS, Limits
+from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.pulleys import pulleys_of
@@ -42,7 +43,10 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
             raise InputError("cable_diameter", cable_diameter, "a number >= 0, in m")
         changes["cable_diameter"] = leaf(cable_diameter)
     if pulley_radius is not None:
-        changes["pulleys"] = pulleys_of(pulley_radius, pulley_axes, robot.n_cables, robot.z_axis)
+        found = pulleys_of(pulley_radius, pulley_axes, robot.n_cables, robot.z_axis)
+        if PATTERNS[robot.pattern].is_planar and np.asarray(found.axes)[:, 1].any():
+            raise InputError("pulley_axes", pulley_axes, "vectors with y = 0: the plane of a planar robot")
+        changes["pulleys"] = found
     elif pulley_axes is not None:
         raise InputError("pulley_axes", pulley_axes, "absent without pulley_radius")
     return dataclasses.replace(robot, **changes) if changes else robot

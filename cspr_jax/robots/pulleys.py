@@ -82,7 +82,7 @@ def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
     return Pulleys(leaf(np.broadcast_to(sizes, (n_cables,))), leaf(np.broadcast_to(units, (n_cables, 3))))
 
 
-def exits(entry, axis, radius, target) -> Exit:
+def exits(entry: Array, axis: Array, radius: Array, target: Array) -> Exit:
     """Where cables leave their pulleys.
 
     Args:
@@ -104,7 +104,7 @@ def exits(entry, axis, radius, target) -> Exit:
     return Exit(point, c[..., None] * side + d[..., None] * axis, wrapped, free)
 
 
-def exit_lanes(entry: Vector, axis: Vector, radius, target: Vector) -> Exit:
+def exit_lanes(entry: Vector, axis: Vector, radius: Array, target: Vector) -> Exit:
     """Where cables leave their pulleys, one lane a case: the fast form of `exits`.
 
     Args:
