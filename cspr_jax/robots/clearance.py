@@ -26,7 +26,7 @@ BATCH = 65_536
 PAIRS = 28
 # Of the diameter, and of the platform's shape: what of a cable next to its attachment point is not held against it.
 LEAVE_DIAMETERS, LEAVE_SIZE = 10.0, 0.01
-# Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; 3 was met.
+# Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; 2.2 was met.
 ROUNDING = 16.0
 
 Kind = Literal["cables", "obstacle", "platform", "platform-obstacle"]
