@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from cspr_jax.api.beziers import bezier_verdicts as bezier_verdicts
     from cspr_jax.api.examples import copy_examples as copy_examples
     from cspr_jax.api.examples import list_examples as list_examples
+    from cspr_jax.api.imports import ImportedRobot as ImportedRobot
+    from cspr_jax.api.imports import import_robot as import_robot
     from cspr_jax.api.launches import launch_range as launch_range
     from cspr_jax.api.lines import least_time as least_time
     from cspr_jax.api.lines import straight_line as straight_line
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
     from cspr_jax.api.tables import table as table
     from cspr_jax.api.tables import table_names as table_names
     from cspr_jax.problem import load_robot as load_robot
+    from cspr_jax.robots.cables import with_cables as with_cables
     from cspr_jax.robots.limits import Limits as Limits
     from cspr_jax.robots.point_mass import point_mass_robot as point_mass_robot
     from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
@@ -57,6 +60,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "ImportedRobot": ("cspr_jax.api.imports", "ImportedRobot"),
     "LaunchErrors": ("cspr_jax.search.landings", "LaunchErrors"),
     "Limits": ("cspr_jax.robots.limits", "Limits"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
@@ -72,6 +76,7 @@ _PUBLIC = {
     "copy_examples": ("cspr_jax.api.examples", "copy_examples"),
     "encoder_error": ("cspr_jax.api.sensitivities", "encoder_error"),
     "hypocycloid": ("cspr_jax.api.motions", "hypocycloid"),
+    "import_robot": ("cspr_jax.api.imports", "import_robot"),
     "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
     "launch_range": ("cspr_jax.api.launches", "launch_range"),
     "least_time": ("cspr_jax.api.lines", "least_time"),
@@ -103,8 +108,10 @@ _PUBLIC = {
     "three_cable_equivalent": ("cspr_jax.api.robots", "three_cable_equivalent"),
     "transition": ("cspr_jax.api.motions", "transition"),
     "verify": ("cspr_jax.api.runs", "verify"),
+    "with_cables": ("cspr_jax.robots.cables", "with_cables"),
 }
 __all__ = [  # as `_PUBLIC`, for those that read it without running it
+    "ImportedRobot",
     "LaunchErrors",
     "Limits",
     "Verdict",
@@ -120,6 +127,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "copy_examples",
     "encoder_error",
     "hypocycloid",
+    "import_robot",
     "keep_compiled_code",
     "launch_range",
     "least_time",
@@ -151,6 +159,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "three_cable_equivalent",
     "transition",
     "verify",
+    "with_cables",
 ]
 
 

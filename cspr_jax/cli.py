@@ -140,6 +140,10 @@ def _parser() -> argparse.ArgumentParser:
         sub.add_argument("--all-errors", action="store_true", help="print every mistake of a file, one a line")
     for sub in (run, plan, table, bench):
         sub.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
+    foreign = add("import", _import, "read a robot of CASPR, cdpyr or WireX as a robot file")
+    foreign.add_argument("file", type=Path, help="NAME_cables.xml, beside NAME_bodies.xml, or .json, .yaml, .wcrfx")
+    foreign.add_argument("-o", "--output", type=Path, metavar="FILE", help="write FILE.toml (default: print it)")
+    foreign.add_argument("--set", metavar="NAME", help="set of cables of a model of CASPR (default: its own choice)")
     _add_listings(add)
     return parser
 
@@ -323,6 +327,21 @@ def _table(options: argparse.Namespace) -> int:
         _print_json(table_object(options.name, cells))
     else:
         _print(table_for_people(options.name, cells))
+    return ExitCode.DONE
+
+
+def _import(options: argparse.Namespace) -> int:
+    if options.output is not None and options.output.suffix != ".toml":
+        raise ConfigError("-o", f"{options.output}: must end in .toml")
+    from cspr_jax.api.imports import import_robot
+
+    found = import_robot(options.file, options.set)
+    for line in found.warnings:
+        _warn(f"{options.file}: {line}")
+    if options.output is None:
+        sys.stdout.write(found.to_toml())
+    else:
+        sys.stdout.write(f"{found.save(options.output)}\n")
     return ExitCode.DONE
 
 

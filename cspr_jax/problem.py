@@ -1,31 +1,36 @@
 """Problems for the kernels, built from checked files: robot, limits, amplitude function, axes."""
 
 import dataclasses
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame, frame_of
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
-from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, resolve_robot
+from cspr_jax.config.limits import LimitKeys, LimitTable
+from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.feasibility.given_limits import check_bounded, limits_of
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import point_mass
+from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.parallel_pairs import ParallelPairs
 from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
+from cspr_jax.robots.pulleys import Pulleys
 from cspr_jax.robots.reference_pose import aligned, reference_pose
+from cspr_jax.robots.robot import MOVED, check_moved
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.schema.limits import LIMITS, Limit
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.trajectories import amplitudes
 from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors
 from cspr_jax.trajectories.platform_segment import Kind
+
+MAKERS = {"1T": point_mass.guided_robot, "2T": point_mass.planar_robot, "3T": point_mass.point_mass_robot}
 
 RobotKind = TypeVar("RobotKind", bound=PointMassRobot | PlatformRobot)
 
@@ -44,6 +49,10 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     if isinstance(robot, PlatformRobot):
         changes["platform_points"] = leaf(frame.turned(robot.platform_points))
         changes["inertia"] = frame.turned_tensor(leaf(robot.inertia))
+        if robot.centre_of_mass is not None:
+            changes["centre_of_mass"] = leaf(frame.turned(robot.centre_of_mass))
+    if robot.pulleys is not None:
+        changes["pulleys"] = Pulleys(robot.pulleys.radius, leaf(frame.turned(robot.pulleys.axes)))
     return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
 
 
@@ -55,7 +64,11 @@ def prepared(robot: RobotKind) -> tuple[RobotKind, Frame]:
 
     Returns:
         the robot, and the frame that takes points to it and back.
+
+    Raises:
+        InputError: a robot that no trajectory moves, as `robots.robot.check_moved` says.
     """
+    check_moved(robot)
     own, frame = centred(robot)
     return (aligned(own)[0] if isinstance(own, PlatformRobot) else own), frame  # type: ignore[return-value]
 
@@ -91,12 +104,16 @@ def build_robot(spec: RobotFile, keys: TrajectoryKeys, file: object) -> PointMas
     given |= {"z_axis": spec.z_axis, "limits": build_limits(spec, LimitKeys(), file)}
     try:
         if not spec.is_platform:
-            make = point_mass.planar_robot if spec.planar else point_mass.point_mass_robot
-            return make(spec.base_points, **given)
+            return with_cables(MAKERS[spec.own_pattern](spec.base_points, **given), **_of_cables(spec))
         given |= {"inertia": spec.inertia, "centre_of_mass": spec.centre_of_mass or [0.0, 0.0, 0.0]}
-        return platform_robot(spec.base_points, spec.platform_points, **given)
+        robot = platform_robot(spec.base_points, spec.platform_points, pattern=spec.own_pattern, **given)
+        return with_cables(robot, **_of_cables(spec))
     except InputError as error:
         raise ConfigError(file, spec.typed(error)) from error
+
+
+def _of_cables(spec: RobotFile) -> dict[str, Any]:
+    return {name: getattr(spec, name) for name in ("cable_diameter", "pulley_radius", "pulley_axes")}
 
 
 def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
@@ -128,11 +145,17 @@ def kernel_robot(spec: RobotFile, keys: TrajectoryKeys, file: object, *, any_cab
         the robot, centred.
 
     Raises:
-        ConfigError: its geometry or inertia cannot be used, or it has more cables than degrees of freedom.
+        ConfigError: its geometry or inertia cannot be used, it has more cables than degrees of freedom, or no
+            trajectory moves such a robot.
     """
     robot: Any = build_robot(spec, keys, file)
+    place, key = spec.placed("base_points", file)
+    try:
+        check_moved(robot)
+        check_bounded(robot.limits)
+    except InputError as error:
+        raise ConfigError(place, key.removesuffix("base_points") + str(error)) from error
     if robot.n_cables != robot.dof and not any_cables:
-        place, key = spec.placed("base_points", file)
         raise ConfigError(
             place,
             f'{key}: {robot.n_cables} points: must be {robot.dof} for family "{keys.family}" '
@@ -151,6 +174,8 @@ def fault_at_rest(spec: RobotFile) -> str | None:
         the reason; None if it hangs with every cable taut.
     """
     spec = spec.equivalent() if spec.translation_only else spec
+    if spec.own_pattern not in MOVED:
+        return f"not known: nobody asked where {spec.kind} hangs still"
     if len(spec.base_points) > spec.dof:
         return "not known: more cables than degrees of freedom share the weight in many ways"
     try:
@@ -216,7 +241,7 @@ def build_limits(spec: RobotFile, keys: LimitKeys, file: object) -> Limits:
     """
     pairs = spec.pairs
     try:
-        limits = _limits(spec, vars(keys), vars(spec), "", len(spec.as_written.base_points))
+        limits = limits_of(spec, vars(keys), vars(spec), "", len(spec.as_written.base_points))
         return limits if pairs is None else pair_limits(limits, pairs)
     except InputError as error:
         raise ConfigError(file, str(error)) from error
@@ -251,12 +276,13 @@ def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
     return dataclasses.replace(limits, **values)
 
 
-def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None) -> Limits:
+def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None, *, any_tensions: bool = False) -> Limits:
     """Limits that are given over those of a robot, as the kernels take them.
 
     Args:
         robot: in its own axes.
         limits: one number or one a cable each, in the robot's axes; None: those of the robot.
+        any_tensions: whether some of the largest tensions may be infinite.
 
     Returns:
         the limits.
@@ -265,31 +291,10 @@ def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None) ->
         InputError: numbers of another count, or no limits at all: not finite, a length or speed that is not positive,
             a smallest tension that is not below the largest.
     """
-    return _limits(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
-
-
-def _limits(robot, given: Mapping[str, Any], own: Mapping[str, Any], at: str, n_cables: int | None = None) -> Limits:
-    # What is given over the robot's own; `robot` has base_points and z_axis of its file. n_cables: limits are of those.
-    n_cables, values = n_cables or len(robot.base_points), dict[str, Any]()
-    for row in LIMITS:
-        value = given.get(row.name)
-        value = own.get(row.name) if value is None else value
-        values[row.name] = None if value is None else _limit(row, value, n_cables, at)
-    low, high = values["tension_min"], values["tension_max"]
-    if low is not None and high is not None and not (low < high).all():
-        raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
-    if values["floor"] is not None:
-        values["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
-    return Limits(**values)
-
-
-def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
-    numbers = np.asarray(value, float)
-    least = -np.inf if not row.per_cable else 0.0 if row.from_zero else np.nextafter(0.0, 1.0)
-    shapes = [(), (n_cables,)] if row.per_cable else [()]
-    if numbers.shape not in shapes or not ((numbers >= least) & np.isfinite(numbers)).all():
-        raise InputError(f"{at}{row.name}", value, row.allowed + f", or {n_cables}: one a cable" * row.per_cable)
-    return leaf(np.broadcast_to(numbers, (n_cables,) if row.per_cable else ()))
+    found = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
+    if not any_tensions:
+        check_bounded(found)
+    return found
 
 
 def build_problem(
@@ -323,6 +328,10 @@ def build_problem(
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     given = build_limits(spec, limits, file)
+    try:
+        check_bounded(given)
+    except InputError as error:
+        raise ConfigError(file, str(error)) from error
     robot = kernel_robot(spec, keys, file, any_cables=any_cables)
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
 

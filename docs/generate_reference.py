@@ -6,8 +6,9 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from cspr_jax.config.launch import LaunchSearch
+from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.plan import Choice, PlanFile, Pose
-from cspr_jax.config.robot import LimitTable, RobotFile
+from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepTrajectory
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.errors import ExitCode

@@ -66,7 +66,7 @@ class Lines(Leg):
         return sampled_answers(problem, motions), motions
 
 
-FAMILY = Family("straight-line", "straight lines at a mean speed", {3: "straight_lines:Lines"})
+FAMILY = Family("straight-line", "straight lines at a mean speed", {"3T": "straight_lines:Lines"})
 '''
 PLAN = """schema = 1
 robot = "prototype"
@@ -153,10 +153,10 @@ def test_the_row_is_gone_behind_the_block(tmp_path):
 
 def test_rows_of_the_package():
     lines = ["s-curve", "quintic", "cubic", "bezier"]
-    assert moving(2) == ["transition", *lines]
-    assert moving(3) == ["hypocycloid-standard", "transition", *lines]
-    assert moving(6) == ["hypocycloid-standard", "hypocycloid"]
-    assert all(row.leg(dof) for row in FAMILIES.values() for dof in row.legs)
+    assert moving("2T") == ["transition", *lines]
+    assert moving("3T") == ["hypocycloid-standard", "transition", *lines]
+    assert moving("3R3T") == ["hypocycloid-standard", "hypocycloid"]
+    assert all(row.leg(pattern) for row in FAMILIES.values() for pattern in row.legs)
 
 
 def assert_continuous(plan) -> None:

@@ -80,9 +80,30 @@ def test_more_cables_than_any_robot_has():
         (BODY, ("base_points = 3 points", "must be at least 6", *SUPPORTED)),
         (BODY | {"base_points": [*RING, [0.0, 0.0, 1.0]]}, ("platform_points = 6 points: must be 7, as many as base",)),
         ({"tension_max": [1.0, 2.0]}, ("tension_max = [1.0, 2.0]: must be a number > 0, or 3: one a cable",)),
-        ({"pattern": "2T"}, ('pattern = "2T": must be "3T", or absent: as the other keys say',)),
-        ({"pattern": "3R3T"}, ('pattern = "3R3T": must be "3T"',)),
-        (BODY | {"base_points": RING, "pattern": "2R3T"}, ('pattern = "2R3T": must be "3R3T"',)),
+        ({"pattern": "3T", "planar": True}, ('pattern = "3T": must be "2T", or absent: as the other keys say',)),
+        ({"pattern": "3R3T"}, ('pattern = "3R3T": must be "1T" or "2T" or "3T", or absent',)),
+        (
+            BODY | {"base_points": RING, "pattern": "3T"},
+            ('pattern = "3T": must be "1R2T" or "2R3T" or "3R3T" or "3R"',),
+        ),
+        (
+            {"pattern": "1T", "base_points": []},
+            (
+                "base_points = 0 points",
+                "must be at least 1 (a point mass on a",
+            ),
+        ),
+        ({"tension_max": [1.0, 2e9, 1.0]}, ("tension_max[1] = 2000000000.0: must be at most 1e9, or inf",)),
+        ({"tension_max": [1.0, float("nan"), 1.0]}, ("tension_max[1] = nan: must be",)),
+        ({"pulley_axes": [0.0, 0.0, 1.0]}, ("pulley_axes = [0.0, 0.0, 1.0]: must be absent without pulley_radius",)),
+        ({"pulley_radius": [0.1]}, ("pulley_radius = [0.1]: must be a number >= 0, or 3: one a cable",)),
+        (
+            {"pulley_radius": 0.1, "pulley_axes": [[0, 0, 1]]},
+            (
+                "pulley_axes",
+                "must be",
+            ),
+        ),
         ({"pattern": "4T"}, ('pattern = "4T": must be ', "3R3T")),
         ({"base_points": RING, "platform_points": RING}, ("inertia is missing", "beside platform_points")),
         ({"base_points": RING, "inertia": BODY["inertia"]}, ("platform_points is missing", "beside inertia")),

@@ -15,7 +15,8 @@ from support.pairs import LAUNCH_BASE, LAUNCH_PLATFORM, made, random_pairs
 
 import cspr_jax
 from cspr_jax.config.equivalents import as_moved, no_equivalent
-from cspr_jax.config.robot import CATALOGUE, LimitTable, RobotFile, read_robot
+from cspr_jax.config.limits import LimitTable
+from cspr_jax.config.robot import CATALOGUE, RobotFile, read_robot
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.problem import build_limits
 from cspr_jax.robots import force_balance, wrench_balance
@@ -210,14 +211,14 @@ def test_without_the_key_it_stays_a_platform_where_platforms_move():
     free = RobotFile(**{key: value for key, value in robot.model_dump().items() if key != "translation_only"})
     for name, family in FAMILIES.items():
         assert as_moved(robot, [family.legs]).dof == 3, name
-        assert as_moved(free, [family.legs]).dof == (6 if 6 in family.legs else 3), name
+        assert as_moved(free, [family.legs]).dof == (6 if "3R3T" in family.legs else 3), name
     assert as_moved(free, [FAMILIES["hypocycloid-standard"].legs, FAMILIES["transition"].legs]).dof == 3
-    moved = as_moved(free, [(2, 3)])
+    moved = as_moved(free, [("2T", "3T")])
     assert moved.name == "launch-robot" and moved.settings == robot.settings
     assert free.settings == {key: value for key, value in robot.settings.items() if key != "translation_only"}
     mssm = read_robot(CATALOGUE / "laval-mssm.toml")
-    assert as_moved(mssm, [(2, 3)]) is mssm and "are not parallel" in no_equivalent(mssm)
-    assert {kind.freedoms for kind in MAP_KINDS.values()} == {(), (3,), (2, 3), (6,)}
+    assert as_moved(mssm, [("2T", "3T")]) is mssm and "are not parallel" in no_equivalent(mssm)
+    assert {kind.patterns for kind in MAP_KINDS.values()} == {(), ("3T",), ("2T", "3T"), ("3R3T",)}
 
 
 THREE = inline([LAUNCH_BASE[i : i + 2].mean(0) for i in (0, 2, 4)])

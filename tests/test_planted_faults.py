@@ -48,8 +48,8 @@ FAULTS = {
         "test_margins.py",
     ),
     "a lost pair of cables": (
-        "for i, j in itertools.combinations(range(robot.n_cables), 2)\n        if not _is_same(base",
-        "for i, j in itertools.combinations(range(robot.n_cables - 1), 2)\n        if not _is_same(base",
+        "for i, j in itertools.combinations(range(robot.n_cables), 2)\n        if not is_same(base",
+        "for i, j in itertools.combinations(range(robot.n_cables - 1), 2)\n        if not is_same(base",
         "test_platform.py::test_the_catalogue_hangs_still",
     ),
     "a wrong parity of arcs": (

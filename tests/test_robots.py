@@ -12,8 +12,9 @@ from oracles import platform as oracle
 import cspr_jax
 from cspr_jax.arithmetic import minima, rotations
 from cspr_jax.cli import main
+from cspr_jax.config.limits import LimitKeys, LimitTable
 from cspr_jax.config.plan import PlanFile
-from cspr_jax.config.robot import LimitKeys, LimitTable, RobotFile, read_robot
+from cspr_jax.config.robot import RobotFile, read_robot
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.limits import Values, scales, slack, values
 from cspr_jax.feasibility.point_mass import proof_slacks

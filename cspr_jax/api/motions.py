@@ -69,7 +69,7 @@ def hypocycloid(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (2.49).
     """
-    own, frame = _prepared(robot, (3,), "a point mass on three cables")
+    own, frame = _prepared(robot, ("3T",), "a point mass on three cables")
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     first, last = _places(frame, start, end, z0)
     geometry = segment(own, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
@@ -94,7 +94,7 @@ def transition(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (1.27) or (1.28).
     """
-    own, frame = _prepared(robot, (2, 3), "a point mass")
+    own, frame = _prepared(robot, ("2T", "3T"), "a point mass")
     function = amplitude_of(amplitude, free_end=True)
     end = jnp.asarray(frame.inward(target), float)
     geometry = transitions.transition(own, function, end, jnp.asarray(z0, float))
@@ -132,7 +132,7 @@ def platform_motion(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (2.49).
     """
-    own, frame = _prepared(robot, (6,), "a platform on six cables")
+    own, frame = _prepared(robot, ("3R3T",), "a platform on six cables")
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     places = _places(frame, start, end, z0)
     turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
@@ -200,7 +200,7 @@ def _inner(motion: Motion) -> Motion:
     return motion.motion if isinstance(motion, Placed) else motion
 
 
-def _prepared(robot: Any, dofs: tuple[int, ...], allowed: str) -> tuple[Any, Any]:
-    if getattr(robot, "dof", None) not in dofs or robot.n_cables != robot.dof:
+def _prepared(robot: Any, patterns: tuple[str, ...], allowed: str) -> tuple[Any, Any]:
+    if getattr(robot, "pattern", None) not in patterns or robot.n_cables != robot.dof:
         raise InputError("robot", getattr(robot, "name", robot), allowed)
     return prepared(robot)

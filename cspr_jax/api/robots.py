@@ -3,11 +3,11 @@
 import numpy as np
 
 from cspr_jax.errors import InputError
-from cspr_jax.problem import pair_limits
+from cspr_jax.problem import MAKERS, pair_limits
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.parallel_pairs import parallel_pairs
-from cspr_jax.robots.platform import PlatformRobot, platform_robot
-from cspr_jax.robots.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot, planar_robot, point_mass_robot
+from cspr_jax.robots.platform import RIGID, PlatformRobot, platform_robot
+from cspr_jax.robots.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot, point_mass_robot
 
 
 def point_mass(
@@ -19,17 +19,19 @@ def point_mass(
     planar: bool = False,
     name: str = "robot",
     limits: Limits | None = None,
+    pattern: str | None = None,
 ) -> PointMassRobot:
     """A point mass on cables.
 
     Args:
-        base_points: (n_cables, 3) spool points, at least three, or two if planar; m.
+        base_points: (n_cables, 3) spool points, at least three, two if planar, or one on a guide; m.
         mass: kg, positive.
         gravity: m/s^2, positive.
         z_axis: where z points, "down" or "up".
         planar: whether everything lies in the plane y = 0.
         name: for people.
         limits: limits beyond taut cables; None: none.
+        pattern: "1T" along a vertical guide, "2T" or "3T"; None: as planar says.
 
     Returns:
         the robot.
@@ -37,11 +39,14 @@ def point_mass(
     Raises:
         InputError: what a robot file with these numbers would be refused for.
     """
-    make = planar_robot if planar else point_mass_robot
-    return make(base_points, mass=mass, gravity=gravity, name=name, z_axis=z_axis, limits=limits)
+    wanted = pattern or ("2T" if planar else "3T")
+    if wanted not in MAKERS or (planar and wanted != "2T"):
+        allowed = '"2T", or None, beside planar' if planar else '"1T", "2T" or "3T"'
+        raise InputError("pattern", pattern, allowed)
+    return MAKERS[wanted](base_points, mass=mass, gravity=gravity, name=name, z_axis=z_axis, limits=limits)
 
 
-def platform(
+def platform(  # noqa: PLR0913
     base_points,
     platform_points,
     *,
@@ -52,11 +57,12 @@ def platform(
     z_axis: Axis = "down",
     name: str = "robot",
     limits: Limits | None = None,
+    pattern: str = RIGID,
 ) -> PlatformRobot:
-    """A rigid platform on cables.
+    """A platform on cables.
 
     Args:
-        base_points: (n_cables, 3) spool points, at least six; m.
+        base_points: (n_cables, 3) spool points, at least as many as degrees of freedom; m.
         platform_points: (n_cables, 3) attachment points in platform axes, cable by cable; m.
         mass: kg, positive.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2.
@@ -65,6 +71,8 @@ def platform(
         z_axis: where z points, "down" or "up".
         name: for people.
         limits: limits beyond taut cables; None: none.
+        pattern: "3R3T"; "1R2T" in the plane y = 0; "2R3T" of a rod, platform_points on one line; "3R" about a fixed
+            joint, the origin of the platform axes.
 
     Returns:
         the robot.
@@ -83,6 +91,7 @@ def platform(
         name=name,
         z_axis=z_axis,
         limits=limits,
+        pattern=pattern,
     )
 
 
@@ -149,8 +158,8 @@ def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
         InputError: cables that are no such pairs, a mass centre that is not between the points of a pair, or limits
             that contradict each other.
     """
-    if not isinstance(robot, PlatformRobot):
-        raise InputError("robot", getattr(robot, "name", robot), "a platform on six cables")
+    if not isinstance(robot, PlatformRobot) or robot.pattern != RIGID or robot.pulleys is not None:
+        raise InputError("robot", getattr(robot, "name", robot), "a rigid platform on six cables without pulleys")
     pairs = parallel_pairs(robot.base_points, robot.platform_points)
     return point_mass_robot(
         pairs.exit_points,

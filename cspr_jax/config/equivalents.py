@@ -5,15 +5,15 @@ from collections.abc import Collection, Iterable
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 
-PLATFORM = 6  # degrees of freedom
+PLATFORM = "3R3T"
 
 
-def as_moved(spec: RobotFile, freedoms: Iterable[Collection[int]]) -> RobotFile:
+def as_moved(spec: RobotFile, patterns: Iterable[Collection[str]]) -> RobotFile:
     """The robot as trajectory families, or a kind of map, move it.
 
     Args:
         spec: the robot of a file.
-        freedoms: for each of them, degrees of freedom of the robots that it moves.
+        patterns: for each of them, patterns of motion of the robots that it moves.
 
     Returns:
         a platform's equivalent, if it says that it only translates, or if some of them move no platforms and it has
@@ -21,7 +21,7 @@ def as_moved(spec: RobotFile, freedoms: Iterable[Collection[int]]) -> RobotFile:
     """
     if not spec.is_platform:
         return spec
-    if not spec.translation_only and all(PLATFORM in some for some in freedoms):
+    if not spec.translation_only and all(PLATFORM in some for some in patterns):
         return spec
     try:
         return spec.equivalent()

@@ -16,7 +16,7 @@ INERTIA_RATIOS = (1e-5, 1e3)
 
 
 def robot_hints(spec: RobotFile) -> list[str]:
-    """Likely mistakes in the units of a robot.
+    """Likely mistakes in the units of a robot, and what was left out of a file of another program.
 
     Args:
         spec: the robot.
@@ -24,7 +24,7 @@ def robot_hints(spec: RobotFile) -> list[str]:
     Returns:
         one line each.
     """
-    lines, spools = [], np.asarray(spec.base_points)
+    lines, spools = list(spec.notes), np.asarray(spec.base_points)
     span = float(np.linalg.norm(spools[:, None] - spools, axis=2).max())
     if span > LARGEST_SPAN and spec.mass < LARGEST_MASS:
         lines.append(

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from cspr_jax.config.limits import Coordinate, Point, Positive
 from cspr_jax.config.reading import Table
-from cspr_jax.config.robot import Coordinate, Point, Positive
 from cspr_jax.config.wording import fault
 
 Size = Annotated[float, Field(ge=0.0, le=1e3)]

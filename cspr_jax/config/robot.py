@@ -1,106 +1,65 @@
 """Robot files and the catalogue."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field, PrivateAttr, Tag, create_model, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
+from cspr_jax.config.formats.table import ENDINGS, Imported, format_of, parted, read
 from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.reading import Table, checked, read_toml
+from cspr_jax.config.limits import (
+    LARGEST_LENGTH,
+    MOST_CABLES,
+    LimitKeys,
+    NotNegativePerCable,
+    PerCableDirection,
+    Point,
+    Positive,
+    Row,
+)
+from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.robots.parallel_pairs import ParallelPairs, parallel_pairs
+from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
-# Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.point_mass`, with jax.
-LARGEST_LENGTH = 1e6
-MOST_CABLES = 1000
-Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
-Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
-Row = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
-Positive = Annotated[float, Field(gt=0, le=1e9)]
-PerCable = Annotated[
-    Annotated[Positive, Tag("~one")]
-    | Annotated[list[Positive], Field(min_length=2, max_length=MOST_CABLES), Tag("~each")],
-    Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
-]
-
-
-NotNegative = Annotated[float, Field(ge=0, le=1e9)]
-NotNegativePerCable = Annotated[
-    Annotated[NotNegative, Tag("~one")]
-    | Annotated[list[NotNegative], Field(min_length=2, max_length=MOST_CABLES), Tag("~each")],
-    Discriminator(lambda value: "~each" if isinstance(value, list) else "~one"),
-]
-
-
-def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
-    keys: dict[str, Any] = {}
-    for row in LIMITS:
-        if row.per_cable == per_cable:
-            kind = (NotNegativePerCable if row.from_zero else PerCable) if per_cable else Coordinate
-            text = f"{row.description}{', one number or one a cable' * per_cable}, {row.unit}"
-            keys[row.name] = (kind | None, Field(None, description=text))
-    return keys
-
-
-# Their fields are rows of `schema.limits.LIMITS`; of a base that it does not know mypy asks nothing.
-_Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=True))
-
-
-class LimitKeys(_Cables):
-    """Limits beyond taut cables; a plan's or a sweep's stand over those of the robot file."""
-
-
-_Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(per_cable=False))
-
-
-class LimitTable(_Heights):
-    """Limits of all motions of the file."""
-
-    if TYPE_CHECKING:
-        floor: float | None = None
-
-
-# Motions of the effector, R rotations and T translations, and how a file says which it makes.
-PATTERNS = {
-    "2T": "2 (planar = true)",
-    "3T": "3 (a point mass)",
-    "3R3T": "6 (a rigid platform, with platform_points and inertia)",
-}
-FREEDOMS = {"2T": 2, "3T": 3, "3R3T": 6}
-LEAST = "least numbers of cables are " + ", ".join(PATTERNS.values())
+LEAST = "least numbers of cables are " + ", ".join(f"{row.dof} ({row.description})" for row in PATTERNS.values())
+BODIES = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if row.is_body)
+POINTS = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if not row.is_body)
 # Two spools count as level if their heights differ by less than this part of their distance; as in `robots.point_mass`.
 LEVEL = 1e-9
 
 
 class RobotFile(LimitKeys):
-    """A point mass on three cables or more, on two or more in the plane y = 0, or a rigid platform on six or more."""
+    """A robot of one effector: a point mass on cables, or a platform; `pattern` says how it moves where it must."""
 
     name: str = Field(description="name of the robot, at most 200 characters", min_length=1, max_length=200)
     base_points: Annotated[list[Point], Field(max_length=MOST_CABLES)] = Field(
-        description="where the cables leave their spools: points [x, y, z] in cable order, m; three or more, two or "
-        "more if planar, six or more with a rigid platform"
+        description="where the cables leave their spools, or enter their pulleys: points [x, y, z] in cable order, m; "
+        "as many as degrees of freedom, or more; with y = 0 if planar"
     )
     platform_points: Annotated[list[Point], Field(max_length=MOST_CABLES)] | None = Field(
-        None, description="rigid platform: where the cables are attached, as many points in platform axes, m"
+        None, description="platform: where the cables are attached, as many points in platform axes, m"
     )
     inertia: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = Field(
         None,
-        description="rigid platform: inertia tensor about the mass centre, platform axes, kg m^2, parts up to 1e18",
+        description="platform: inertia tensor about the mass centre, platform axes, kg m^2, parts up to 1e18",
     )
     centre_of_mass: Point | None = Field(
-        None, description="rigid platform: mass centre in platform axes, m (default [0, 0, 0])"
+        None, description="platform: mass centre in platform axes, m (default [0, 0, 0])"
     )
     planar: bool = Field(False, description="true: a point mass, everything in the plane y = 0")
     pattern: Literal["1T", "2T", "3T", "1R2T", "2R3T", "3R3T", "3R"] | None = Field(
         None,
-        description='motions of the effector, R rotations and T translations: "2T" of a planar robot, "3T" of a point '
-        'mass, "3R3T" of a rigid platform; the other keys tell which',
+        description="motions of the effector, R rotations and T translations (default: as the other keys say, "
+        '"2T" if planar, "3T" of a point mass, "3R3T" of a platform): "1T" along a vertical guide; "1R2T" of a '
+        'platform in the plane y = 0; "2R3T" of a rod, platform_points on one line; "3R" of a platform that turns '
+        "about a fixed joint, the origin of its axes",
     )
     translation_only: bool | None = Field(
         None,
@@ -113,7 +72,24 @@ class RobotFile(LimitKeys):
     _file: Path | None = PrivateAttr(None)  # it was read from; None for a table of another file
     # Of a point mass on three cables that stand for the pairs of six: the robot that it is the equivalent of.
     _platform: "RobotFile | None" = PrivateAttr(None)
+    cable_diameter: Annotated[float, Field(ge=0, le=LARGEST_LENGTH)] | None = Field(
+        None, description="diameter of the cables, for their distances, m (default 0)"
+    )
+    pulley_radius: NotNegativePerCable | None = Field(
+        None, description="radius of swivelling pulleys, one number or one a cable, m; absent: cables leave from points"
+    )
+    pulley_axes: PerCableDirection | None = Field(
+        None,
+        description="axes about which pulleys swivel, in the direction in which the cables enter them: one vector "
+        "[x, y, z] or one a cable (default: straight up)",
+    )
+    _notes: tuple[str, ...] = PrivateAttr(())  # of what a file of another program says besides
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out of a file of another program, one line each."""
+        return self._notes
 
     @property
     def is_platform(self) -> bool:
@@ -123,19 +99,25 @@ class RobotFile(LimitKeys):
     @property
     def own_pattern(self) -> str:
         """Motions of the effector, as the keys say."""
-        return "3R3T" if self.is_platform else "2T" if self.planar else "3T"
+        return self.pattern or ("3R3T" if self.is_platform else "2T" if self.planar else "3T")
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether everything lies in the plane y = 0."""
+        return PATTERNS[self.own_pattern].is_planar
 
     @property
     def dof(self) -> int:
         """Degrees of freedom of the effector."""
-        return FREEDOMS[self.own_pattern]
+        return PATTERNS[self.own_pattern].dof
 
     @property
     def kind(self) -> str:
         """Kind of robot, for people."""
         if self._platform is not None:
             return "a platform that only translates"
-        return {2: "a planar robot", 3: "a point mass", 6: "a platform"}[self.dof]
+        known = {"2T": "a planar robot", "3R3T": "a platform"}
+        return known.get(self.own_pattern, PATTERNS[self.own_pattern].description)
 
     @model_validator(mode="after")
     def _kind(self) -> "RobotFile":
@@ -144,17 +126,24 @@ class RobotFile(LimitKeys):
             raise fault(missing, None, f"a rigid platform has it beside {other}, a point mass has neither")
         if self.centre_of_mass is not None and not self.is_platform:
             raise fault("centre_of_mass", self.centre_of_mass, "absent without platform_points and inertia")
-        if self.is_platform and self.planar:
-            raise fault("planar", True, "false, or absent, for a rigid platform (platform_points, inertia)")
         own, count = self.own_pattern, len(self.base_points)
-        if self.pattern not in (None, own):
-            raise fault("pattern", shown(self.pattern), f'"{own}", or absent: as the other keys say')
-        if count < self.dof:
-            raise fault("base_points", f"{count} points", f"at least {PATTERNS[own]}, as the other keys say; {LEAST}")
+        row = PATTERNS[own]
+        if row.is_body != self.is_platform:
+            raise fault(
+                "pattern", shown(own), f"{BODIES if self.is_platform else POINTS}, or absent: as the other keys say"
+            )
+        if self.planar and not row.is_planar:
+            if self.is_platform:
+                allowed = "false, or absent, for a rigid platform (platform_points, inertia)"
+                raise fault("planar", True, f'{allowed}; a planar one has pattern = "1R2T"')
+            raise fault("pattern", shown(own), '"2T", or absent: as the other keys say')
+        if count < row.dof:
+            allowed = f"at least {row.dof} ({row.description}), as the other keys say; {LEAST}"
+            raise fault("base_points", f"{count} points", allowed)
         if self.platform_points is not None and len(self.platform_points) != count:
             allowed = f"{count}, as many as base_points"
             raise fault("platform_points", f"{len(self.platform_points)} points", allowed)
-        if self.planar and count == self.dof:
+        if own == "2T" and count == row.dof:
             _check_level(self.base_points)
         return self
 
@@ -178,6 +167,10 @@ class RobotFile(LimitKeys):
         """
         if self.platform_points is None:
             raise InputError("platform_points", None, "given", fault="it has no platform_points")
+        if self.own_pattern != "3R3T":
+            raise InputError("pattern", None, "3R3T", fault=f"it is {self.kind}")
+        if self.pulley_radius is not None:
+            raise InputError("pulley_radius", None, "absent", fault="its cables leave from pulleys")
         points = np.asarray(self.platform_points) - np.asarray(self.centre_of_mass or [0.0, 0.0, 0.0])
         return parallel_pairs(self.base_points, points)
 
@@ -206,7 +199,8 @@ class RobotFile(LimitKeys):
             InputError: why it is none.
         """
         exits = self.parallel_pairs().exit_points.tolist()
-        absent = dict.fromkeys(("platform_points", "inertia", "centre_of_mass", "pattern", "translation_only"))
+        others = ("inertia", "centre_of_mass", "pattern", "translation_only")
+        absent = dict.fromkeys(("platform_points", *others))
         found = self.model_copy(update={"base_points": exits, **absent})
         found._platform = self.model_copy(update={"translation_only": True})
         return found
@@ -217,6 +211,13 @@ class RobotFile(LimitKeys):
             value, count = getattr(self, row.name, None), len(self.base_points)
             if isinstance(value, list) and len(value) != count:
                 raise fault(row.name, value, f"{row.allowed}, or {count}: one a cable")
+        radii, axes = self.pulley_radius, self.pulley_axes
+        if isinstance(radii, list) and len(radii) != count:
+            raise fault("pulley_radius", radii, f"a number >= 0, or {count}: one a cable")
+        if axes is not None and radii is None:
+            raise fault("pulley_axes", axes, "absent without pulley_radius")
+        if axes is not None and isinstance(axes[0], list) and len(axes) != count:
+            raise fault("pulley_axes", f"{len(axes)} vectors", f"one vector, or {count}: one a cable")
         return self
 
     def placed(self, key: str, file: object) -> tuple[object, str]:
@@ -280,6 +281,12 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
         return checked(RobotFile, reference, file, at="robot")
     if not isinstance(reference, str):
         raise ConfigError(file, f"robot = {shown(reference)}: must be a catalogue name, a path, or a [robot] table")
+    name, cable_set = parted(reference)
+    if format_of(name) is not None:
+        path = directory / name
+        if not path.is_file():
+            raise ConfigError(file, f"robot = {shown(reference)}: no such file: must be a catalogue name, or a path")
+        return read_foreign(path, cable_set)[0]
     if reference.endswith(".toml") or "/" in reference:
         path = directory / reference
         if not path.is_file():
@@ -289,7 +296,30 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
         return read_robot(CATALOGUE / f"{reference}.toml")
     hint = did_you_mean(reference, catalogue_names())
     names = ", ".join(catalogue_names())
-    raise ConfigError(file, f"robot = {shown(reference)}: {hint}must be one of {names}, or a path to a .toml file")
+    raise ConfigError(
+        file,
+        f"robot = {shown(reference)}: {hint}must be one of {names}, or a path to a .toml file, or one of another "
+        f"program ({', '.join(ENDINGS)})",
+    )
+
+
+def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, Imported]:
+    """A robot file of another program, `config.formats`.
+
+    Args:
+        path: the file, with an ending that a format has.
+        cable_set: which set of cables, where the file has several; None: its default.
+
+    Returns:
+        the robot, and what it was read from.
+
+    Raises:
+        ConfigError: a mistake in it, or what no robot file can say.
+    """
+    found = read(path, cable_set)
+    spec = checked(RobotFile, found.keys, path)
+    spec._file, spec._notes = path, found.warnings
+    return spec, found
 
 
 def read_robot(path: Path) -> RobotFile:

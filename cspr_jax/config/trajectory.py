@@ -4,9 +4,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from cspr_jax.config.limits import Positive
 from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import Table
-from cspr_jax.config.robot import Positive
 from cspr_jax.schema.families import FAMILIES
 
 LARGEST_MAX_ARCS = 1000

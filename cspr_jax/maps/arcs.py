@@ -17,7 +17,7 @@ class MinimumArcsMap(PointMassMap):
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a planar robot; build what all tiles share."""
-        if spec.planar:
+        if spec.is_planar:
             raise ConfigError(file, f'robot "{spec.name}" is planar: must have three cables in this map')
         super().__init__(spec, keys, file)
 

@@ -17,7 +17,7 @@ class FromPlacesMap(PointMassMap):
         """Refuse starts that are none."""
         super().__init__(spec, keys, file)
         start = keys.trajectory.start
-        if spec.planar and start is not None and start.position is not None and start.position[1] != 0.0:
+        if spec.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:
             raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")
         if start is not None and start.rest:
             raise ConfigError(

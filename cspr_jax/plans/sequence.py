@@ -15,7 +15,7 @@ from cspr_jax.plans.leg import Leg
 from cspr_jax.plans.stops import Stops
 from cspr_jax.schema.families import FAMILIES, moving
 
-POINT_MASS = 3  # degrees of freedom
+POINT_MASS = "3T"
 
 
 class Sequence:
@@ -45,7 +45,7 @@ class Sequence:
         self.legs: list[Leg] = []
         for first, after in zip([0, *changes], [*changes, last], strict=True):
             family = keys.family_of(first)
-            leg = FAMILIES[family].leg(spec.dof)
+            leg = FAMILIES[family].leg(spec.own_pattern)
             self.legs.append(leg(Stops(spec, keys, path, frame, family, first, after)))
 
     def table(self, problem: Problem, depths: np.ndarray) -> dict[str, np.ndarray]:
@@ -68,10 +68,13 @@ class Sequence:
 def _check_families(spec: RobotFile, keys: PlanFile, path: Path) -> None:
     for i in range(len(keys.pose) - 1):
         family, own = keys.family_of(i), keys.pose[i + 1].family
-        if spec.dof in FAMILIES[family].legs:
+        if spec.own_pattern in FAMILIES[family].legs:
             continue
         key = "family" if own is None else f"pose[{i + 1}].family"
-        names = " or ".join(f'"{name}"' for name in moving(spec.dof))
+        names = " or ".join(f'"{name}"' for name in moving(spec.own_pattern))
+        if not names:
+            known = "it moves robots of the patterns " + ", ".join(FAMILIES[family].legs)
+            raise ConfigError(path, f'{key} = "{family}": no family moves {spec.kind} ("{spec.name}") yet: {known}')
         why = no_equivalent(spec) if POINT_MASS in FAMILIES[family].legs else ""
         raise ConfigError(path, f'{key} = "{family}": must be {names} for {spec.kind} ("{spec.name}"){why}')
 
@@ -102,7 +105,7 @@ def _check_poses(spec: RobotFile, keys: PlanFile, path: Path) -> None:
         for key in () if spec.is_platform else ("tilt_torsion", "quaternion", "beta_hat"):
             if getattr(pose, key) is not None:
                 raise ConfigError(path, f"pose[{i}].{key}: must be absent for {spec.kind}")
-        if spec.planar and pose.position is not None and pose.position[1] != 0.0:
+        if spec.is_planar and pose.position is not None and pose.position[1] != 0.0:
             raise ConfigError(path, f"pose[{i}].position = {shown(pose.position)}: must have y = 0: a planar robot")
 
 
@@ -111,5 +114,5 @@ def _check_plane(spec: RobotFile, keys: PlanFile, path: Path) -> None:
     if keys.launch is not None:
         given |= {f"launch.{name}": getattr(keys.launch, name) for name in ("point", "target", "velocity")}
     for key, value in given.items():
-        if spec.planar and value is not None and value[1] != 0.0:
+        if spec.is_planar and value is not None and value[1] != 0.0:
             raise ConfigError(path, f"{key} = {shown(value)}: must have y = 0: a planar robot")

@@ -1,18 +1,55 @@
-"""Cables of any robot at one instant: tensions, lengths and their rates, by the balance of its kind."""
+"""Cables of any robot: what they are made of; their tensions, lengths and rates, by the balance of its kind."""
 
-from typing import TypeAlias
+import dataclasses
+from typing import Any, TypeAlias, TypeVar
 
+import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.errors import InputError
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.limits import NO_LIMITS, Limits
+from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.pulleys import pulleys_of
 from cspr_jax.robots.state import State
 from cspr_jax.robots.tension_distribution import centred
 from cspr_jax.robots.wrench_sets import tension_range
 
 AnyRobot: TypeAlias = PointMassRobot | PlatformRobot
+RobotKind = TypeVar("RobotKind", bound=AnyRobot)
+
+
+def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pulley_axes=None) -> RobotKind:
+    """A robot with thick cables, or pulleys.
+
+    Args:
+        robot: the robot.
+        cable_diameter: m; None: 0.
+        pulley_radius: () or (n_cables,) m; None: no pulleys.
+        pulley_axes: (3,) or (n_cables, 3) swivel axes, in the direction in which the cables enter; None: straight up.
+
+    Returns:
+        the robot.
+
+    Raises:
+        InputError: a diameter or pulleys that are none.
+    """
+    changes: dict[str, Any] = {}
+    if cable_diameter is not None:
+        if not 0.0 <= cable_diameter < np.inf:
+            raise InputError("cable_diameter", cable_diameter, "a number >= 0, in m")
+        changes["cable_diameter"] = leaf(cable_diameter)
+    if pulley_radius is not None:
+        found = pulleys_of(pulley_radius, pulley_axes, robot.n_cables, robot.z_axis)
+        if PATTERNS[robot.pattern].is_planar and np.asarray(found.axes)[:, 1].any():
+            raise InputError("pulley_axes", pulley_axes, "vectors with y = 0: the plane of a planar robot")
+        changes["pulleys"] = found
+    elif pulley_axes is not None:
+        raise InputError("pulley_axes", pulley_axes, "absent without pulley_radius")
+    return dataclasses.replace(robot, **changes) if changes else robot
 
 
 def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS) -> Array:

@@ -1,4 +1,8 @@
-"""The rigid platform on cables: geometry, mass, inertia, limits, wrenches; its axes are as of `robots.point_mass`."""
+"""Bodies on cables, of any pattern of motion: geometry, mass, inertia, limits, wrenches.
+
+Axes are as of `robots.point_mass`. `robots.patterns` says which forces and moments the cables balance; what a planar
+platform or a rod leaves out vanishes, and a joint carries the others.
+"""
 
 import dataclasses
 import itertools
@@ -10,32 +14,32 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
+from cspr_jax.robots.body_geometry import checked_centre, checked_inertia, checked_platform, is_same
 from cspr_jax.robots.limits import NO_LIMITS, Limits
+from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.point_mass import (
-    LARGEST_LENGTH,
     STANDARD_GRAVITY,
     Axis,
     check_axis,
     check_numbers,
+    checked_coordinates,
     checked_points,
+    pulls,
 )
+from cspr_jax.robots.pulleys import Pulleys
 from cspr_jax.robots.state import State
 
-RIGID = 6  # degrees of freedom
-# Points nearer to each other than this part of the largest distance are one point.
-SAME = 1e-9
-# Rounding that is allowed to an inertia tensor: of its symmetry, and of a flat body's I1 + I2 = I3.
-INERTIA_TOLERANCE = 1e-9
+RIGID = "3R3T"
 
 
 @dataclasses.dataclass(frozen=True)
 class PlatformRobot:
-    """A rigid platform on six cables or more.
+    """A body on cables: a rigid platform, or one of another pattern that turns.
 
     Fields:
-        base_points: (n_cables, 3) where the cables leave their spools, in cable order; m.
-        platform_points: (n_cables, 3) where they are attached, from the mass centre, in platform axes, which are
-            parallel to the fixed ones in the reference orientation; m.
+        base_points: (n_cables, 3) where the cables leave their spools, in cable order, of pulleys where they enter; m.
+        platform_points: (n_cables, 3) where they are attached, from the mass centre, of a robot on a joint from the
+            joint, in platform axes, which are parallel to the fixed ones in the reference orientation; m.
         mass: () kg.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2.
         gravity: () downwards, m/s^2.
@@ -44,7 +48,10 @@ class PlatformRobot:
         limits: limits beyond taut cables.
         name: for people.
         z_axis: where z points, "down" or "up"; known when a function is compiled.
-        dof: degrees of freedom; known when a function is compiled.
+        pattern: name of its row of `robots.patterns`; known when a function is compiled.
+        centre_of_mass: (3,) from the origin of the platform frame, in platform axes, m; None: that origin.
+        pulleys: between base points and cables; None: the cables leave from the base points.
+        cable_diameter: () m; None: 0.
     """
 
     base_points: Array
@@ -56,7 +63,15 @@ class PlatformRobot:
     limits: Limits = NO_LIMITS
     name: str = ""
     z_axis: Axis = "down"
-    dof: int = RIGID
+    pattern: str = RIGID
+    centre_of_mass: Array | None = None
+    pulleys: Pulleys | None = None
+    cable_diameter: Array | None = None
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom."""
+        return PATTERNS[self.pattern].dof
 
     @property
     def n_cables(self) -> int:
@@ -65,24 +80,39 @@ class PlatformRobot:
 
     def wrench_matrix(self, state: State) -> Array:
         """Wrenches of unit tensions; see `Robot.wrench_matrix`."""
-        cables, arms = rays(self, state.position, state.rotation)
-        pulls = -cables / jnp.linalg.norm(cables, axis=1, keepdims=True)
-        return jnp.concatenate([pulls, jnp.cross(arms, pulls)], axis=1).T
+        arms = self.platform_points @ state.rotation.T
+        forces = pulls(self, state.position[None] + arms)
+        return self._balanced(state.rotation, forces.T, jnp.cross(arms, forces).T)
 
     def inertial_wrench(self, state: State) -> Array:
         """Wrench that the cables must supply; see `Robot.inertial_wrench`."""
-        return self.mass * wrench_per_mass(self, state)
+        if self.pattern == RIGID:
+            return self.mass * wrench_per_mass(self, state)
+        force = self.mass * state.acceleration.at[2].add(-self.gravity)
+        moment = _spin_moment(self, state)
+        if PATTERNS[self.pattern].is_jointed and self.centre_of_mass is not None:
+            moment = moment + jnp.cross(state.rotation @ self.centre_of_mass, force)
+        return self._balanced(state.rotation, force, moment)
+
+    def _balanced(self, rotation: Array, force: Array, moment: Array) -> Array:
+        # Of the forces and moments, (3, ...) each, those that the cables balance.
+        row = PATTERNS[self.pattern]
+        turning = (rotation @ across_line(self)).T @ moment if row.along_line else moment[np.array(row.moments)]
+        return jnp.concatenate([force[np.array(row.forces, int)], turning])
 
 
 jax.tree_util.register_dataclass(
     PlatformRobot,
-    ["base_points", "platform_points", "mass", "inertia", "gravity", "limits"],
-    ["joints", "z_axis", "dof"],
+    [
+        *("base_points", "platform_points", "mass", "inertia", "gravity", "limits", "centre_of_mass", "pulleys"),
+        "cable_diameter",
+    ],
+    ["joints", "z_axis", "pattern"],
     drop_fields=["name"],
 )
 
 
-def platform_robot(
+def platform_robot(  # noqa: PLR0913
     base_points,
     platform_points,
     *,
@@ -93,12 +123,14 @@ def platform_robot(
     name: str = "robot",
     z_axis: Axis = "down",
     limits: Limits | None = None,
+    pattern: str = RIGID,
 ) -> PlatformRobot:
     """A platform on cables, its geometry and inertia checked.
 
     Args:
-        base_points: (n_cables, 3) spool points, six or more, m.
-        platform_points: (n_cables, 3) attachment points in platform axes, m.
+        base_points: (n_cables, 3) spool points, as many as degrees of freedom or more, m; of a planar platform y = 0.
+        platform_points: (n_cables, 3) attachment points in platform axes, m; of a planar platform y = 0, of a rod on
+            one line with the mass centre, of a robot on a joint from the joint.
         mass: kg, positive.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2; symmetric, positive definite, of a real body.
         centre_of_mass: (3,) in platform axes, m.
@@ -106,58 +138,66 @@ def platform_robot(
         name: for people.
         z_axis: where z points, "down" or "up".
         limits: limits beyond taut cables; None: none.
+        pattern: "3R3T", "1R2T", "2R3T" or "3R".
 
     Returns:
         the robot, float64 NumPy leaves.
 
     Raises:
-        InputError: wrong shape, fewer points, other numbers of both, not finite, points on a line, two cables between
-            the same two points, an inertia tensor that no body has, mass or gravity not positive, another z_axis.
+        InputError: wrong shape, fewer points, other numbers of both, not finite, points on a line, or not on one, or
+            not in the plane, two cables between the same two points, an inertia tensor that no body has, mass or
+            gravity not positive, another z_axis, a pattern of no body.
     """
-    base = checked_points("base_points", base_points, RIGID)
-    platform = checked_points("platform_points", platform_points, RIGID)
-    if len(platform) != len(base):
-        allowed = f"must be {len(base)}, as many as base_points"
-        raise InputError("platform_points", None, allowed, fault=f"{len(platform)} points")
-    centre = np.asarray(centre_of_mass, float)
-    if centre.shape != (3,) or not (np.abs(centre) <= LARGEST_LENGTH).all():
-        raise InputError("centre_of_mass", centre_of_mass, "three coordinates, at most 1e6 m")
+    row = PATTERNS.get(pattern)
+    if row is None or not row.is_body:
+        bodies = " or ".join(f'"{name}"' for name, known in PATTERNS.items() if known.is_body)
+        raise InputError("pattern", pattern, bodies)
+    base = (checked_coordinates if row.is_planar else checked_points)("base_points", base_points, row.dof)
+    platform = checked_platform(platform_points, len(base), row)
+    if row.is_planar and (base[:, 1] != 0.0).any():
+        raise InputError("base_points", base.tolist(), "points with y = 0: the plane of a planar robot")
+    centre = checked_centre(centre_of_mass, platform, row)
     check_numbers(mass, gravity)
     check_axis(z_axis)
-    tensor = _inertia(inertia)
+    tensor = checked_inertia(inertia, row)
     for first, second in itertools.combinations(range(len(base)), 2):
-        if _is_same(base, first, second) and _is_same(platform, first, second):
+        if is_same(base, first, second) and is_same(platform, first, second):
             raise InputError(
                 "platform_points",
                 platform.tolist(),
                 f"no cables {first + 1} and {second + 1} between the same two points",
             )
     joints = tuple(int((platform == point).all(1).argmax()) for point in platform)
-    numbers = (leaf(base), leaf(platform - centre), leaf(mass), leaf(tensor), leaf(gravity))
-    return PlatformRobot(*numbers, joints, limits or NO_LIMITS, name, z_axis)
+    points = platform if row.is_jointed else platform - centre
+    numbers = (leaf(base), leaf(points), leaf(mass), leaf(tensor), leaf(gravity))
+    return PlatformRobot(*numbers, joints, limits or NO_LIMITS, name, z_axis, pattern, leaf(centre))
 
 
-def _is_same(points: np.ndarray, first: int, second: int) -> bool:
-    span = np.ptp(points, axis=0).max()
-    return bool(np.linalg.norm(points[first] - points[second]) <= SAME * span)
+def across_line(robot: PlatformRobot) -> Array:
+    """Two axes of a rod, normal to the line of its attachment points and to each other.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        (3, 2) unit vectors in platform axes.
+    """
+    offsets = robot.platform_points - robot.platform_points[:1]
+    line = offsets[jnp.argmax(jnp.sum(offsets**2, axis=1))]
+    line = line / jnp.linalg.norm(line)
+    first = jnp.cross(line, jnp.eye(3)[jnp.argmin(jnp.abs(line))])
+    first = first / jnp.linalg.norm(first)
+    return jnp.stack([first, jnp.cross(line, first)], axis=1)
 
 
-def _inertia(given) -> np.ndarray:
-    tensor = np.asarray(given, float)
-    if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
-        raise InputError("inertia", given, "three rows of three finite numbers, kg m^2")
-    scale = np.abs(tensor).max()
-    if np.abs(tensor - tensor.T).max() > INERTIA_TOLERANCE * scale:
-        raise InputError("inertia", tensor.tolist(), "a symmetric tensor")
-    tensor = 0.5 * (tensor + tensor.T)
-    low, middle, high = np.linalg.eigvalsh(tensor)
-    if not low > 0.0:
-        raise InputError("inertia", tensor.tolist(), "a positive definite tensor")
-    if high > (low + middle) * (1.0 + INERTIA_TOLERANCE):
-        raise InputError(
-            "inertia", tensor.tolist(), "a tensor of a real body: no principal moment above the sum of the other two"
-        )
-    return tensor
+def _spin_moment(robot: PlatformRobot, state: State) -> Array:
+    # Rate of the angular momentum about the mass centre, (3.8), or about a joint; N m.
+    inertia = state.rotation @ robot.inertia @ state.rotation.T
+    if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
+        arm = state.rotation @ robot.centre_of_mass
+        inertia = inertia + robot.mass * (jnp.dot(arm, arm) * jnp.eye(3) - jnp.outer(arm, arm))
+    moment = inertia @ state.angular_acceleration
+    return moment + jnp.cross(state.angular_velocity, inertia @ state.angular_velocity)
 
 
 def rays(robot: PlatformRobot, position: Array, rotation: Array) -> tuple[Array, Array]:
@@ -185,10 +225,8 @@ def wrench_per_mass(robot: PlatformRobot, state: State) -> Array:
     Returns:
         (6,) p'' - g, m/s^2, and the rate of the angular momentum (3.8) over the mass, m^2/s^2.
     """
-    inertia = state.rotation @ robot.inertia @ state.rotation.T
-    moment = inertia @ state.angular_acceleration
-    moment = moment + jnp.cross(state.angular_velocity, inertia @ state.angular_velocity)
-    return jnp.concatenate([state.acceleration.at[2].add(-robot.gravity), moment / robot.mass])
+    moment = _spin_moment(robot, state) / robot.mass
+    return jnp.concatenate([state.acceleration.at[2].add(-robot.gravity), moment])
 
 
 def pairs_apart(robot: PlatformRobot) -> tuple[tuple[int, int], ...]:
@@ -204,5 +242,5 @@ def pairs_apart(robot: PlatformRobot) -> tuple[tuple[int, int], ...]:
     return tuple(
         (i, j)
         for i, j in itertools.combinations(range(robot.n_cables), 2)
-        if not _is_same(base, i, j) and not _is_same(platform, i, j)
+        if not is_same(base, i, j) and not is_same(platform, i, j)
     )

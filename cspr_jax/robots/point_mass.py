@@ -15,13 +15,15 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
 from cspr_jax.robots.limits import NO_LIMITS, Limits
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.pulleys import Pulleys, exits
 from cspr_jax.robots.robot import Robot
 from cspr_jax.robots.spool_plane import SMALLEST_LEVEL_RATIO, is_on_line, is_vertical
 from cspr_jax.robots.state import State
 
 STANDARD_GRAVITY = 9.81
-# Degrees of freedom of a point mass in space, and in the plane y = 0.
-SPATIAL, PLANAR = 3, 2
+# Degrees of freedom of a point mass in space, in the plane y = 0, and on a vertical guide.
+SPATIAL, PLANAR, GUIDED = 3, 2, 1
 LARGEST_LENGTH = 1e6  # m; beyond, products of lengths lose their meaning
 # Two spools count as level if their heights differ by less than this part of their distance.
 LEVEL = 1e-9
@@ -33,16 +35,19 @@ Axis = Literal["down", "up"]
 
 @dataclasses.dataclass(frozen=True)
 class PointMassRobot:
-    """A point mass on three cables or more, or on two or more in the plane y = 0.
+    """A point mass on three cables or more, on two or more in the plane y = 0, or on a vertical guide.
 
     Fields:
-        base_points: (n_cables, 3) where the cables leave their spools, one a row, in cable order; m.
+        base_points: (n_cables, 3) where the cables leave their spools, one a row, in cable order, of pulleys where they
+            enter; m.
         mass: () of the effector, kg.
         gravity: () downwards, m/s^2.
         limits: limits beyond taut cables.
         name: for people.
         z_axis: where z points, "down" or "up"; known when a function is compiled.
-        dof: degrees of freedom, 3, or 2 in the plane y = 0; known when a function is compiled.
+        dof: degrees of freedom, 3, 2 in the plane y = 0, or 1 on a guide; known when a function is compiled.
+        pulleys: between base points and cables; None: the cables leave from the base points.
+        cable_diameter: () m; None: 0.
     """
 
     base_points: Array
@@ -52,6 +57,13 @@ class PointMassRobot:
     name: str = ""
     z_axis: Axis = "down"
     dof: int = SPATIAL
+    pulleys: Pulleys | None = None
+    cable_diameter: Array | None = None
+
+    @property
+    def pattern(self) -> str:
+        """Name of its row of `robots.patterns`."""
+        return f"{self.dof}T"
 
     @property
     def n_cables(self) -> int:
@@ -60,8 +72,7 @@ class PointMassRobot:
 
     def wrench_matrix(self, state: State) -> Array:
         """Wrenches of unit tensions; see `Robot.wrench_matrix`."""
-        rays = self.base_points - state.position[None]
-        return (rays / jnp.linalg.norm(rays, axis=1, keepdims=True)).T[self._directions]
+        return pulls(self, state.position[None]).T[self._directions]
 
     def inertial_wrench(self, state: State) -> Array:
         """Wrench that the cables must supply; see `Robot.inertial_wrench`."""
@@ -70,12 +81,15 @@ class PointMassRobot:
     @property
     def _directions(self) -> np.ndarray:
         # In which the effector moves: x and z in the plane y = 0.
-        return np.array([0, 2] if self.dof == PLANAR else [0, 1, 2])
+        return np.array(PATTERNS[self.pattern].forces)
 
 
 # The name stays outside: compiled functions do not see it, and are not compiled again for another one.
 jax.tree_util.register_dataclass(
-    PointMassRobot, ["base_points", "mass", "gravity", "limits"], ["z_axis", "dof"], drop_fields=["name"]
+    PointMassRobot,
+    ["base_points", "mass", "gravity", "limits", "pulleys", "cable_diameter"],
+    ["z_axis", "dof"],
+    drop_fields=["name"],
 )
 
 
@@ -153,6 +167,37 @@ def planar_robot(
     return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, PLANAR)
 
 
+def guided_robot(
+    base_points,
+    *,
+    mass: float,
+    gravity: float = STANDARD_GRAVITY,
+    name: str = "robot",
+    z_axis: Axis = "down",
+    limits: Limits | None = None,
+) -> PointMassRobot:
+    """A point mass on cables that moves along a vertical guide, its geometry checked.
+
+    Args:
+        base_points: (n_cables, 3) spool points, one or more, m.
+        mass: kg, positive.
+        gravity: m/s^2, positive.
+        name: for people.
+        z_axis: where z points, "down" or "up".
+        limits: limits beyond taut cables; None: none.
+
+    Returns:
+        the robot, float64 NumPy leaves.
+
+    Raises:
+        InputError: wrong shape, not finite, mass or gravity not positive, another z_axis.
+    """
+    points = checked_coordinates("base_points", base_points, GUIDED)
+    check_numbers(mass, gravity)
+    check_axis(z_axis)
+    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, GUIDED)
+
+
 def checked_points(key: str, given, least: int) -> np.ndarray:
     """Points of a robot's geometry.
 
@@ -167,6 +212,26 @@ def checked_points(key: str, given, least: int) -> np.ndarray:
     Raises:
         InputError: fewer, another shape, not finite, too far away; three or more on one line, or two at one place.
     """
+    points = checked_coordinates(key, given, least)
+    if least > PLANAR and is_on_line(points):
+        raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
+    return points
+
+
+def checked_coordinates(key: str, given, least: int) -> np.ndarray:
+    """Points, wherever they lie.
+
+    Args:
+        key: named in errors.
+        given: (n, 3) m.
+        least: smallest number of them.
+
+    Returns:
+        (n, 3) m.
+
+    Raises:
+        InputError: fewer, another shape, not finite, too far away.
+    """
     if isinstance(given, jax.core.Tracer):
         raise InputError(key, "a traced array", "numbers; to differentiate, dataclasses.replace(robot, ...) takes both")
     points = np.asarray(given, float)
@@ -174,9 +239,24 @@ def checked_points(key: str, given, least: int) -> np.ndarray:
         raise InputError(key, given, f"{least} points or more of three coordinates, at most 1e6 m")
     if len(points) < least:
         raise InputError(key, given, f"must be {least} or more, one a cable", fault=f"{len(points)} points")
-    if least > PLANAR and is_on_line(points):
-        raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
     return points
+
+
+def pulls(robot: Robot, targets: Array) -> Array:
+    """Unit vectors of the cables, from the effector on; with pulleys those of the free cables.
+
+    Args:
+        robot: the robot.
+        targets: (n_cables, 3) or (1, 3) where the cables are attached, in the axes of the spools, m.
+
+    Returns:
+        (n_cables, 3).
+    """
+    if robot.pulleys is not None:
+        targets = jnp.broadcast_to(targets, robot.base_points.shape)
+        return -exits(robot.base_points, robot.pulleys.axes, robot.pulleys.radius, targets).direction  # type: ignore[operator]
+    rays = robot.base_points - targets
+    return rays / jnp.linalg.norm(rays, axis=1, keepdims=True)
 
 
 def relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:

@@ -71,7 +71,9 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
         if np.abs(rotation - np.eye(3)).max() < ALIGNED:
             rotation = np.eye(3)
     points, inertia = leaf(robot.platform_points) @ rotation.T, rotation @ leaf(robot.inertia) @ rotation.T
-    return dataclasses.replace(robot, platform_points=leaf(points), inertia=leaf(inertia)), rotation
+    centre = None if robot.centre_of_mass is None else leaf(leaf(robot.centre_of_mass) @ rotation.T)
+    turned = dataclasses.replace(robot, platform_points=leaf(points), inertia=leaf(inertia), centre_of_mass=centre)
+    return turned, rotation
 
 
 def reference_pose(robot: PlatformRobot, z0: float) -> Reference:

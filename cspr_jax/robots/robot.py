@@ -6,6 +6,7 @@ from jax import Array
 
 from cspr_jax.errors import InputError
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.pulleys import Pulleys
 from cspr_jax.robots.state import State
 
 
@@ -36,8 +37,20 @@ class Robot(Protocol):
         """Number of degrees of freedom; known when a function is compiled."""
 
     @property
+    def pattern(self) -> str:
+        """Name of its pattern of motion, a row of `robots.patterns`; known when a function is compiled."""
+
+    @property
     def n_cables(self) -> int:
         """Number of cables."""
+
+    @property
+    def pulleys(self) -> Pulleys | None:
+        """Pulleys between base points and cables; None: the cables leave from the base points."""
+
+    @property
+    def cable_diameter(self) -> Array | None:
+        """Diameter of the cables, (), m; None: 0."""
 
     def wrench_matrix(self, state: State) -> Array:
         """Wrenches of unit tensions.
@@ -46,7 +59,8 @@ class Robot(Protocol):
             state: position, and the rotation of a platform; z down.
 
         Returns:
-            (dof, n_cables), one column a cable: the force, of a platform the moment about its mass centre below it, m.
+            (dof, n_cables), one column a cable: the force, of a platform the moment about its mass centre, or about its
+            joint, below it, m; of both the components that its pattern balances.
         """
 
     def inertial_wrench(self, state: State) -> Array:
@@ -56,8 +70,29 @@ class Robot(Protocol):
             state: the state; z down.
 
         Returns:
-            (dof,) force, N, of a platform the moment about its mass centre after it, N m.
+            (dof,) force, N, of a platform the moment after it, N m; components as in `wrench_matrix`.
         """
+
+
+MOVED = ("2T", "3T", "3R3T")  # patterns that trajectories and searches know; workspaces know all
+
+
+def check_moved(robot: Robot) -> None:
+    """Refuse a robot that no trajectory and no search moves.
+
+    Args:
+        robot: the robot.
+
+    Raises:
+        InputError: another pattern than 2T, 3T or 3R3T, or pulleys.
+    """
+    if robot.pattern not in MOVED:
+        known = " or ".join(f'"{name}"' for name in MOVED)
+        raise InputError("pattern", robot.pattern, f"{known} (what is asked for does not exist yet for others)")
+    if robot.pulleys is not None:
+        raise InputError(
+            "pulley_radius", None, "must be absent (what is asked for does not exist yet for them)", fault="pulleys"
+        )
 
 
 def check_determined(robot: Robot) -> None:
@@ -67,8 +102,9 @@ def check_determined(robot: Robot) -> None:
         robot: the robot.
 
     Raises:
-        InputError: more cables than degrees of freedom.
+        InputError: more cables than degrees of freedom, or what `check_moved` refuses.
     """
+    check_moved(robot)
     if robot.n_cables != robot.dof:
         raise InputError(
             "base_points",

@@ -35,8 +35,8 @@ class Distribution(NamedTuple):
     """Tensions of all cables at one instant.
 
     Fields:
-        tensions: (n_cables,) N. Where none are feasible those of least norm, whatever the limits. They may not be
-            finite where the cables do not span all components of a wrench.
+        tensions: (n_cables,) N. Where none are feasible, or those that a rule finds are not, those of least norm,
+            whatever the limits. They may not be finite where the cables do not span all components of a wrench.
         residual: () size of W t - w, over 1 + that of w.
         is_within: () whether all limits are kept, to 1e-9 of the largest tension, and W has full rank.
     """
@@ -46,13 +46,28 @@ class Distribution(NamedTuple):
     is_within: Array
 
 
-class _Set(NamedTuple):
-    # All tensions that give a wrench: least + x @ kernel.
-    least: Array  # (n,)
-    kernel: Array  # (r, n) orthonormal rows
-    is_regular: Array  # ()
+class AllTensions(NamedTuple):
+    """All tensions that give a wrench: least + x @ kernel.
+
+    Fields:
+        least: (n_cables,) those of least norm, N.
+        kernel: (n_free, n_cables) orthonormal rows that pull on nothing, one for each cable more than needed.
+        is_regular: () whether the cables span all components of a wrench.
+    """
+
+    least: Array
+    kernel: Array
+    is_regular: Array
 
     def tensions(self, point: Array) -> Array:
+        """Tensions of one x.
+
+        Args:
+            point: (m,) N.
+
+        Returns:
+            (n_cables,) N.
+        """
         return self.least + point @ self.kernel
 
 
@@ -72,9 +87,9 @@ def least_norm(matrix: Array, wrench: Array, tension_min: Array, tension_max: Ar
     Raises:
         InputError: fewer cables than components.
     """
-    every = _all_tensions(matrix, wrench)
+    every = all_tensions(matrix, wrench)
     tensions = every.tensions(_shortest(every, tension_min, tension_max))
-    return _checked(matrix, wrench, tension_min, tension_max, every, tensions)
+    return checked(matrix, wrench, tension_min, tension_max, every, tensions)
 
 
 @jax.jit
@@ -96,35 +111,80 @@ def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array
     Raises:
         InputError: fewer cables than components.
     """
-    every = _all_tensions(matrix, wrench)
+    every = all_tensions(matrix, wrench)
     largest = _largest_distance(matrix, wrench, tension_min, tension_max, every)
     inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
     tensions = every.tensions(_shortest(every, tension_min + inwards, tension_max - inwards))
-    found = _checked(matrix, wrench, tension_min, tension_max, every, tensions)
+    found = checked(matrix, wrench, tension_min, tension_max, every, tensions)
     return found, jnp.where(every.is_regular, largest, -jnp.inf)
 
 
-def _checked(matrix: Array, wrench: Array, low: Array, high: Array, every: _Set, tensions: Array) -> Distribution:
-    tensions = jnp.where(_keeps(tensions, low, high), tensions, every.least)
+def checked(matrix: Array, wrench: Array, low: Array, high: Array, every: AllTensions, tensions: Array) -> Distribution:
+    """Tensions with their residual and verdict.
+
+    Args:
+        matrix: (dof, n_cables) unit columns.
+        wrench: (dof,) N.
+        low: (n_cables,) N.
+        high: (n_cables,) N, inf for none.
+        every: of `all_tensions`.
+        tensions: (n_cables,) what a rule has found, N.
+
+    Returns:
+        the tensions (n_cables,), those of least norm where they do not keep the limits; () residual; () whether what
+        is returned does.
+    """
+    tensions = jnp.where(keeps(tensions, low, high), tensions, every.least)
     residual = jnp.linalg.norm(matrix @ tensions - wrench) / (1.0 + jnp.linalg.norm(wrench))
-    return Distribution(tensions, residual, every.is_regular & _keeps(tensions, low, high))
+    return Distribution(tensions, residual, every.is_regular & keeps(tensions, low, high))
 
 
-def _keeps(tensions: Array, low: Array, high: Array) -> Array:
-    return jnp.max(jnp.abs(_beyond(tensions, low, high))) <= WITHIN * jnp.max(jnp.abs(tensions))
+def keeps(tensions: Array, low: Array, high: Array) -> Array:
+    """Whether tensions keep their limits, to 1e-9 of the largest.
+
+    Args:
+        tensions: (n_cables,) N.
+        low: (n_cables,) N.
+        high: (n_cables,) N, inf for none.
+
+    Returns:
+        () of bool.
+    """
+    return jnp.max(jnp.abs(beyond(tensions, low, high))) <= WITHIN * jnp.max(jnp.abs(tensions))
 
 
-def _beyond(tensions: Array, low: Array, high: Array) -> Array:
-    # How far tensions are below their smallest; negative: above their largest.
+def beyond(tensions: Array, low: Array, high: Array) -> Array:
+    """How far tensions are below their smallest; negative: above their largest.
+
+    Args:
+        tensions: (...) N.
+        low: (...) N.
+        high: (...) N, inf for none.
+
+    Returns:
+        (...) N, 0 within the limits.
+    """
     return jnp.maximum(low - tensions, 0.0) - jnp.maximum(tensions - high, 0.0)
 
 
-def _all_tensions(matrix: Array, wrench: Array) -> _Set:
+def all_tensions(matrix: Array, wrench: Array) -> AllTensions:
+    """All tensions that give a wrench.
+
+    Args:
+        matrix: (dof, n_cables) unit columns.
+        wrench: (dof,) N.
+
+    Returns:
+        the tensions.
+
+    Raises:
+        InputError: fewer cables than components.
+    """
     dof, count = matrix.shape
     if count < dof:
         raise InputError("matrix", None, f"must be {dof} or more, one a cable", fault=f"{count} columns")
     frame, along, left = _frame(matrix, wrench)
-    return _Set(along[:dof] @ frame[:dof], frame[dof:], jnp.min(left[:dof]) > FLAT * jnp.max(left[:dof]))
+    return AllTensions(along[:dof] @ frame[:dof], frame[dof:], jnp.min(left[:dof]) > FLAT * jnp.max(left[:dof]))
 
 
 def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
@@ -155,7 +215,7 @@ def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
     return frame, along, lax.stop_gradient(jnp.sqrt(square))
 
 
-def _shortest(every: _Set, low: Array, high: Array) -> Array:
+def _shortest(every: AllTensions, low: Array, high: Array) -> Array:
     """The shortest x (r,) within limits; where there is none, one that is not far beyond them."""
     freedom = every.kernel.shape[0]
     if freedom == 0:
@@ -164,14 +224,14 @@ def _shortest(every: _Set, low: Array, high: Array) -> Array:
         return _at_limits(every, low, high, _limits_reached(every, low, high))
     points, is_point = _candidates(every, low, high)
     tensions = every.least[None] + points @ every.kernel
-    beyond = jnp.max(jnp.abs(_beyond(tensions, low[None], high[None])), axis=1)
-    is_within = is_point & (beyond <= ROUNDING * jnp.max(jnp.abs(tensions), axis=1))
+    excess = jnp.max(jnp.abs(beyond(tensions, low[None], high[None])), axis=1)
+    is_within = is_point & (excess <= ROUNDING * jnp.max(jnp.abs(tensions), axis=1))
     # Where the limits leave but one point, rounding can leave none.
-    worse = jnp.where(is_within.any(), jnp.where(is_within, jnp.sum(points**2, axis=1), jnp.inf), beyond)
+    worse = jnp.where(is_within.any(), jnp.where(is_within, jnp.sum(points**2, axis=1), jnp.inf), excess)
     return points[jnp.argmin(jnp.where(is_point, worse, jnp.inf))]
 
 
-def _candidates(every: _Set, low: Array, high: Array) -> tuple[Array, Array]:
+def _candidates(every: AllTensions, low: Array, high: Array) -> tuple[Array, Array]:
     """Where the shortest of one or two components can be, (k, r), and whether each is a point."""
     freedom, count = every.kernel.shape
     rows = jnp.concatenate([every.kernel.T, every.kernel.T])
@@ -211,14 +271,14 @@ class _Search(NamedTuple):
     steps: Array  # ()
 
 
-def _limits_reached(every: _Set, low: Array, high: Array) -> Array:
+def _limits_reached(every: AllTensions, low: Array, high: Array) -> Array:
     """Limits that the shortest x reaches, (n,): 1 the smallest tension, -1 the largest, 0 none."""
     every, low, high = lax.stop_gradient((every, low, high))
     freedom, count = every.kernel.shape
 
     def is_open(search):
         tensions = every.tensions(search.point)
-        worst = jnp.max(jnp.abs(_beyond(tensions, low, high)))
+        worst = jnp.max(jnp.abs(beyond(tensions, low, high)))
         is_beyond = worst > ROUNDING * jnp.max(jnp.abs(tensions))
         return (search.is_seeking | is_beyond) & ~search.is_stuck & (search.steps < LONGEST * count)
 
@@ -229,14 +289,14 @@ def _limits_reached(every: _Set, low: Array, high: Array) -> Array:
     return lax.while_loop(is_open, lambda search: _step(every, low, high, search), start).sides
 
 
-def _step(every: _Set, low: Array, high: Array, search: _Search) -> _Search:
+def _step(every: AllTensions, low: Array, high: Array, search: _Search) -> _Search:
     """Towards the limit that is sought, until it is reached or one that is held is in the way, and let go."""
-    beyond = _beyond(every.tensions(search.point), low, high)
-    sought = jnp.where(search.is_seeking, search.sought, jnp.argmax(jnp.abs(beyond)))
-    is_sought = jnp.arange(beyond.size) == sought
-    side, distance = jnp.sign(beyond[sought]), jnp.abs(beyond[sought])
+    excess = beyond(every.tensions(search.point), low, high)
+    sought = jnp.where(search.is_seeking, search.sought, jnp.argmax(jnp.abs(excess)))
+    is_sought = jnp.arange(excess.size) == sought
+    side, distance = jnp.sign(excess[sought]), jnp.abs(excess[sought])
     is_held = search.sides != 0.0
-    way, loss = _projected(every.kernel, is_held, side * every.kernel[:, sought], jnp.zeros_like(beyond))
+    way, loss = projected(every.kernel, is_held, side * every.kernel[:, sought], jnp.zeros_like(excess))
     square = jnp.dot(way, way)
     is_blocked = (is_held.sum() >= way.size) | (square <= DEPENDENT**2)
     whole = jnp.where(is_blocked, jnp.inf, distance / jnp.where(is_blocked, 1.0, square))
@@ -246,7 +306,7 @@ def _step(every: _Set, low: Array, high: Array, search: _Search) -> _Search:
     length = jnp.minimum(whole, until[first])
     is_stuck, is_reached = jnp.isinf(length), whole <= until[first]
     length = jnp.where(is_stuck, 0.0, length)
-    let_go = (jnp.arange(beyond.size) == first) & ~is_reached
+    let_go = (jnp.arange(excess.size) == first) & ~is_reached
     pulls = search.pulls + length * (jnp.where(is_sought, side, 0.0) - loss)
     sides = jnp.where(is_sought & is_reached & ~is_stuck, side, search.sides)
     return _Search(
@@ -260,15 +320,25 @@ def _step(every: _Set, low: Array, high: Array, search: _Search) -> _Search:
     )
 
 
-def _at_limits(every: _Set, low: Array, high: Array, sides: Array) -> Array:
+def _at_limits(every: AllTensions, low: Array, high: Array, sides: Array) -> Array:
     # The shortest x with so many tensions at their limits.
     limits = jnp.where(sides > 0.0, low, jnp.where(sides < 0.0, high, 0.0))
     wanted = jnp.where(sides == 0.0, 0.0, limits - every.least)
-    return _projected(every.kernel, sides != 0.0, jnp.zeros(every.kernel.shape[0]), wanted)[0]
+    return projected(every.kernel, sides != 0.0, jnp.zeros(every.kernel.shape[0]), wanted)[0]
 
 
-def _projected(kernel: Array, is_held: Array, vector: Array, wanted: Array) -> tuple[Array, Array]:
-    """The nearest to a vector with given products with columns of the kernel, and what of each column is taken off."""
+def projected(kernel: Array, is_held: Array, vector: Array, wanted: Array) -> tuple[Array, Array]:
+    """The nearest to a vector with given products with columns of the kernel, and what of each column is taken off.
+
+    Args:
+        kernel: (m, n_cables).
+        is_held: (n_cables,) whose products are given.
+        vector: (m,).
+        wanted: (n_cables,) the products.
+
+    Returns:
+        (m,); (n_cables,).
+    """
     freedom = kernel.shape[0]
     held = jnp.where(is_held[None], kernel, 0.0)
     above = jnp.concatenate([jnp.eye(freedom), held], axis=1)
@@ -278,7 +348,7 @@ def _projected(kernel: Array, is_held: Array, vector: Array, wanted: Array) -> t
     return found[:freedom], found[freedom:]
 
 
-def _largest_distance(matrix: Array, wrench: Array, low: Array, high: Array, every: _Set) -> Array:
+def _largest_distance(matrix: Array, wrench: Array, low: Array, high: Array, every: AllTensions) -> Array:
     """Largest r, () N: half of a cable's range, or a face's slack over its way inwards for each newton of r."""
     dof, count = matrix.shape
     if count == dof:

@@ -17,7 +17,8 @@ class Family:
     Fields:
         name: in files.
         description: for people, without a full stop.
-        legs: by degrees of freedom of the robots that it moves, the class that joins poses: "module:Class".
+        legs: by patterns of motion of the robots that it moves, rows of `robots.patterns`, the class that joins poses:
+            "module:Class".
         free_end: whether A''(1) of its amplitude function is free: (1.27) and (1.28) in place of (2.49).
         rests_anywhere: whether its poses are at rest wherever they are, so that it knows neither P0 nor an amplitude
             function.
@@ -26,16 +27,16 @@ class Family:
 
     name: str
     description: str
-    legs: Mapping[int, str]
+    legs: Mapping[str, str]
     free_end: bool = False
     rests_anywhere: bool = False
     any_cables: bool = False
 
-    def leg(self, dof: int) -> Any:
+    def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.
 
         Args:
-            dof: degrees of freedom of the robot.
+            pattern: of the robot.
 
         Returns:
             the class.
@@ -43,7 +44,7 @@ class Family:
         Raises:
             KeyError: the family does not move such robots.
         """
-        module, _, name = self.legs[dof].partition(":")
+        module, _, name = self.legs[pattern].partition(":")
         return getattr(importlib.import_module(module), name)
 
 
@@ -54,24 +55,24 @@ _ROWS = (
     Family(
         "hypocycloid-standard",
         "standard hypocycloids between any poses (thesis chapter 2)",
-        {3: _LEGS.format("hypocycloids:Hypocycloids"), 6: _LEGS.format("platform_poses:StandardPoses")},
+        {"3T": _LEGS.format("hypocycloids:Hypocycloids"), "3R3T": _LEGS.format("platform_poses:StandardPoses")},
     ),
     Family(
         "transition",
         "from rest to a target, swings at it, and back to rest (1)",
-        {2: _LEGS.format("transitions:Transitions"), 3: _LEGS.format("transitions:Transitions")},
+        {"2T": _LEGS.format("transitions:Transitions"), "3T": _LEGS.format("transitions:Transitions")},
         free_end=True,
     ),
     Family(
         "hypocycloid",
         "hypocycloids of variable amplitude (3), for platforms",
-        {6: _LEGS.format("platform_poses:VariablePoses")},
+        {"3R3T": _LEGS.format("platform_poses:VariablePoses")},
     ),
     *(
         Family(
             name,
             f"straight lines from rest to rest {law}",
-            dict.fromkeys((2, 3), _LEGS.format("timed_lines:TimedLines")),
+            dict.fromkeys(("2T", "3T"), _LEGS.format("timed_lines:TimedLines")),
             rests_anywhere=True,
             any_cables=True,
         )
@@ -84,23 +85,23 @@ _ROWS = (
     Family(
         "bezier",
         "Bezier curves of the second order, at rest in every pose (launch paper)",
-        dict.fromkeys((2, 3), _LEGS.format("beziers:Beziers")),
+        dict.fromkeys(("2T", "3T"), _LEGS.format("beziers:Beziers")),
         rests_anywhere=True,
     ),
 )
 FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}
 
 
-def moving(dof: int) -> list[str]:
+def moving(pattern: str) -> list[str]:
     """Names of the families that move a robot.
 
     Args:
-        dof: degrees of freedom of the robot.
+        pattern: of the robot.
 
     Returns:
         the names.
     """
-    return [row.name for row in FAMILIES.values() if dof in row.legs]
+    return [row.name for row in FAMILIES.values() if pattern in row.legs]
 
 
 @contextlib.contextmanager

@@ -42,8 +42,8 @@ class MapKind:
         definitions: of the accessible set that it takes.
         is_over_orientations: whether its grid has axes over all orientations besides those of the sweep file.
         cells: of a tile, at most, where the sweep file does not say.
-        freedoms: degrees of freedom of the robots that it moves, by which `config.equivalents` finds which robot that
-            is; none: robots go to its class as their files have them.
+        patterns: of motion of the robots that it moves, rows of `robots.patterns`, by which `config.equivalents` finds
+            which robot that is; none: robots go to its class as their files have them.
     """
 
     name: str
@@ -62,7 +62,7 @@ class MapKind:
     definitions: tuple[str, ...] = ("grid", "scan", "equal-volume")
     is_over_orientations: bool = False
     cells: int = LARGEST_TILE
-    freedoms: tuple[int, ...] = ()
+    patterns: tuple[str, ...] = ()
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -120,7 +120,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
             pictured=("arcs",),
             families=("hypocycloid-standard",),
-            freedoms=(3,),
+            patterns=("3T",),
             start="point",
             needs=("axes.z0",),
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "limits"),
@@ -137,7 +137,7 @@ MAP_KINDS: dict[str, MapKind] = {
             ),
             pictured=("oscillations",),
             families=("transition",),
-            freedoms=(2, 3),
+            patterns=("2T", "3T"),
             takes=("limits",),
             one_of=_DEPTHS,
         ),
@@ -151,7 +151,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("lower_envelope",),
             motionless=_OF_INSTANTS,
             families=("transition",),
-            freedoms=(2, 3),
+            patterns=("2T", "3T"),
             needs=("axes.tau",),
             takes=("axes.cable", "limits"),
             one_of=_DEPTHS,
@@ -165,7 +165,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
-            freedoms=(6,),
+            patterns=("3R3T",),
             start="pose",
             needs=("axes.z0",),
             takes=(
@@ -182,7 +182,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
-            freedoms=(6,),
+            patterns=("3R3T",),
             takes=("axes.z0", "orientations", "orientations.values", "limits"),
             definitions=("grid",),
             is_over_orientations=True,
@@ -197,7 +197,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("accessible_volume",),
             motionless=_OF_PLACES,
             families=_OF_PLATFORMS,
-            freedoms=(6,),
+            patterns=("3R3T",),
             takes=("orientations",),
             cells=64,  # a cell takes long
         ),
@@ -211,7 +211,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("attainable_fraction", "accessible_volume"),
             motionless=_OF_PLACES,
             families=_OF_PLATFORMS,
-            freedoms=(6,),
+            patterns=("3R3T",),
             takes=("axes.z0", "orientations", "orientations.values", "limits"),
             cells=16,
         ),
@@ -225,7 +225,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("acceleration_margin",),
             motionless=_OF_ACCELERATIONS,
             families=(),
-            freedoms=(2, 3),
+            patterns=("2T", "3T"),
             takes=("limits",),
         ),
         MapKind(
@@ -237,7 +237,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_OF_LINES,
             pictured=("duration",),
             families=("s-curve",),
-            freedoms=(2, 3),
+            patterns=("2T", "3T"),
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.max_acceleration", "limits"),
         ),
@@ -250,7 +250,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_OF_LAUNCHES,
             pictured=("release_speed",),
             families=("bezier",),
-            freedoms=(2, 3),
+            patterns=("2T", "3T"),
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "launch", "limits"),
             cells=1024,  # a cell takes long

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cspr_jax.config.limits import LARGEST_LENGTH, MOST_CABLES
 from cspr_jax.config.reading import checked
-from cspr_jax.config.robot import LARGEST_LENGTH, MOST_CABLES, RobotFile
+from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, StoreError, one_line, shown
 from cspr_jax.schema import labelled

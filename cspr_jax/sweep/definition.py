@@ -107,7 +107,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     robot = resolve_robot(keys.robot, path, path.parent)
     kind = MAP_KINDS[keys.map]
     check_map(kind, keys, path)
-    robot = as_moved(robot, [kind.freedoms]) if kind.freedoms else robot
+    robot = as_moved(robot, [kind.patterns]) if kind.patterns else robot
     own = _orientation_axes(keys) if kind.is_over_orientations else {}
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
     counts |= {name: len(points) for name, points in own.items()}

@@ -121,7 +121,7 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         apex=np.asarray(faces.apex)[0] * upward,
         falling=np.array([0.0, 0.0, -gravity_of(spec, keys)]),
         motion=motion * upward,
-        is_planar=spec.planar,
+        is_planar=spec.is_planar,
     )
 
 

@@ -30,6 +30,11 @@ class Pattern:
         return len(self.forces) + len(self.moments) + 2 * self.along_line
 
     @property
+    def is_planar(self) -> bool:
+        """Whether all lies in the plane y = 0."""
+        return self.forces == (0, 2)
+
+    @property
     def is_body(self) -> bool:
         """Whether the effector is a body that turns, and not a point."""
         return bool(self.moments) or self.along_line
@@ -39,11 +44,11 @@ PATTERNS: dict[str, Pattern] = {
     row.name: row
     for row in (
         Pattern("1T", "a point mass on a vertical guide", (2,)),
-        Pattern("2T", "a planar point mass (planar = true)", (0, 2)),
+        Pattern("2T", "planar = true", (0, 2)),
         Pattern("3T", "a point mass", (0, 1, 2)),
         Pattern("1R2T", "a planar platform", (0, 2), (1,)),
         Pattern("2R3T", "a rod, its cables attached along a line", (0, 1, 2), along_line=True),
-        Pattern("3R3T", "a rigid platform", (0, 1, 2), (0, 1, 2)),
+        Pattern("3R3T", "a rigid platform, with platform_points and inertia", (0, 1, 2), (0, 1, 2)),
         Pattern("3R", "a platform on a spherical joint", (), (0, 1, 2), is_jointed=True),
     )
 }

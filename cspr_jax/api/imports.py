@@ -1,0 +1,85 @@
+"""Robots of other programs from Python: read, and written as robot files."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from cspr_jax.config.formats.table import ENDINGS, Imported, format_of
+from cspr_jax.config.formats.writing import robot_text
+from cspr_jax.config.robot import RobotFile, read_foreign
+from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.errors import ConfigError
+from cspr_jax.problem import build_robot
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.publishing import publish
+
+
+@dataclasses.dataclass(frozen=True)
+class ImportedRobot:
+    """Robot that was read from a file of another program.
+
+    Fields:
+        robot: for all functions that take one.
+        keys: of its robot file, plain values.
+        warnings: what was left out, one line each.
+    """
+
+    robot: PointMassRobot | PlatformRobot
+    keys: dict[str, Any]
+    warnings: tuple[str, ...]
+    _imported: Imported
+
+    def to_toml(self) -> str:
+        """The robot file.
+
+        Returns:
+            its text.
+        """
+        return robot_text(self.keys, self._imported.cable_names)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the robot file.
+
+        Args:
+            path: its name, which ends in .toml; a file of that name is replaced.
+
+        Returns:
+            the path.
+
+        Raises:
+            ConfigError: another ending.
+            StoreError: the disk or the folder refuses.
+        """
+        target = Path(path)
+        if target.suffix != ".toml":
+            raise ConfigError("-o", f"{target}: must end in .toml")
+        publish(Disk(), target, self.to_toml().encode("utf-8"))
+        return target
+
+
+def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobot:
+    """A robot of CASPR (NAME_cables.xml beside NAME_bodies.xml), cdpyr (.json, .yaml) or WireX (.wcrfx).
+
+    Args:
+        path: the file, of CASPR either of both; at most 1 MB.
+        cable_set: of CASPR, which set of cables; None: the file's default.
+
+    Returns:
+        the robot, z up.
+
+    Raises:
+        ConfigError: no such file or set, a mistake in it, or what no robot file can say, such as several links.
+    """
+    file = Path(path)
+    if format_of(file.name) is None:
+        raise ConfigError(file, f"must end in {', '.join(ENDINGS)}")
+    if not file.is_file():
+        raise ConfigError(file, "no such file")
+    spec, found = read_foreign(file, cable_set)
+    return ImportedRobot(_built(spec, file), found.keys, found.warnings, found)
+
+
+def _built(spec: RobotFile, file: Path) -> PointMassRobot | PlatformRobot:
+    return build_robot(spec, TrajectoryKeys(), file)

@@ -1,0 +1,1 @@
+"""Robot files of other programs, read as robot files of this one."""

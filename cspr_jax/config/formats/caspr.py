@@ -1,0 +1,194 @@
+"""Models of CASPR: NAME_bodies.xml and NAME_cables.xml, metres, newtons, z up.
+
+Points are in the frame of their link. A link's mass centre lies at com_location from its joint; points of cables whose
+attachment_reference is "com" count from there. Off-diagonals of an inertia tensor are its entries, not minus them.
+"""
+
+import dataclasses
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from cspr_jax.config.formats import model
+from cspr_jax.config.formats.model import Body, Cable
+from cspr_jax.config.formats.xml_text import child, number, read_xml, text_of, vector
+from cspr_jax.config.suggestions import did_you_mean
+from cspr_jax.config.wording import either
+from cspr_jax.errors import ConfigError, shown
+
+
+@dataclasses.dataclass(frozen=True)
+class _Joint:
+    pattern: str
+    axes: np.ndarray = dataclasses.field(default_factory=lambda: model.SAME)
+    is_level: bool = False
+
+
+_JOINTS = {
+    "SPATIAL_EULER_XYZ": _Joint("3R3T"),
+    "S_EULER_XYZ": _Joint("3R"),
+    "S_FIXED_XYZ": _Joint("3R"),
+    "T_XYZ": _Joint("3T"),
+    "PLANAR_XZ": _Joint("1R2T"),
+    "PLANAR_YZ": _Joint("1R2T", model.OF_YZ),
+    "PLANAR_XY": _Joint("1R2T", model.OF_XY, is_level=True),
+    "P_XZ": _Joint("2T"),
+    "P_YZ": _Joint("2T", model.OF_YZ),
+    "P_XY": _Joint("2T", model.OF_XY, is_level=True),
+}
+_ENDINGS = ("_bodies.xml", "_cables.xml")
+_RIGID = "cable_ideal"
+_CABLES = "cable_"  # all kinds begin so
+_PULLEY = "base_rotating_pulley"
+
+
+def read(path: Path, cable_set: str | None) -> Body:
+    """A model.
+
+    Args:
+        path: of its bodies or its cables; the other file lies beside it.
+        cable_set: name of a set of cables; None: that of the file's default_cable_set.
+
+    Returns:
+        the body.
+
+    Raises:
+        ConfigError: no such set, no other file, several links, or what no robot file can say.
+    """
+    bodies, cables = _both(path)
+    joint, body = _body(bodies)
+    place, base_shift = body.centre, _joint_place(bodies, joint)
+    chosen = _cable_set(cables, cable_set)
+    tags = [element for element in chosen if isinstance(element.tag, str)]
+    body.cables = [_cable(element, k, cables, place, base_shift) for k, element in enumerate(tags)]
+    body.file = cables
+    elastic = sorted({element.tag for element in tags} - {_RIGID})
+    if elastic:
+        body.warnings.append(f"cables are taken as rigid: {', '.join(elastic)}")
+    name = path.name[: -len(_ENDINGS[0])]
+    body.name = name
+    body.source = f'CASPR model {name}, cable set "{chosen.get("id", "")}"'
+    return body
+
+
+def _both(path: Path) -> tuple[Path, Path]:
+    ending = next((ending for ending in _ENDINGS if path.name.endswith(ending)), None)
+    if ending is None or path.name == ending:
+        raise ConfigError(path, f"must be named NAME{_ENDINGS[0]} or NAME{_ENDINGS[1]}, as models of CASPR are")
+    stem = path.name.removesuffix(ending)
+    files = path.with_name(stem + _ENDINGS[0]), path.with_name(stem + _ENDINGS[1])
+    for file in files:
+        if not file.is_file():
+            raise ConfigError(path, f"no such file beside it: {file.name}")
+    return files
+
+
+def _root(file: Path, tag: str) -> Element:
+    root = read_xml(file)
+    if root.tag != tag:
+        raise ConfigError(file, f"<{root.tag}>: must be <{tag}>, a file of CASPR")
+    return root
+
+
+def _link(file: Path) -> Element:
+    links = child(_root(file, "bodies_system"), "links", file)
+    found = [element for element in links if isinstance(element.tag, str)]
+    if len(found) != 1:
+        raise ConfigError(file, f"links: {len(found)} links: must be one, which the cables move")
+    if found[0].tag != "link_rigid":
+        raise ConfigError(file, f"<{found[0].tag}>: must be <link_rigid>")
+    return found[0]
+
+
+def _joint_of(link: Element, file: Path) -> _Joint:
+    kind = child(link, "joint", file).get("type", "")
+    if kind not in _JOINTS:
+        raise ConfigError(file, f"joint.type = {shown(kind)}: must be {either(_JOINTS)}")
+    return _JOINTS[kind]
+
+
+def _body(file: Path) -> tuple[_Joint, Body]:
+    link = _link(file)
+    joint, physical = _joint_of(link, file), child(link, "physical", file)
+    mass = number(text_of(child(physical, "mass", file)), file, "physical.mass")
+    if mass < 0.0:
+        raise ConfigError(file, f"physical.mass = {mass:g}: must be a number >= 0")
+    centre = vector(child(physical, "com_location", file), file, "physical")
+    inertia = child(physical, "inertia", file)
+    parts = {axes: number(text_of(child(inertia, f"I{axes}", file)), file, f"inertia.I{axes}") for axes in _PARTS}
+    tensor = np.array([[parts["".join(sorted(a + b))] for b in "xyz"] for a in "xyz"])
+    reference = inertia.get("ref", "")
+    if reference not in ("com", "joint"):
+        raise ConfigError(file, f'inertia.ref = {shown(reference)}: must be "com" or "joint"')
+    if reference == "joint":
+        tensor = model.about_centre(tensor, mass, centre)
+    given = tensor if tensor.any() else None
+    body = Body(file, "", joint.pattern, [], "", mass or None, centre, given, joint.axes, joint.is_level)
+    return joint, body
+
+
+_PARTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+
+def _joint_place(file: Path, joint: _Joint) -> list[float]:
+    # Base points count from a joint that does not move; of planar robots the plane is that of the joint.
+    parent = child(_link(file), "parent", file)
+    if text_of(child(parent, "num", file)) != "0":
+        raise ConfigError(file, "parent.num: must be 0, the base")
+    place = np.array(vector(child(parent, "location", file), file, "parent"))
+    if joint.pattern == "3R":
+        return place.tolist()
+    normal = joint.axes[1] if joint.pattern in ("1R2T", "2T") else np.zeros(3)
+    return (normal * float(normal @ place)).tolist()
+
+
+def _cable_set(file: Path, wanted: str | None) -> Element:
+    root = _root(file, "cables")
+    sets = {element.get("id", ""): element for element in root.findall("cable_set")}
+    name = root.get("default_cable_set", "") if wanted is None else wanted
+    if name not in sets:
+        key = "default_cable_set" if wanted is None else "--set"
+        known = either(sets) if sets else "absent: the file has no cable_set"
+        raise ConfigError(file, f"{key} = {shown(name)}: {did_you_mean(name, list(sets))}must be {known}")
+    return sets[name]
+
+
+def _cable(element: Element, k: int, file: Path, centre: list[float], shift: list[float]) -> Cable:
+    name = element.get("name", "")
+    place = f"cable {k + 1}" + f' ("{name[:40]}")' * bool(name)
+    if not str(element.tag).startswith(_CABLES):
+        raise ConfigError(file, f"{place}: <{element.tag}>: must be a cable, such as <{_RIGID}>")
+    reference = element.get("attachment_reference", "")
+    if reference not in ("com", "joint"):
+        raise ConfigError(file, f'{place}.attachment_reference = {shown(reference)}: must be "com" or "joint"')
+    base, end = _ends(child(element, "attachments", file, place), file, place)
+    point = np.array(vector(child(end, "location", file, place), file, place))
+    cable = Cable([], (point + (centre if reference == "com" else 0.0)).tolist(), name)
+    if base.tag == _PULLEY:
+        start = vector(child(base, "fixed_location", file, place), file, place)
+        cable.radius = number(text_of(child(base, "pulley_radius", file, place)), file, f"{place}.pulley_radius")
+        cable.axis = vector(child(base, "cable_entry_vector", file, place), file, place)
+    else:
+        start = vector(child(base, "location", file, place), file, place)
+    cable.base = (np.array(start) - shift).tolist()
+    limits = child(element, "properties", file, place)
+    for key, limit in (("tension_min", "force_min"), ("tension_max", "force_max")):
+        found = limits.find(limit)
+        if found is not None:
+            setattr(cable, key, number(text_of(found), file, f"{place}.{limit}", infinite=key == "tension_max"))
+    return cable
+
+
+def _ends(attachments: Element, file: Path, place: str) -> tuple[Element, Element]:
+    # That on the base, which may be a pulley, and that on the body.
+    found = [element for element in attachments if isinstance(element.tag, str)]
+    wanted = f"one attachment on link 0, or a <{_PULLEY}>, and one on link 1"
+    links = []
+    for element in found:
+        if element.tag not in ("attachment", _PULLEY):
+            raise ConfigError(file, f"{place}: <{element.tag}>: must be {wanted}")
+        links.append("0" if element.tag == _PULLEY else text_of(child(element, "link", file, place)))
+    if sorted(links) != ["0", "1"]:
+        raise ConfigError(file, f"{place}: attachments on links {', '.join(links) or 'none'}: must be {wanted}"[:300])
+    return found[links.index("0")], found[links.index("1")]

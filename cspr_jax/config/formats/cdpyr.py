@@ -1,0 +1,212 @@
+"""Robots of cdpyr: JSON or YAML, metres, kilogrammes, newtons, z up; in a plane x and y, with y up; on a line x.
+
+Chains say which frame anchor goes to which platform anchor; numbers count from 0. Inertia is about the origin of the
+platform. A pulley swivels about the z axis of its anchor, and the cable enters along it.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.config.formats import model
+from cspr_jax.config.formats.model import Body, Cable
+from cspr_jax.config.reading import read_text
+from cspr_jax.config.wording import either
+from cspr_jax.errors import ConfigError, shown
+
+# By numbers of rotations and translations.
+PATTERNS = {(0, 1): "1T", (0, 2): "2T", (0, 3): "3T", (1, 2): "1R2T", (2, 3): "2R3T", (3, 3): "3R3T"}
+AXES = {"1T": model.OF_X, "2T": model.OF_XY, "1R2T": model.OF_XY}
+MOST_CABLES = 1000
+LARGEST = 1_000_000  # values of a file
+
+
+def read_json(path: Path, cable_set: str | None) -> Body:
+    """A robot of a JSON file.
+
+    Args:
+        path: the file.
+        cable_set: must be None: such files have no sets.
+
+    Returns:
+        the body.
+
+    Raises:
+        ConfigError: no JSON, several platforms, or what no robot file can say.
+    """
+    return _read(path, cable_set, json.loads, "JSON")
+
+
+def read_yaml(path: Path, cable_set: str | None) -> Body:
+    """A robot of a YAML file.
+
+    Args:
+        path: the file.
+        cable_set: must be None: such files have no sets.
+
+    Returns:
+        the body.
+
+    Raises:
+        ConfigError: no YAML, references in it that grow, several platforms, or what no robot file can say.
+    """
+    return _read(path, cable_set, _yaml, "YAML")
+
+
+def _yaml(text: str) -> Any:
+    import yaml
+
+    try:
+        data = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ValueError(" ".join(str(error).split())[:200]) from error
+    if not _size(data, {}) <= LARGEST:
+        raise ValueError(f"its references (*name) stand for more than {LARGEST} values, or for themselves")
+    return data
+
+
+def _size(data: Any, known: dict[int, float]) -> float:
+    # Number of values with references written out; infinite where one holds itself.
+    if not isinstance(data, dict | list):
+        return 1.0
+    if id(data) not in known:
+        known[id(data)] = math.inf
+        values = data.values() if isinstance(data, dict) else data
+        known[id(data)] = 1.0 + sum(_size(value, known) for value in values)
+    return known[id(data)]
+
+
+def _read(path: Path, cable_set: str | None, parse: Callable[[str], Any], kind: str) -> Body:
+    if cable_set is not None:
+        raise ConfigError(path, f"--set = {shown(cable_set)}: must be absent: only models of CASPR have cable sets")
+    text = read_text(path)
+    try:
+        data = parse(text)
+    except RecursionError as error:
+        raise ConfigError(path, f"is not {kind} that is read here: nested too deeply") from error
+    except Exception as error:
+        raise ConfigError(path, f"is not {kind}: {error}") from error
+    data = data["robot"] if isinstance(data, dict) and set(data) == {"robot"} else data
+    return _body(_Table(data, "the file", path), path)
+
+
+class _Table:
+    """Part of the file, by its keys."""
+
+    def __init__(self, data: Any, place: str, file: Path) -> None:
+        if not isinstance(data, dict):
+            raise ConfigError(file, f"{place} = {shown(data)}: must be a table")
+        self.data, self.file, self.place = data, file, "" if place == "the file" else f"{place}."
+
+    def has(self, key: str) -> bool:
+        return self.data.get(key) is not None
+
+    def table(self, key: str) -> "_Table":
+        return _Table(self._given(key), self.place + key, self.file)
+
+    def tables(self, key: str) -> list["_Table"]:
+        found = self._given(key)
+        if not isinstance(found, list) or not 1 <= len(found) <= MOST_CABLES:
+            raise ConfigError(self.file, f"{self.place}{key}: must be a list of 1 to {MOST_CABLES} tables")
+        return [_Table(one, f"{self.place}{key}[{k}]", self.file) for k, one in enumerate(found)]
+
+    def numbers(self, key: str, *shape: int, missing: Any = None) -> np.ndarray | None:
+        """Finite numbers of a shape; None where the key is absent, or what is missing is infinite."""
+        if not self.has(key):
+            return None if missing is None else np.asarray(missing, float)
+        try:
+            found = np.array(self.data[key], float)
+        except (ValueError, TypeError, OverflowError):
+            found = np.full(1, np.nan)
+        if found.shape == shape and np.isposinf(np.abs(found)).any():
+            return None
+        if found.shape != shape or not np.isfinite(found).all():
+            words = f"{' x '.join(map(str, shape))} finite numbers" if shape else "a finite number"
+            raise ConfigError(self.file, f"{self.place}{key} = {shown(self.data[key])}: must be {words}")
+        return found
+
+    def index(self, key: str, count: int, missing: int | None = None) -> int:
+        found = self.data.get(key, missing)
+        if isinstance(found, bool) or not isinstance(found, int) or not 0 <= found < count:
+            raise ConfigError(self.file, f"{self.place}{key} = {shown(found)}: must be a number from 0 to {count - 1}")
+        return found
+
+    def _given(self, key: str) -> Any:
+        if not self.has(key):
+            raise ConfigError(self.file, f"{self.place}{key} is missing: a robot of cdpyr has it")
+        return self.data[key]
+
+
+def _body(robot: _Table, path: Path) -> Body:
+    platforms = robot.tables("platforms")
+    if len(platforms) != 1:
+        raise ConfigError(path, f"platforms: {len(platforms)} platforms: must be one")
+    platform = platforms[0]
+    pattern = _pattern(platform)
+    body = Body(path, _name(robot, path), pattern, _cables(robot, platform), f"cdpyr robot {path.name}")
+    body.axes = AXES.get(pattern, model.SAME)
+    centre = platform.numbers("center_of_gravity", 3, missing=[0.0, 0.0, 0.0])
+    body.centre = [0.0, 0.0, 0.0] if centre is None else centre.tolist()
+    if platform.has("inertia"):
+        inertia = platform.table("inertia")
+        linear, angular = inertia.numbers("linear", 3, 3), inertia.numbers("angular", 3, 3)
+        body.mass = None if linear is None else float(linear[0, 0])
+        if angular is not None and angular.any():
+            body.inertia = model.about_centre(angular, body.mass or 0.0, body.centre)
+    _thickness(robot, body)
+    return body
+
+
+def _name(robot: _Table, path: Path) -> str:
+    name = robot.data.get("name")
+    return name if isinstance(name, str) and name else path.stem
+
+
+def _pattern(platform: _Table) -> str:
+    given = platform.data.get("motion_pattern")
+    if isinstance(given, dict):
+        counts = given.get("rotation") or 0, given.get("translation") or 0
+        given = PATTERNS.get(counts, given) if all(isinstance(count, int) for count in counts) else given
+    if not isinstance(given, str) or given not in PATTERNS.values():
+        key = f"{platform.place}motion_pattern"
+        raise ConfigError(platform.file, f"{key} = {shown(given)}: must be {either(PATTERNS.values())}")
+    return given
+
+
+def _cables(robot: _Table, platform: _Table) -> list[Cable]:
+    starts, ends = robot.table("frame").tables("anchors"), platform.tables("anchors")
+    cables = []
+    for chain in robot.tables("kinematic_chains"):
+        chain.index("platform", 1, 0)
+        start, end = starts[chain.index("frame_anchor", len(starts))], ends[chain.index("platform_anchor", len(ends))]
+        points = [anchor.numbers("position", 3, missing=[0.0, 0.0, 0.0]) for anchor in (start, end)]
+        for anchor, point in zip((start, end), points, strict=True):
+            if point is None:
+                raise ConfigError(robot.file, f"{anchor.place}position: must be 3 finite numbers")
+        cable = Cable(*(point.tolist() for point in points if point is not None))
+        if start.has("pulley"):
+            pulley = start.table("pulley")
+            radius = pulley.numbers("radius")
+            cable.radius = 0.0 if radius is None else float(radius)
+            cable.axis = (_turn(start) @ _turn(pulley))[:, 2].tolist()
+        cables.append(cable)
+    return cables
+
+
+def _turn(anchor: _Table) -> np.ndarray:
+    found = anchor.numbers("dcm", 3, 3)
+    return np.eye(3) if found is None else found
+
+
+def _thickness(robot: _Table, body: Body) -> None:
+    if not robot.has("cables"):
+        return
+    sizes = [cable.numbers("diameter") for cable in robot.tables("cables")]
+    known = [float(size) for size in sizes if size is not None]
+    body.cable_diameter = max(known, default=None)
+    if len(set(known)) > 1:
+        body.warnings.append(f"cables of several diameters: the largest, {max(known):g} m, stands for all")

@@ -1,0 +1,215 @@
+"""What all formats read: one body on cables; and the keys of a robot file that it becomes."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.errors import ConfigError
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.spool_plane import SMALLEST_AREA_RATIO
+
+# Rows: x, y and z of a robot file in the axes of another, for each plane, or line, of motion there.
+SAME = np.eye(3)
+OF_XY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+OF_YZ = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+OF_X = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+NO_GRAVITY = 1e-9  # m/s^2; of robots that move in a level plane
+# Part of the size that a planar robot may miss its plane.
+OUT_OF_PLANE = 1e-9
+LARGEST = 1e9  # N; tensions beyond stand for none
+DIGITS = 15  # of numbers that are sums
+
+
+@dataclasses.dataclass
+class Cable:
+    """A cable.
+
+    Fields:
+        base: (3,) where it leaves its spool, or enters its pulley, m.
+        platform: (3,) where it is attached, from the origin of the platform frame, m.
+        name: in the file; empty: none.
+        tension_min: N.
+        tension_max: N; infinite: none.
+        radius: of its pulley, m; 0: none.
+        axis: (3,) about which that swivels, in the direction in which the cable enters.
+    """
+
+    base: list[float]
+    platform: list[float]
+    name: str = ""
+    tension_min: float | None = None
+    tension_max: float = math.inf
+    radius: float = 0.0
+    axis: list[float] = dataclasses.field(default_factory=lambda: [0.0, 0.0, 1.0])
+
+
+@dataclasses.dataclass
+class Body:
+    """A robot of one body, z up, in the axes of its file.
+
+    Fields:
+        file: that it was read from, named in errors.
+        name: of the robot.
+        pattern: of its motion, a row of `robots.patterns`.
+        cables: in their order.
+        source: where the numbers come from.
+        mass: kg; None: missing.
+        centre: (3,) mass centre from the origin of the platform frame, m.
+        inertia: (3, 3) about it, platform axes, kg m^2; None: missing.
+        axes: (3, 3) rows x, y and z of a robot file in these axes.
+        is_level: whether its plane is level, so that it feels no gravity.
+        cable_diameter: m.
+        warnings: what was left out.
+    """
+
+    file: object
+    name: str
+    pattern: str
+    cables: list[Cable]
+    source: str
+    mass: float | None = None
+    centre: list[float] = dataclasses.field(default_factory=lambda: [0.0, 0.0, 0.0])
+    inertia: np.ndarray | None = None
+    axes: np.ndarray = dataclasses.field(default_factory=lambda: SAME)
+    is_level: bool = False
+    cable_diameter: float | None = None
+    warnings: list[str] = dataclasses.field(default_factory=list)
+
+
+def about_centre(tensor: np.ndarray, mass: float, centre: list[float]) -> np.ndarray:
+    """Inertia about the mass centre of one about the origin of the platform frame, by Steiner's theorem.
+
+    Args:
+        tensor: (3, 3) about the origin, kg m^2.
+        mass: kg.
+        centre: (3,) m.
+
+    Returns:
+        (3, 3) kg m^2.
+    """
+    arm = np.asarray(centre)
+    return tensor - mass * (float(arm @ arm) * np.eye(3) - np.outer(arm, arm))
+
+
+def robot_keys(body: Body) -> dict[str, Any]:
+    """Keys of the robot file that a body becomes.
+
+    Args:
+        body: the body.
+
+    Returns:
+        plain values, as TOML would give them.
+
+    Raises:
+        ConfigError: no cables, or one out of the plane of a planar robot.
+    """
+    if not body.cables:
+        raise ConfigError(body.file, "no cables: must be one or more")
+    base = np.array([cable.base for cable in body.cables]) @ body.axes.T
+    platform = np.array([cable.platform for cable in body.cables]) @ body.axes.T
+    swivels = np.array([cable.axis for cable in body.cables]) @ body.axes.T
+    pattern = _own_pattern(body, platform)
+    row = PATTERNS[pattern]
+    if row.is_planar:
+        _check_plane(body, base, platform)
+        base[:, 1] = platform[:, 1] = 0.0
+        swivels = _in_plane(body, swivels)
+    if not row.is_body:  # it does not turn: forces alone count
+        base, platform = base - platform, np.zeros_like(platform)
+    notes: list[str] = []
+    keys: dict[str, Any] = {"name": body.name, "pattern": pattern, "z_axis": "up", "base_points": _rounded(base)}
+    if row.is_body:
+        keys["platform_points"] = _rounded(platform)
+    keys["mass"] = body.mass if body.mass else 1.0
+    if not body.mass:
+        notes.append("placeholder mass of 1 kg")
+    if row.is_body:
+        keys |= _inertia(body, platform, keys["mass"], notes, is_planar=row.is_planar)
+    if body.is_level:
+        keys["gravity"] = NO_GRAVITY
+    keys |= _of_cables(body, swivels)
+    # A source that begins so is shown as a placeholder.
+    keys["source"] = "; ".join([*notes, body.source])
+    return keys
+
+
+def _own_pattern(body: Body, platform: np.ndarray) -> str:
+    # Cables that are attached on one line, or at one point, with the mass centre, leave a body in space free to turn.
+    if body.pattern != "3R3T":
+        return body.pattern
+    offsets = platform - body.axes @ np.asarray(body.centre)
+    sizes = np.append(np.linalg.svd(offsets, compute_uv=False), [0.0, 0.0])
+    if sizes[0] == 0.0:
+        body.warnings.append('all cables are attached at its mass centre: pattern = "3T", a point mass')
+        return "3T"
+    if sizes[1] <= SMALLEST_AREA_RATIO * sizes[0] and np.ptp(platform, axis=0).any():
+        body.warnings.append('all cables are attached on one line: pattern = "2R3T", a rod')
+        return "2R3T"
+    return body.pattern
+
+
+def _check_plane(body: Body, base: np.ndarray, platform: np.ndarray) -> None:
+    room = OUT_OF_PLANE * float(np.ptp(base, axis=0).max())
+    for k, cable in enumerate(body.cables):
+        if abs(base[k, 1] - platform[k, 1]) > room:
+            words = f"cable {k + 1}" + f' ("{cable.name[:40]}")' * bool(cable.name)
+            raise ConfigError(body.file, f"{words} leaves the plane of a planar robot: must lie in it")
+
+
+def _in_plane(body: Body, swivels: np.ndarray) -> np.ndarray:
+    # A pulley that swivels about another axis would take its cable out of the plane.
+    for cable, axis in zip(body.cables, swivels, strict=True):
+        if cable.radius > 0.0 and abs(axis[1]) > OUT_OF_PLANE:
+            cable.radius = 0.0
+            body.warnings.append("pulleys that swivel out of its plane are left out")
+    body.warnings[:] = dict.fromkeys(body.warnings)
+    return swivels * np.array([1.0, 0.0, 1.0])
+
+
+def _inertia(body: Body, platform: np.ndarray, mass: float, notes: list[str], *, is_planar: bool) -> dict[str, Any]:
+    centre = body.axes @ np.asarray(body.centre)
+    if is_planar:
+        centre[1] = 0.0
+    tensor = None if body.inertia is None else body.axes @ np.asarray(body.inertia) @ body.axes.T
+    if tensor is None or not _is_real(tensor, is_planar=is_planar):
+        if tensor is not None:
+            body.warnings.append("its inertia tensor is that of no real body: a placeholder stands for it")
+        radius = float(np.linalg.norm(platform - centre, axis=1).max()) or 1.0
+        tensor = 0.4 * mass * radius**2 * np.eye(3)
+        notes.append("placeholder inertia of a uniform sphere of the platform's size")
+    return {"inertia": _rounded(tensor), "centre_of_mass": _rounded(centre)}
+
+
+def _is_real(tensor: np.ndarray, *, is_planar: bool) -> bool:
+    if is_planar:
+        return bool(tensor[1, 1] > 0.0)
+    low, middle, high = np.linalg.eigvalsh(tensor)
+    return bool(low > 0.0 and high <= (low + middle) * (1.0 + 1e-9))
+
+
+def _of_cables(body: Body, swivels: np.ndarray) -> dict[str, Any]:
+    cables, keys = body.cables, dict[str, Any]()
+    least = [cable.tension_min for cable in cables]
+    if any(low is not None for low in least):
+        keys["tension_min"] = _one([low or 0.0 for low in least])
+    most = [cable.tension_max if cable.tension_max <= LARGEST else math.inf for cable in cables]
+    if any(math.isfinite(high) for high in most):
+        keys["tension_max"] = _one(most)
+    if body.cable_diameter:
+        keys["cable_diameter"] = body.cable_diameter
+    if any(cable.radius > 0.0 for cable in cables):
+        keys["pulley_radius"] = _one([cable.radius for cable in cables])
+        axes = _rounded(swivels)
+        keys["pulley_axes"] = axes[0] if all(axis == axes[0] for axis in axes) else axes
+    return keys
+
+
+def _one(values: list[float]) -> Any:
+    return values[0] if len(set(values)) == 1 else values
+
+
+def _rounded(values: np.ndarray) -> Any:
+    # Of sums and turned axes: without the last digit, and without a negative zero.
+    return [_rounded(row) for row in values] if values.ndim > 1 else [float(f"{x:.{DIGITS}g}") + 0.0 for x in values]

@@ -1,0 +1,107 @@
+"""Table of formats: one row each. A new format is a file beside this one, and a row."""
+
+import dataclasses
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from cspr_jax.config.formats.model import Body, robot_keys
+
+
+@dataclasses.dataclass(frozen=True)
+class Format:
+    """Format of robot files of another program.
+
+    Fields:
+        name: of the program.
+        endings: of its files' names.
+        description: for people.
+        reader: "module:function", called with the path and the name of a set of cables, or None.
+    """
+
+    name: str
+    endings: tuple[str, ...]
+    description: str
+    reader: str
+
+    def load(self) -> Callable[[Path, str | None], Body]:
+        """The function that reads a file, imported now.
+
+        Returns:
+            the function.
+        """
+        module, _, name = self.reader.partition(":")
+        return getattr(importlib.import_module(module), name)
+
+
+_HERE = "cspr_jax.config.formats."
+FORMATS = (
+    Format("CASPR", (".xml",), "NAME_bodies.xml and NAME_cables.xml, side by side", _HERE + "caspr:read"),
+    Format("cdpyr", (".json",), "a robot as JSON", _HERE + "cdpyr:read_json"),
+    Format("cdpyr", (".yaml", ".yml"), "a robot as YAML", _HERE + "cdpyr:read_yaml"),
+    Format("WireX", (".wcrfx",), "a robot of version 0.31", _HERE + "wirex:read"),
+)
+ENDINGS = tuple(ending for row in FORMATS for ending in row.endings)
+
+
+@dataclasses.dataclass(frozen=True)
+class Imported:
+    """Robot that was read from a file of another program.
+
+    Fields:
+        keys: of its robot file.
+        cable_names: in the other file.
+        warnings: what was left out, one line each.
+    """
+
+    keys: dict[str, Any]
+    cable_names: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def format_of(name: str) -> Format | None:
+    """The format of a file.
+
+    Args:
+        name: of the file.
+
+    Returns:
+        its row; None if another program does not write such files.
+    """
+    return next((row for row in FORMATS if name.lower().endswith(row.endings)), None)
+
+
+def parted(reference: str) -> tuple[str, str | None]:
+    """File and set of cables that a reference such as "robot_cables.xml#set" names.
+
+    Args:
+        reference: the text.
+
+    Returns:
+        the name of the file, and that of the set; None: not said.
+    """
+    name, mark, cable_set = reference.partition("#")
+    return (name, cable_set) if mark and format_of(name) else (reference, None)
+
+
+def read(path: Path, cable_set: str | None = None) -> Imported:
+    """A robot of another program.
+
+    Args:
+        path: with an ending of `ENDINGS`.
+        cable_set: which set of cables, where the file has several; None: its default.
+
+    Returns:
+        the robot.
+
+    Raises:
+        ConfigError: a mistake in the file, or what no robot file can say.
+        KeyError: another ending.
+    """
+    row = format_of(path.name)
+    if row is None:
+        raise KeyError(path.name)
+    body = row.load()(path, cable_set)
+    keys = robot_keys(body)
+    return Imported(keys, tuple(cable.name for cable in body.cables), tuple(body.warnings))

@@ -1,0 +1,86 @@
+"""Robots of WireX: XML named .wcrfx, metres, kilogrammes, z up; numbers of platforms and cables count from 1.
+
+A pulley swivels about the z axis of its base point, and the cable enters along it. Inertia is about the mass centre.
+"""
+
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from cspr_jax.config.formats import cdpyr
+from cspr_jax.config.formats.model import SAME as UPRIGHT
+from cspr_jax.config.formats.model import Body, Cable
+from cspr_jax.config.formats.xml_text import child, number, read_xml
+from cspr_jax.config.wording import either
+from cspr_jax.errors import ConfigError, shown
+
+
+def read(path: Path, cable_set: str | None) -> Body:
+    """A robot.
+
+    Args:
+        path: the file.
+        cable_set: must be None: such files have no sets.
+
+    Returns:
+        the body.
+
+    Raises:
+        ConfigError: no such XML, several platforms, or what no robot file can say.
+    """
+    if cable_set is not None:
+        raise ConfigError(path, f"--set = {shown(cable_set)}: must be absent: only models of CASPR have cable sets")
+    root = read_xml(path)
+    if root.tag != "models":
+        raise ConfigError(path, f"<{root.tag}>: must be <models>, a file of WireX")
+    robot = child(root, "robot", path)
+    chains = child(robot, "geometry", path).findall("chain")
+    used = {chain.get("platform_id", "1") for chain in chains}
+    if not chains or len(used) != 1:
+        raise ConfigError(path, f"geometry: {len(chains)} chains to {len(used)} platforms: must be one platform")
+    platforms = robot.findall("platform")
+    number_of = used.pop()
+    platform = next((one for one in platforms if one.get("id") == number_of), platforms[0] if platforms else None)
+    given = (None if platform is None else platform.get("motionpattern")) or robot.get("motionpattern") or ""
+    if given not in cdpyr.PATTERNS.values():
+        raise ConfigError(path, f"motionpattern = {shown(given)}: must be {either(cdpyr.PATTERNS.values())}")
+    cables = [_cable(chain, k, path) for k, chain in enumerate(chains)]
+    body = Body(path, robot.get("name") or path.stem, given, cables, f"WireX robot {path.name}")
+    body.axes = cdpyr.AXES.get(given, UPRIGHT)
+    if platform is not None:
+        _weigh(platform, body, path)
+    sizes = [_of(cable, "radius", path, "cable") for cable in root.findall("cable")]
+    body.cable_diameter = 2.0 * max(sizes, default=0.0) or None
+    if len(set(sizes)) > 1:
+        body.warnings.append(f"cables of several diameters: the largest, {body.cable_diameter:g} m, stands for all")
+    return body
+
+
+def _of(element: Element, key: str, file: Path, place: str, missing: float = 0.0) -> float:
+    given = element.get(key)
+    return missing if given is None else number(given, file, f"{place}.{key}")
+
+
+def _cable(chain: Element, k: int, file: Path) -> Cable:
+    place = f"chain {k + 1}"
+    base, end = child(chain, "base", file, place), child(chain, "platform", file, place)
+    points = [[_of(one, key, file, f"{place}.{one.tag}") for key in "xyz"] for one in (base, end)]
+    axis = [_of(base, f"a{row}3", file, f"{place}.base", float(row == 3)) for row in (1, 2, 3)]
+    return Cable(points[0], points[1], radius=_of(base, "radius", file, f"{place}.base"), axis=axis)
+
+
+def _weigh(platform: Element, body: Body, file: Path) -> None:
+    mass = platform.get("mass")
+    body.mass = None if mass is None else number(mass, file, "platform.mass", infinite=True)
+    body.mass = None if body.mass == float("inf") else body.mass
+    centre, tensor = platform.find("centerofgravity"), platform.find("inertiatensor")
+    if centre is not None:
+        body.centre = [_of(centre, key, file, "centerofgravity") for key in "xyz"]
+    if tensor is not None:
+        parts = [
+            [number(tensor.get(f"I{a}{b}", "0"), file, f"inertiatensor.I{a}{b}", infinite=True) for b in "xyz"]
+            for a in "xyz"
+        ]
+        found = np.array(parts)
+        body.inertia = found if np.isfinite(found).all() and found.any() else None

@@ -1,0 +1,36 @@
+"""A robot file as TOML text."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cspr_jax.errors import one_line
+
+
+def robot_text(keys: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
+    """Text of a robot file.
+
+    Args:
+        keys: of the robot.
+        cable_names: named in a comment, if they have any.
+
+    Returns:
+        TOML that reads back to the same keys.
+    """
+    lines = []
+    if any(cable_names):
+        lines.append("# cables: " + ", ".join(one_line(name) for name in cable_names))
+    return "\n".join([*lines, *(f"{key} = {_text(value)}" for key, value in keys.items())]) + "\n"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return "[\n" + "".join(f"    {_text(row)},\n" for row in value) + "]"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "inf" if math.isinf(value) else repr(value)

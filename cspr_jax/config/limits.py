@@ -1,0 +1,89 @@
+"""Limits of robots, plans and sweeps, and the kinds of numbers that these files hold."""
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, PlainSerializer, Tag, create_model
+
+from cspr_jax.config.reading import Table
+from cspr_jax.schema.limits import LIMITS
+
+# Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.point_mass`, with jax.
+LARGEST_LENGTH = 1e6
+MOST_CABLES = 1000
+Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
+Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Row = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, Field(gt=0, le=1e9)]
+NotNegative = Annotated[float, Field(ge=0, le=1e9)]
+
+
+def _infinite(value: Any) -> Any:
+    # JSON has no infinity: results and lists keep the word.
+    return math.inf if value == "inf" else value
+
+
+def _bounded(value: float) -> float:
+    if value > 1e9 and not math.isinf(value):
+        raise ValueError("at most 1e9, or inf")
+    return value
+
+
+Bound = Annotated[
+    float,
+    Field(gt=0, allow_inf_nan=True),
+    BeforeValidator(_infinite),
+    AfterValidator(_bounded),
+    PlainSerializer(lambda value: "inf" if math.isinf(value) else value, when_used="json"),
+]
+
+
+def _variant(value: Any) -> str:
+    return "~each" if isinstance(value, list) else "~one"
+
+
+def _variant_of_vectors(value: Any) -> str:
+    return "~each" if isinstance(value, list) and value and isinstance(value[0], list) else "~one"
+
+
+def _one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) -> Any:
+    several = Annotated[list[each], Field(min_length=1, max_length=MOST_CABLES), Tag("~each")]
+    return Annotated[Annotated[one, Tag("~one")] | several, Discriminator(variant)]
+
+
+Direction = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
+# Of types that are made here mypy asks nothing.
+PerCable: Any = _one_or_each(Positive, Positive)
+NotNegativePerCable: Any = _one_or_each(NotNegative, NotNegative)
+TensionPerCable: Any = _one_or_each(Positive, Bound)
+PerCableDirection: Any = _one_or_each(Direction, Direction, _variant_of_vectors)
+
+
+def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
+    keys: dict[str, Any] = {}
+    for row in LIMITS:
+        if row.per_cable == per_cable:
+            kind = (NotNegativePerCable if row.from_zero else PerCable) if per_cable else Coordinate
+            kind = TensionPerCable if row.name == "tension_max" else kind
+            text = f"{row.description}{', one number or one a cable' * per_cable}, {row.unit}"
+            keys[row.name] = (kind | None, Field(None, description=text))
+    return keys
+
+
+# Their fields are rows of `schema.limits.LIMITS`; of a base that it does not know mypy asks nothing.
+_Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=True))
+
+
+class LimitKeys(_Cables):
+    """Limits beyond taut cables; a plan's or a sweep's stand over those of the robot file."""
+
+
+_Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(per_cable=False))
+
+
+class LimitTable(_Heights):
+    """Limits of all motions of the file."""
+
+    if TYPE_CHECKING:
+        floor: float | None = None

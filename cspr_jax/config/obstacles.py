@@ -1,0 +1,147 @@
+"""Obstacles, tables of sweep files, and keys of the platform's own shape; without jax."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from cspr_jax.config.reading import Table
+from cspr_jax.config.robot import Coordinate, Point
+from cspr_jax.config.wording import fault
+from cspr_jax.errors import InputError
+from cspr_jax.robots import shapes
+
+MOST_OBSTACLES, MOST_CORNERS = 1000, 1000
+# Of a unit quaternion; as in `arithmetic.rotations`, with jax.
+UNIT_TOLERANCE = 1e-6
+Extent = Annotated[float, Field(ge=0.0, le=shapes.LARGEST_LENGTH)]
+Radius = Annotated[float, Field(gt=0.0, le=shapes.LARGEST_LENGTH)]
+Size = Annotated[list[Extent], Field(min_length=3, max_length=3)]
+Component = Annotated[float, Field(ge=-1.1, le=1.1)]
+Quaternion = Annotated[list[Component], Field(min_length=4, max_length=4)]
+Corners = Annotated[list[Point], Field(min_length=2, max_length=2)]
+Points = Annotated[list[Point], Field(min_length=4, max_length=MOST_CORNERS)]
+
+# Keys of each kind: those that it needs, and those that it may have.
+_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "sphere": (("centre", "radius"), ()),
+    "cylinder": (("start", "end", "radius"), ()),
+    "box": ((), ("corners", "centre", "size", "quaternion")),
+}
+
+
+class ObstacleTable(Table):
+    """An obstacle fixed in space."""
+
+    kind: Literal["sphere", "cylinder", "box"] = Field(description='shape: "sphere", "cylinder" or "box"')
+    name: str | None = Field(None, min_length=1, max_length=200, description="name of the obstacle; absent: its kind")
+    centre: Point | None = Field(None, description="sphere, box: centre [x, y, z], axes of the robot file, m")
+    radius: Radius | None = Field(None, description="sphere, cylinder: radius, m")
+    start: Point | None = Field(None, description="cylinder: one end of its axis, [x, y, z], m")
+    end: Point | None = Field(
+        None, description="cylinder: the other end of its axis, m; half a ball of its radius lies beyond both ends"
+    )
+    size: Size | None = Field(None, description="box: lengths of its edges along its own axes, m")
+    quaternion: Quaternion | None = Field(
+        None, description="box: orientation, scalar first (default [1, 0, 0, 0], along the axes of the robot file)"
+    )
+    corners: Corners | None = Field(
+        None,
+        description="box along the axes: [[x, y, z], [x, y, z]], least and largest, m; in place of centre and size",
+    )
+
+    @model_validator(mode="after")
+    def _of_its_kind(self) -> "ObstacleTable":
+        needed, allowed = _KEYS[self.kind]
+        for name in needed:
+            if getattr(self, name) is None:
+                raise fault(name, None, f"a {self.kind} needs it")
+        for name in ("centre", "radius", "start", "end", "size", "quaternion", "corners"):
+            if getattr(self, name) is not None and name not in (*needed, *allowed):
+                raise fault(name, getattr(self, name), f"absent: a {self.kind} has none")
+        if self.kind == "box":
+            self._check_box()
+        return self
+
+    def _check_box(self) -> None:
+        if self.corners is None:
+            for name in ("centre", "size"):
+                if getattr(self, name) is None:
+                    raise fault(name, None, "a box needs centre and size, or corners")
+        else:
+            for name in ("centre", "size", "quaternion"):
+                if getattr(self, name) is not None:
+                    raise fault(name, getattr(self, name), "absent beside corners")
+            _check_corners("corners", self.corners)
+        if self.quaternion is not None and not _is_unit(self.quaternion):
+            raise fault("quaternion", self.quaternion, "a unit quaternion, scalar first")
+
+    def shape(self) -> shapes.Obstacle:
+        """The shape.
+
+        Returns:
+            the shape, in the axes of the robot file.
+        """
+        name = self.name or self.kind
+        if self.kind == "sphere" and self.radius is not None:
+            return shapes.sphere(self.centre, self.radius, name=name)
+        if self.kind == "cylinder" and self.radius is not None:
+            return shapes.cylinder(self.start, self.end, self.radius, name=name)
+        if self.corners is not None:
+            return shapes.box_between(*self.corners, name=name)
+        return shapes.box(self.centre, self.size, self.quaternion or (1.0, 0.0, 0.0, 0.0), name=name)
+
+
+Obstacles = Annotated[list[ObstacleTable], Field(max_length=MOST_OBSTACLES)]
+
+
+class PlatformShapeKeys(Table):
+    """The platform's own shape, which its cables are kept clear of."""
+
+    platform_box: Corners | None = Field(
+        None, description="rigid platform: its box, [[x, y, z], [x, y, z]], least and largest, platform axes, m"
+    )
+    platform_hull: Points | None = Field(
+        None,
+        description="rigid platform: points whose convex hull is its shape, platform axes, m, in place of "
+        "platform_box; absent: the hull of platform_points, if these do not lie in a plane",
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> "PlatformShapeKeys":
+        if self.platform_box is not None and self.platform_hull is not None:
+            raise fault("platform_hull", self.platform_hull, "absent beside platform_box")
+        if self.platform_box is not None:
+            _check_corners("platform_box", self.platform_box)
+        if self.platform_hull is not None:
+            try:
+                shapes.hull(self.platform_hull)
+            except InputError as error:
+                raise fault("platform_hull", self.platform_hull, "four points or more, not all in a plane") from error
+        return self
+
+    def body(self, centre_of_mass: Sequence[Coordinate] = (0.0, 0.0, 0.0)) -> shapes.Body | None:
+        """The shape.
+
+        Args:
+            centre_of_mass: (3,) of the robot file, platform axes, m.
+
+        Returns:
+            the shape in platform axes, from the mass centre; None: not given.
+        """
+        if self.platform_box is not None:
+            low, high = ([x - c for x, c in zip(corner, centre_of_mass, strict=True)] for corner in self.platform_box)
+            return shapes.box_between(low, high, name="platform")
+        if self.platform_hull is not None:
+            points = [[x - c for x, c in zip(point, centre_of_mass, strict=True)] for point in self.platform_hull]
+            return shapes.hull(points, name="platform")
+        return None
+
+
+def _check_corners(key: str, corners: list[list[float]]) -> None:
+    if any(low > high for low, high in zip(*corners, strict=True)):
+        raise fault(key, corners, "[least, largest], no coordinate of the first above the second's")
+
+
+def _is_unit(quaternion: list[float]) -> bool:
+    return abs(sum(x * x for x in quaternion) ** 0.5 - 1.0) <= UNIT_TOLERANCE

@@ -1,0 +1,71 @@
+"""Limits as somebody gives them, checked, in the kernels' axes."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.errors import InputError
+from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.limits import LIMITS, Limit
+
+
+def limits_of(
+    robot: Any, given: Mapping[str, Any], own: Mapping[str, Any], at: str, n_cables: int | None = None
+) -> Limits:
+    """Limits that are given over those of a robot.
+
+    Args:
+        robot: has base_points and z_axis of its file.
+        given: by name, one number or one a cable each; None: as in `own`.
+        own: likewise; None: no limit.
+        at: prefix of keys in errors.
+        n_cables: of which the limits are; None: those of the robot.
+
+    Returns:
+        the limits, the floor as a depth; some of the largest tensions may be infinite.
+
+    Raises:
+        InputError: numbers of another count, or no limits at all: not finite, a length or speed that is not positive,
+            a smallest tension that is not below the largest.
+    """
+    n_cables, values = n_cables or len(robot.base_points), dict[str, Any]()
+    for row in LIMITS:
+        value = given.get(row.name)
+        value = own.get(row.name) if value is None else value
+        values[row.name] = None if value is None else _limit(row, value, n_cables, at)
+    low, high = values["tension_min"], values["tension_max"]
+    if low is not None and high is not None and not (low < high).all():
+        raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
+    if values["floor"] is not None:
+        values["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
+    return Limits(**values)
+
+
+def check_bounded(limits: Limits) -> None:
+    """Refuse largest tensions of which some are infinite.
+
+    Args:
+        limits: of a trajectory or a search.
+
+    Raises:
+        InputError: the tensions.
+    """
+    high = limits.tension_max
+    if high is not None and not np.isfinite(high).all():
+        raise InputError(
+            "tension_max", np.asarray(high).tolist(), "finite, or absent (only workspaces take infinite ones)"
+        )
+
+
+def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
+    numbers = np.asarray(value, float)
+    least = -np.inf if not row.per_cable else 0.0 if row.from_zero else np.nextafter(0.0, 1.0)
+    shapes = [(), (n_cables,)] if row.per_cable else [()]
+    allowed = np.isfinite(numbers) | ((numbers == np.inf) & (row.name == "tension_max") & (numbers.ndim > 0))
+    if numbers.shape not in shapes or not ((numbers >= least) & allowed).all():
+        raise InputError(f"{at}{row.name}", value, row.allowed + f", or {n_cables}: one a cable" * row.per_cable)
+    return leaf(np.broadcast_to(numbers, (n_cables,) if row.per_cable else ()))

@@ -1,0 +1,134 @@
+"""Attachment points, mass centre and inertia of a body on cables, checked. NumPy alone."""
+
+import numpy as np
+
+from cspr_jax.errors import InputError
+from cspr_jax.robots.patterns import Pattern
+from cspr_jax.robots.point_mass import LARGEST_LENGTH, checked_coordinates
+from cspr_jax.robots.spool_plane import is_on_line
+
+# Points nearer to each other than this part of the largest distance are one point.
+SAME = 1e-9
+# Rounding that is allowed to an inertia tensor: of its symmetry, and of a flat body's I1 + I2 = I3.
+INERTIA_TOLERANCE = 1e-9
+# Part of the length of a rod that its mass centre may lie beside the line of its attachment points.
+BESIDE = 1e-6
+
+
+def is_same(points: np.ndarray, first: int, second: int) -> bool:
+    """Whether two points are one.
+
+    Args:
+        points: (n, 3) m.
+        first: number of one, from 0 on.
+        second: of the other.
+
+    Returns:
+        whether they are nearer to each other than rounding.
+    """
+    span = np.ptp(points, axis=0).max()
+    return bool(np.linalg.norm(points[first] - points[second]) <= SAME * span)
+
+
+def checked_platform(given, count: int, pattern: Pattern) -> np.ndarray:
+    """Attachment points of a body.
+
+    Args:
+        given: (n_cables, 3) in platform axes, m.
+        count: number of cables.
+        pattern: of the body.
+
+    Returns:
+        (n_cables, 3) m.
+
+    Raises:
+        InputError: wrong shape, another number, not finite; on one line, or not on one where the pattern asks for it;
+            out of the plane of a planar platform.
+    """
+    points = checked_coordinates("platform_points", given, pattern.dof)
+    if len(points) != count:
+        raise InputError(
+            "platform_points", None, f"must be {count}, as many as base_points", fault=f"{len(points)} points"
+        )
+    if pattern.is_planar:
+        if (points[:, 1] != 0.0).any():
+            raise InputError("platform_points", points.tolist(), "points with y = 0: the plane of a planar robot")
+        if not np.ptp(points, axis=0).max() > 0.0:
+            raise InputError("platform_points", points.tolist(), "points that are not all the same: no cable turns it")
+    elif pattern.along_line:
+        if not is_on_line(points) or not np.ptp(points, axis=0).max() > 0.0:
+            raise InputError("platform_points", points.tolist(), 'points on one line, and not all the same: "2R3T"')
+    elif not pattern.is_jointed and is_on_line(points):
+        raise InputError(
+            "platform_points",
+            points.tolist(),
+            'points that are not on one line, or coincident (all on one line: pattern = "2R3T", a rod)',
+        )
+    return points
+
+
+def checked_centre(given, platform: np.ndarray, pattern: Pattern) -> np.ndarray:
+    """Mass centre of a body.
+
+    Args:
+        given: (3,) in platform axes, m.
+        platform: (n_cables, 3) attachment points, m.
+        pattern: of the body.
+
+    Returns:
+        (3,) m.
+
+    Raises:
+        InputError: wrong shape, not finite, out of a planar platform's plane, or beside a rod's line, where its weight
+            would turn it about that.
+    """
+    centre = np.asarray(given, float)
+    if centre.shape != (3,) or not (np.abs(centre) <= LARGEST_LENGTH).all():
+        raise InputError("centre_of_mass", given, "three coordinates, at most 1e6 m")
+    if pattern.is_planar and centre[1] != 0.0:
+        raise InputError("centre_of_mass", centre.tolist(), "a point with y = 0: the plane of a planar robot")
+    if pattern.along_line:
+        offsets = platform - platform[0]
+        line = offsets[np.argmax((offsets**2).sum(1))]
+        beside = np.linalg.norm(np.cross(centre - platform[0], line)) / (line @ line)
+        if not beside <= BESIDE:
+            raise InputError("centre_of_mass", centre.tolist(), "a point on the line of platform_points: a rod")
+    return centre
+
+
+def checked_inertia(given, pattern: Pattern) -> np.ndarray:
+    """Inertia tensor of a body.
+
+    Args:
+        given: (3, 3) about the mass centre, platform axes, kg m^2.
+        pattern: of the body. Of a planar platform only the moment about y counts, and a rod may have none about its
+            line.
+
+    Returns:
+        (3, 3) symmetric, kg m^2.
+
+    Raises:
+        InputError: wrong shape, not finite, not symmetric, not positive definite, or of no real body.
+    """
+    tensor = np.asarray(given, float)
+    if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
+        raise InputError("inertia", given, "three rows of three finite numbers, kg m^2")
+    scale = np.abs(tensor).max()
+    if np.abs(tensor - tensor.T).max() > INERTIA_TOLERANCE * scale:
+        raise InputError("inertia", tensor.tolist(), "a symmetric tensor")
+    tensor = 0.5 * (tensor + tensor.T)
+    if pattern.is_planar:
+        if not tensor[1, 1] > 0.0:
+            raise InputError("inertia", tensor.tolist(), "a tensor with a positive moment about y, inertia[1][1]")
+        return tensor
+    low, middle, high = np.linalg.eigvalsh(tensor)
+    if pattern.along_line:
+        if not (low >= -INERTIA_TOLERANCE * scale and middle > 0.0):
+            raise InputError("inertia", tensor.tolist(), "a tensor of no negative moment, 0 at most about one axis")
+    elif not low > 0.0:
+        raise InputError("inertia", tensor.tolist(), "a positive definite tensor")
+    if high > (low + middle) * (1.0 + INERTIA_TOLERANCE):
+        raise InputError(
+            "inertia", tensor.tolist(), "a tensor of a real body: no principal moment above the sum of the other two"
+        )
+    return tensor

@@ -1,0 +1,334 @@
+"""Clearance of many poses: how far cables are from each other, from obstacles and from their own platform, signed.
+
+Coordinates are those of the robot that is given; shapes have the same axes, its platform's own shape those of the
+platform, from the mass centre. Every meeting of a scene has a kernel of `clearance_lanes`, compiled once a robot.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches, in_parts, room
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.errors import InputError
+from cspr_jax.robots import clearance_kernels as kernels
+from cspr_jax.robots.platform import PlatformRobot, pairs_apart
+from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, box_between, hull, is_flat
+
+# Poses of a batch on a CPU: of 16384 to 131072 about the same.
+BATCH = 65_536
+# Pairs of cables of one compiled loop; XLA takes a longer one apart.
+PAIRS = 28
+# Of the diameter, and of the platform's shape: what of a cable next to its attachment point is not held against it.
+LEAVE_DIAMETERS, LEAVE_SIZE = 10.0, 0.01
+# Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; 2.2 was met.
+ROUNDING = 16.0
+
+Kind = Literal["cables", "obstacle", "platform", "platform-obstacle"]
+
+
+class Meeting(NamedTuple):
+    """Two bodies that can meet.
+
+    Fields:
+        kind: "cables": two cables; "obstacle": a cable and an obstacle; "platform": a cable and its own platform;
+            "platform-obstacle": the platform and an obstacle.
+        cable: number of the cable, the first of two, from 0 on; -1 of the platform.
+        other: number of the other cable or of the obstacle, from 0 on; -1 of the platform.
+    """
+
+    kind: Kind
+    cable: int
+    other: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Scene:
+    """A robot among what its cables can meet.
+
+    Fields:
+        base_points: (n_cables, 3) m.
+        platform_points: (n_cables, 3) platform axes, from the mass centre, m; zero of a point mass.
+        diameters: (n_cables,) m.
+        pairs: cables that share neither spool nor platform point.
+        obstacles: shapes fixed in space.
+        body: shape of the platform in its axes, from the mass centre; None: it is not looked at.
+        leave: length of each cable next to its attachment point that is not held against its own platform, m.
+    """
+
+    base_points: np.ndarray
+    platform_points: np.ndarray
+    diameters: np.ndarray
+    pairs: tuple[tuple[int, int], ...]
+    obstacles: tuple[Obstacle, ...]
+    body: Body | None
+    leave: float
+
+    @property
+    def meetings(self) -> tuple[Meeting, ...]:
+        """What `Clearances.nearest` counts."""
+        cables = range(len(self.base_points))
+        found = [Meeting("cables", i, j) for i, j in self.pairs]
+        found += [Meeting("obstacle", i, j) for j in range(len(self.obstacles)) for i in cables]
+        if self.body is not None:
+            found += [Meeting("platform", i, -1) for i in cables]
+            found += [Meeting("platform-obstacle", -1, j) for j in range(len(self.obstacles))]
+        return tuple(found)
+
+
+class Clearances(NamedTuple):
+    """Clearances of poses.
+
+    Fields:
+        clearance: (n,) the least of all, m; negative where two bodies meet; inf where nothing can meet.
+        nearest: (n,) place among `Scene.meetings` of what is the nearest; -1 where nothing can meet.
+        cables: (n,) the least of two cables, m; inf where none can meet.
+        obstacles: (n,) the least of obstacles with cables and platform, m.
+        platform: (n,) the least of cables with their own platform, m; of whole cables never above `Scene.leave`.
+        is_open: (n,) whether the least is nearer to the threshold than rounding lets it be told.
+    """
+
+    clearance: np.ndarray
+    nearest: np.ndarray
+    cables: np.ndarray
+    obstacles: np.ndarray
+    platform: np.ndarray
+    is_open: np.ndarray
+
+
+def scene(
+    robot: PlatformRobot | PointMassRobot,
+    *,
+    diameter=0.0,
+    obstacles: Sequence[Obstacle] = (),
+    body: Body | None = None,
+    leave: float | None = None,
+) -> Scene:
+    """A robot among what its cables can meet.
+
+    Args:
+        robot: a platform, or a point mass, whose cables never meet each other.
+        diameter: of the cables, one number or (n_cables,), m.
+        obstacles: shapes fixed in space, in the robot's axes.
+        body: shape of the platform in its axes, from the mass centre; see `attachment_hull`. None: cables are not
+            held against their platform, nor it against obstacles.
+        leave: length of each cable next to its attachment point that is not held against its own platform, m; None:
+            ten diameters, or a hundredth of the shape if that is more.
+
+    Returns:
+        the scene.
+
+    Raises:
+        InputError: another number of diameters, one that is negative or not finite; `leave` negative or not finite; a
+            shape of a point mass.
+    """
+    base = np.asarray(robot.base_points, float)
+    given = np.asarray(diameter, float)
+    if (given.ndim and given.shape != (len(base),)) or not (np.isfinite(given) & (given >= 0.0)).all():
+        raise InputError("diameter", diameter, f"one length, or {len(base)}, not negative")
+    if body is not None and not isinstance(robot, PlatformRobot):
+        raise InputError("body", None, "must be None", fault="a point mass has no shape")
+    if leave is None:
+        size = 0.0 if body is None else float(np.ptp(_corners(body), axis=0).max())
+        leave = max(LEAVE_DIAMETERS * float(given.max()), LEAVE_SIZE * size)
+    if not 0.0 <= leave < np.inf:
+        raise InputError("leave", leave, "a length, not negative")
+    platform = np.asarray(robot.platform_points, float) if isinstance(robot, PlatformRobot) else np.zeros_like(base)
+    pairs = pairs_apart(robot) if isinstance(robot, PlatformRobot) else ()
+    return Scene(base, platform, np.broadcast_to(given, (len(base),)), pairs, tuple(obstacles), body, float(leave))
+
+
+def attachment_hull(robot: PlatformRobot) -> Hull | None:
+    """The convex hull of the points where cables are attached.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        the hull, platform axes from the mass centre; None where the points lie in a plane, so that it has no inside.
+    """
+    points = np.asarray(robot.platform_points, float)
+    return None if is_flat(points) else hull(points, name="platform")
+
+
+def clearances(
+    scene: Scene,
+    positions,
+    quaternions=None,
+    *,
+    ends=None,
+    threshold: float = 0.0,
+    dtype: Literal["float64", "float32"] = "float64",
+) -> Clearances:
+    """Clearances of poses.
+
+    Args:
+        scene: the robot and what its cables can meet.
+        positions: (n, 3) of the mass centre, m.
+        quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
+        ends: (n, n_cables, 3) where the cables leave their spools, if that moves, m; None: the base points.
+        threshold: the clearance about which verdicts are wanted, m.
+        dtype: of the numbers; of "float32" poses that are open are done again in float64.
+
+    Returns:
+        the clearances, float64; of "float32" good to some 1e-6 of the scene's size where they are not near the
+        threshold.
+
+    Raises:
+        InputError: arrays of other shapes.
+    """
+    given = _checked(scene, positions, quaternions, ends)
+    if not len(given.place):
+        return _nothing(0)
+    found = _all(scene, given, threshold, np.dtype(dtype))
+    again = np.flatnonzero(found.is_open)
+    if dtype == "float32" and len(again):
+        for old, new in zip(found, _all(scene, given.some(again), threshold, np.dtype("float64")), strict=True):
+            old[again] = new
+    return found
+
+
+class _Given(NamedTuple):
+    place: np.ndarray  # (n, 3)
+    turn: np.ndarray | None  # (n, 4)
+    spools: np.ndarray | None  # (n, n_cables, 3)
+
+    def some(self, which) -> "_Given":
+        turn, spools = (None if x is None else x[which] for x in self[1:])
+        return _Given(self.place[which], turn, spools)
+
+    def lanes(self, origin: np.ndarray, dtype: np.dtype) -> kernels.Poses:
+        def columns(array):
+            return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
+
+        turn = None if self.turn is None else columns(self.turn)
+        ends = None if self.spools is None else [columns(x) for x in np.swapaxes(self.spools - origin, 0, 1)]
+        return kernels.Poses(columns(self.place - origin), turn, ends)
+
+
+def _checked(scene: Scene, positions, quaternions, ends) -> _Given:
+    place = np.asarray(positions, float)
+    if place.ndim != 2 or place.shape[1] != 3:
+        raise InputError("positions", None, "must be (n, 3)", fault=f"an array of shape {place.shape}")
+
+    def checked(name: str, given, shape: tuple[int, ...]) -> np.ndarray | None:
+        array = None if given is None else np.asarray(given, float)
+        if array is not None and array.shape != shape:
+            raise InputError(name, None, f"must be {shape}", fault=f"an array of shape {array.shape}")
+        return array
+
+    turn = checked("quaternions", quaternions, (len(place), 4))
+    return _Given(place, turn, checked("ends", ends, (len(place), len(scene.base_points), 3)))
+
+
+def _all(scene: Scene, given: _Given, threshold: float, dtype: np.dtype) -> Clearances:
+    # From the centroid of the spools, so that float32 has the digits where they are needed.
+    origin = scene.base_points.mean(0)
+    terms = list(_terms(scene, origin, dtype))
+    own = max(float(np.abs(x).max()) for x in (scene.base_points - origin, scene.platform_points))
+    reach = max([own] + [_reach(shape, origin) for shape in scene.obstacles])
+    bound = ROUNDING * float(np.finfo(dtype).eps)
+
+    def one(part: slice) -> Clearances:
+        poses = given.some(part).lanes(origin, dtype)
+        answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, size=BATCH)
+        found = _least([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
+        far = [np.abs(x) for x in poses.position]
+        size = np.maximum(np.maximum(np.maximum(far[0], far[1]), far[2]), reach)
+        # NaN is open.
+        return found._replace(is_open=~(np.abs(found.clearance - threshold) > bound * size))
+
+    if not terms:
+        return _nothing(len(given.place))
+    parts = in_parts(one, len(given.place), room(BATCH))
+    return Clearances(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def _nothing(count: int) -> Clearances:
+    far = np.full(count, np.inf)
+    return Clearances(far, np.full(count, -1, np.int32), far, far, far, np.zeros(count, bool))
+
+
+def _least(terms: Sequence[tuple[Kind, int, np.ndarray]]) -> Clearances:
+    # Of what each kernel found, in its dtype.
+    _, first, found = terms[0]
+    clearance, nearest = found.real.copy(), found.imag.astype(np.int32) + np.int32(first)
+    for _, first, found in terms[1:]:
+        # Of a pose that is NaN the first is, and stays.
+        is_less = found.real < clearance
+        np.copyto(clearance, found.real, where=is_less)
+        np.copyto(nearest, found.imag.astype(np.int32) + np.int32(first), where=is_less)
+
+    def least(*kinds: Kind) -> np.ndarray:
+        values = [found.real for kind, _, found in terms if kind in kinds]
+        return functools.reduce(np.minimum, values, np.full(len(clearance), np.inf, clearance.dtype)).astype(float)
+
+    kinds = least("cables"), least("obstacle", "platform-obstacle"), least("platform")
+    return Clearances(clearance.astype(float), nearest, *kinds, np.zeros(len(clearance), bool))
+
+
+def _terms(scene: Scene, origin: np.ndarray, dtype: np.dtype):
+    """Compiled functions of poses, each with its kind and the number of its first meeting."""
+    count, first = len(scene.base_points), 0
+    points = _cast(
+        kernels.Points(*map(leaf, (scene.base_points - origin, scene.platform_points, scene.diameters))), dtype
+    )
+    for start in range(0, len(scene.pairs), PAIRS):
+        group = scene.pairs[start : start + PAIRS]
+        yield "cables", first, lambda poses, group=group: kernels.of_cables(points, poses, group)
+        first += len(group)
+    solids = [_cast(_solid(shape, origin), dtype) for shape in scene.obstacles]
+    for solid in solids:
+        yield "obstacle", first, lambda poses, solid=solid: kernels.of_obstacle(points, poses, solid)
+        first += count
+    if scene.body is None:
+        return
+    body, leave = _cast(_solid(scene.body, np.zeros(3)), dtype), _cast(np.asarray(scene.leave), dtype)
+    yield "platform", first, lambda poses: kernels.of_platform(points, poses, body, leave)
+    first += count
+    around = _cast(_solid(_around(scene.body), np.zeros(3)), dtype)
+    for solid in solids:
+        if isinstance(solid, kernels.Brick):
+            yield "platform-obstacle", first, lambda poses, solid=solid: kernels.of_boxes(poses, around, solid)
+        else:
+            yield "platform-obstacle", first, lambda poses, solid=solid: kernels.of_body(poses, body, solid)
+        first += 1
+
+
+def _cast(tree, dtype: np.dtype):
+    return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
+
+
+def _solid(shape: Obstacle | Hull, origin: np.ndarray):
+    if isinstance(shape, Sphere):
+        return kernels.Ball(*map(leaf, (shape.centre - origin, shape.radius)))
+    if isinstance(shape, Cylinder):
+        return kernels.Rod(*map(leaf, (shape.start - origin, shape.end - shape.start, shape.radius)))
+    if isinstance(shape, Box):
+        return kernels.Brick(*map(leaf, (shape.centre - origin, shape.half, shape.turn)))
+    return kernels.Polyhedron(*map(leaf, (shape.normals, shape.offsets, shape.triangles, shape.edges)))
+
+
+def _corners(shape: Body) -> np.ndarray:
+    if isinstance(shape, Hull):
+        return shape.triangles.reshape(-1, 3)
+    signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(-1, 3)
+    return shape.centre + (signs * shape.half) @ shape.turn.T
+
+
+def _around(shape: Body) -> Box:
+    corners = _corners(shape)
+    return shape if isinstance(shape, Box) else box_between(corners.min(0), corners.max(0))
+
+
+def _reach(shape: Obstacle, origin: np.ndarray) -> float:
+    # Largest coordinate.
+    if isinstance(shape, Box):
+        return float(np.abs(_corners(shape) - origin).max())
+    ends = [shape.centre] if isinstance(shape, Sphere) else [shape.start, shape.end]
+    return max(float(np.abs(end - origin).max()) for end in ends) + shape.radius

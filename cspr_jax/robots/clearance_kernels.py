@@ -1,0 +1,255 @@
+"""Compiled functions of `clearance`: the nearest of each kind of meeting, one lane a pose.
+
+Each gives one complex number a pose, of `clearance_lanes.nearest`: the clearance, m, and which of its meetings it is.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import NamedTuple, TypeAlias
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic import lanes
+from cspr_jax.arithmetic.lanes import Matrix, Vector
+from cspr_jax.robots.clearance_lanes import (
+    Polyhedron,
+    boxes,
+    nearest,
+    point_segment,
+    segment_box,
+    segment_hull,
+    segments,
+)
+
+__all__ = [
+    "Ball",
+    "Brick",
+    "Points",
+    "Polyhedron",
+    "Poses",
+    "Rod",
+    "of_body",
+    "of_cables",
+    "of_obstacle",
+    "of_platform",
+]
+
+
+class Points(NamedTuple):
+    """Geometry of a robot.
+
+    Fields:
+        base: (n_cables, 3) m.
+        platform: (n_cables, 3) platform axes, m.
+        diameters: (n_cables,) m.
+    """
+
+    base: Array
+    platform: Array
+    diameters: Array
+
+
+class Poses(NamedTuple):
+    """Poses as lanes.
+
+    Fields:
+        position: three arrays, m.
+        quaternion: four arrays of a unit quaternion, scalar first; None: no rotation.
+        ends: where each cable leaves its spool, three arrays each, m; None: the base points.
+    """
+
+    position: Vector
+    quaternion: Vector | None
+    ends: Sequence[Vector] | None
+
+
+class Ball(NamedTuple):
+    """A sphere.
+
+    Fields:
+        centre: (3,) m.
+        radius: () m.
+    """
+
+    centre: Array
+    radius: Array
+
+
+class Rod(NamedTuple):
+    """A cylinder with round ends.
+
+    Fields:
+        start: (3,) m.
+        ray: (3,) from there to the end, m.
+        radius: () m.
+    """
+
+    start: Array
+    ray: Array
+    radius: Array
+
+
+class Brick(NamedTuple):
+    """A box.
+
+    Fields:
+        centre: (3,) m.
+        half: (3,) halves of the lengths of its edges, m.
+        turn: (3, 3) its axes, one a column.
+    """
+
+    centre: Array
+    half: Array
+    turn: Array
+
+
+Solid: TypeAlias = Ball | Rod | Brick
+Own: TypeAlias = Brick | Polyhedron
+
+
+def _three(array: Array) -> Vector:
+    return tuple(array[i] for i in range(3))
+
+
+def _less(a: Vector, b: Vector) -> Vector:
+    return tuple(x - y for x, y in zip(a, b, strict=True))
+
+
+def _rotation(poses: Poses) -> Matrix | None:
+    return None if poses.quaternion is None else lanes.rotation(poses.quaternion)
+
+
+def _cables(points: Points, poses: Poses) -> tuple[Sequence[Vector], Sequence[Vector]]:
+    # Where cables leave their spools, and from there to the platform.
+    turn, count = _rotation(poses), points.base.shape[0]
+    arms = [_three(points.platform[k]) for k in range(count)]
+    if turn is not None:
+        arms = [lanes.turned(turn, arm) for arm in arms]
+    ends = [_three(points.base[k]) for k in range(count)] if poses.ends is None else list(poses.ends)
+    return ends, [tuple(poses.position[i] + arms[k][i] - ends[k][i] for i in range(3)) for k in range(count)]
+
+
+@partial(jax.jit, static_argnames="pairs")
+def of_cables(points: Points, poses: Poses, pairs: tuple[tuple[int, int], ...]) -> Array:
+    """The nearest two cables.
+
+    Args:
+        points: of the robot.
+        poses: lanes (n,).
+        pairs: cables that can meet; known when this is compiled.
+
+    Returns:
+        (n,) complex: distance less the mean of both diameters, m, and place among the pairs.
+    """
+    ends, rays = _cables(points, poses)
+    thick = [0.5 * (points.diameters[i] + points.diameters[j]) for i, j in pairs]
+    found = [segments(ends[i], rays[i], ends[j], rays[j]) for i, j in pairs]
+    return nearest([x - y for x, y in zip(found, thick, strict=True)])
+
+
+@jax.jit
+def of_obstacle(points: Points, poses: Poses, solid: Solid) -> Array:
+    """The cable that is the nearest to an obstacle.
+
+    Args:
+        points: of the robot.
+        poses: lanes (n,).
+        solid: the obstacle.
+
+    Returns:
+        (n,) complex: distance from the surface less half a diameter, m, and the cable.
+    """
+    ends, rays = _cables(points, poses)
+    found = []
+    for k, (end, ray) in enumerate(zip(ends, rays, strict=True)):
+        if isinstance(solid, Ball):
+            apart = point_segment(_three(solid.centre), end, ray) - solid.radius
+        elif isinstance(solid, Rod):
+            apart = segments(_three(solid.start), _three(solid.ray), end, ray) - solid.radius
+        else:
+            apart = segment_box(*_in_brick(solid, end, ray), _three(solid.half))
+        found.append(apart - 0.5 * points.diameters[k])
+    return nearest(found)
+
+
+def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]:
+    # A segment in the axes of a box, from its centre.
+    axes = [_three(row) for row in brick.turn]
+    return lanes.turned_back(axes, _less(start, _three(brick.centre))), lanes.turned_back(axes, ray)
+
+
+@jax.jit
+def of_platform(points: Points, poses: Poses, own: Own, leave: Array) -> Array:
+    """The cable that is the nearest to its own platform.
+
+    Args:
+        points: of the robot.
+        poses: lanes (n,).
+        own: shape of the platform in its axes.
+        leave: () length next to the attachment point that is left out, m.
+
+    Returns:
+        (n,) complex: distance from the surface less half a diameter, m, and the cable.
+    """
+    turn, found = _rotation(poses), []
+    _, rays = _cables(points, poses)
+    for k, ray in enumerate(rays):
+        away = tuple(-x for x in _inward(turn, ray))
+        length = jnp.sqrt(lanes.dot(away, away))
+        # Of a cable that is shorter its end is left.
+        part = jnp.where(length > leave, leave / jnp.where(length > leave, length, 1.0), 1.0)
+        start = tuple(x + part * y for x, y in zip(_three(points.platform[k]), away, strict=True))
+        rest = tuple((1.0 - part) * x for x in away)
+        found.append(_from_own(own, start, rest) - 0.5 * points.diameters[k])
+    return nearest(found)
+
+
+def _from_own(own: Own, start: Vector, ray: Vector) -> Array:
+    if isinstance(own, Brick):
+        return segment_box(*_in_brick(own, start, ray), _three(own.half))
+    return segment_hull(start, ray, own)
+
+
+@jax.jit
+def of_body(poses: Poses, own: Own, solid: Ball | Rod) -> Array:
+    """The platform and a sphere or a cylinder.
+
+    Args:
+        poses: lanes (n,).
+        own: shape of the platform in its axes.
+        solid: the obstacle.
+
+    Returns:
+        (n,) complex: signed distance, m, and 0.
+    """
+    zero, turn = jnp.zeros_like(poses.position[0]), _rotation(poses)
+    rod = Rod(solid.centre, jnp.zeros_like(solid.centre), solid.radius) if isinstance(solid, Ball) else solid
+    start = _inward(turn, _less(_three(rod.start), poses.position))
+    ray = _inward(turn, [zero + x for x in _three(rod.ray)])
+    return nearest([_from_own(own, start, ray) - rod.radius])
+
+
+@jax.jit
+def of_boxes(poses: Poses, own: Brick, solid: Brick) -> Array:
+    """The platform and a box, the nearest that both can be: the largest gap between their shadows on a line.
+
+    Args:
+        poses: lanes (n,).
+        own: a box around the platform, in its axes.
+        solid: the obstacle.
+
+    Returns:
+        (n,) complex: no larger than the signed distance, with its sign, m, and 0.
+    """
+    zero, turn = jnp.zeros_like(poses.position[0]), _rotation(poses)
+    axes = [_three(row) for row in own.turn]
+    edges = [lanes.turned_back(axes, _inward(turn, _three(column))) for column in solid.turn.T]
+    away = _inward(turn, _less(_three(solid.centre), poses.position))
+    centre, _ = _in_brick(own, away, [zero, zero, zero])
+    return nearest([boxes(_three(own.half), centre, [tuple(zero + x for x in e) for e in edges], _three(solid.half))])
+
+
+def _inward(turn: Matrix | None, vector: Vector) -> Vector:
+    return vector if turn is None else lanes.turned_back(turn, vector)

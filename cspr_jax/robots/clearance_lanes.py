@@ -1,0 +1,285 @@
+"""Signed distances of cables from each other and from solid shapes, one lane a pose: no branch, no NaN of finite ends.
+
+A cable is a segment without thickness here; who asks takes off half its diameter. Every formula is exact outside of the
+shape. Products that vanish for parallel segments are taken of vector products, not of differences of squares, so that
+their rounding falls with the angle and the distance keeps its digits at every angle.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.arithmetic.elementary import lesser
+from cspr_jax.arithmetic.lanes import Vector, cross, dot
+
+Numbers = Sequence[Array]
+
+
+def _tiny(like: Array) -> Array:
+    # Beside a sum of squares: keeps 0 / 0 from being NaN.
+    return jnp.asarray(np.finfo(like.dtype).tiny, like.dtype)
+
+
+def _greater(a: Array, b: Array) -> Array:
+    return jnp.where(a > b, a, b)
+
+
+def _fraction(x: Array) -> Array:
+    # Into [0, 1]. One instruction each, where `jnp.clip` takes care of NaN: what is not finite shows in the distance.
+    return lesser(_greater(x, jnp.zeros_like(x)), jnp.ones_like(x))
+
+
+def _less(a: Vector, b: Vector) -> Vector:
+    return tuple(x - y for x, y in zip(a, b, strict=True))
+
+
+def _along(start: Vector, ray: Vector, part: Array) -> Vector:
+    return tuple(x + part * y for x, y in zip(start, ray, strict=True))
+
+
+def segments(a: Vector, u: Vector, b: Vector, v: Vector) -> Array:
+    """Distance of two segments.
+
+    Args:
+        a: start of the first, m.
+        u: from there to its end, m; may be zero.
+        b: start of the second, m.
+        v: from there to its end, m; may be zero.
+
+    Returns:
+        (...) m.
+    """
+    # The nearest points of the lines, then from end to end: the last two steps are exact for one at an end, and for
+    # parallel lines whatever the first has found.
+    apart, normal = _less(b, a), cross(u, v)
+    uu, vv, uv, tiny = dot(u, u), dot(v, v), dot(u, v), _tiny(apart[0] * u[0])
+    s = _fraction(dot(cross(apart, v), normal) / _greater(dot(normal, normal), tiny))
+    t = _fraction((s * uv - dot(apart, v)) / _greater(vv, tiny))
+    s = _fraction((dot(apart, u) + t * uv) / _greater(uu, tiny))
+    between = tuple(apart[k] + t * v[k] - s * u[k] for k in range(3))
+    return jnp.sqrt(dot(between, between))
+
+
+def point_segment(point: Vector, a: Vector, u: Vector) -> Array:
+    """Distance of a point from a segment.
+
+    Args:
+        point: m.
+        a: start of the segment, m.
+        u: from there to its end, m; may be zero.
+
+    Returns:
+        (...) m.
+    """
+    apart = _less(point, a)
+    s = _fraction(dot(apart, u) / _greater(dot(u, u), _tiny(apart[0] * u[0])))
+    between = tuple(apart[k] - s * u[k] for k in range(3))
+    return jnp.sqrt(dot(between, between))
+
+
+def segment_box(a: Vector, u: Vector, half: Numbers) -> Array:
+    """Signed distance of a segment from a box around the origin, in its axes.
+
+    Args:
+        a: start of the segment from the centre of the box, axes of the box, m.
+        u: from there to its end, m; may be zero.
+        half: three halves of the lengths of its edges, m.
+
+    Returns:
+        (...) m: the distance outside; where the segment enters the box, minus the least translation that parts them.
+    """
+    apart = _parting(a, u, half)
+    return jnp.where(apart > 0.0, _outside_box(a, u, half), apart)
+
+
+def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
+    """Distance of a segment from a box.
+
+    Half the derivative of its square along the segment rises and is linear between the six planes of the faces: the
+    last of them (or of the ends) where it is not positive, the first where it is not negative, and what lies between.
+    """
+
+    def slope(part):
+        beyond = _beyond(_along(a, u, part), half)
+        return dot(beyond, u)
+
+    zero, one = jnp.zeros_like(a[0] + u[0]), jnp.ones_like(a[0] + u[0])
+    start, stop, rise, fall = zero, one, slope(zero), slope(one)
+    is_first, is_last = rise >= 0.0, fall <= 0.0
+    for k in range(3):
+        # Of a segment that lies in a plane any place will do.
+        inverse = 1.0 / jnp.where(u[k] == 0.0, jnp.ones_like(u[k]), u[k])
+        for side in (-half[k], half[k]):
+            part = _fraction((side - a[k]) * inverse)
+            value = slope(part)
+            later, sooner = (value <= 0.0) & (part >= start), (value >= 0.0) & (part <= stop)
+            start, rise = jnp.where(later, part, start), jnp.where(later, value, rise)
+            stop, fall = jnp.where(sooner, part, stop), jnp.where(sooner, value, fall)
+    steep = fall - rise
+    part = start - rise * (stop - start) / jnp.where(steep > 0.0, steep, one)
+    part = jnp.where(is_first, zero, jnp.where(is_last, one, _fraction(part)))
+    beyond = _beyond(_along(a, u, part), half)
+    return jnp.sqrt(dot(beyond, beyond))
+
+
+def _beyond(point: Vector, half: Numbers) -> Vector:
+    # From the nearest point of the box.
+    return tuple(x - _greater(lesser(x, h), -h) for x, h in zip(point, half, strict=True))
+
+
+def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
+    """Largest gap between the shadows of a segment and a box on a line: not positive where they meet.
+
+    The lines are the normals to the faces, and to the segment and an edge: those to the faces of the sum of both
+    shapes, so that the largest gap, negative, is minus the least translation that parts them.
+    """
+    w = tuple(0.5 * x for x in u)
+    c = tuple(x + y for x, y in zip(a, w, strict=True))
+    size = tuple(jnp.abs(x) for x in w)
+    gap = jnp.abs(c[0]) - (half[0] + size[0])
+    for k in (1, 2):
+        gap = _greater(jnp.abs(c[k]) - (half[k] + size[k]), gap)
+    for i, j in ((1, 2), (2, 0), (0, 1)):
+        square = w[i] * w[i] + w[j] * w[j]
+        shadow = jnp.abs(c[i] * w[j] - c[j] * w[i]) - (half[i] * size[j] + half[j] * size[i])
+        across = shadow / jnp.sqrt(_greater(square, _tiny(square)))
+        # Of a segment along the third axis there is no such line.
+        gap = jnp.where((square > _tiny(square)) & (across > gap), across, gap)
+    return gap
+
+
+def nearest(values: Sequence[Array]) -> Array:
+    """The smallest of several arrays and which it is, as one complex number, since XLA computes two outputs twice.
+
+    Args:
+        values: arrays (...) of real numbers.
+
+    Returns:
+        (...) complex: the smallest, and i times its place among the values, the first of equal ones; NaN is smallest if
+        it is the first.
+    """
+    least, place = values[0], jnp.zeros_like(values[0])
+    for k, value in enumerate(values[1:], 1):
+        is_less = value < least
+        least, place = jnp.where(is_less, value, least), jnp.where(is_less, np.asarray(k, value.dtype), place)
+    return lax.complex(least, place)
+
+
+class Polyhedron(NamedTuple):
+    """A `robots.shapes.Hull` for compiled code.
+
+    Fields:
+        normals: (n_faces, 3).
+        offsets: (n_faces,) m.
+        triangles: (n_faces, 3, 3) m.
+        edges: (n_edges, 2, 3) m.
+    """
+
+    normals: Array
+    offsets: Array
+    triangles: Array
+    edges: Array
+
+
+def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
+    """Signed distance of a segment from a convex polyhedron, in its axes.
+
+    Args:
+        a: start of the segment, m.
+        u: from there to its end, m; may be zero.
+        hull: the polyhedron.
+
+    Returns:
+        (...) m: the distance outside; where the segment enters, minus the depth of the middle of its part inside, from
+        the nearest face. Half of the depth of its deepest point, or more.
+    """
+    zero = jnp.zeros_like(a[0] + u[0])
+    count = len(hull.offsets)
+
+    def clip(face, ends):
+        high, rate = _of_face(hull, face, a, u)
+        meet = -high / jnp.where(rate == 0.0, jnp.ones_like(rate), rate)
+        # A segment along the plane of a face is outside of it, or inside, as a whole.
+        first = jnp.where(rate < 0.0, _greater(meet, ends[0]), ends[0])
+        last = jnp.where(rate > 0.0, lesser(meet, ends[1]), ends[1])
+        return first, jnp.where((rate == 0.0) & (high > 0.0), -jnp.ones_like(last), last)
+
+    first, last = lax.fori_loop(0, count, clip, (zero, jnp.ones_like(zero)))
+    middle = _fraction(0.5 * (first + last))
+
+    def deeper(face, depth):
+        high, rate = _of_face(hull, face, a, u)
+        return _greater(high + rate * middle, depth)
+
+    depth = lax.fori_loop(0, count, deeper, jnp.full_like(zero, -jnp.inf))
+    return jnp.where((first <= last) & (depth < 0.0), depth, _outside_hull(a, u, hull))
+
+
+def _of_face(hull: Polyhedron, face: Array, a: Vector, u: Vector) -> tuple[Array, Array]:
+    # Height of a start above the plane of a face, and its growth along the segment.
+    normal, corner = hull.normals[face], hull.triangles[face, 0]
+    three = [normal[k] for k in range(3)]
+    return dot(three, [a[k] - corner[k] for k in range(3)]), dot(three, u)
+
+
+def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
+    """Distance from a polyhedron that a segment does not enter: of an edge, or of an end from the inside of a face."""
+
+    def to_edge(edge, least):
+        start, end = hull.edges[edge, 0], hull.edges[edge, 1]
+        return lesser(segments(a, u, [start[k] for k in range(3)], [end[k] - start[k] for k in range(3)]), least)
+
+    def to_face(face, least):
+        normal, triangle = hull.normals[face], hull.triangles[face]
+        for point in (a, tuple(x + y for x, y in zip(a, u, strict=True))):
+            high = dot([normal[k] for k in range(3)], [point[k] - triangle[0, k] for k in range(3)])
+            is_above, turns = high >= 0.0, []
+            for i in range(3):
+                side, out = triangle[(i + 1) % 3] - triangle[i], [point[k] - triangle[i, k] for k in range(3)]
+                turns.append(dot([normal[k] for k in range(3)], cross([side[k] for k in range(3)], out)))
+            # Either way around.
+            inside = ((turns[0] >= 0.0) & (turns[1] >= 0.0) & (turns[2] >= 0.0)) | (
+                (turns[0] <= 0.0) & (turns[1] <= 0.0) & (turns[2] <= 0.0)
+            )
+            least = jnp.where(is_above & inside & (high < least), high, least)
+        return least
+
+    far = jnp.full_like(a[0] + u[0], jnp.inf)
+    least = lax.fori_loop(0, len(hull.edges), to_edge, far)
+    return lax.fori_loop(0, len(hull.offsets), to_face, least)
+
+
+def boxes(own: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Array:
+    """Largest gap between the shadows of two boxes on a line, in the axes of the first, around the origin.
+
+    Args:
+        own: three halves of the lengths of the edges of the first, m.
+        centre: of the second, m.
+        axes: three unit vectors of the second.
+        half: three halves of the lengths of its edges, m.
+
+    Returns:
+        (...) m: no larger than the distance, positive exactly where they are apart; else minus the least translation
+        that parts them.
+    """
+    gap = jnp.full_like(centre[0] + axes[0][0], -jnp.inf)
+    for k in range(3):
+        reach = own[k] + sum(half[j] * jnp.abs(axes[j][k]) for j in range(3))
+        gap = _greater(jnp.abs(centre[k]) - reach, gap)
+        reach = half[k] + sum(own[j] * jnp.abs(axes[k][j]) for j in range(3))
+        gap = _greater(jnp.abs(dot(centre, axes[k])) - reach, gap)
+    for axis in axes:
+        for i, j in ((1, 2), (2, 0), (0, 1)):
+            # Across an edge of each: the line has no part along the third axis of the first.
+            x, y = -axis[j], axis[i]
+            square = x * x + y * y
+            reach = own[i] * jnp.abs(x) + own[j] * jnp.abs(y)
+            reach = reach + sum(h * jnp.abs(e[i] * x + e[j] * y) for h, e in zip(half, axes, strict=True))
+            tiny = _tiny(square)
+            across = (jnp.abs(centre[i] * x + centre[j] * y) - reach) / jnp.sqrt(_greater(square, tiny))
+            # Parallel edges have no such line.
+            gap = jnp.where((square > tiny) & (across > gap), across, gap)
+    return gap

@@ -1,0 +1,146 @@
+"""Where a cable leaves a swivelling pulley, and how much of it is wrapped around.
+
+A cable reaches the pulley at its entry point A, running along the swivel axis k, about which the pulley turns towards
+the attachment point B. All lies in one plane: with e the unit vector normal to k on the side of B, the centre is
+C = A + r e. Let v = B - C, s^2 = v.v - r^2 and K the turn by a right angle that takes -e to k: of the unit vectors n,
+from C to where the cable leaves, and t = K n along the cable, v = r n + s t. Hence n = (r v - s K v) / v.v and
+t = (s v + r K v) / v.v, and no angle is needed but that of the wrapped arc, counted from A.
+"""
+
+import dataclasses
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.lanes import Vector, combined, dot
+from cspr_jax.errors import InputError
+
+LARGEST_RADIUS = 1e6  # m, as coordinates
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Pulleys:
+    """Swivelling pulleys of a robot; the base points are their entry points.
+
+    Fields:
+        radius: (n_cables,) of the cable's centre line, 0 or more; m.
+        axes: (n_cables, 3) unit vectors of the swivel axes, in the direction in which the cables run when they enter.
+    """
+
+    radius: Array
+    axes: Array
+
+
+class Exit(NamedTuple):
+    """A cable behind its pulley. Vectors are arrays (..., 3), or three arrays (...) as lanes.
+
+    Fields:
+        point: where the cable leaves the pulley, m.
+        direction: unit vector from there to the attachment point.
+        wrapped: (...) length on the pulley, m.
+        free: (...) length from the pulley to the attachment point, m; NaN where that lies within the pulley.
+    """
+
+    point: Array | Vector
+    direction: Array | Vector
+    wrapped: Array
+    free: Array
+
+
+def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
+    """Pulleys of a robot, checked.
+
+    Args:
+        radius: () or (n_cables,) m.
+        axes: (3,) or (n_cables, 3) swivel axes, of any length; None: straight up.
+        n_cables: number of cables.
+        z_axis: where z points, "down" or "up".
+
+    Returns:
+        the pulleys, float64 NumPy leaves.
+
+    Raises:
+        InputError: other shapes, a negative radius, axes without a direction, numbers that are not finite.
+    """
+    sizes = np.asarray(radius, float)
+    if sizes.shape not in ((), (n_cables,)) or not ((sizes >= 0.0) & (sizes <= LARGEST_RADIUS)).all():
+        raise InputError("pulley_radius", radius, f"a number >= 0, in m, or {n_cables}: one a cable")
+    up = [0.0, 0.0, 1.0 if z_axis == "up" else -1.0]
+    given = np.asarray(up if axes is None else axes, float)
+    if given.shape not in ((3,), (n_cables, 3)) or not np.isfinite(given).all():
+        raise InputError("pulley_axes", axes, f"a vector [x, y, z], or {n_cables}: one a cable")
+    largest = np.abs(given).max(-1, keepdims=True)
+    if not (largest > 0.0).all():
+        raise InputError("pulley_axes", given.tolist(), "vectors that are not zero")
+    given = given / largest
+    units = given / np.linalg.norm(given, axis=-1, keepdims=True)
+    return Pulleys(leaf(np.broadcast_to(sizes, (n_cables,))), leaf(np.broadcast_to(units, (n_cables, 3))))
+
+
+def exits(entry: Array, axis: Array, radius: Array, target: Array) -> Exit:
+    """Where cables leave their pulleys.
+
+    Args:
+        entry: (..., 3) entry points, m.
+        axis: (..., 3) unit vectors of the swivel axes.
+        radius: (...) m; 0: no pulley.
+        target: (..., 3) attachment points, m.
+
+    Returns:
+        the exits.
+    """
+    ray = target - entry
+    high = jnp.sum(ray * axis, axis=-1)
+    aside = ray - high[..., None] * axis
+    wide = jnp.linalg.norm(aside, axis=-1)
+    side = aside / _nonzero(wide)[..., None]
+    (a, b), (c, d), wrapped, free = _in_plane(radius, wide, high)
+    point = entry + a[..., None] * side + b[..., None] * axis
+    return Exit(point, c[..., None] * side + d[..., None] * axis, wrapped, free)
+
+
+def exit_lanes(entry: Vector, axis: Vector, radius: Array, target: Vector) -> Exit:
+    """Where cables leave their pulleys, one lane a case: the fast form of `exits`.
+
+    Args:
+        entry: of the entry point, m.
+        axis: unit vector of the swivel axis.
+        radius: (...) m; 0: no pulley.
+        target: attachment point, m.
+
+    Returns:
+        the exits.
+    """
+    ray = tuple(target[i] - entry[i] for i in range(3))
+    high = dot(ray, axis)
+    aside = tuple(ray[i] - high * axis[i] for i in range(3))
+    wide = jnp.sqrt(dot(aside, aside))
+    side = tuple(x / _nonzero(wide) for x in aside)
+    (a, b), (c, d), wrapped, free = _in_plane(radius, wide, high)
+    offset = combined([(a, side), (b, axis)])
+    point = tuple(entry[i] + offset[i] for i in range(3))
+    return Exit(point, combined([(c, side), (d, axis)]), wrapped, free)
+
+
+def _nonzero(width):
+    # Above or below the entry point any side is as good, and none is taken.
+    return jnp.where(width > 0.0, width, 1.0)
+
+
+def _in_plane(radius, wide, high):
+    # Point and direction along e and k, from A; `wide` and `high` are those of B.
+    x, z = wide - radius, high
+    square = x * x + z * z
+    free = jnp.sqrt(square - radius * radius)
+    # K v = (z, -x)
+    normal = ((radius * x - free * z) / square, (radius * z + free * x) / square)
+    along = ((free * x + radius * z) / square, (free * z - radius * x) / square)
+    around = jnp.arctan2(z, -x)  # of B about C, from A on
+    around = jnp.where(z < 0.0, around + 2.0 * jnp.pi, around)
+    wrapped = radius * jnp.maximum(around - jnp.arctan2(free, radius), 0.0)
+    return (radius + radius * normal[0], radius * normal[1]), along, wrapped, free

@@ -1,0 +1,266 @@
+"""Solid shapes that cables are kept clear of: spheres, cylinders with round ends, boxes, convex hulls. Without jax."""
+
+import dataclasses
+from typing import TypeAlias
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.errors import InputError
+
+# Beyond it squares of lengths lose their meaning; as in `robots.point_mass`, with jax.
+LARGEST_LENGTH = 1e6
+# Of a unit quaternion, as in `arithmetic.rotations`, with jax.
+UNIT_TOLERANCE = 1e-6
+# Points nearer to a plane than this part of their extent lie in it.
+FLAT = 1e-9
+
+
+@dataclasses.dataclass(frozen=True)
+class Sphere:
+    """A ball.
+
+    Fields:
+        centre: (3,) m.
+        radius: m.
+        name: for people.
+    """
+
+    centre: np.ndarray
+    radius: float
+    name: str = "sphere"
+
+
+@dataclasses.dataclass(frozen=True)
+class Cylinder:
+    """A cylinder with half a ball at each end: all that is as near to its axis, a segment.
+
+    Fields:
+        start: (3,) of the axis, m.
+        end: (3,) of the axis, m.
+        radius: m.
+        name: for people.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    radius: float
+    name: str = "cylinder"
+
+
+@dataclasses.dataclass(frozen=True)
+class Box:
+    """A box.
+
+    Fields:
+        centre: (3,) m.
+        half: (3,) halves of the lengths of its edges, m.
+        turn: (3, 3) its axes, one a column.
+        name: for people.
+    """
+
+    centre: np.ndarray
+    half: np.ndarray
+    turn: np.ndarray
+    name: str = "box"
+
+
+@dataclasses.dataclass(frozen=True)
+class Hull:
+    """A convex polyhedron that spans a volume.
+
+    Fields:
+        normals: (n_faces, 3) outward unit normals of its triangles.
+        offsets: (n_faces,) their products with points of the triangle, m.
+        triangles: (n_faces, 3, 3) corners, m.
+        edges: (n_edges, 2, 3) ends of the edges, those within a flat face left out, m.
+        name: for people.
+    """
+
+    normals: np.ndarray
+    offsets: np.ndarray
+    triangles: np.ndarray
+    edges: np.ndarray
+    name: str = "hull"
+
+
+Obstacle: TypeAlias = Sphere | Cylinder | Box
+Body: TypeAlias = Box | Hull
+
+
+def sphere(centre, radius: float, *, name: str = "sphere") -> Sphere:
+    """A ball, its numbers checked.
+
+    Args:
+        centre: (3,) m.
+        radius: m, not negative.
+        name: for people.
+
+    Returns:
+        the ball.
+
+    Raises:
+        InputError: not three coordinates, or a radius that is negative or not finite.
+    """
+    return Sphere(_point("centre", centre), _radius(radius), name)
+
+
+def cylinder(start, end, radius: float, *, name: str = "cylinder") -> Cylinder:
+    """A cylinder with round ends, its numbers checked.
+
+    Args:
+        start: (3,) of the axis, m.
+        end: (3,) of the axis, m; may be the start.
+        radius: m, not negative.
+        name: for people.
+
+    Returns:
+        the cylinder; it reaches beyond both ends of its axis by its radius.
+
+    Raises:
+        InputError: not three coordinates each, or a radius that is negative or not finite.
+    """
+    return Cylinder(_point("start", start), _point("end", end), _radius(radius), name)
+
+
+def box(centre, size, quaternion=(1.0, 0.0, 0.0, 0.0), *, name: str = "box") -> Box:
+    """A box, its numbers checked.
+
+    Args:
+        centre: (3,) m.
+        size: (3,) lengths of its edges, m, not negative.
+        quaternion: (4,) its orientation, scalar first.
+        name: for people.
+
+    Returns:
+        the box.
+
+    Raises:
+        InputError: not three coordinates or lengths, one negative, or not a unit quaternion.
+    """
+    lengths, turn = _point("size", size), np.asarray(quaternion, float)
+    if not (lengths >= 0.0).all():
+        raise InputError("size", size, "three lengths, none negative")
+    if turn.shape != (4,) or not abs(np.linalg.norm(turn) - 1.0) <= UNIT_TOLERANCE:
+        raise InputError("quaternion", quaternion, "four numbers of a unit quaternion, scalar first")
+    return Box(_point("centre", centre), 0.5 * lengths, _matrix(turn / np.linalg.norm(turn)), name)
+
+
+def box_between(lowest, highest, *, name: str = "box") -> Box:
+    """A box along the axes.
+
+    Args:
+        lowest: (3,) corner of the least coordinates, m.
+        highest: (3,) corner of the largest, m.
+        name: for people.
+
+    Returns:
+        the box.
+
+    Raises:
+        InputError: not three coordinates each, or the first above the second.
+    """
+    low, high = _point("lowest", lowest), _point("highest", highest)
+    if not (low <= high).all():
+        raise InputError("lowest", lowest, f"nowhere above {high.tolist()}")
+    return Box(0.5 * (low + high), 0.5 * (high - low), np.eye(3), name)
+
+
+def hull(points, *, name: str = "hull") -> Hull:
+    """The convex hull of points.
+
+    Args:
+        points: (n, 3) m.
+        name: for people.
+
+    Returns:
+        the hull.
+
+    Raises:
+        InputError: fewer than four points, not finite, or all in a plane.
+    """
+    from scipy.spatial import ConvexHull
+
+    given = np.asarray(points, float)
+    if given.ndim != 2 or given.shape[1] != 3 or not (np.abs(given) <= LARGEST_LENGTH).all():
+        raise InputError("points", points, "points of three coordinates, at most 1e6 m")
+    if is_flat(given):
+        raise InputError("points", given.tolist(), "four points or more that are not all in a plane")
+    found = ConvexHull(given)
+    corners, normals = found.simplices, found.equations[:, :3]
+    # Once more in the corners, whose coordinates it has to fit.
+    offsets = np.einsum("fi,fi->f", normals, given[corners].mean(1))
+    edges = []
+    for face, (simplex, others) in enumerate(zip(corners, found.neighbors, strict=True)):
+        for k, other in enumerate(others):
+            if face < other and normals[face] @ normals[other] < 1.0 - FLAT:
+                edges.append(given[np.delete(simplex, k)])
+    return Hull(normals, offsets, given[corners], np.array(edges), name)
+
+
+def is_flat(points: np.ndarray) -> bool:
+    """Whether points lie in a plane.
+
+    Args:
+        points: (n, 3) m.
+
+    Returns:
+        whether they span no volume, but for rounding.
+    """
+    if len(points) < 4:
+        return True
+    spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
+    return bool(spread[2] <= FLAT * spread[0])
+
+
+def inward(shape: Obstacle, frame: Frame) -> Obstacle:
+    """An obstacle of a robot file in the kernels' coordinates.
+
+    Args:
+        shape: in the axes of the file.
+        frame: these axes.
+
+    Returns:
+        the obstacle, from the centroid of the spools, z down.
+    """
+    if isinstance(shape, Cylinder):
+        return dataclasses.replace(shape, start=frame.inward(shape.start), end=frame.inward(shape.end))
+    if isinstance(shape, Sphere):
+        return dataclasses.replace(shape, centre=frame.inward(shape.centre))
+    return dataclasses.replace(shape, centre=frame.inward(shape.centre), turn=frame.turned(shape.turn.T).T)
+
+
+def turned(shape: Body, frame: Frame) -> Body:
+    """A platform's own shape in the axes that its points have in the kernels.
+
+    Args:
+        shape: in platform axes as in the robot file.
+        frame: the axes of the file.
+
+    Returns:
+        the shape, from the same point.
+    """
+    if isinstance(shape, Box):
+        return dataclasses.replace(shape, centre=frame.turned(shape.centre), turn=frame.turned(shape.turn.T).T)
+    normals, triangles, edges = map(frame.turned, (shape.normals, shape.triangles, shape.edges))
+    return dataclasses.replace(shape, normals=normals, triangles=triangles, edges=edges)
+
+
+def _point(key: str, given) -> np.ndarray:
+    point = np.asarray(given, float)
+    if point.shape != (3,) or not (np.abs(point) <= LARGEST_LENGTH).all():
+        raise InputError(key, given, "three numbers, at most 1e6 m")
+    return point
+
+
+def _radius(given: float) -> float:
+    if not 0.0 <= given <= LARGEST_LENGTH:
+        raise InputError("radius", given, "a length, not negative, at most 1e6 m")
+    return float(given)
+
+
+def _matrix(quaternion: np.ndarray) -> np.ndarray:
+    w, x, y, z = quaternion
+    vector = np.array([x, y, z])
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return (w * w - vector @ vector) * np.eye(3) + 2.0 * np.outer(vector, vector) + 2.0 * w * skew

@@ -1,0 +1,415 @@
+"""Robots of other programs: what is read of them, what is refused, and that nothing is expanded, fetched or run."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+import yaml
+
+import cspr_jax
+from cspr_jax.cli import main
+from cspr_jax.config.formats.table import FORMATS
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.errors import ConfigError
+
+BODIES = """<?xml version="1.0" encoding="utf-8"?>
+<!DOCTYPE bodies_system SYSTEM "../../nowhere/bodies.dtd">
+<bodies_system><links><link_rigid num="1" name="hub">
+<joint type="{joint}" q_initial="0"/>
+<physical><mass>{mass}</mass><com_location>{centre}</com_location><end_location>0 0 0</end_location>
+<inertia ref="{ref}"><Ixx>{I[0]}</Ixx><Iyy>{I[1]}</Iyy><Izz>{I[2]}</Izz><Ixy>{I[3]}</Ixy>
+<Ixz>{I[4]}</Ixz><Iyz>{I[5]}</Iyz>
+</inertia></physical>
+<parent><num>{parent}</num><location>{location}</location></parent></link_rigid>{more}</links></bodies_system>
+"""
+PLAIN = {
+    "joint": "SPATIAL_EULER_XYZ",
+    "mass": "2.5",
+    "centre": "0.1 0.0 0.05",
+    "ref": "com",
+    "I": ("0.2", "0.3", "0.4", "0.01", "0.02", "-0.03"),
+    "parent": "0",
+    "location": "0 0 0",
+    "more": "",
+}
+BASE = [[-3.0, -2, 4], [3, -2, 4.1], [3, 2, 4], [-3, 2, 4], [-3, -2, 0], [3, -2, 0], [3, 2.2, 0], [-3, 2, 0]]
+ENDS = [[-0.3, -0.2, 0.1], [0.3, -0.2, 0.1], [0.3, 0.2, 0.1], [-0.3, 0.2, 0.1]]
+ENDS += [[0.3, 0.2, -0.1], [-0.3, 0.2, -0.1], [-0.3, -0.2, -0.1], [0.3, -0.2, -0.1]]
+
+
+def words(point):
+    return " ".join(map(str, point))
+
+
+def attachment(link, point):
+    return f"<attachment><link>{link}</link><location>{words(point)}</location></attachment>"
+
+
+def wheel(point, axis="0 0 1", radius="0.05"):
+    return (
+        f"<base_rotating_pulley><fixed_location>{words(point)}</fixed_location><pulley_radius>{radius}</pulley_radius>"
+        f"<cable_entry_vector>{axis}</cable_entry_vector></base_rotating_pulley>"
+    )
+
+
+def cable(first, second, reference="joint", limits=(1, 500), name="c", tag="cable_ideal"):
+    low, high = limits
+    return (
+        f'<{tag} name="{name}" attachment_reference="{reference}"><properties><force_min>{low}</force_min>'
+        f"<force_max>{high}</force_max></properties><attachments>{first}{second}</attachments></{tag}>"
+    )
+
+
+def plain_cables(base=BASE, ends=ENDS, **more):
+    return "".join(
+        cable(attachment(0, a), attachment(1, b), name=f"c{k}", **more)
+        for k, (a, b) in enumerate(zip(base, ends, strict=True))
+    )
+
+
+def caspr(folder, cables=None, sets="", default="main", doctype="", name="hub", **body):
+    text = plain_cables() if cables is None else cables
+    folder.mkdir(exist_ok=True)
+    (folder / f"{name}_bodies.xml").write_text(BODIES.format(**(PLAIN | body)))
+    head = '<?xml version="1.0"?>' + (doctype or '<!DOCTYPE cables SYSTEM "../cables.dtd">')
+    text = f'{head}<cables default_cable_set="{default}"><cable_set id="main">{text}</cable_set>{sets}</cables>'
+    (folder / f"{name}_cables.xml").write_text(text)
+    return folder / f"{name}_cables.xml"
+
+
+CDPYR = {
+    "name": "eight",
+    "frame": {"anchors": [{"position": a} for a in reversed(BASE)]},
+    "platforms": [
+        {
+            "motion_pattern": {"translation": 3, "rotation": 3},
+            "anchors": [{"position": b} for b in ENDS],
+            "center_of_gravity": [0.1, 0.0, 0.05],
+            "inertia": {"linear": np.diag([2.5] * 3).tolist(), "angular": np.diag([0.3, 0.4, 0.5]).tolist()},
+        }
+    ],
+    "cables": [{"name": "rope", "diameter": 0.006}],
+    "kinematic_chains": [{"frame_anchor": 7 - k, "platform_anchor": k, "cable": 0} for k in range(8)],
+}
+WIREX = """<?xml version="1.0"?><models version="0.31"><robot name="wires" motionpattern="{pattern}"><geometry>{chains}
+</geometry><platform id="1" mass="2.5" motionpattern="{pattern}">
+<inertiatensor Ixx="0.2" Iyy="0.3" Izz="0.4"/><centerofgravity x="0.1" y="0" z="0.05"/></platform></robot>
+<cable id="1" name="rope" radius="0.003"/></models>
+"""
+
+
+def chain(base, end, radius=0.0, more="", platform=1):
+    ends = ("".join(f'{key}="{x}" ' for key, x in zip("xyz", point, strict=True)) for point in (base, end))
+    first, second = ends
+    return (
+        f'<chain id="1" platform_id="{platform}" cable_id="1"><base {first} radius="{radius}" {more}/>'
+        f"<platform {second}/></chain>"
+    )
+
+
+def wirex(folder, chains=None, pattern="3R3T"):
+    text = "".join(chain(a, b) for a, b in zip(BASE, ENDS, strict=True)) if chains is None else chains
+    (folder / "robot.wcrfx").write_text(WIREX.format(chains=text, pattern=pattern))
+    return folder / "robot.wcrfx"
+
+
+def written(folder, kind, data=CDPYR):
+    text = json.dumps(data) if kind == "json" else yaml.safe_dump(data)
+    (folder / f"robot.{kind}").write_text(text)
+    return folder / f"robot.{kind}"
+
+
+@pytest.mark.parametrize("kind", ["caspr", "json", "yaml", "wcrfx"])
+def test_a_platform_is_the_same_whatever_wrote_it(tmp_path, kind, capsys):
+    """Geometry, mass and mass centre; what is written reads back to the same robot; plans and Python take the file."""
+    path = caspr(tmp_path) if kind == "caspr" else wirex(tmp_path) if kind == "wcrfx" else written(tmp_path, kind)
+    found = cspr_jax.import_robot(path)
+    robot = found.robot
+    assert (robot.pattern, robot.n_cables, robot.z_axis, float(robot.gravity)) == ("3R3T", 8, "up", 9.81)
+    np.testing.assert_array_equal(robot.base_points, BASE)
+    np.testing.assert_allclose(robot.platform_points, np.array(ENDS) - [0.1, 0.0, 0.05], atol=1e-15)
+    np.testing.assert_array_equal(robot.centre_of_mass, [0.1, 0.0, 0.05])
+    assert float(robot.mass) == 2.5 and found.warnings == ()
+    assert main(["import", str(path), "-o", str(tmp_path / "out.toml")]) == 0
+    assert capsys.readouterr().out.strip() == str(tmp_path / "out.toml")
+    assert RobotFile(**tomllib.loads((tmp_path / "out.toml").read_text())) == RobotFile(**found.keys)
+    for again in (cspr_jax.load_robot(tmp_path / "out.toml"), cspr_jax.load_robot(path)):
+        for name in ("base_points", "platform_points", "inertia", "mass", "centre_of_mass"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(robot, name))
+    assert main(["import", str(path)]) == 0
+    assert capsys.readouterr().out == (tmp_path / "out.toml").read_text()
+    plan = f'schema = 1\nrobot = "{path.name}"\nfamily = "hypocycloid"\nz0 = 1.0\n'
+    plan += "[[pose]]\nrest = true\n[[pose]]\nposition = [0, 0, 1]\n"
+    (tmp_path / "plan.toml").write_text(plan)
+    assert main(["plan", str(tmp_path / "plan.toml")]) == 2
+    assert f"{path}: base_points: 8 points: must be 6" in capsys.readouterr().err
+
+
+def test_caspr_bodies(tmp_path):
+    """Tensions, inertia about joint or mass centre, points from either, pulleys, sets; the file of bodies will do."""
+    path = caspr(tmp_path)
+    robot = cspr_jax.import_robot(tmp_path / "hub_bodies.xml").robot
+    np.testing.assert_array_equal(robot.inertia, [[0.2, 0.01, 0.02], [0.01, 0.3, -0.03], [0.02, -0.03, 0.4]])
+    assert np.asarray(robot.limits.tension_max).tolist() == [500.0] * 8
+    arm, mass = np.array([0.1, 0.0, 0.05]), 2.5
+    moved = np.asarray(robot.inertia) + mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    parts = tuple(str(moved[a, b]) for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+    np.testing.assert_allclose(
+        cspr_jax.import_robot(caspr(tmp_path, ref="joint", I=parts)).robot.inertia, robot.inertia, atol=1e-14
+    )
+    other = cspr_jax.import_robot(caspr(tmp_path, plain_cables(reference="com"))).robot
+    np.testing.assert_allclose(other.platform_points, ENDS, atol=1e-15)
+    some = wheel(BASE[0]), *(attachment(0, a) for a in BASE[1:])
+    text = "".join(
+        cable(a, attachment(1, b), limits=(0, "inf" if k else 9e9))
+        for k, (a, b) in enumerate(zip(some, ENDS, strict=True))
+    )
+    text = text.replace("<force_max>inf", "<force_max>80", 1)
+    sets = f'<cable_set id="other">{text}</cable_set>'
+    path = caspr(tmp_path, sets=sets)
+    assert cspr_jax.import_robot(path).robot.pulleys is None
+    for found in (cspr_jax.import_robot(path, "other").robot, cspr_jax.load_robot(f"{path}#other")):
+        assert np.asarray(found.pulleys.radius).tolist() == [0.05] + [0.0] * 7
+        assert np.asarray(found.limits.tension_max).tolist() == [np.inf, 80.0] + [np.inf] * 6
+
+
+@pytest.mark.parametrize(
+    ("joint", "turn"), [("PLANAR_XZ", [0, 1, 2]), ("PLANAR_XY", [0, 2, 1]), ("PLANAR_YZ", [1, 0, 2])]
+)
+def test_caspr_planar_robots_come_into_the_plane_of_x_and_z(tmp_path, joint, turn):
+    """Their moments stay; in a level plane there is no weight."""
+    base, ends = np.array(BASE[:4]) * [1, 0, 1] + [[0, 0, k] for k in range(4)], np.array(ENDS[:4]) * [1, 0, 1]
+    away = np.eye(3)[1] * 0.7  # along the normal, with its joint
+    place = words((np.array(away))[turn])
+    text = plain_cables((base + away)[:, turn].tolist(), ends[:, turn].tolist())
+    diagonal = np.array([0.2, 0.35, 0.4])[turn]
+    tensor = (*map(str, diagonal), "0", "0", "0")
+    robot = cspr_jax.import_robot(caspr(tmp_path, text, joint=joint, centre="0 0 0", location=place, I=tensor)).robot
+    assert robot.pattern == "1R2T" and float(robot.inertia[1, 1]) == 0.35
+    np.testing.assert_allclose(robot.base_points, base, atol=1e-15)
+    np.testing.assert_allclose(robot.platform_points, ends, atol=1e-15)
+    assert float(robot.gravity) == (1e-9 if joint == "PLANAR_XY" else 9.81)
+
+
+def test_caspr_points_rods_and_joints(tmp_path):
+    """A body that only translates is a point mass; one that turns about a joint has that at the origin."""
+    ends = [[0.1, 0.0, 0.2]] * 8
+    robot = cspr_jax.import_robot(caspr(tmp_path, plain_cables(ends=ENDS), joint="T_XYZ")).robot
+    assert robot.pattern == "3T"
+    np.testing.assert_allclose(robot.base_points, np.array(BASE) - ENDS, atol=1e-15)
+    robot = cspr_jax.import_robot(caspr(tmp_path, joint="S_EULER_XYZ", location="0.5 0.25 1")).robot
+    assert robot.pattern == "3R"
+    np.testing.assert_allclose(robot.base_points, np.array(BASE) - [0.5, 0.25, 1.0], atol=1e-15)
+    np.testing.assert_array_equal(robot.platform_points, ENDS)
+    np.testing.assert_array_equal(robot.centre_of_mass, [0.1, 0.0, 0.05])
+    line = (np.linspace(-1.0, 1.0, 8)[:, None] * [0.1, 0.2, 0.3]).tolist()
+    found = cspr_jax.import_robot(caspr(tmp_path, plain_cables(ends=line), centre="0 0 0"))
+    assert found.robot.pattern == "2R3T" and "on one line" in found.warnings[0]
+    found = cspr_jax.import_robot(caspr(tmp_path, plain_cables(ends=ends), centre="0.1 0 0.2"))
+    assert found.robot.pattern == "3T" and "a point mass" in found.warnings[0]
+
+
+def test_what_is_missing_is_marked(tmp_path):
+    zero = ("0",) * 6
+    found = cspr_jax.import_robot(caspr(tmp_path, mass="0", I=zero, centre="0 0 0"))
+    assert found.keys["source"].startswith("placeholder mass of 1 kg; placeholder inertia of a uniform sphere")
+    radius = np.linalg.norm(ENDS[0])
+    np.testing.assert_allclose(found.robot.inertia, 0.4 * radius**2 * np.eye(3), rtol=1e-12)
+    found = cspr_jax.import_robot(caspr(tmp_path, I=("1", "1", "9", "0", "0", "0")))
+    assert "no real body" in found.warnings[0] and found.keys["source"].startswith("placeholder inertia")
+    springs = plain_cables(tag="cable_linear_spring")
+    assert cspr_jax.import_robot(caspr(tmp_path, springs)).warnings == (
+        "cables are taken as rigid: cable_linear_spring",
+    )
+
+
+BOMB = "".join(f'<!ENTITY e{k} "{f"&e{k - 1};" * 10 if k else "ha" * 10}">' for k in range(12))
+SECRET = '<!DOCTYPE cables [<!ENTITY leak SYSTEM "file:///etc/hostname">]>'
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"doctype": f"<!DOCTYPE cables [{BOMB}]>", "default": "&e11;"}, "declares XML entities: must be without"),
+        ({"doctype": SECRET, "default": "&leak;"}, "declares XML entities: must be without"),
+        ({"doctype": '<!DOCTYPE cables [<!ENTITY % p SYSTEM "http://localhost:9/p"> %p;]>'}, "declares XML entities"),
+        ({"doctype": "<cables", "default": "x"}, "is not XML"),
+        ({"default": "gone"}, 'default_cable_set = "gone": must be "main"'),
+        ({"joint": "R_X"}, 'joint.type = "R_X": must be "SPATIAL_EULER_XYZ"'),
+        ({"more": "<link_rigid/>"}, "links: 2 links: must be one"),
+        ({"parent": "1"}, "parent.num: must be 0, the base"),
+        ({"mass": "nan"}, 'physical.mass = "nan": must be a finite number'),
+        ({"mass": "heavy"}, 'physical.mass = "heavy": must be a finite number'),
+        ({"mass": "-1"}, "physical.mass = -1: must be a number >= 0"),
+        ({"centre": "0 0"}, 'physical.com_location = "0 0": must be three numbers'),
+        ({"centre": "0 0 inf"}, 'physical.com_location = "inf": must be a finite number'),
+        ({"ref": "end"}, 'inertia.ref = "end": must be "com" or "joint"'),
+        ({"cables": ""}, "no cables: must be one or more"),
+        ({"cables": plain_cables(BASE[:5], ENDS[:5])}, "base_points = 5 points: must be at least 6"),
+        (
+            {"cables": plain_cables().replace("<link>1", "<link>2", 1)},
+            'cable 1 ("c0"): attachments on links 0, 2: must be one',
+        ),
+        (
+            {"cables": plain_cables() + cable(attachment(0, BASE[0]), "")},
+            "attachments on links 0: must be one attachment",
+        ),
+        (
+            {"cables": plain_cables().replace("joint", "end", 1)},
+            '.attachment_reference = "end": must be "com" or "joint"',
+        ),
+        ({"cables": plain_cables(limits=("nan", 5))}, 'cable 1 ("c0").force_min = "nan": must be a finite number'),
+        ({"cables": plain_cables(limits=(5, 5))}, "tension_min = [5"),
+        ({"cables": plain_cables(tag="rope")}, "<rope>: must be a cable, such as <cable_ideal>"),
+        (
+            {"cables": cable(wheel(BASE[0]).replace("base_rot", "screw_base_rot"), attachment(1, ENDS[0]))},
+            "<screw_base_rotating_pulley>: must be one attachment on link 0, or a <base_rotating_pulley>",
+        ),
+        ({"joint": "PLANAR_XZ"}, 'cable 1 ("c0") leaves the plane of a planar robot: must lie in it'),
+        ({"name": "", "cables": None}, "must be named NAME_bodies.xml or NAME_cables.xml"),
+    ],
+)
+def test_caspr_files_that_are_refused(tmp_path, change, line, capsys):
+    """One line that names the file; exit code 2; nothing is written."""
+    path = caspr(tmp_path / "model", **change)
+    assert main(["import", str(path), "-o", str(tmp_path / "out.toml")]) == 2
+    err = capsys.readouterr().err
+    assert line in err and err.count("\n") == 1 and str(tmp_path / "model") in err and len(err) < 800, err
+    assert not (tmp_path / "out.toml").exists()
+
+
+def test_files_that_are_none(tmp_path, capsys):
+    path = caspr(tmp_path)
+    cases = [
+        (["--set", "mian"], path, '--set = "mian": did you mean main? must be "main"'),
+        ([], tmp_path / "gone_cables.xml", "gone_cables.xml: no such file"),
+        ([], tmp_path / "robot.urdf", "must end in .xml, .json, .yaml, .yml, .wcrfx"),
+        (["--set", "a"], written(tmp_path, "json"), '--set = "a": must be absent: only models of CASPR'),
+        (["-o", "robot.xml"], path, "-o: robot.xml: must end in .toml"),
+    ]
+    (tmp_path / "alone_cables.xml").write_text(path.read_text())
+    cases.append(([], tmp_path / "alone_cables.xml", "no such file beside it: alone_bodies.xml"))
+    (tmp_path / "big.json").write_text(" " * (1 << 20) + "{}")
+    cases.append(([], tmp_path / "big.json", "must be at most 1048576"))
+    for more, file, line in cases:
+        assert main(["import", str(file), *more]) == 2
+        err = capsys.readouterr().err
+        assert line in err and err.count("\n") == 1, err
+    with pytest.raises(ConfigError, match="no such file: must be a catalogue name"):
+        cspr_jax.load_robot(tmp_path / "gone.json")
+    assert {row.name for row in FORMATS} == {"CASPR", "cdpyr", "WireX"}
+
+
+def changed(**more):
+    return CDPYR | more
+
+
+PLATFORM = CDPYR["platforms"][0]
+
+
+@pytest.mark.parametrize(
+    ("data", "line"),
+    [
+        ([1, 2], "the file = [1, 2]: must be a table"),
+        ({}, "platforms is missing: a robot of cdpyr has it"),
+        (changed(platforms=[PLATFORM] * 2), "platforms: 2 platforms: must be one"),
+        (changed(platforms=[PLATFORM | {"motion_pattern": "4R"}]), 'platforms[0].motion_pattern = "4R": must be "1T"'),
+        (changed(platforms=[PLATFORM | {"motion_pattern": {"rotation": [1]}}]), "platforms[0].motion_pattern"),
+        (changed(frame={"anchors": "x"}), "frame.anchors: must be a list of 1 to 1000 tables"),
+        (
+            changed(frame={"anchors": [{"position": [1, 2]}] * 8}),
+            "frame.anchors[7].position = [1, 2]: must be 3 finite",
+        ),
+        (changed(frame={"anchors": [{"position": [1, 2, float("nan")]}] * 8}), "must be 3 finite numbers"),
+        (changed(frame={"anchors": [{"position": [1, 2, float("inf")]}] * 8}), "must be 3 finite numbers"),
+        (
+            changed(kinematic_chains=[{"frame_anchor": 8, "platform_anchor": 0}]),
+            "frame_anchor = 8: must be a number from 0 to 7",
+        ),
+        (changed(kinematic_chains=[{"frame_anchor": True, "platform_anchor": 0}]), "frame_anchor = true: must be"),
+        (
+            changed(kinematic_chains=[{"frame_anchor": 0, "platform_anchor": 0}]),
+            "base_points = 1 points: must be at least 6",
+        ),
+        (changed(cables=[{"diameter": "thick"}]), 'cables[0].diameter = "thick": must be a finite number'),
+    ],
+)
+@pytest.mark.parametrize("kind", ["json", "yaml"])
+def test_cdpyr_files_that_are_refused(tmp_path, kind, data, line, capsys):
+    assert main(["import", str(written(tmp_path, kind, data))]) == 2
+    err = capsys.readouterr().err
+    assert line in err and err.count("\n") == 1 and len(err) < 800, err
+
+
+def test_yaml_runs_nothing_and_expands_nothing(tmp_path, capsys):
+    bomb = "a: &a [x, x, x]\n" + "".join(
+        f"{chr(98 + k)}: &{chr(98 + k)} [{', '.join(['*' + chr(97 + k)] * 9)}]\n" for k in range(9)
+    )
+    for text, line in (
+        (bomb, "stand for more than 1000000 values"),
+        ("a: &a [*a]", "or for themselves"),
+        (f"!!python/object/apply:os.system ['touch {tmp_path}/ran']", "is not YAML: "),
+        ("[" * 5000, "nested too deeply"),
+        ("a: [1", "is not YAML: "),
+        ("\x00", "is not YAML: "),
+        ("", "the file = "),
+    ):
+        (tmp_path / "robot.yaml").write_text(text)
+        assert main(["import", str(tmp_path / "robot.yaml")]) == 2
+        err = capsys.readouterr().err
+        assert line in err and err.count("\n") == 1 and len(err) < 800, err
+    (tmp_path / "robot.json").write_text("[" * 100000)
+    assert main(["import", str(tmp_path / "robot.json")]) == 2
+    assert not (tmp_path / "ran").exists()
+
+
+def test_cdpyr_patterns(tmp_path):
+    """In a plane x and y, with y up; on a line x. A point counts by its force alone."""
+    flat = (np.array(BASE[:4]) * [1, 0, 0] + [[0, 2.0 * k, 0] for k in range(4)]).tolist()
+    for pattern, (rotation, translation) in {"1R2T": (1, 2), "2T": (0, 2), "1T": (0, 1)}.items():
+        ends = [{"position": [x, y, 0.0]} for x, y, _ in ENDS[:4]]
+        data = changed(
+            frame={"anchors": [{"position": a, "pulley": {"radius": 0.1}} for a in flat]},
+            platforms=[{"motion_pattern": {"translation": translation, "rotation": rotation}, "anchors": ends}],
+            kinematic_chains=[{"frame_anchor": k, "platform_anchor": k, "cable": 0} for k in range(4)],
+        )
+        found = cspr_jax.import_robot(written(tmp_path, "json", data))
+        assert found.robot.pattern == pattern and float(found.robot.cable_diameter) == 0.006
+        base, arms = np.array(flat), np.array([end["position"] for end in ends])
+        if pattern == "1T":
+            np.testing.assert_allclose(found.robot.base_points[:, 2], (base - arms)[:, 0], atol=1e-15)
+            assert found.robot.pulleys is not None
+            continue
+        shift = arms if pattern == "2T" else 0.0
+        np.testing.assert_allclose(found.robot.base_points, (base - shift)[:, [0, 2, 1]], atol=1e-15)
+        assert found.robot.pulleys is None and "pulleys that swivel out of its plane are left out" in found.warnings
+        assert "placeholder mass of 1 kg" in found.keys["source"]
+
+
+def test_pulleys_of_cdpyr_and_wirex(tmp_path):
+    """They swivel about the z axis of their anchor; diameters are twice the radius in WireX."""
+    turn = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    anchors = [{"position": a, "dcm": turn, "pulley": {"radius": 0.1, "dcm": turn}} for a in reversed(BASE)]
+    first = cspr_jax.import_robot(written(tmp_path, "json", changed(frame={"anchors": anchors}))).robot
+    np.testing.assert_allclose(first.pulleys.axes, [[0.0, 0.0, -1.0]] * 8, atol=1e-15)
+    text = "".join(chain(a, b, 0.1, 'a13="0" a23="-1" a33="0"') for a, b in zip(BASE, ENDS, strict=True))
+    second = cspr_jax.import_robot(wirex(tmp_path, text)).robot
+    np.testing.assert_allclose(second.pulleys.axes, [[0.0, -1.0, 0.0]] * 8, atol=1e-15)
+    assert float(second.cable_diameter) == 0.006 and np.asarray(second.pulleys.radius).tolist() == [0.1] * 8
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ({"chains": ""}, "geometry: 0 chains to 0 platforms: must be one platform"),
+        ({"chains": chain(BASE[0], ENDS[0]) + chain(BASE[1], ENDS[1], platform=2)}, "2 chains to 2 platforms"),
+        ({"pattern": "9T"}, 'motionpattern = "9T": must be "1T"'),
+        ({"chains": chain(["x", 0, 0], ENDS[0])}, 'chain 1.base.x = "x": must be a finite number'),
+        ({"chains": "<chain/>"}, "chain 1: 0 elements <base>: must be one"),
+    ],
+)
+def test_wirex_files_that_are_refused(tmp_path, given, line, capsys):
+    assert main(["import", str(wirex(tmp_path, **given))]) == 2
+    err = capsys.readouterr().err
+    assert line in err and err.count("\n") == 1, err
