@@ -57,6 +57,7 @@ FUNCTIONS = {
     "plot": ("plot", "open_result"),
     "table": ("table", "table_names"),
     "bench": ("benchmark",),
+    "import": ("import_robot",),
     "robots": ("list_robots",),
     "quantities": ("list_quantities",),
     "examples": ("list_examples", "copy_examples"),
@@ -100,10 +101,12 @@ def test_every_command_has_its_function():
     for name, parser in commands().items():
         functions = [getattr(cspr_jax, function) for function in FUNCTIONS[name]]
         functions += [plans.Plan.save] if name == "plan" else []
+        functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
         own = NAMES | {"run": {"output": "directory"}, "plan": {"output": "path"}}.get(name, {})
         own |= {"name": "names", "output": "folder"} if name == "examples" else {}
         own |= {"path": "directory"} if name == "status" else {}
+        own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
         options = {action.dest for action in parser._actions} - PRINTING
         assert {own.get(option, option) for option in options} <= known, name
 
