@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cspr_jax.api.accelerations import available_accelerations as available_accelerations
+    from cspr_jax.api.workspaces import workspace as workspace
     from cspr_jax.api.beziers import bezier as bezier
     from cspr_jax.api.beziers import bezier_durations as bezier_durations
     from cspr_jax.api.beziers import bezier_verdicts as bezier_verdicts
@@ -68,6 +69,7 @@ _PUBLIC = {
     "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
     "attainable": ("cspr_jax.api.platform_searches", "attainable"),
     "available_accelerations": ("cspr_jax.api.accelerations", "available_accelerations"),
+    "workspace": ("cspr_jax.api.workspaces", "workspace"),
     "benchmark": ("cspr_jax.api.speed", "benchmark"),
     "bezier": ("cspr_jax.api.beziers", "bezier"),
     "bezier_durations": ("cspr_jax.api.beziers", "bezier_durations"),
@@ -119,6 +121,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "amplitude",
     "attainable",
     "available_accelerations",
+    "workspace",
     "benchmark",
     "bezier",
     "bezier_durations",

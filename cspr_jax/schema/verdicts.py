@@ -22,6 +22,7 @@ class Verdict(enum.IntFlag):
     CABLE_OVER_ACCELERATION = 4096
     FEWER_ARCS_UNDECIDED = 8192
     NOT_ACCESSIBLE = 16384
+    WRENCH_INFEASIBLE = 32768
 
     @property
     def text(self) -> str:
@@ -47,4 +48,5 @@ SENTENCES = {
     Verdict.CABLE_OVER_ACCELERATION: "A cable exceeds its largest acceleration.",
     Verdict.FEWER_ARCS_UNDECIDED: "Feasible as stated, but a smaller number of arcs could not be refuted.",
     Verdict.NOT_ACCESSIBLE: "No way leads there from the reference orientation without interference or singularity.",
+    Verdict.WRENCH_INFEASIBLE: "Within their limits of tension the cables cannot supply a wrench that they must.",
 }

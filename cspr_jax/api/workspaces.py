@@ -1,0 +1,127 @@
+"""Workspaces from Python: which poses a robot on any number of cables can hold."""
+
+import numpy as np
+
+from cspr_jax.api.arguments import points_of, quaternions
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.errors import InputError
+from cspr_jax.problem import centred, limits_over
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.search import workspaces as search
+from cspr_jax.search.workspaces import CONDITIONS, FEASIBLE, Question, WorkspaceAnswers
+
+__all__ = ["WorkspaceAnswers", "workspace"]
+
+
+def workspace(  # noqa: PLR0913
+    robot: PointMassRobot | PlatformRobot,
+    positions,
+    orientations=None,
+    *,
+    condition: str = FEASIBLE,
+    tension_min=None,
+    tension_max=None,
+    wrenches=None,
+) -> WorkspaceAnswers:
+    """Workspace of a robot of any pattern on any number of cables: whether each of n poses belongs to it.
+
+    Args:
+        robot: a point mass or a body on as many cables as degrees of freedom, or more; pulleys count.
+        positions: (n, 3) of the origin of the platform frame, of a robot on a joint of the joint, in the robot's axes,
+            m.
+        orientations: (n, 4) unit quaternions, scalar first, from the orientation of the file; None: that one.
+        condition: "static": taut cables of any tension hold the weight; "wrench-feasible": tensions within limits
+            supply all wrenches; "wrench-closure": cables that are pulled hard enough resist every wrench.
+        tension_min: smallest tension, () or (n_cables,) N, of "wrench-feasible"; None: the robot's, else 0.
+        tension_max: largest tension, likewise, inf allowed; None: the robot's, else none.
+        wrenches: (k, dof) what the cables must supply, of "wrench-feasible": forces, N, then moments about the mass
+            centre, or the joint, N m, in the robot's axes; None: what holds the weight still.
+
+    Returns:
+        verdicts, 0 inside, and margins.
+
+    Raises:
+        InputError: another kind of robot, an unknown condition, shapes that do not fit, values that are not finite,
+            quaternions that are not of unit length, orientations of a point mass, wrenches of a rod, limits or wrenches
+            where the condition has none, limits that contradict each other.
+    """
+    if not isinstance(robot, PointMassRobot | PlatformRobot):
+        raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
+    if condition not in CONDITIONS:
+        raise InputError("condition", condition, " or ".join(f'"{name}"' for name in CONDITIONS))
+    for key, value in (("tension_min", tension_min), ("tension_max", tension_max), ("wrenches", wrenches)):
+        if value is not None and condition != FEASIBLE:
+            raise InputError(key, value, f'None with condition "{condition}"')
+    places = _places(robot, positions)
+    with double_precision():
+        own, frame = centred(robot)
+        low, high = _tensions(robot, tension_min, tension_max, condition)
+        loads = None if wrenches is None else _wrenches(robot, wrenches, frame)
+        inner, turns = _poses(own, frame, places, orientations)
+        return search.workspace(own, inner, turns, Question(condition, low, high, loads))
+
+
+def _places(robot, positions) -> np.ndarray:
+    places = points_of("positions", positions)
+    row = PATTERNS[robot.pattern]
+    if row.is_planar and places[:, 1].any():
+        raise InputError("positions", "y not 0", "y = 0: the plane of a planar robot")
+    return places
+
+
+def _tensions(robot, tension_min, tension_max, condition: str) -> tuple[np.ndarray, np.ndarray]:
+    count = robot.n_cables
+    if condition != FEASIBLE:
+        return np.zeros(count), np.full(count, np.inf)
+    given = Limits(tension_min=tension_min, tension_max=_bounded(tension_max, robot))
+    limits = limits_over(robot, given, any_tensions=True)
+    if tension_max is not None and np.isinf(np.asarray(tension_max, float)).all():
+        limits = Limits(tension_min=limits.tension_min)
+    low, high = tension_range(robot, limits)
+    return np.asarray(low), np.asarray(high)
+
+
+def _bounded(tension_max, robot):
+    # All of them infinite is none, and a list of some is a list of floats.
+    if tension_max is None:
+        return None
+    values = np.asarray(tension_max, float)
+    return None if values.shape in ((), (robot.n_cables,)) and np.isinf(values).all() and (values > 0).all() else values
+
+
+def _wrenches(robot, given, frame: Frame) -> np.ndarray:
+    row, values = PATTERNS[robot.pattern], np.asarray(given, float)
+    if row.along_line:
+        raise InputError("wrenches", "of a rod", "None: its two axes of moments turn with it")
+    if values.ndim != 2 or values.shape[0] == 0 or values.shape[1] != robot.dof or not np.isfinite(values).all():
+        raise InputError("wrenches", f"shape {values.shape}", f"finite numbers of shape (k, {robot.dof})")
+    signs = [frame.signs[i] for i in (*row.forces, *row.moments)]
+    return values * np.array(signs)
+
+
+def _poses(own, frame: Frame, places: np.ndarray, orientations) -> tuple[np.ndarray, np.ndarray | None]:
+    row = PATTERNS[own.pattern]
+    inner, turns = np.asarray(frame.inward(places)), None
+    if orientations is not None:
+        if not row.is_body:
+            raise InputError("orientations", None, "must be None", fault="a point mass has none")
+        given = quaternions("orientations", orientations, len(places))
+        if row.is_planar and given[:, [1, 3]].any():
+            raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
+        turns = frame.turned_quaternions(given)
+    if row.is_body and not row.is_jointed and own.centre_of_mass is not None:
+        inner = inner + _turned(turns, np.asarray(own.centre_of_mass), len(inner))
+    return inner, turns
+
+
+def _turned(turns: np.ndarray | None, vector: np.ndarray, count: int) -> np.ndarray:
+    if turns is None:
+        return np.tile(vector, (count, 1))
+    scalar, axis = turns[:, :1], turns[:, 1:]
+    twice = 2.0 * np.cross(axis, np.broadcast_to(vector, axis.shape))
+    return vector + scalar * twice + np.cross(axis, twice)

@@ -1,0 +1,197 @@
+"""Workspaces: margins of many poses of a robot on any number of cables. Arrays in, answers out.
+
+Poses that rounding may have decided, and those whose wrench matrix is near a loss of rank, are answered once more, by
+singular values.
+"""
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+
+from cspr_jax.arithmetic.batches import in_batches, in_parts
+from cspr_jax.feasibility.workspace import exact, kernels
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.verdicts import Verdict
+
+STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
+CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
+# Of the largest limit of the tensions, or of the wrench: a margin nearer to zero is that of the boundary.
+BOUNDARY = 1e-9
+BATCH, ARRAYS, PART = 4096, 256, 65536
+# Poses by which the base block is chosen.
+TRIALS = 200
+
+
+@dataclasses.dataclass(frozen=True)
+class WorkspaceAnswers(Columns):
+    """Answers about n poses.
+
+    Fields:
+        verdict: (n,) flags of `Verdict`; 0: the pose belongs to the workspace. Singular: the cables do not span a
+            wrench that they must supply. Undecided: on the boundary, within 1e-9 of the limits.
+        margin: (n,) N: by how much tensions can keep from their limits, negative outside; inf where nothing bounds it,
+            -inf where the cables do not span the wrench. Of wrench closure a pure number in [-1, 1].
+        is_exact: (n,) whether the pose was answered by singular values.
+    """
+
+    verdict: np.ndarray
+    margin: np.ndarray
+    is_exact: np.ndarray
+    LEFT_OUT: ClassVar[tuple[str, ...]] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class Question:
+    """What is asked of each pose.
+
+    Fields:
+        condition: one of `CONDITIONS`.
+        low: (n_cables,) smallest tensions, N.
+        high: (n_cables,) largest ones, inf for none, N.
+        wrenches: (k, dof) what the cables must supply, kernels' axes, N and N m; None: what holds the weight still.
+    """
+
+    condition: str
+    low: np.ndarray
+    high: np.ndarray
+    wrenches: np.ndarray | None = None
+
+
+def workspace(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray | None, asked: Question):
+    """Whether poses belong to the workspace of a robot.
+
+    Args:
+        robot: centred, z down.
+        positions: (n, 3) of the mass centre, or of the joint, m.
+        quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
+        asked: the condition.
+
+    Returns:
+        the answers.
+    """
+    if len(positions) == 0:
+        return WorkspaceAnswers(np.zeros(0, np.uint16), np.zeros(0), np.zeros(0, bool))
+    length = _length(robot)
+    given = _Asked(robot, asked, length)
+    if quaternions is None:
+        quaternions = np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(positions), 1))
+    parts = in_parts(lambda part: _part(given, positions[part], quaternions[part]), len(positions), PART)
+    margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
+    verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
+    verdict = np.where(np.abs(margin) <= given.boundary, Verdict.UNDECIDED, verdict)
+    verdict = np.where(is_outside, Verdict.SINGULAR, verdict)
+    verdict = np.where(np.isnan(margin), Verdict.NOT_FINITE, verdict)
+    return WorkspaceAnswers(verdict.astype(np.uint16), margin, is_exact)
+
+
+def _length(robot: AnyRobot) -> float:
+    # By which moments are divided: the size of the platform.
+    if not isinstance(robot, PlatformRobot):
+        return 1.0
+    points = np.asarray(robot.platform_points)
+    return float(np.sqrt((points**2).sum(1).mean())) or 1.0
+
+
+class _Asked:
+    # A question, and what the kernels need for it.
+    def __init__(self, robot: AnyRobot, asked: Question, length: float) -> None:
+        self.robot, self.asked, self.length = robot, asked, length
+        self.kind = "closure" if asked.condition == CLOSURE else "tensions"
+        self.unbounded = tuple(np.isinf(asked.high).tolist())
+        self.high = np.where(np.isinf(asked.high), 0.0, asked.high)
+        self.is_moment = kernels.scales(robot)
+        size = np.abs(np.concatenate([asked.low, self.high, [float(robot.mass * robot.gravity)]])).max()
+        if asked.wrenches is not None:
+            size = max(size, float(np.abs(asked.wrenches).max()))
+        self.boundary = BOUNDARY if self.kind == "closure" else BOUNDARY * size
+        self.order = self._order() if robot.dof == kernels.CABLES and kernels.is_unrolled(robot) else ()
+
+    def _order(self) -> tuple[int, ...]:
+        # The block that is the farthest from singular at poses among the spools.
+        rng, base = np.random.default_rng(1), np.asarray(self.robot.base_points)
+        low, high = base.min(0), base.max(0)
+        middle, half = 0.5 * (low + high), 0.4 * (high - low)
+        half[2] = max(half[2], 0.2 * half.max())
+        places = middle + half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
+        turns = np.array([1.0, 0.0, 0.0, 0.0]) + 0.2 * rng.normal(size=(TRIALS, 4))
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        return kernels.base_order(self.matrices(places, turns))
+
+    def matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        """Wrench matrices of poses, moments over the length."""
+        found = in_batches(
+            lambda x: kernels.wrench_matrices(self.robot, *x), (positions, quaternions), size=ARRAYS
+        )
+        return found / np.where(self.is_moment, self.length, 1.0)[:, None]
+
+    def wrenches(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        """Wrenches that the cables must supply at poses, (n, k, dof), moments over the length."""
+        if self.asked.wrenches is not None and self.kind != "closure":
+            every = np.broadcast_to(self.asked.wrenches, (len(positions), *self.asked.wrenches.shape))
+        elif PATTERNS[self.robot.pattern].is_jointed:
+            poses = positions, quaternions
+            every = in_batches(lambda x: kernels.weights(self.robot, *x), poses, size=ARRAYS)[:, None]
+        else:
+            one = np.zeros(self.robot.dof)
+            forces = PATTERNS[self.robot.pattern].forces
+            one[forces.index(2)] = -float(self.robot.mass * self.robot.gravity)
+            every = np.broadcast_to(one, (len(positions), 1, self.robot.dof))
+        return every / np.where(self.is_moment, self.length, 1.0)
+
+
+def _part(given: _Asked, positions: np.ndarray, quaternions: np.ndarray):
+    wrenches = given.wrenches(positions, quaternions)
+    by_lanes = kernels.is_unrolled(given.robot)
+    found = (_by_lanes if by_lanes else _by_arrays)(given, positions, quaternions, wrenches)
+    margin, is_exact = np.array(found.value), np.array(found.is_open)
+    is_exact |= np.abs(margin) <= given.boundary
+    is_outside = np.zeros(len(positions), bool)
+    places = np.flatnonzero(is_exact)
+    if len(places):
+        margin[places], is_outside[places] = _exactly(given, positions, quaternions, wrenches, places)
+    return margin, is_exact, is_outside
+
+
+def _by_lanes(given: _Asked, positions, quaternions, wrenches):
+    def compiled(batch):
+        place, turn, loads = batch
+        turned = tuple(turn.T) if PATTERNS[given.robot.pattern].is_body else None
+        units = kernels.unit_vectors(given.robot, tuple(place.T), turned)
+        columns = [tuple(load.T) for load in np.moveaxis(loads, 1, 0)]
+        limits = given.asked.low, given.high, np.float64(given.length)
+        options = {"condition": given.kind, "order": given.order, "unbounded": given.unbounded}
+        return kernels.margins(given.robot, units, turned, columns, *limits, **options)
+
+    return in_batches(compiled, (positions, quaternions, wrenches), size=BATCH)
+
+
+def _by_arrays(given: _Asked, positions, quaternions, wrenches):
+    def compiled(batch):
+        places, turns, loads = batch
+        limits = given.asked.low, given.high, np.float64(given.length)
+        options = {"condition": given.kind, "unbounded": given.unbounded}
+        return kernels.array_margins(given.robot, places, turns, loads, *limits, **options)
+
+    return in_batches(compiled, (positions, quaternions, wrenches), size=ARRAYS)
+
+
+def _exactly(given: _Asked, positions, quaternions, wrenches, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    matrices = given.matrices(positions[places], quaternions[places])
+    margins, is_outside = np.full(len(places), np.nan), np.zeros(len(places), bool)
+    for i, (columns, loads) in enumerate(zip(matrices, wrenches[places], strict=True)):
+        if not np.isfinite(columns).all():
+            continue
+        if given.kind == "closure":
+            margins[i] = exact.closure_margin(columns)
+            is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
+        else:
+            margins[i] = exact.tension_margin(columns, loads, given.asked.low, given.asked.high)
+            is_outside[i] = margins[i] == -np.inf
+    return margins, is_outside
+
+
