@@ -121,8 +121,12 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     steep = fall - rise
     part = start - rise * (stop - start) / jnp.where(steep > 0.0, steep, one)
     part = jnp.where(is_first, zero, jnp.where(is_last, one, _fraction(part)))
-    beyond = _beyond(_along(a, u, part), half)
-    return jnp.sqrt(dot(beyond, beyond))
+    # Where the slope is small beside its own rounding in a plane, that plane is the better place.
+    first, *others = (_beyond(_along(a, u, place), half) for place in (part, start, stop))
+    least = dot(first, first)
+    for beyond in others:
+        least = lesser(dot(beyond, beyond), least)
+    return jnp.sqrt(least)
 
 
 def _beyond(point: Vector, half: Numbers) -> Vector:
