@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cspr_jax.api.accelerations import available_accelerations as available_accelerations
-    from cspr_jax.api.workspaces import workspace as workspace
     from cspr_jax.api.beziers import bezier as bezier
     from cspr_jax.api.beziers import bezier_durations as bezier_durations
     from cspr_jax.api.beziers import bezier_verdicts as bezier_verdicts
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
     from cspr_jax.api.sweeps import run as run
     from cspr_jax.api.tables import table as table
     from cspr_jax.api.tables import table_names as table_names
+    from cspr_jax.api.workspaces import workspace as workspace
     from cspr_jax.problem import load_robot as load_robot
     from cspr_jax.robots.cables import with_cables as with_cables
     from cspr_jax.robots.limits import Limits as Limits
@@ -121,7 +121,6 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "amplitude",
     "attainable",
     "available_accelerations",
-    "workspace",
     "benchmark",
     "bezier",
     "bezier_durations",
@@ -163,6 +162,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "transition",
     "verify",
     "with_cables",
+    "workspace",
 ]
 
 

@@ -18,7 +18,7 @@ from cspr_jax.search.workspaces import CONDITIONS, FEASIBLE, Question, Workspace
 __all__ = ["WorkspaceAnswers", "workspace"]
 
 
-def workspace(  # noqa: PLR0913
+def workspace(
     robot: PointMassRobot | PlatformRobot,
     positions,
     orientations=None,

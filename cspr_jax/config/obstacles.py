@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from cspr_jax.config.limits import Coordinate, Point
 from cspr_jax.config.reading import Table
-from cspr_jax.config.robot import Coordinate, Point
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import InputError
 from cspr_jax.robots import shapes

@@ -9,7 +9,6 @@ from typing import ClassVar
 
 import numpy as np
 
-
 from cspr_jax.arithmetic.batches import in_batches, in_parts
 from cspr_jax.feasibility.workspace import exact, kernels
 from cspr_jax.robots.cables import AnyRobot
@@ -124,9 +123,7 @@ class _Asked:
 
     def matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         """Wrench matrices of poses, moments over the length."""
-        found = in_batches(
-            lambda x: kernels.wrench_matrices(self.robot, *x), (positions, quaternions), size=ARRAYS
-        )
+        found = in_batches(lambda x: kernels.wrench_matrices(self.robot, *x), (positions, quaternions), size=ARRAYS)
         return found / np.where(self.is_moment, self.length, 1.0)[:, None]
 
     def wrenches(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
@@ -163,7 +160,7 @@ def _by_lanes(given: _Asked, positions, quaternions, wrenches):
         turned = tuple(turn.T) if PATTERNS[given.robot.pattern].is_body else None
         units = kernels.unit_vectors(given.robot, tuple(place.T), turned)
         columns = [tuple(load.T) for load in np.moveaxis(loads, 1, 0)]
-        limits = given.asked.low, given.high, np.float64(given.length)
+        limits = (given.asked.low, given.high), np.float64(given.length)
         options = {"condition": given.kind, "order": given.order, "unbounded": given.unbounded}
         return kernels.margins(given.robot, units, turned, columns, *limits, **options)
 
@@ -173,7 +170,7 @@ def _by_lanes(given: _Asked, positions, quaternions, wrenches):
 def _by_arrays(given: _Asked, positions, quaternions, wrenches):
     def compiled(batch):
         places, turns, loads = batch
-        limits = given.asked.low, given.high, np.float64(given.length)
+        limits = (given.asked.low, given.high), np.float64(given.length)
         options = {"condition": given.kind, "unbounded": given.unbounded}
         return kernels.array_margins(given.robot, places, turns, loads, *limits, **options)
 
@@ -193,5 +190,3 @@ def _exactly(given: _Asked, positions, quaternions, wrenches, places: np.ndarray
             margins[i] = exact.tension_margin(columns, loads, given.asked.low, given.asked.high)
             is_outside[i] = margins[i] == -np.inf
     return margins, is_outside
-
-

@@ -128,9 +128,7 @@ def by_block(
     for i, k in enumerate(others):
         null[k] = [-found.common if i == j else 0.0 * found.common for j in range(len(others))]
     inverse = 1.0 / found.common
-    particular = [
-        {k: tensions[i] * inverse for i, k in enumerate(base)} for tensions in found.tensions[len(others) :]
-    ]
+    particular = [{k: tensions[i] * inverse for i, k in enumerate(base)} for tensions in found.tensions[len(others) :]]
     return _relations(null, others, particular), found.common
 
 
@@ -154,9 +152,7 @@ def _relations(
 
 
 def _products(null: Mapping[int, Sequence[Array]], cables: Sequence[int]) -> dict[tuple[int, int], Array]:
-    return {
-        (i, j): null[i][0] * null[j][1] - null[i][1] * null[j][0] for i, j in itertools.combinations(cables, 2)
-    }
+    return {(i, j): null[i][0] * null[j][1] - null[i][1] * null[j][0] for i, j in itertools.combinations(cables, 2)}
 
 
 def _total(entries: Mapping[int, Array], tensions: Mapping[int, Array], held: Sequence[int]) -> Array:

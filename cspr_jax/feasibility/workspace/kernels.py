@@ -29,6 +29,8 @@ from cspr_jax.robots.wrench_sets import normals_to, spanning
 UNROLLED = 8
 # As many in a line or a plane, or with three components.
 UNROLLED_DIRECT = 12
+# Of unit columns, in float64: a normal to dof - 1 of them whose products with all others are smaller means nothing.
+SHORT_NORMAL = 1e-10
 # Of six unit columns: below this share of a determinant the tensions that it divides are lost to rounding.
 REGULAR = {"float32": 3e-3, "float64": 1e-7}
 
@@ -44,7 +46,7 @@ def pulls(robot: AnyRobot, position: Vector, quaternion: Vector | None) -> list[
     Returns:
         one a cable; with pulleys those of the free cables.
     """
-    arms, found = arms_of(robot, quaternion), []
+    arms, found = arms_of(robot, quaternion), list[Vector]()
     for k in range(robot.n_cables):
         target = tuple(position[i] + arms[k][i] for i in range(3)) if arms else tuple(position)
         base = _row(robot.base_points, k)
@@ -81,7 +83,16 @@ def arms_of(robot: AnyRobot, quaternion: Vector | None) -> list[Vector]:
 
 @jax.jit
 def unit_vectors(robot: AnyRobot, position: Vector, quaternion: Vector | None) -> list[Vector]:
-    """Unit vectors of the cables; see `pulls`."""
+    """Unit vectors of the cables, compiled; see `pulls`.
+
+    Args:
+        robot: z down.
+        position: of the mass centre, or of the joint, m.
+        quaternion: unit quaternion, scalar first; None: no rotation.
+
+    Returns:
+        one a cable.
+    """
     return pulls(robot, position, quaternion)
 
 
@@ -98,7 +109,7 @@ def columns(robot: AnyRobot, units: Sequence[Vector], arms: Sequence[Vector], le
         one a cable, of dof components; not of a rod.
     """
     row = PATTERNS[robot.pattern]
-    found = []
+    found = list[Sequence[Array]]()
     for k, unit in enumerate(units):
         forces = [unit[i] for i in row.forces]
         moment = lanes.cross(arms[k], unit) if row.moments else ()
@@ -112,8 +123,7 @@ def margins(
     units: Sequence[Vector],
     quaternion: Vector | None,
     wrenches: Sequence[Sequence[Array]],
-    low: Array,
-    high: Array,
+    limits: tuple[Array, Array],
     length: Array,
     *,
     condition: str,
@@ -127,8 +137,7 @@ def margins(
         units: of `unit_vectors`.
         quaternion: as for `pulls`.
         wrenches: what the cables must supply, of dof components each, moments over `length`, N.
-        low: (n_cables,) N.
-        high: (n_cables,) N; of cables without a largest tension any number.
+        limits: (n_cables,) smallest and (n_cables,) largest tensions, N; of cables without a largest one any number.
         length: () m.
         condition: "closure", or any other for the tensions; known when this is compiled, as what follows.
         order: of cables in space, those of the base block first.
@@ -138,21 +147,24 @@ def margins(
         the margins.
     """
     cables = columns(robot, units, arms_of(robot, quaternion), length)
-    is_lost = jnp.zeros(units[0][0].shape, bool)
+    is_lost, unit = jnp.zeros(units[0][0].shape, bool), 1.0
     if len(cables[0]) == CABLES:
+        unit = 0.0
         cocircuits, common = by_block(cables, wrenches, order)
         is_lost = ~(jnp.abs(common) > REGULAR[str(common.dtype)])
     else:
         cocircuits = direct(cables, wrenches)
-    found = _judged(list(cocircuits), low, high, condition, unbounded)
+    found = _judged(list(cocircuits), limits, condition, unbounded, unit)
     return Margin(found.value, found.is_open | is_lost)
 
 
-def _judged(rows: Sequence[Cocircuit], low: Array, high: Array, condition: str, unbounded: Sequence[bool]) -> Margin:
+def _judged(
+    rows: Sequence[Cocircuit], limits: tuple[Array, Array], condition: str, unbounded: Sequence[bool], unit: float
+) -> Margin:
     if condition == "closure":
-        return closure_margin(rows)
-    count = len(unbounded)
-    return tension_margin(rows, Tensions([low[k] for k in range(count)], [high[k] for k in range(count)], unbounded))
+        return closure_margin(rows, unit)
+    low, high = ([limit[k] for k in range(len(unbounded))] for limit in limits)
+    return tension_margin(rows, Tensions(low, high, unbounded), unit)
 
 
 @partial(jax.jit, static_argnames=("condition", "unbounded"))
@@ -161,8 +173,7 @@ def array_margins(
     positions: Array,
     quaternions: Array,
     wrenches: Array,
-    low: Array,
-    high: Array,
+    limits: tuple[Array, Array],
     length: Array,
     *,
     condition: str,
@@ -175,8 +186,7 @@ def array_margins(
         positions: (n, 3) of the mass centre, or of the joint, m.
         quaternions: (n, 4) unit quaternions, scalar first.
         wrenches: (n, k, dof) what the cables must supply, moments over `length`, N.
-        low: (n_cables,) N.
-        high: (n_cables,) N.
+        limits: (n_cables,) smallest and (n_cables,) largest tensions, N.
         length: () m.
         condition: as for `margins`.
         unbounded: which cables have no largest tension.
@@ -195,9 +205,9 @@ def array_margins(
         np.put_along_axis(own, spanning(*columns.shape[::-1]), True, axis=1)
         entries = jnp.where(own, 0.0, entries)
         rows = Cocircuit(dict(enumerate(entries.T)), list(products.T))
-        found = _judged([rows], low, high, condition, unbounded)
+        found = _judged([rows], limits, condition, unbounded, 0.0)
         sizes = jnp.sum(jnp.abs(entries), axis=1)
-        is_short = ~(jnp.min(sizes) > 1e-10 * jnp.max(sizes))
+        is_short = ~(jnp.min(sizes) > SHORT_NORMAL)
         return Margin(jnp.min(found.value), found.is_open.any() | is_short)
 
     return jax.vmap(one)(positions, quaternions, wrenches)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.arithmetic.lanes import smallest
 from cspr_jax.feasibility.workspace.cocircuits import Cocircuit
 
 # Of the largest component of a cocircuit, in units of rounding: what is smaller may be zero.
@@ -44,102 +45,99 @@ class Margin(NamedTuple):
     is_open: Array
 
 
-def tension_margin(cocircuits: Iterable[Cocircuit], limits: Tensions) -> Margin:
+def tension_margin(cocircuits: Iterable[Cocircuit], limits: Tensions, unit: float) -> Margin:
     """Largest s such that tensions between low + s and high - s give each of some wrenches.
 
     Args:
         cocircuits: of the wrench matrix, with their products with the wrenches.
         limits: of the tensions; a margin counts against those that are finite.
+        unit: length that a cocircuit of columns far from parallel has; 0: none is known.
 
     Returns:
         the margin, N.
     """
     # Twice: what may be a zero is one, and then it is not.
-    least, other, sizes = None, None, []
+    least, other, sizes = [], [], []
     for row in cocircuits:
         size, largest = _sizes(row.entries)
         tiny = NOISE * jnp.finfo(size.dtype).eps * largest
         sizes.append(size)
         for sign in (1.0, -1.0):
             slack = _slack(row, sign, limits) / jnp.where(size > 0.0, size, 1.0)
-            no_wall = [sign * row.entries[k] > tiny for k in row.entries if limits.unbounded[k]]
-            perhaps = [sign * row.entries[k] > 0.0 for k in row.entries if limits.unbounded[k]]
-            least = _lower(least, slack, [*no_wall, size == 0.0])
-            other = _lower(other, slack, [*perhaps, size == 0.0])
-    value = jnp.minimum(least, _half_range(limits, least))
-    is_open = (least != other) | _has_short(sizes) | ~(value == value)
-    return Margin(value, is_open)
+            free = [sign * row.entries[k] for k in row.entries if limits.unbounded[k]]
+            least.append(_without(slack, [*(entry > tiny for entry in free), size == 0.0]))
+            other.append(_without(slack, [*(entry > 0.0 for entry in free), size == 0.0]))
+    value, as_given = smallest(least), smallest(other)
+    is_open = (value != as_given) | _has_short(sizes, unit) | jnp.isnan(value)
+    return Margin(smallest([value, *_half_ranges(limits, value)]), is_open)
 
 
 def _sizes(entries: Mapping[int, Array]) -> tuple[Array, Array]:
-    size = largest = None
-    for entry in entries.values():
-        one = jnp.abs(entry)
-        size = one if size is None else size + one
-        largest = one if largest is None else jnp.maximum(largest, one)
-    return size, largest
+    parts = [jnp.abs(entry) for entry in entries.values()]
+    return sum(parts[1:], parts[0]), largest_of(parts)
+
+
+def largest_of(values: Sequence[Array]) -> Array:
+    """The largest of several arrays, case by case.
+
+    Args:
+        values: arrays (...).
+
+    Returns:
+        (...).
+    """
+    most = values[0]
+    for value in values[1:]:
+        most = jnp.maximum(most, value)
+    return most
 
 
 def _slack(row: Cocircuit, sign: float, limits: Tensions) -> Array:
     # The largest product that tensions within their limits give, above the largest that a wrench asks for.
-    total = None
+    parts = []
     for k, entry in row.entries.items():
-        y = sign * entry
-        most = y * limits.low[k] if limits.unbounded[k] else jnp.maximum(y * limits.low[k], y * limits.high[k])
-        total = most if total is None else total + most
-    worst = sign * row.products[0]
-    for product in row.products[1:]:
-        worst = jnp.maximum(worst, sign * product)
-    return total - worst
+        low, y = limits.low[k], sign * entry
+        parts.append(y * low if limits.unbounded[k] else jnp.maximum(y * low, y * limits.high[k]))
+    return sum(parts[1:], parts[0]) - largest_of([sign * product for product in row.products])
 
 
-def _lower(least: Array | None, value: Array, without: Sequence[Array]) -> Array:
-    is_free = without[0]
-    for one in without[1:]:
+def _without(value: Array, free: Sequence[Array]) -> Array:
+    # What a cable without a largest tension frees bounds nothing.
+    is_free = free[0]
+    for one in free[1:]:
         is_free = is_free | one
-    value = jnp.where(is_free, jnp.inf, value)
-    return value if least is None else jnp.minimum(least, value)
+    return jnp.where(is_free, jnp.inf, value)
 
 
-def _half_range(limits: Tensions, like: Array) -> Array:
+def _half_ranges(limits: Tensions, like: Array) -> list[Array]:
     # No margin is larger than half of what a cable has.
-    halves = [
-        0.5 * (high - low)
-        for low, high, unbounded in zip(limits.low, limits.high, limits.unbounded, strict=True)
-        if not unbounded
-    ]
-    least = jnp.full_like(like, jnp.inf)
-    for half in halves:
-        least = jnp.minimum(least, half)
-    return least
+    every = zip(limits.low, limits.high, limits.unbounded, strict=True)
+    return [jnp.broadcast_to(0.5 * (high - low), like.shape) for low, high, unbounded in every if not unbounded]
 
 
-def _has_short(sizes: Sequence[Array]) -> Array:
-    longest, shortest = sizes[0], sizes[0]
-    for size in sizes[1:]:
-        longest, shortest = jnp.maximum(longest, size), jnp.minimum(shortest, size)
-    return ~(shortest > SHORT * jnp.finfo(longest.dtype).eps * longest)
+def _has_short(sizes: Sequence[Array], unit: float) -> Array:
+    longest = jnp.maximum(largest_of(sizes), unit)
+    return ~(smallest(sizes) > SHORT * jnp.finfo(longest.dtype).eps * longest)
 
 
-def closure_margin(cocircuits: Iterable[Cocircuit]) -> Margin:
+def closure_margin(cocircuits: Iterable[Cocircuit], unit: float) -> Margin:
     """Margin of wrench closure: whether cables that are pulled hard enough resist every wrench.
 
     Args:
         cocircuits: of the wrench matrix.
+        unit: as for `tension_margin`.
 
     Returns:
         the margin, a pure number in [-1, 1]: of every cocircuit the largest component of the rarer sign, over the
         largest of all; positive where there is closure.
     """
-    least, sizes = None, []
+    rarer, sizes = [], []
     for row in cocircuits:
         size, largest = _sizes(row.entries)
-        most = fewest = None
-        for entry in row.entries.values():
-            most = entry if most is None else jnp.maximum(most, entry)
-            fewest = entry if fewest is None else jnp.minimum(fewest, entry)
-        rarer = jnp.minimum(most, -fewest) / jnp.where(largest > 0.0, largest, 1.0)
+        entries = list(row.entries.values())
+        fewest = jnp.minimum(largest_of(entries), -smallest(entries))
+        rarer.append(fewest / jnp.where(largest > 0.0, largest, 1.0))
         sizes.append(size)
-        least = rarer if least is None else jnp.minimum(least, rarer)
+    least = smallest(rarer)
     near_zero = jnp.abs(least) < NOISE * jnp.finfo(least.dtype).eps
-    return Margin(least, near_zero | _has_short(sizes) | ~(least == least))
+    return Margin(least, near_zero | _has_short(sizes, unit) | jnp.isnan(least))
