@@ -11,6 +11,7 @@ from cspr_jax.config.plan import Choice, PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepTrajectory
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
+from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ExitCode
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
 from cspr_jax.schema.motion_quantities import SEGMENTS, TRAJECTORY
@@ -38,6 +39,7 @@ FILES = {
         ("trajectory.from", From),
         ("[orientations]", Orientations),
         ("[launch]", LaunchSearch),
+        ("[workspace]", WorkspaceTable),
         ("[limits]", LimitTable),
         ("[run]", Run),
     ],

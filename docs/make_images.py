@@ -106,6 +106,10 @@ IMAGES = {
         60,
         command="draw",
     ),
+    "workspace": Image(
+        "Wrench-feasible workspace of CoGiRo at four heights: by how many newtons all tensions keep from their limits.",
+        20,
+    ),
     "launch_sensitivity": Image(
         "Largest displacement of the launch robot over the largest error of a cable; infinite on z = 0 (theory.md).", 10
     ),

@@ -132,7 +132,7 @@ def test_its_picture_is_a_file(sweep, tmp_path):
         (("[trajectory]", '[run]\nstore = ["arcs"]\n[trajectory]'), "must be one of spool_distance, nearest_spool in"),
         (("[trajectory]", '[run]\nstore = ["spool_distanc"]\n[trajectory]'), 'did you mean "spool_distance"?'),
         (("spool-distances", "spool-distance"), 'did you mean "spool-distances"? must be "minimum-arcs", "minimum-osc'),
-        (("spool-distances", "spool-distance"), '"sensitivity" or "spool-distances"'),
+        (("spool-distances", "spool-distance"), '"workspace" or "spool-distances"'),
         (("z = [1.1]", "z = [-1.1]"), "every point is above the spool plane"),
     ],
 )

@@ -61,7 +61,7 @@ def workspace(
     with double_precision():
         own, frame = centred(robot)
         low, high = _tensions(robot, tension_min, tension_max, condition)
-        loads = None if wrenches is None else _wrenches(robot, wrenches, frame)
+        loads = None if wrenches is None else search.given_wrenches(own, wrenches, frame)
         inner, turns = _poses(own, frame, places, orientations)
         return search.workspace(own, inner, turns, Question(condition, low, high, loads))
 
@@ -80,7 +80,7 @@ def _tensions(robot, tension_min, tension_max, condition: str) -> tuple[np.ndarr
         return np.zeros(count), np.full(count, np.inf)
     given = Limits(tension_min=tension_min, tension_max=_bounded(tension_max, robot))
     limits = limits_over(robot, given, any_tensions=True)
-    if tension_max is not None and np.isinf(np.asarray(tension_max, float)).all():
+    if tension_max is not None and given.tension_max is None:
         limits = Limits(tension_min=limits.tension_min)
     low, high = tension_range(robot, limits)
     return np.asarray(low), np.asarray(high)
@@ -94,16 +94,6 @@ def _bounded(tension_max, robot):
     return None if values.shape in ((), (robot.n_cables,)) and np.isinf(values).all() and (values > 0).all() else values
 
 
-def _wrenches(robot, given, frame: Frame) -> np.ndarray:
-    row, values = PATTERNS[robot.pattern], np.asarray(given, float)
-    if row.along_line:
-        raise InputError("wrenches", "of a rod", "None: its two axes of moments turn with it")
-    if values.ndim != 2 or values.shape[0] == 0 or values.shape[1] != robot.dof or not np.isfinite(values).all():
-        raise InputError("wrenches", f"shape {values.shape}", f"finite numbers of shape (k, {robot.dof})")
-    signs = [frame.signs[i] for i in (*row.forces, *row.moments)]
-    return values * np.array(signs)
-
-
 def _poses(own, frame: Frame, places: np.ndarray, orientations) -> tuple[np.ndarray, np.ndarray | None]:
     row = PATTERNS[own.pattern]
     inner, turns = np.asarray(frame.inward(places)), None
@@ -115,13 +105,6 @@ def _poses(own, frame: Frame, places: np.ndarray, orientations) -> tuple[np.ndar
             raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
         turns = frame.turned_quaternions(given)
     if row.is_body and not row.is_jointed and own.centre_of_mass is not None:
-        inner = inner + _turned(turns, np.asarray(own.centre_of_mass), len(inner))
+        centre = np.asarray(own.centre_of_mass)
+        inner = inner + (centre if turns is None else search.turned(turns, centre))
     return inner, turns
-
-
-def _turned(turns: np.ndarray | None, vector: np.ndarray, count: int) -> np.ndarray:
-    if turns is None:
-        return np.tile(vector, (count, 1))
-    scalar, axis = turns[:, :1], turns[:, 1:]
-    twice = 2.0 * np.cross(axis, np.broadcast_to(vector, axis.shape))
-    return vector + scalar * twice + np.cross(axis, twice)

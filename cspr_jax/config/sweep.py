@@ -10,6 +10,7 @@ from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import either
+from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
@@ -165,6 +166,9 @@ class SweepFile(Table):
     )
     launch: LaunchSearch | None = Field(
         None, description="[launch] of launch-range: where a release is looked for, and how thoroughly"
+    )
+    workspace: WorkspaceTable | None = Field(
+        None, description="[workspace] of workspace: conditions, orientation, wrenches"
     )
     limits: LimitTable = Field(default_factory=LimitTable, description="[limits]")
     run: Run = Field(default_factory=Run, description="[run] dtype, tile, store")

@@ -17,6 +17,7 @@ from jax import Array
 
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_acceleration
+from cspr_jax.robots.robot import Robot
 from cspr_jax.robots.state import State
 
 # Of unit columns: volumes of d - 1 of them below this span nothing; a column nearer to a plane lies in it.
@@ -219,7 +220,7 @@ def acceleration_faces(robot: PointMassRobot, position: Array, tension_min: Arra
     return dataclasses.replace(faces, normals=normals, apex=apex + falling, offsets=faces.offsets + normals @ falling)
 
 
-def tension_range(robot: PointMassRobot, limits: Limits) -> tuple[Array, Array]:
+def tension_range(robot: Robot, limits: Limits) -> tuple[Array, Array]:
     """Smallest and largest tension of each cable.
 
     Args:

@@ -221,6 +221,21 @@ QUANTITIES = {
             signed=True,
         ),
         Quantity(
+            "wrench_margin",
+            "N",
+            "margin of the tensions",
+            "Largest distance that tensions which supply all wrenches can keep from their finite limits; negative "
+            "outside of the workspace, infinite where nothing bounds it.",
+            signed=True,
+        ),
+        Quantity(
+            "clearance",
+            "m",
+            "clearance of the cables",
+            "Smallest distance between cables without a common point, less their diameter.",
+            signed=True,
+        ),
+        Quantity(
             "level_acceleration",
             "m s-2",
             "level acceleration in every direction",

@@ -5,15 +5,20 @@ singular values.
 """
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.errors import InputError
 from cspr_jax.feasibility.workspace import exact, kernels
 from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.clearance import clearances, scene
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.labelled import Columns
 from cspr_jax.schema.verdicts import Verdict
 
@@ -94,6 +99,108 @@ def _length(robot: AnyRobot) -> float:
         return 1.0
     points = np.asarray(robot.platform_points)
     return float(np.sqrt((points**2).sum(1).mean())) or 1.0
+
+
+def question(robot: AnyRobot, condition: str, limits: Limits, wrenches: np.ndarray | None = None) -> Question:
+    """A question of a condition.
+
+    Args:
+        robot: the robot.
+        condition: one of `CONDITIONS`.
+        limits: of the tensions; of account for "wrench-feasible" alone.
+        wrenches: as in `Question`.
+
+    Returns:
+        the question.
+    """
+    low, high = tension_range(robot, limits if condition == FEASIBLE else Limits())
+    return Question(condition, np.asarray(low), np.asarray(high), wrenches)
+
+
+def given_wrenches(robot: AnyRobot, given: Any, frame: Frame) -> np.ndarray:
+    """Wrenches as the kernels take them.
+
+    Args:
+        robot: gives the pattern.
+        given: (k, dof) in the axes of the file, N and N m.
+        frame: of the file.
+
+    Returns:
+        (k, dof).
+
+    Raises:
+        InputError: another shape, not finite, or of a rod.
+    """
+    row = PATTERNS[robot.pattern]
+    if row.along_line:
+        raise InputError("wrenches", "of a rod", "absent: its two axes of moments turn with it")
+    try:
+        values = np.asarray(given, float)
+    except ValueError:
+        values = np.full(0, np.nan)
+    if values.ndim != 2 or values.shape[0] == 0 or values.shape[1] != robot.dof or not np.isfinite(values).all():
+        raise InputError("wrenches", f"shape {values.shape}", f"finite numbers of shape (k, {robot.dof})")
+    return values * np.array([frame.signs[i] for i in (*row.forces, *row.moments)])
+
+
+class Poses:
+    """Places of a platform frame's origin, at one orientation.
+
+    Args:
+        robot: centred, z down.
+        quaternion: (4,) unit quaternion, scalar first.
+    """
+
+    def __init__(self, robot: AnyRobot, quaternion: np.ndarray) -> None:
+        """Turn the arm to the mass centre once."""
+        self._arm = np.zeros(3)
+        row = PATTERNS[robot.pattern]
+        if isinstance(robot, PlatformRobot) and not row.is_jointed and robot.centre_of_mass is not None:
+            self._arm = turned(quaternion[None], np.asarray(robot.centre_of_mass))[0]
+
+    def positions(self, origins: np.ndarray) -> np.ndarray:
+        """Positions of the mass centre.
+
+        Args:
+            origins: (n, 3) m.
+
+        Returns:
+            (n, 3) m.
+        """
+        return origins + self._arm
+
+
+def turned(quaternions: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """A vector of the platform in fixed axes.
+
+    Args:
+        quaternions: (n, 4) unit quaternions, scalar first.
+        vector: (3,).
+
+    Returns:
+        (n, 3).
+    """
+    scalar, axis = quaternions[:, :1], quaternions[:, 1:]
+    twice = 2.0 * np.cross(axis, np.broadcast_to(vector, axis.shape))
+    return vector + scalar * twice + np.cross(axis, twice)
+
+
+def apart(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Clearance of the cables of a robot from each other.
+
+    Args:
+        robot: centred, z down.
+        positions: (n, 3) of the mass centre, m.
+        quaternions: (n, 4) unit quaternions, scalar first.
+
+    Returns:
+        (n,) m, inf where no two cables can meet; (n,) flags of `Verdict`.
+    """
+    diameter = 0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter)
+    is_body = PATTERNS[robot.pattern].is_body
+    found = clearances(scene(robot, diameter=diameter), positions, quaternions if is_body else None)
+    verdict = np.where(found.clearance > 0.0, 0, Verdict.CABLE_CABLE)
+    return found.clearance, np.where(found.is_open, Verdict.UNDECIDED, verdict).astype(np.uint16)
 
 
 class _Asked:
