@@ -104,7 +104,4 @@ def _poses(own, frame: Frame, places: np.ndarray, orientations) -> tuple[np.ndar
         if row.is_planar and given[:, [1, 3]].any():
             raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
         turns = frame.turned_quaternions(given)
-    if row.is_body and not row.is_jointed and own.centre_of_mass is not None:
-        centre = np.asarray(own.centre_of_mass)
-        inner = inner + (centre if turns is None else search.turned(turns, centre))
-    return inner, turns
+    return search.mass_centres(own, inner, turns), turns

@@ -43,7 +43,6 @@ class WorkspaceMap(GridMap):
             raise ConfigError(file, "workspace.orientation: must turn about y: that of a planar robot")
         self._turn = self._frame.turned_quaternions(given[None])[0]
         try:
-            self._poses = search.Poses(self._robot, self._turn)
             self._questions = [self._question(name) for name in self._asked.conditions if name != INTERFERENCE]
             self._clear = INTERFERENCE in self._asked.conditions
         except InputError as error:
@@ -59,7 +58,7 @@ class WorkspaceMap(GridMap):
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        places = self._poses.positions(self._targets(cells))
+        places = search.mass_centres(self._robot, self._targets(cells), self._turn[None])
         turns = np.tile(self._turn, (len(places), 1))
         verdict = np.zeros(len(places), np.uint16)
         found = {name: np.full(len(places), np.nan) for name in ("wrench_margin", "closure_margin", "clearance")}

@@ -143,46 +143,26 @@ def given_wrenches(robot: AnyRobot, given: Any, frame: Frame) -> np.ndarray:
     return values * np.array([frame.signs[i] for i in (*row.forces, *row.moments)])
 
 
-class Poses:
-    """Places of a platform frame's origin, at one orientation.
+def mass_centres(robot: AnyRobot, origins: np.ndarray, quaternions: np.ndarray | None) -> np.ndarray:
+    """Positions of the mass centre, as the kernels take them; of a robot on a joint those of the joint.
 
     Args:
         robot: centred, z down.
-        quaternion: (4,) unit quaternion, scalar first.
-    """
-
-    def __init__(self, robot: AnyRobot, quaternion: np.ndarray) -> None:
-        """Turn the arm to the mass centre once."""
-        self._arm = np.zeros(3)
-        row = PATTERNS[robot.pattern]
-        if isinstance(robot, PlatformRobot) and not row.is_jointed and robot.centre_of_mass is not None:
-            self._arm = turned(quaternion[None], np.asarray(robot.centre_of_mass))[0]
-
-    def positions(self, origins: np.ndarray) -> np.ndarray:
-        """Positions of the mass centre.
-
-        Args:
-            origins: (n, 3) m.
-
-        Returns:
-            (n, 3) m.
-        """
-        return origins + self._arm
-
-
-def turned(quaternions: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """A vector of the platform in fixed axes.
-
-    Args:
-        quaternions: (n, 4) unit quaternions, scalar first.
-        vector: (3,).
+        origins: (n, 3) of the platform frame, m.
+        quaternions: (n, 4) unit quaternions, scalar first, or (1, 4) one for all; None: no rotation.
 
     Returns:
-        (n, 3).
+        (n, 3) m.
     """
+    row = PATTERNS[robot.pattern]
+    if not isinstance(robot, PlatformRobot) or row.is_jointed or robot.centre_of_mass is None:
+        return origins
+    arm = np.asarray(robot.centre_of_mass)
+    if quaternions is None:
+        return origins + arm
     scalar, axis = quaternions[:, :1], quaternions[:, 1:]
-    twice = 2.0 * np.cross(axis, np.broadcast_to(vector, axis.shape))
-    return vector + scalar * twice + np.cross(axis, twice)
+    twice = 2.0 * np.cross(axis, np.broadcast_to(arm, axis.shape))
+    return origins + arm + scalar * twice + np.cross(axis, twice)
 
 
 def apart(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
