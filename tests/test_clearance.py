@@ -257,6 +257,7 @@ def test_scenes():
     assert not found.is_open.any()
 
 
+@pytest.mark.soak
 def test_float32_gives_the_same_verdicts():
     """A quick look, done again where it cannot tell."""
     place, turns = random_poses(4_000, 7)
