@@ -78,7 +78,7 @@ def compare(drawn, rng, count, condition):
 
 
 QUICK = {("static", False), ("wrench-closure", False)}
-COUNTS = {"1T": (1, 2, 3), "2T": (2, 3, 5), "3T": (3, 4, 6), "1R2T": (3, 4, 5), "3R": (4, 5), "2R3T": (6, 7)}
+COUNTS = {"1T": (1, 2, 3), "2T": (3, 5), "3T": (3, 4, 6), "1R2T": (3, 4, 5), "3R": (4, 5), "2R3T": (6, 7)}
 COUNTS["3R3T"] = (6, 7, 8)
 # Each robot is compiled once more; test_cogiro has eight cables in space.
 SOME = [("1T", 3), ("2T", 3), ("3T", 4), ("1R2T", 4), ("3R", 4), ("2R3T", 6)]
