@@ -69,7 +69,6 @@ _PUBLIC = {
     "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
     "attainable": ("cspr_jax.api.platform_searches", "attainable"),
     "available_accelerations": ("cspr_jax.api.accelerations", "available_accelerations"),
-    "workspace": ("cspr_jax.api.workspaces", "workspace"),
     "benchmark": ("cspr_jax.api.speed", "benchmark"),
     "bezier": ("cspr_jax.api.beziers", "bezier"),
     "bezier_durations": ("cspr_jax.api.beziers", "bezier_durations"),
@@ -111,6 +110,7 @@ _PUBLIC = {
     "transition": ("cspr_jax.api.motions", "transition"),
     "verify": ("cspr_jax.api.runs", "verify"),
     "with_cables": ("cspr_jax.robots.cables", "with_cables"),
+    "workspace": ("cspr_jax.api.workspaces", "workspace"),
 }
 __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "ImportedRobot",

@@ -352,6 +352,9 @@ def test_yaml_runs_nothing_and_expands_nothing(tmp_path, capsys):
         (f"!!python/object/apply:os.system ['touch {tmp_path}/ran']", "is not YAML: "),
         ("[" * 5000, "nested too deeply"),
         ("a: [1", "is not YAML: "),
+        ("a: !!int ''", "is not YAML: "),
+        ("a: !!bool x", "is not YAML: "),
+        ("a: !!timestamp x", "is not YAML: "),
         ("\x00", "is not YAML: "),
         ("", "the file = "),
     ):

@@ -1,5 +1,6 @@
 """Workspaces of robots on any number of cables, beside linear programs and singular values."""
 
+import dataclasses
 import math
 
 import h5py
@@ -13,9 +14,13 @@ from support.commands import cspr
 import cspr_jax
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.reasons import REASONS
+from cspr_jax.problem import centred
 from cspr_jax.robots import point_mass
+from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.platform import platform_robot
+from cspr_jax.robots.pulleys import exits
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
+from cspr_jax.search.workspaces import apart
 
 G = cable_robots.GRAVITY
 ROUND = np.diag([0.05, 0.05, 0.05])
@@ -188,6 +193,21 @@ def test_interference_and_the_floor_of_a_map(tmp_path):
     assert (((verdict & Verdict.BELOW_FLOOR) != 0) == below).all()
 
 
+def test_cables_that_leave_pulleys_are_kept_apart_from_there():
+    """Of a planar platform on three cables, pose by pose: the same as of spools where the cables leave."""
+    base = np.array([[-2.0, 0.0, -1.0], [2.0, 0.0, -1.0], [-1.9, 0.0, -1.2]])
+    platform = np.array([[-0.3, 0.0, 0.1], [0.3, 0.0, 0.1], [0.0, 0.0, -0.1]])
+    plain = platform_robot(base, platform, mass=1.0, inertia=ROUND, pattern="1R2T", z_axis="down", gravity=G)
+    wound = with_cables(plain, pulley_radius=0.1)
+    places, turns = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.3]]), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
+    found = apart(centred(wound)[0], places - base.mean(0), turns)[0]
+    for place, value in zip(places, found, strict=True):
+        ends = np.asarray(exits(base, wound.pulleys.axes, wound.pulleys.radius, place + platform).point)
+        moved = dataclasses.replace(plain, base_points=ends)
+        assert value == pytest.approx(apart(moved, place[None], turns[:1])[0][0], abs=1e-9)
+        assert value != pytest.approx(apart(plain, place[None], turns[:1])[0][0], abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -199,6 +219,8 @@ def test_interference_and_the_floor_of_a_map(tmp_path):
         ({"more": "orientation = [1, 1, 0, 0]"}, "workspace.orientation"),
         ({"more": "orientation = [0.8, 0.6, 0, 0]"}, "workspace.orientation"),
         ({"more": "obstacle = 1"}, "workspace.obstacle"),
+        ({"conditions": '["static"]', "more": "wrenches = [[0, 0, 0]]"}, "workspace.wrenches"),
+        ({"conditions": '["static"]', "more": "[limits]\ntension_max = 9"}, "limits.tension_max"),
         ({"more": "[limits]\ncable_speed_max = 1"}, "limits.cable_speed_max"),
         ({"more": "[limits]\ntension_min = 100"}, "tension_min"),
         ({"robot": "prototype", "more": "orientation = [1, 0, 0, 0]"}, "workspace.orientation"),
@@ -258,6 +280,14 @@ def test_a_finite_set_of_wrenches_is_its_worst():
         matrix = oracle.wrench_matrix(drawn.base, drawn.platform, places[i], turns[i], "1R2T")
         value = oracle.tension_margin(matrix, loads, drawn.low, drawn.high)
         assert all_three.margin[i] == pytest.approx(value, abs=1e-8 * drawn.high.max())
+
+
+def test_no_largest_tension_goes_before_the_robot_s_own():
+    """Of the KNTU platform, 0.001 to 60 N in its file."""
+    robot, place = cspr_jax.load_robot("kntu-planar"), [[0.0, 0.0, 0.0]]
+    assert cspr_jax.workspace(robot, place, tension_min=100.0, tension_max=np.inf).verdict[0] == 0
+    with pytest.raises(InputError, match="tension_min"):
+        cspr_jax.workspace(robot, place, tension_min=100.0)
 
 
 def test_the_prism_below_the_spools():

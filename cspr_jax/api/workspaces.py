@@ -11,9 +11,8 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.search import workspaces as search
-from cspr_jax.search.workspaces import CONDITIONS, FEASIBLE, Question, WorkspaceAnswers
+from cspr_jax.search.workspaces import CONDITIONS, FEASIBLE, WorkspaceAnswers, WorkspaceSearch
 
 __all__ = ["WorkspaceAnswers", "workspace"]
 
@@ -60,10 +59,10 @@ def workspace(
     places = _places(robot, positions)
     with double_precision():
         own, frame = centred(robot)
-        low, high = _tensions(robot, tension_min, tension_max, condition)
+        limits = _limits(robot, tension_min, tension_max)
         loads = None if wrenches is None else search.given_wrenches(own, wrenches, frame)
         inner, turns = _poses(own, frame, places, orientations)
-        return search.workspace(own, inner, turns, Question(condition, low, high, loads))
+        return WorkspaceSearch(own, search.question(own, condition, limits, loads))(inner, turns)
 
 
 def _places(robot, positions) -> np.ndarray:
@@ -74,24 +73,10 @@ def _places(robot, positions) -> np.ndarray:
     return places
 
 
-def _tensions(robot, tension_min, tension_max, condition: str) -> tuple[np.ndarray, np.ndarray]:
-    count = robot.n_cables
-    if condition != FEASIBLE:
-        return np.zeros(count), np.full(count, np.inf)
-    given = Limits(tension_min=tension_min, tension_max=_bounded(tension_max, robot))
-    limits = limits_over(robot, given, any_tensions=True)
-    if tension_max is not None and given.tension_max is None:
-        limits = Limits(tension_min=limits.tension_min)
-    low, high = tension_range(robot, limits)
-    return np.asarray(low), np.asarray(high)
-
-
-def _bounded(tension_max, robot):
-    # All of them infinite is none, and a list of some is a list of floats.
-    if tension_max is None:
-        return None
-    values = np.asarray(tension_max, float)
-    return None if values.shape in ((), (robot.n_cables,)) and np.isinf(values).all() and (values > 0).all() else values
+def _limits(robot, tension_min, tension_max) -> Limits:
+    if tension_max is not None and np.ndim(tension_max) == 0:  # of an infinite one each cable has its own
+        tension_max = np.full(robot.n_cables, tension_max)
+    return limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max), any_tensions=True)
 
 
 def _poses(own, frame: Frame, places: np.ndarray, orientations) -> tuple[np.ndarray, np.ndarray | None]:

@@ -128,6 +128,21 @@ def smallest(values: Sequence[Array]) -> Array:
     return least
 
 
+def largest(values: Sequence[Array]) -> Array:
+    """The largest of several arrays, case by case; NaN stays NaN.
+
+    Args:
+        values: arrays (...).
+
+    Returns:
+        (...).
+    """
+    most = values[0]
+    for value in values[1:]:
+        most = jnp.maximum(most, value)
+    return most
+
+
 def stored(values: Any, one: Array | None) -> Any:
     """The same values, which XLA then computes once.
 

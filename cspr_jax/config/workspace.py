@@ -2,10 +2,11 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Quaternion
+from cspr_jax.config.wording import fault
 
 Condition = Literal["static", "wrench-feasible", "wrench-closure", "interference-free"]
 Component = Annotated[float, Field(ge=-1e12, le=1e12)]
@@ -35,3 +36,9 @@ class WorkspaceTable(Table):
         if len(set(names)) < len(names):
             raise ValueError("a list without repetitions")
         return names
+
+    @model_validator(mode="after")
+    def _somebody_asks(self) -> "WorkspaceTable":
+        if self.wrenches is not None and "wrench-feasible" not in self.conditions:
+            raise fault("wrenches", None, 'absent: "wrench-feasible" is not among the conditions')
+        return self

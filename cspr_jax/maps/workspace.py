@@ -10,7 +10,6 @@ from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.problem import build_limits, build_robot, centred, given_quaternion
-from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.tiles import Grid
@@ -19,7 +18,8 @@ from cspr_jax.search import workspaces as search
 
 INTERFERENCE = "interference-free"
 # Limits of poses at rest: others belong to motions.
-HELD = ("tension_min", "tension_max", "floor")
+TENSIONS = ("tension_min", "tension_max")
+HELD = (*TENSIONS, "floor")
 
 
 class WorkspaceMap(GridMap):
@@ -31,8 +31,13 @@ class WorkspaceMap(GridMap):
         self._frame, self._z_axis = frame_of(spec.base_points, spec.z_axis), spec.z_axis
         self._asked = keys.workspace or WorkspaceTable()
         for limit in LIMITS:
-            if limit.name not in HELD and getattr(keys.limits, limit.name) is not None:
+            if getattr(keys.limits, limit.name) is None:
+                continue
+            if limit.name not in HELD:
                 raise ConfigError(file, f"limits.{limit.name}: must be absent in this map, whose cells are at rest")
+            if limit.name in TENSIONS and search.FEASIBLE not in self._asked.conditions:
+                allowed = f'must be absent: "{search.FEASIBLE}" is not among workspace.conditions'
+                raise ConfigError(file, f"limits.{limit.name}: {allowed}")
         self._limits = build_limits(spec, keys.limits, file)
         self._robot = centred(build_robot(spec, keys.trajectory, file))[0]
         row = PATTERNS[self._robot.pattern]
@@ -43,18 +48,16 @@ class WorkspaceMap(GridMap):
             raise ConfigError(file, "workspace.orientation: must turn about y: that of a planar robot")
         self._turn = self._frame.turned_quaternions(given[None])[0]
         try:
-            self._questions = [self._question(name) for name in self._asked.conditions if name != INTERFERENCE]
-            self._clear = INTERFERENCE in self._asked.conditions
+            names = [name for name in self._asked.conditions if name != INTERFERENCE]
+            self._searches = {name: self._search(name) for name in names}
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
 
-    def _question(self, name: str) -> search.Question:
-        wrenches = self._asked.wrenches
-        limits = self._limits if name == search.FEASIBLE else Limits()
-        loads = None
+    def _search(self, name: str) -> search.WorkspaceSearch:
+        wrenches, loads = self._asked.wrenches, None
         if wrenches is not None and name == search.FEASIBLE:
             loads = search.given_wrenches(self._robot, wrenches, self._frame)
-        return search.question(self._robot, name, limits, loads)
+        return search.WorkspaceSearch(self._robot, search.question(self._robot, name, self._limits, loads))
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -62,12 +65,12 @@ class WorkspaceMap(GridMap):
         turns = np.tile(self._turn, (len(places), 1))
         verdict = np.zeros(len(places), np.uint16)
         found = {name: np.full(len(places), np.nan) for name in ("wrench_margin", "closure_margin", "clearance")}
-        for asked in self._questions:
-            answers = search.workspace(self._robot, places, turns, asked)
+        for condition, asked in self._searches.items():
+            answers = asked(places, turns)
             verdict |= answers.verdict
-            name = "closure_margin" if asked.condition == search.CLOSURE else "wrench_margin"
+            name = "closure_margin" if condition == search.CLOSURE else "wrench_margin"
             found[name] = np.fmin(found[name], answers.margin)
-        if self._clear:
+        if INTERFERENCE in self._asked.conditions:
             found["clearance"], flags = search.apart(self._robot, places, turns)
             verdict |= flags
         floor: Array | None = self._limits.floor

@@ -121,11 +121,9 @@ def point_mass_robot(
             another z_axis.
     """
     points = checked_points("base_points", base_points, SPATIAL)
-    check_numbers(mass, gravity)
-    check_axis(z_axis)
     if is_vertical(points):
         raise InputError("base_points", points.tolist(), "spools whose plane is not vertical")
-    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis)
+    return _robot(points, mass, gravity, limits, name, z_axis, SPATIAL)
 
 
 def planar_robot(
@@ -155,8 +153,6 @@ def planar_robot(
             or gravity, another z_axis.
     """
     points = checked_points("base_points", base_points, PLANAR)
-    check_numbers(mass, gravity)
-    check_axis(z_axis)
     if (points[:, 1] != 0.0).any():
         raise InputError("base_points", points.tolist(), "points with y = 0: the plane of a planar robot")
     width, _, height = np.ptp(points, axis=0)
@@ -164,7 +160,7 @@ def planar_robot(
         raise InputError("base_points", points.tolist(), "spools that are not on a vertical line")
     if len(points) == PLANAR and not height <= LEVEL * width:
         raise InputError("base_points", points.tolist(), "two spools on a level line")
-    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, PLANAR)
+    return _robot(points, mass, gravity, limits, name, z_axis, PLANAR)
 
 
 def guided_robot(
@@ -193,9 +189,13 @@ def guided_robot(
         InputError: wrong shape, not finite, mass or gravity not positive, another z_axis.
     """
     points = checked_coordinates("base_points", base_points, GUIDED)
+    return _robot(points, mass, gravity, limits, name, z_axis, GUIDED)
+
+
+def _robot(points: np.ndarray, mass, gravity, limits: Limits | None, name: str, z_axis: Axis, dof: int):
     check_numbers(mass, gravity)
     check_axis(z_axis)
-    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, GUIDED)
+    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, dof)
 
 
 def checked_points(key: str, given, least: int) -> np.ndarray:

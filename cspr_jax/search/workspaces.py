@@ -5,7 +5,7 @@ singular values.
 """
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +46,6 @@ class WorkspaceAnswers(Columns):
     verdict: np.ndarray
     margin: np.ndarray
     is_exact: np.ndarray
-    LEFT_OUT: ClassVar[tuple[str, ...]] = ()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -64,41 +63,6 @@ class Question:
     low: np.ndarray
     high: np.ndarray
     wrenches: np.ndarray | None = None
-
-
-def workspace(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray | None, asked: Question):
-    """Whether poses belong to the workspace of a robot.
-
-    Args:
-        robot: centred, z down.
-        positions: (n, 3) of the mass centre, or of the joint, m.
-        quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
-        asked: the condition.
-
-    Returns:
-        the answers.
-    """
-    if len(positions) == 0:
-        return WorkspaceAnswers(np.zeros(0, np.uint16), np.zeros(0), np.zeros(0, bool))
-    length = _length(robot)
-    given = _Asked(robot, asked, length)
-    if quaternions is None:
-        quaternions = np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(positions), 1))
-    parts = in_parts(lambda part: _part(given, positions[part], quaternions[part]), len(positions), PART)
-    margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
-    verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
-    verdict = np.where(np.abs(margin) <= given.boundary, Verdict.UNDECIDED, verdict)
-    verdict = np.where(is_outside, Verdict.SINGULAR, verdict)
-    verdict = np.where(np.isnan(margin), Verdict.NOT_FINITE, verdict)
-    return WorkspaceAnswers(verdict.astype(np.uint16), margin, is_exact)
-
-
-def _length(robot: AnyRobot) -> float:
-    # By which moments are divided: the size of the platform.
-    if not isinstance(robot, PlatformRobot):
-        return 1.0
-    points = np.asarray(robot.platform_points)
-    return float(np.sqrt((points**2).sum(1).mean())) or 1.0
 
 
 def question(robot: AnyRobot, condition: str, limits: Limits, wrenches: np.ndarray | None = None) -> Question:
@@ -177,103 +141,128 @@ def apart(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray) -> tu
         (n,) m, inf where no two cables can meet; (n,) flags of `Verdict`.
     """
     diameter = 0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter)
-    is_body = PATTERNS[robot.pattern].is_body
-    found = clearances(scene(robot, diameter=diameter), positions, quaternions if is_body else None)
+    turns, ends = quaternions if PATTERNS[robot.pattern].is_body else None, None
+    pulleys = robot.pulleys
+    if pulleys is not None:
+        ends = in_batches(lambda x: kernels.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
+    found = clearances(scene(robot, diameter=diameter), positions, turns, ends=ends)
     verdict = np.where(found.clearance > 0.0, 0, Verdict.CABLE_CABLE)
     return found.clearance, np.where(found.is_open, Verdict.UNDECIDED, verdict).astype(np.uint16)
 
 
-class _Asked:
-    # A question, and what the kernels need for it.
-    def __init__(self, robot: AnyRobot, asked: Question, length: float) -> None:
-        self.robot, self.asked, self.length = robot, asked, length
-        self.kind = "closure" if asked.condition == CLOSURE else "tensions"
-        self.unbounded = tuple(np.isinf(asked.high).tolist())
-        self.high = np.where(np.isinf(asked.high), 0.0, asked.high)
-        self.is_moment = kernels.scales(robot)
-        size = np.abs(np.concatenate([asked.low, self.high, [float(robot.mass * robot.gravity)]])).max()
-        if asked.wrenches is not None:
-            size = max(size, float(np.abs(asked.wrenches).max()))
-        self.boundary = BOUNDARY if self.kind == "closure" else BOUNDARY * size
-        self.order = self._order() if robot.dof == kernels.CABLES and kernels.is_unrolled(robot) else ()
+class WorkspaceSearch:
+    """A question to poses of one robot; what it needs of the robot alone is found once."""
 
-    def _order(self) -> tuple[int, ...]:
+    def __init__(self, robot: AnyRobot, asked: Question) -> None:
+        """Of a robot, centred, z down."""
+        self._robot, self._asked, self._length = robot, asked, _length(robot)
+        self._kind = "closure" if asked.condition == CLOSURE else "tensions"
+        self._unbounded = tuple(np.isinf(asked.high).tolist())
+        self._high = np.where(np.isinf(asked.high), 0.0, asked.high)
+        self._unit = np.where(kernels.scales(robot), self._length, 1.0)
+        self._boundary = BOUNDARY
+        if self._kind != "closure":
+            loads = [float(robot.mass * robot.gravity)] if asked.wrenches is None else np.ravel(asked.wrenches)
+            self._boundary *= np.abs(np.concatenate([asked.low, self._high, loads])).max()
+        self._by_lanes = kernels.is_unrolled(robot)
+        self._order = self._base_order() if self._by_lanes and robot.dof == kernels.CABLES else ()
+
+    def __call__(self, positions: np.ndarray, quaternions: np.ndarray | None) -> WorkspaceAnswers:
+        """Whether poses belong to the workspace.
+
+        Args:
+            positions: (n, 3) of the mass centre, or of the joint, m.
+            quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
+
+        Returns:
+            the answers.
+        """
+        if len(positions) == 0:
+            return WorkspaceAnswers(np.zeros(0, np.uint16), np.zeros(0), np.zeros(0, bool))
+        turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(positions), 1)) if quaternions is None else quaternions
+        parts = in_parts(lambda part: self._part(positions[part], turns[part]), len(positions), PART)
+        margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
+        verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
+        verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
+        verdict = np.where(is_outside, Verdict.SINGULAR, verdict)
+        verdict = np.where(np.isnan(margin), Verdict.NOT_FINITE, verdict)
+        return WorkspaceAnswers(verdict.astype(np.uint16), margin, is_exact)
+
+    def _base_order(self) -> tuple[int, ...]:
         # The block that is the farthest from singular at poses among the spools.
-        rng, base = np.random.default_rng(1), np.asarray(self.robot.base_points)
+        rng, base = np.random.default_rng(1), np.asarray(self._robot.base_points)
         low, high = base.min(0), base.max(0)
         middle, half = 0.5 * (low + high), 0.4 * (high - low)
         half[2] = max(half[2], 0.2 * half.max())
         places = middle + half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
         turns = np.array([1.0, 0.0, 0.0, 0.0]) + 0.2 * rng.normal(size=(TRIALS, 4))
         turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-        return kernels.base_order(self.matrices(places, turns))
+        return kernels.base_order(self._matrices(places, turns))
 
-    def matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        """Wrench matrices of poses, moments over the length."""
-        found = in_batches(lambda x: kernels.wrench_matrices(self.robot, *x), (positions, quaternions), size=ARRAYS)
-        return found / np.where(self.is_moment, self.length, 1.0)[:, None]
+    def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        # Wrench matrices, moments over the length.
+        found = in_batches(lambda x: kernels.wrench_matrices(self._robot, *x), (positions, quaternions), size=ARRAYS)
+        return found / self._unit[:, None]
 
-    def wrenches(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        """Wrenches that the cables must supply at poses, (n, k, dof), moments over the length."""
-        if self.asked.wrenches is not None and self.kind != "closure":
-            every = np.broadcast_to(self.asked.wrenches, (len(positions), *self.asked.wrenches.shape))
-        elif PATTERNS[self.robot.pattern].is_jointed:
+    def _wrenches(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        # What the cables must supply, (n, k, dof), moments over the length.
+        if self._asked.wrenches is not None:
+            every = self._asked.wrenches[None]
+        elif PATTERNS[self._robot.pattern].is_jointed:
             poses = positions, quaternions
-            every = in_batches(lambda x: kernels.weights(self.robot, *x), poses, size=ARRAYS)[:, None]
-        else:
-            one = np.zeros(self.robot.dof)
-            forces = PATTERNS[self.robot.pattern].forces
-            one[forces.index(2)] = -float(self.robot.mass * self.robot.gravity)
-            every = np.broadcast_to(one, (len(positions), 1, self.robot.dof))
-        return every / np.where(self.is_moment, self.length, 1.0)
+            every = in_batches(lambda x: kernels.weights(self._robot, *x), poses, size=ARRAYS)[:, None]
+        else:  # the same everywhere
+            every = np.asarray(kernels.weights(self._robot, positions[:1], quaternions[:1]))[None]
+        return np.broadcast_to(every / self._unit, (len(positions), *every.shape[1:]))
 
+    def _part(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        wrenches = self._wrenches(positions, quaternions)
+        compiled, size = (self._lanes, BATCH) if self._by_lanes else (self._arrays, ARRAYS)
+        found = in_batches(compiled, (positions, quaternions, wrenches), size=size)
+        margin, is_exact = np.array(found.value), np.array(found.is_open)
+        is_exact |= np.abs(margin) <= self._boundary
+        is_outside = np.zeros(len(positions), bool)
+        open_ones = np.flatnonzero(is_exact)
+        if len(open_ones):
+            poses = positions[open_ones], quaternions[open_ones]
+            margin[open_ones], is_outside[open_ones] = self._exactly(self._matrices(*poses), wrenches[open_ones])
+        return margin, is_exact, is_outside
 
-def _part(given: _Asked, positions: np.ndarray, quaternions: np.ndarray):
-    wrenches = given.wrenches(positions, quaternions)
-    by_lanes = kernels.is_unrolled(given.robot)
-    found = (_by_lanes if by_lanes else _by_arrays)(given, positions, quaternions, wrenches)
-    margin, is_exact = np.array(found.value), np.array(found.is_open)
-    is_exact |= np.abs(margin) <= given.boundary
-    is_outside = np.zeros(len(positions), bool)
-    places = np.flatnonzero(is_exact)
-    if len(places):
-        margin[places], is_outside[places] = _exactly(given, positions, quaternions, wrenches, places)
-    return margin, is_exact, is_outside
-
-
-def _by_lanes(given: _Asked, positions, quaternions, wrenches):
-    def compiled(batch):
-        place, turn, loads = batch
-        turned = tuple(turn.T) if PATTERNS[given.robot.pattern].is_body else None
-        units = kernels.unit_vectors(given.robot, tuple(place.T), turned)
-        columns = [tuple(load.T) for load in np.moveaxis(loads, 1, 0)]
-        limits = (given.asked.low, given.high), np.float64(given.length)
-        options = {"condition": given.kind, "order": given.order, "unbounded": given.unbounded}
-        return kernels.margins(given.robot, units, turned, columns, *limits, **options)
-
-    return in_batches(compiled, (positions, quaternions, wrenches), size=BATCH)
-
-
-def _by_arrays(given: _Asked, positions, quaternions, wrenches):
-    def compiled(batch):
+    def _lanes(self, batch):
         places, turns, loads = batch
-        limits = (given.asked.low, given.high), np.float64(given.length)
-        options = {"condition": given.kind, "unbounded": given.unbounded}
-        return kernels.array_margins(given.robot, places, turns, loads, *limits, **options)
+        turned = tuple(turns.T) if PATTERNS[self._robot.pattern].is_body else None
+        units = kernels.unit_vectors(self._robot, tuple(places.T), turned)
+        given = units, turned, [tuple(load.T) for load in np.moveaxis(loads, 1, 0)]
+        return kernels.margins(self._robot, *given, *self._limits, order=self._order, **self._options)
 
-    return in_batches(compiled, (positions, quaternions, wrenches), size=ARRAYS)
+    def _arrays(self, batch):
+        return kernels.array_margins(self._robot, *batch, *self._limits, **self._options)
+
+    @property
+    def _limits(self) -> tuple[tuple[np.ndarray, np.ndarray], np.float64]:
+        return (self._asked.low, self._high), np.float64(self._length)
+
+    @property
+    def _options(self) -> dict[str, Any]:
+        return {"condition": self._kind, "unbounded": self._unbounded}
+
+    def _exactly(self, matrices: np.ndarray, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        margins, is_outside = np.full(len(matrices), np.nan), np.zeros(len(matrices), bool)
+        for i, (columns, loads) in enumerate(zip(matrices, wrenches, strict=True)):
+            if not np.isfinite(columns).all():
+                continue
+            if self._kind == "closure":
+                margins[i] = exact.closure_margin(columns)
+                is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
+            else:
+                margins[i] = exact.tension_margin(columns, loads, self._asked.low, self._asked.high)
+                is_outside[i] = margins[i] == -np.inf
+        return margins, is_outside
 
 
-def _exactly(given: _Asked, positions, quaternions, wrenches, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    matrices = given.matrices(positions[places], quaternions[places])
-    margins, is_outside = np.full(len(places), np.nan), np.zeros(len(places), bool)
-    for i, (columns, loads) in enumerate(zip(matrices, wrenches[places], strict=True)):
-        if not np.isfinite(columns).all():
-            continue
-        if given.kind == "closure":
-            margins[i] = exact.closure_margin(columns)
-            is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
-        else:
-            margins[i] = exact.tension_margin(columns, loads, given.asked.low, given.asked.high)
-            is_outside[i] = margins[i] == -np.inf
-    return margins, is_outside
+def _length(robot: AnyRobot) -> float:
+    # By which moments are divided: the size of the platform.
+    if not isinstance(robot, PlatformRobot):
+        return 1.0
+    points = np.asarray(robot.platform_points)
+    return float(np.sqrt((points**2).sum(1).mean())) or 1.0

@@ -25,12 +25,11 @@ MOST_CABLES = 1000
 LARGEST = 1_000_000  # values of a file
 
 
-def read_json(path: Path, cable_set: str | None) -> Body:
+def read_json(path: Path) -> Body:
     """A robot of a JSON file.
 
     Args:
         path: the file.
-        cable_set: must be None: such files have no sets.
 
     Returns:
         the body.
@@ -38,15 +37,14 @@ def read_json(path: Path, cable_set: str | None) -> Body:
     Raises:
         ConfigError: no JSON, several platforms, or what no robot file can say.
     """
-    return _read(path, cable_set, json.loads, "JSON")
+    return _read(path, json.loads, "JSON")
 
 
-def read_yaml(path: Path, cable_set: str | None) -> Body:
+def read_yaml(path: Path) -> Body:
     """A robot of a YAML file.
 
     Args:
         path: the file.
-        cable_set: must be None: such files have no sets.
 
     Returns:
         the body.
@@ -54,7 +52,7 @@ def read_yaml(path: Path, cable_set: str | None) -> Body:
     Raises:
         ConfigError: no YAML, references in it that grow, several platforms, or what no robot file can say.
     """
-    return _read(path, cable_set, _yaml, "YAML")
+    return _read(path, _yaml, "YAML")
 
 
 def _yaml(text: str) -> Any:
@@ -62,7 +60,8 @@ def _yaml(text: str) -> Any:
 
     try:
         data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
+    # Its constructors of numbers and dates raise what they happen to, as of "!!int ''" and "!!timestamp x".
+    except (yaml.YAMLError, LookupError, AttributeError) as error:
         raise ValueError(" ".join(str(error).split())[:200]) from error
     if not _size(data, {}) <= LARGEST:
         raise ValueError(f"its references (*name) stand for more than {LARGEST} values, or for themselves")
@@ -80,15 +79,13 @@ def _size(data: Any, known: dict[int, float]) -> float:
     return known[id(data)]
 
 
-def _read(path: Path, cable_set: str | None, parse: Callable[[str], Any], kind: str) -> Body:
-    if cable_set is not None:
-        raise ConfigError(path, f"--set = {shown(cable_set)}: must be absent: only models of CASPR have cable sets")
+def _read(path: Path, parse: Callable[[str], Any], kind: str) -> Body:
     text = read_text(path)
     try:
         data = parse(text)
     except RecursionError as error:
         raise ConfigError(path, f"is not {kind} that is read here: nested too deeply") from error
-    except Exception as error:
+    except ValueError as error:
         raise ConfigError(path, f"is not {kind}: {error}") from error
     data = data["robot"] if isinstance(data, dict) and set(data) == {"robot"} else data
     return _body(_Table(data, "the file", path), path)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.config.formats.model import Body, robot_keys
+from cspr_jax.errors import ConfigError, shown
 
 
 @dataclasses.dataclass(frozen=True)
@@ -17,15 +18,17 @@ class Format:
         name: of the program.
         endings: of its files' names.
         description: for people.
-        reader: "module:function", called with the path and the name of a set of cables, or None.
+        reader: "module:function", called with the path, and with the name of a set of cables, or None, if `has_sets`.
+        has_sets: whether a file may hold several sets of cables.
     """
 
     name: str
     endings: tuple[str, ...]
     description: str
     reader: str
+    has_sets: bool = False
 
-    def load(self) -> Callable[[Path, str | None], Body]:
+    def load(self) -> Callable[..., Body]:
         """The function that reads a file, imported now.
 
         Returns:
@@ -37,7 +40,9 @@ class Format:
 
 _HERE = "cspr_jax.config.formats."
 FORMATS = (
-    Format("CASPR", (".xml",), "NAME_bodies.xml and NAME_cables.xml, side by side", _HERE + "caspr:read"),
+    Format(
+        "CASPR", (".xml",), "NAME_bodies.xml and NAME_cables.xml, side by side", _HERE + "caspr:read", has_sets=True
+    ),
     Format("cdpyr", (".json",), "a robot as JSON", _HERE + "cdpyr:read_json"),
     Format("cdpyr", (".yaml", ".yml"), "a robot as YAML", _HERE + "cdpyr:read_yaml"),
     Format("WireX", (".wcrfx",), "a robot of version 0.31", _HERE + "wirex:read"),
@@ -102,6 +107,12 @@ def read(path: Path, cable_set: str | None = None) -> Imported:
     row = format_of(path.name)
     if row is None:
         raise KeyError(path.name)
-    body = row.load()(path, cable_set)
+    if row.has_sets:
+        body = row.load()(path, cable_set)
+    elif cable_set is None:
+        body = row.load()(path)
+    else:
+        owners = " and ".join(dict.fromkeys(other.name for other in FORMATS if other.has_sets))
+        raise ConfigError(path, f"--set = {shown(cable_set)}: must be absent: only models of {owners} have cable sets")
     keys = robot_keys(body)
     return Imported(keys, tuple(cable.name for cable in body.cables), tuple(body.warnings))

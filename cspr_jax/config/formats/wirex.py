@@ -16,12 +16,11 @@ from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
 
 
-def read(path: Path, cable_set: str | None) -> Body:
+def read(path: Path) -> Body:
     """A robot.
 
     Args:
         path: the file.
-        cable_set: must be None: such files have no sets.
 
     Returns:
         the body.
@@ -29,8 +28,6 @@ def read(path: Path, cable_set: str | None) -> Body:
     Raises:
         ConfigError: no such XML, several platforms, or what no robot file can say.
     """
-    if cable_set is not None:
-        raise ConfigError(path, f"--set = {shown(cable_set)}: must be absent: only models of CASPR have cable sets")
     root = read_xml(path)
     if root.tag != "models":
         raise ConfigError(path, f"<{root.tag}>: must be <models>, a file of WireX")

@@ -21,7 +21,7 @@ from cspr_jax.feasibility.workspace.margins import Margin, Tensions, closure_mar
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.pulleys import exit_lanes
+from cspr_jax.robots.pulleys import Pulleys, exit_lanes, exits
 from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_sets import normals_to, spanning
 
@@ -35,8 +35,9 @@ SHORT_NORMAL = 1e-10
 REGULAR = {"float32": 3e-3, "float64": 1e-7}
 
 
-def pulls(robot: AnyRobot, position: Vector, quaternion: Vector | None) -> list[Vector]:
-    """Unit vectors of the cables, from the effector on.
+@jax.jit
+def unit_vectors(robot: AnyRobot, position: Vector, quaternion: Vector | None) -> list[Vector]:
+    """Unit vectors of the cables, from the effector on, one lane a pose.
 
     Args:
         robot: z down.
@@ -69,7 +70,7 @@ def arms_of(robot: AnyRobot, quaternion: Vector | None) -> list[Vector]:
 
     Args:
         robot: the robot.
-        quaternion: as for `pulls`.
+        quaternion: as for `unit_vectors`.
 
     Returns:
         one a cable, fixed axes, m; none of a point mass.
@@ -81,27 +82,12 @@ def arms_of(robot: AnyRobot, quaternion: Vector | None) -> list[Vector]:
     return points if turn is None else [lanes.turned(turn, point) for point in points]
 
 
-@jax.jit
-def unit_vectors(robot: AnyRobot, position: Vector, quaternion: Vector | None) -> list[Vector]:
-    """Unit vectors of the cables, compiled; see `pulls`.
-
-    Args:
-        robot: z down.
-        position: of the mass centre, or of the joint, m.
-        quaternion: unit quaternion, scalar first; None: no rotation.
-
-    Returns:
-        one a cable.
-    """
-    return pulls(robot, position, quaternion)
-
-
 def columns(robot: AnyRobot, units: Sequence[Vector], arms: Sequence[Vector], length: Array) -> list[Sequence[Array]]:
     """Columns of the wrench matrix.
 
     Args:
         robot: gives the pattern.
-        units: of `pulls`.
+        units: of `unit_vectors`.
         arms: of `arms_of`.
         length: () by which moments are divided, m.
 
@@ -135,7 +121,7 @@ def margins(
     Args:
         robot: z down.
         units: of `unit_vectors`.
-        quaternion: as for `pulls`.
+        quaternion: as for `unit_vectors`.
         wrenches: what the cables must supply, of dof components each, moments over `length`, N.
         limits: (n_cables,) smallest and (n_cables,) largest tensions, N; of cables without a largest one any number.
         length: () m.
@@ -293,6 +279,28 @@ def wrench_matrices(robot: AnyRobot, positions: Array, quaternions: Array) -> Ar
         (n, dof, n_cables).
     """
     return jax.vmap(lambda p, q: robot.wrench_matrix(at_rest(p, q)))(positions, quaternions)
+
+
+@jax.jit
+def exit_points(robot: AnyRobot, pulleys: Pulleys, positions: Array, quaternions: Array) -> Array:
+    """Where cables leave their pulleys.
+
+    Args:
+        robot: z down.
+        pulleys: of the robot.
+        positions: (n, 3) m.
+        quaternions: (n, 4).
+
+    Returns:
+        (n, n_cables, 3) m.
+    """
+
+    def one(position, quaternion):
+        arms = robot.platform_points @ matrix(quaternion).T if isinstance(robot, PlatformRobot) else 0.0
+        targets = jnp.broadcast_to(position[None] + arms, robot.base_points.shape)
+        return exits(robot.base_points, pulleys.axes, pulleys.radius, targets).point
+
+    return jax.vmap(one)(positions, quaternions)
 
 
 @jax.jit

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.lanes import smallest
+from cspr_jax.arithmetic.lanes import largest, smallest
 from cspr_jax.feasibility.workspace.cocircuits import Cocircuit
 
 # Of the largest component of a cocircuit, in units of rounding: what is smaller may be zero.
@@ -59,8 +59,8 @@ def tension_margin(cocircuits: Iterable[Cocircuit], limits: Tensions, unit: floa
     # Twice: what may be a zero is one, and then it is not.
     least, other, sizes = [], [], []
     for row in cocircuits:
-        size, largest = _sizes(row.entries)
-        tiny = NOISE * jnp.finfo(size.dtype).eps * largest
+        size, most = _sizes(row.entries)
+        tiny = NOISE * jnp.finfo(size.dtype).eps * most
         sizes.append(size)
         for sign in (1.0, -1.0):
             slack = _slack(row, sign, limits) / jnp.where(size > 0.0, size, 1.0)
@@ -74,22 +74,7 @@ def tension_margin(cocircuits: Iterable[Cocircuit], limits: Tensions, unit: floa
 
 def _sizes(entries: Mapping[int, Array]) -> tuple[Array, Array]:
     parts = [jnp.abs(entry) for entry in entries.values()]
-    return sum(parts[1:], parts[0]), largest_of(parts)
-
-
-def largest_of(values: Sequence[Array]) -> Array:
-    """The largest of several arrays, case by case.
-
-    Args:
-        values: arrays (...).
-
-    Returns:
-        (...).
-    """
-    most = values[0]
-    for value in values[1:]:
-        most = jnp.maximum(most, value)
-    return most
+    return sum(parts[1:], parts[0]), largest(parts)
 
 
 def _slack(row: Cocircuit, sign: float, limits: Tensions) -> Array:
@@ -98,7 +83,7 @@ def _slack(row: Cocircuit, sign: float, limits: Tensions) -> Array:
     for k, entry in row.entries.items():
         low, y = limits.low[k], sign * entry
         parts.append(y * low if limits.unbounded[k] else jnp.maximum(y * low, y * limits.high[k]))
-    return sum(parts[1:], parts[0]) - largest_of([sign * product for product in row.products])
+    return sum(parts[1:], parts[0]) - largest([sign * product for product in row.products])
 
 
 def _without(value: Array, free: Sequence[Array]) -> Array:
@@ -116,7 +101,7 @@ def _half_ranges(limits: Tensions, like: Array) -> list[Array]:
 
 
 def _has_short(sizes: Sequence[Array], unit: float) -> Array:
-    longest = jnp.maximum(largest_of(sizes), unit)
+    longest = jnp.maximum(largest(sizes), unit)
     return ~(smallest(sizes) > SHORT * jnp.finfo(longest.dtype).eps * longest)
 
 
@@ -133,10 +118,10 @@ def closure_margin(cocircuits: Iterable[Cocircuit], unit: float) -> Margin:
     """
     rarer, sizes = [], []
     for row in cocircuits:
-        size, largest = _sizes(row.entries)
+        size, most = _sizes(row.entries)
         entries = list(row.entries.values())
-        fewest = jnp.minimum(largest_of(entries), -smallest(entries))
-        rarer.append(fewest / jnp.where(largest > 0.0, largest, 1.0))
+        fewest = jnp.minimum(largest(entries), -smallest(entries))
+        rarer.append(fewest / jnp.where(most > 0.0, most, 1.0))
         sizes.append(size)
     least = smallest(rarer)
     near_zero = jnp.abs(least) < NOISE * jnp.finfo(least.dtype).eps
