@@ -11,13 +11,16 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.search import workspaces as search
-from cspr_jax.search.workspaces import CONDITIONS, FEASIBLE, WorkspaceAnswers, WorkspaceSearch
+from cspr_jax.search.workspace_questions import CONDITIONS, FEASIBLE, question, required_wrenches
+from cspr_jax.search.workspaces import WorkspaceAnswers, WorkspaceSearch, mass_centres
 
 __all__ = ["WorkspaceAnswers", "workspace"]
 
 
-def workspace(
+PRECISIONS = ("float64", "float32")
+
+
+def workspace(  # noqa: PLR0913
     robot: PointMassRobot | PlatformRobot,
     positions,
     orientations=None,
@@ -26,6 +29,11 @@ def workspace(
     tension_min=None,
     tension_max=None,
     wrenches=None,
+    wrench_box=None,
+    wrench_ellipsoid=None,
+    acceleration=None,
+    capacity_length: float | None = None,
+    precision: str = "float64",
 ) -> WorkspaceAnswers:
     """Workspace of a robot of any pattern on any number of cables: whether each of n poses belongs to it.
 
@@ -40,29 +48,46 @@ def workspace(
         tension_max: largest tension, likewise, inf allowed; None: the robot's, else none.
         wrenches: (k, dof) what the cables must supply, of "wrench-feasible": forces, N, then moments about the mass
             centre, or the joint, N m, in the robot's axes; None: what holds the weight still.
+        wrench_box: (dof,) half widths of a box of wrenches about each of these, N and N m.
+        wrench_ellipsoid: (dof,) semi-axes of an ellipsoid of wrenches about each of these, N and N m.
+        acceleration: radius of a ball of accelerations of the mass centre that the cables must give beside, m/s^2.
+        capacity_length: of "wrench-feasible": by which moments are divided, m (of a point mass any length), for the
+            capacity margin in place of that of the tensions: the distance of the wrenches from the faces of all that
+            the cables can supply, N (Guay et al. 2014; Ruiz et al. 2015).
+        precision: "float64"; "float32": it decides poses where it can, and float64 the others, so that verdicts are the
+            same; margins of the former are good to some 1e-3 of the limits.
 
     Returns:
         verdicts, 0 inside, and margins.
 
     Raises:
         InputError: another kind of robot, an unknown condition, shapes that do not fit, values that are not finite,
-            quaternions that are not of unit length, orientations of a point mass, wrenches of a rod, limits or wrenches
-            where the condition has none, limits that contradict each other.
+            quaternions that are not of unit length, orientations of a point mass, moments of a rod, accelerations of a
+            robot on a joint, limits or wrenches where the condition has none, limits that contradict each other.
     """
     if not isinstance(robot, PointMassRobot | PlatformRobot):
         raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
     if condition not in CONDITIONS:
         raise InputError("condition", condition, " or ".join(f'"{name}"' for name in CONDITIONS))
-    for key, value in (("tension_min", tension_min), ("tension_max", tension_max), ("wrenches", wrenches)):
+    if precision not in PRECISIONS:
+        raise InputError("precision", precision, " or ".join(f'"{name}"' for name in PRECISIONS))
+    asked = {"wrench_box": wrench_box, "wrench_ellipsoid": wrench_ellipsoid, "acceleration": acceleration}
+    asked |= {"tension_min": tension_min, "tension_max": tension_max, "wrenches": wrenches}
+    for key, value in (*asked.items(), ("capacity_length", capacity_length)):
         if value is not None and condition != FEASIBLE:
             raise InputError(key, value, f'None with condition "{condition}"')
+    if capacity_length is not None and not 0.0 < capacity_length < np.inf:
+        raise InputError("capacity_length", capacity_length, "a number > 0, in m")
     places = _places(robot, positions)
     with double_precision():
         own, frame = centred(robot)
         limits = _limits(robot, tension_min, tension_max)
-        loads = None if wrenches is None else search.given_wrenches(own, wrenches, frame)
+        loads = required_wrenches(
+            own, frame, points=wrenches, box=wrench_box, ellipsoid=wrench_ellipsoid, acceleration=acceleration
+        )
         inner, turns = _poses(own, frame, places, orientations)
-        return WorkspaceSearch(own, search.question(own, condition, limits, loads))(inner, turns)
+        posed = question(own, condition, limits, loads, capacity_length)
+        return WorkspaceSearch(own, posed, precision=precision)(inner, turns)
 
 
 def _places(robot, positions) -> np.ndarray:
@@ -89,4 +114,4 @@ def _poses(own, frame: Frame, places: np.ndarray, orientations) -> tuple[np.ndar
         if row.is_planar and given[:, [1, 3]].any():
             raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
         turns = frame.turned_quaternions(given)
-    return search.mass_centres(own, inner, turns), turns
+    return mass_centres(own, inner, turns), turns

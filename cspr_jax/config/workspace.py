@@ -10,6 +10,7 @@ from cspr_jax.config.wording import fault
 
 Condition = Literal["static", "wrench-feasible", "wrench-closure", "interference-free"]
 Component = Annotated[float, Field(ge=-1e12, le=1e12)]
+Sizes = Annotated[list[Annotated[float, Field(ge=0.0, le=1e12)]], Field(min_length=1, max_length=6)]
 
 
 class WorkspaceTable(Table):
@@ -30,6 +31,18 @@ class WorkspaceTable(Table):
         "the joint, N m; as many numbers each as degrees of freedom; absent: what holds the weight still",
     )
 
+    wrench_box: Sizes | None = Field(
+        None, description="wrench-feasible: half widths of a box of wrenches about each of these, N and N m"
+    )
+    wrench_ellipsoid: Sizes | None = Field(
+        None, description="wrench-feasible: semi-axes of an ellipsoid of wrenches about each of these, N and N m"
+    )
+    acceleration: Annotated[float, Field(ge=0.0, le=1e6)] | None = Field(
+        None,
+        description="wrench-feasible: radius of a ball of accelerations of the mass centre that the cables must give "
+        "beside, m/s^2",
+    )
+
     @field_validator("conditions")
     @classmethod
     def _once(cls, names: list[str]) -> list[str]:
@@ -39,6 +52,7 @@ class WorkspaceTable(Table):
 
     @model_validator(mode="after")
     def _somebody_asks(self) -> "WorkspaceTable":
-        if self.wrenches is not None and "wrench-feasible" not in self.conditions:
-            raise fault("wrenches", None, 'absent: "wrench-feasible" is not among the conditions')
+        for name in ("wrenches", "wrench_box", "wrench_ellipsoid", "acceleration"):
+            if getattr(self, name) is not None and "wrench-feasible" not in self.conditions:
+                raise fault(name, None, 'absent: "wrench-feasible" is not among the conditions')
         return self

@@ -14,7 +14,9 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search import workspaces as search
+from cspr_jax.search.workspace_clearances import apart
+from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, question, required_wrenches
+from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
 
 INTERFERENCE = "interference-free"
 # Limits of poses at rest: others belong to motions.
@@ -35,8 +37,8 @@ class WorkspaceMap(GridMap):
                 continue
             if limit.name not in HELD:
                 raise ConfigError(file, f"limits.{limit.name}: must be absent in this map, whose cells are at rest")
-            if limit.name in TENSIONS and search.FEASIBLE not in self._asked.conditions:
-                allowed = f'must be absent: "{search.FEASIBLE}" is not among workspace.conditions'
+            if limit.name in TENSIONS and FEASIBLE not in self._asked.conditions:
+                allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
                 raise ConfigError(file, f"limits.{limit.name}: {allowed}")
         self._limits = build_limits(spec, keys.limits, file)
         self._robot = centred(build_robot(spec, keys.trajectory, file))[0]
@@ -53,25 +55,27 @@ class WorkspaceMap(GridMap):
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
 
-    def _search(self, name: str) -> search.WorkspaceSearch:
-        wrenches, loads = self._asked.wrenches, None
-        if wrenches is not None and name == search.FEASIBLE:
-            loads = search.given_wrenches(self._robot, wrenches, self._frame)
-        return search.WorkspaceSearch(self._robot, search.question(self._robot, name, self._limits, loads))
+    def _search(self, name: str) -> WorkspaceSearch:
+        loads = None
+        if name == FEASIBLE:
+            asked = self._asked
+            given = {"points": asked.wrenches, "box": asked.wrench_box, "ellipsoid": asked.wrench_ellipsoid}
+            loads = required_wrenches(self._robot, self._frame, **given, acceleration=asked.acceleration)
+        return WorkspaceSearch(self._robot, question(self._robot, name, self._limits, loads))
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        places = search.mass_centres(self._robot, self._targets(cells), self._turn[None])
+        places = mass_centres(self._robot, self._targets(cells), self._turn[None])
         turns = np.tile(self._turn, (len(places), 1))
         verdict = np.zeros(len(places), np.uint16)
         found = {name: np.full(len(places), np.nan) for name in ("wrench_margin", "closure_margin", "clearance")}
         for condition, asked in self._searches.items():
             answers = asked(places, turns)
             verdict |= answers.verdict
-            name = "closure_margin" if condition == search.CLOSURE else "wrench_margin"
+            name = "closure_margin" if condition == CLOSURE else "wrench_margin"
             found[name] = np.fmin(found[name], answers.margin)
         if INTERFERENCE in self._asked.conditions:
-            found["clearance"], flags = search.apart(self._robot, places, turns)
+            found["clearance"], flags = apart(self._robot, places, turns)
             verdict |= flags
         floor: Array | None = self._limits.floor
         if floor is not None:

@@ -185,7 +185,7 @@ def across_line(robot: PlatformRobot) -> Array:
     offsets = robot.platform_points - robot.platform_points[:1]
     line = offsets[jnp.argmax(jnp.sum(offsets**2, axis=1))]
     line = line / jnp.linalg.norm(line)
-    first = jnp.cross(line, jnp.eye(3)[jnp.argmin(jnp.abs(line))])
+    first = jnp.cross(line, jnp.eye(3, dtype=line.dtype)[jnp.argmin(jnp.abs(line))])
     first = first / jnp.linalg.norm(first)
     return jnp.stack([first, jnp.cross(line, first)], axis=1)
 

@@ -1,34 +1,33 @@
 """Workspaces: margins of many poses of a robot on any number of cables. Arrays in, answers out.
 
-Poses that rounding may have decided, and those whose wrench matrix is near a loss of rank, are answered once more, by
-singular values.
+A pose goes from the fastest way to the surest, until its answer is beyond rounding: by the null space of six to eight
+cables in space, by the normals to dof - 1 cables, by singular values.
 """
 
 import dataclasses
-from typing import Any
+from collections.abc import Callable
 
+import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts
-from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.errors import InputError
-from cspr_jax.feasibility.workspace import exact, kernels
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.feasibility.workspace import cocircuits, exact, geometry, kernels
+from cspr_jax.feasibility.workspace.margins import Wrenches
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.clearance import clearances, scene
-from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.labelled import Columns
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.workspace_questions import CLOSURE, UNTURNED, Question
 
-STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
-CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
 # Of the largest limit of the tensions, or of the wrench: a margin nearer to zero is that of the boundary.
 BOUNDARY = 1e-9
-BATCH, ARRAYS, PART = 4096, 256, 65536
-# Poses by which the base block is chosen.
-TRIALS = 200
+BATCH, PART = 8192, 65536
+# Poses by which the base block is chosen, and those by which cocircuits that are none are left out.
+TRIALS, FEW_TRIALS = 200, 8
+# So many open poses go to singular values at once: to compile for them would take longer.
+FEW = 100
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,63 +47,185 @@ class WorkspaceAnswers(Columns):
     is_exact: np.ndarray
 
 
-@dataclasses.dataclass(frozen=True)
-class Question:
-    """What is asked of each pose.
-
-    Fields:
-        condition: one of `CONDITIONS`.
-        low: (n_cables,) smallest tensions, N.
-        high: (n_cables,) largest ones, inf for none, N.
-        wrenches: (k, dof) what the cables must supply, kernels' axes, N and N m; None: what holds the weight still.
-    """
-
-    condition: str
-    low: np.ndarray
-    high: np.ndarray
-    wrenches: np.ndarray | None = None
+Stage = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def question(robot: AnyRobot, condition: str, limits: Limits, wrenches: np.ndarray | None = None) -> Question:
-    """A question of a condition.
+class WorkspaceSearch:
+    """A question to poses of one robot; what it needs of the robot alone is found once."""
 
-    Args:
-        robot: the robot.
-        condition: one of `CONDITIONS`.
-        limits: of the tensions; of account for "wrench-feasible" alone.
-        wrenches: as in `Question`.
+    def __init__(self, robot: AnyRobot, asked: Question, *, precision: str = "float64") -> None:
+        """Of a robot, centred, z down.
 
-    Returns:
-        the question.
-    """
-    low, high = tension_range(robot, limits if condition == FEASIBLE else Limits())
-    return Question(condition, np.asarray(low), np.asarray(high), wrenches)
+        With precision "float32" that decides the poses of which it can, and float64 the others; margins of the former
+        are good to some 1e-5 of the limits.
+        """
+        self._robot, self._asked, self._precision = robot, asked, precision
+        self._length = asked.capacity_length or _length(robot)
+        self._unit = np.where(geometry.scales(robot), self._length, 1.0)
+        self._wrenches = asked.wrenches.over(self._unit)
+        self._measure = "tensions" if asked.capacity_length is None else "capacity"
+        self._boundary = BOUNDARY
+        if asked.condition == CLOSURE:
+            self._measure = "closure"
+        else:
+            sizes = asked.wrenches.size, float(robot.mass * robot.gravity)
+            self._boundary *= np.abs([*asked.low, *asked.high[np.isfinite(asked.high)], *sizes]).max()
+        matrices = self._trials()
+        self._choices = cocircuits.spanning(matrices[:FEW_TRIALS])
+        self._order = tuple[int, ...]()
+        is_few = 0 <= robot.n_cables - cocircuits.CABLES <= cocircuits.MOST_OTHERS
+        if robot.dof == cocircuits.CABLES and is_few and self._wrenches.is_one and self._measure != "capacity":
+            self._order = cocircuits.base_order(matrices)
+
+    def __call__(self, positions: np.ndarray, quaternions: np.ndarray | None) -> WorkspaceAnswers:
+        """Whether poses belong to the workspace.
+
+        Args:
+            positions: (n, 3) of the mass centre, or of the joint, m.
+            quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
+
+        Returns:
+            the answers.
+        """
+        if len(positions) == 0:
+            return WorkspaceAnswers(np.zeros(0, np.uint16), np.zeros(0), np.zeros(0, bool))
+        turns = np.repeat(UNTURNED, len(positions), 0) if quaternions is None else quaternions
+        parts = in_parts(lambda part: self._part(positions[part], turns[part]), len(positions), PART)
+        margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
+        verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
+        verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
+        verdict = np.where(is_outside, Verdict.SINGULAR, verdict)
+        verdict = np.where(np.isnan(margin), Verdict.NOT_FINITE, verdict)
+        return WorkspaceAnswers(verdict.astype(np.uint16), margin, is_exact)
+
+    def _trials(self) -> np.ndarray:
+        # Wrench matrices of poses among the spools.
+        rng, base, row = np.random.default_rng(1), np.asarray(self._robot.base_points), PATTERNS[self._robot.pattern]
+        low, high = base.min(0), base.max(0)
+        middle, half = 0.5 * (low + high), 0.4 * (high - low)
+        half[2] = max(half[2], 0.2 * half.max())
+        places = middle + half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
+        turns = UNTURNED + 0.2 * rng.normal(size=(TRIALS, 4))
+        if row.is_planar:
+            turns[:, [1, 3]] = 0.0
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        return self._matrices(places, turns)
+
+    def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        # Wrench matrices, moments over the length.
+        poses = positions, quaternions
+        found = in_batches(lambda x: geometry.wrench_matrices(self._robot, *x), poses, size=TRIALS)
+        return found / self._unit[:, None]
+
+    def _part(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        count = len(positions)
+        margin, is_open, is_outside = np.full(count, np.nan), np.ones(count, bool), np.zeros(count, bool)
+        for stage, accepts in self._stages():
+            places = np.flatnonzero(is_open)
+            if len(places) == 0 or len(places) < min(FEW, count):
+                break
+            found = stage(positions[places], quaternions[places])
+            is_known = accepts(found)
+            known = found[is_known]
+            margin[places[is_known]] = 0.5 * (known.real + known.imag)
+            is_open[places[is_known]] = False
+        is_open |= np.abs(margin) <= self._boundary
+        places = np.flatnonzero(is_open)
+        if len(places):
+            margin[places], is_outside[places] = self._exactly(positions[places], quaternions[places])
+        return margin, is_open, is_outside
+
+    def _stages(self):
+        def is_told(found):
+            return (found.real > self._boundary) | (found.imag < -self._boundary)
+
+        def is_known(found):
+            with np.errstate(invalid="ignore"):
+                return (found.real == found.imag) | (found.imag - found.real <= self._boundary)
+
+        if self._precision == "float32":
+            yield self._stage(np.float32, bool(self._order)), is_told
+        if self._order:
+            yield self._stage(np.float64, True), is_known
+        if len(self._choices.table):
+            yield self._stage(np.float64, False), is_known
+
+    def _stage(self, dtype: type, by_null_space: bool) -> Stage:
+        def cast(tree):
+            return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
+
+        def lanes(array):
+            return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
+
+        is_bounded, is_body = bool(np.isfinite(self._asked.high).all()), PATTERNS[self._robot.pattern].is_body
+        options = {"measure": self._measure, "is_bounded": is_bounded}
+        robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
+        limits = leaf(self._asked.low[ordered]), leaf(self._asked.high[ordered])
+        asked, length, fixed = cast((kernels.Range(*limits), leaf(self._length), self._fixed))
+        choices = self._relations if by_null_space else self._choices
+        choices = choices._replace(counts=cast(choices.counts))
+
+        def compiled(batch):
+            place, turn, load = batch
+            columns = geometry.wrench_columns(robot, place, turn, length)
+            wrenches = fixed if load is None else fixed._replace(points=[load])
+            if not by_null_space:
+                return kernels.by_normals(columns, wrenches, asked, choices, **options)
+            space = kernels.null_space(columns, wrenches.points[0], order=self._order)
+            return kernels.by_null_space(space, asked, choices, **options)
+
+        def stage(positions, quaternions):
+            loads = self._weights(positions, quaternions)
+            poses = lanes(positions), lanes(quaternions) if is_body else None, None if loads is None else lanes(loads)
+            return in_batches(compiled, poses, size=BATCH)
+
+        return stage
+
+    @property
+    def _relations(self) -> cocircuits.Choices:
+        # Cables of each cocircuit alone, in the order of the block.
+        table, counts = self._choices
+        places = np.argsort(self._order)[table[:, self._robot.dof - 1 :]].astype(np.int32)
+        sorting = np.argsort(places, axis=1)
+        ordered = None if counts is None else np.take_along_axis(counts, sorting, 1)
+        return cocircuits.Choices(np.take_along_axis(places, sorting, 1), ordered)
+
+    def _weights(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray | None:
+        # Of a body on a joint.
+        if self._wrenches.points is not None:
+            return None
+        poses = positions, quaternions
+        return in_batches(lambda x: geometry.weights(self._robot, *x), poses, size=BATCH) / self._unit
+
+    @property
+    def _fixed(self) -> Wrenches:
+        # Without the weight of a body on a joint.
+        asked = self._wrenches
+        points = [] if asked.points is None else [[leaf(x) for x in point] for point in asked.points]
+        return Wrenches(points, None if asked.box is None else leaf(asked.box), [leaf(x) for x in asked.ellipsoids])
+
+    def _exactly(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        matrices, loads = self._matrices(positions, quaternions), self._weights(positions, quaternions)
+        margins, is_outside = np.full(len(matrices), np.nan), np.zeros(len(matrices), bool)
+        for i, columns in enumerate(matrices):
+            if not np.isfinite(columns).all():
+                continue
+            if self._measure == "closure":
+                margins[i] = exact.closure_margin(columns)
+                is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
+            else:
+                asked = self._wrenches if loads is None else self._wrenches.of(loads[i])
+                margins[i] = exact.wrench_margin(columns, asked, self._asked.low, self._asked.high, self._measure)
+                is_outside[i] = margins[i] == -np.inf
+        return margins, is_outside
 
 
-def given_wrenches(robot: AnyRobot, given: Any, frame: Frame) -> np.ndarray:
-    """Wrenches as the kernels take them.
-
-    Args:
-        robot: gives the pattern.
-        given: (k, dof) in the axes of the file, N and N m.
-        frame: of the file.
-
-    Returns:
-        (k, dof).
-
-    Raises:
-        InputError: another shape, not finite, or of a rod.
-    """
-    row = PATTERNS[robot.pattern]
-    if row.along_line:
-        raise InputError("wrenches", "of a rod", "absent: its two axes of moments turn with it")
-    try:
-        values = np.asarray(given, float)
-    except ValueError:
-        values = np.full(0, np.nan)
-    if values.ndim != 2 or values.shape[0] == 0 or values.shape[1] != robot.dof or not np.isfinite(values).all():
-        raise InputError("wrenches", f"shape {values.shape}", f"finite numbers of shape (k, {robot.dof})")
-    return values * np.array([frame.signs[i] for i in (*row.forces, *row.moments)])
+def _length(robot: AnyRobot) -> float:
+    # By which moments are divided: the size of the platform.
+    if not isinstance(robot, PlatformRobot):
+        return 1.0
+    points = np.asarray(robot.platform_points)
+    return float(np.sqrt((points**2).sum(1).mean())) or 1.0
 
 
 def mass_centres(robot: AnyRobot, origins: np.ndarray, quaternions: np.ndarray | None) -> np.ndarray:
@@ -127,142 +248,3 @@ def mass_centres(robot: AnyRobot, origins: np.ndarray, quaternions: np.ndarray |
     scalar, axis = quaternions[:, :1], quaternions[:, 1:]
     twice = 2.0 * np.cross(axis, np.broadcast_to(arm, axis.shape))
     return origins + arm + scalar * twice + np.cross(axis, twice)
-
-
-def apart(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Clearance of the cables of a robot from each other.
-
-    Args:
-        robot: centred, z down.
-        positions: (n, 3) of the mass centre, m.
-        quaternions: (n, 4) unit quaternions, scalar first.
-
-    Returns:
-        (n,) m, inf where no two cables can meet; (n,) flags of `Verdict`.
-    """
-    diameter = 0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter)
-    turns, ends = quaternions if PATTERNS[robot.pattern].is_body else None, None
-    pulleys = robot.pulleys
-    if pulleys is not None:
-        ends = in_batches(lambda x: kernels.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
-    found = clearances(scene(robot, diameter=diameter), positions, turns, ends=ends)
-    verdict = np.where(found.clearance > 0.0, 0, Verdict.CABLE_CABLE)
-    return found.clearance, np.where(found.is_open, Verdict.UNDECIDED, verdict).astype(np.uint16)
-
-
-class WorkspaceSearch:
-    """A question to poses of one robot; what it needs of the robot alone is found once."""
-
-    def __init__(self, robot: AnyRobot, asked: Question) -> None:
-        """Of a robot, centred, z down."""
-        self._robot, self._asked, self._length = robot, asked, _length(robot)
-        self._kind = "closure" if asked.condition == CLOSURE else "tensions"
-        self._unbounded = tuple(np.isinf(asked.high).tolist())
-        self._high = np.where(np.isinf(asked.high), 0.0, asked.high)
-        self._unit = np.where(kernels.scales(robot), self._length, 1.0)
-        self._boundary = BOUNDARY
-        if self._kind != "closure":
-            loads = [float(robot.mass * robot.gravity)] if asked.wrenches is None else np.ravel(asked.wrenches)
-            self._boundary *= np.abs(np.concatenate([asked.low, self._high, loads])).max()
-        self._by_lanes = kernels.is_unrolled(robot)
-        self._order = self._base_order() if self._by_lanes and robot.dof == kernels.CABLES else ()
-
-    def __call__(self, positions: np.ndarray, quaternions: np.ndarray | None) -> WorkspaceAnswers:
-        """Whether poses belong to the workspace.
-
-        Args:
-            positions: (n, 3) of the mass centre, or of the joint, m.
-            quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
-
-        Returns:
-            the answers.
-        """
-        if len(positions) == 0:
-            return WorkspaceAnswers(np.zeros(0, np.uint16), np.zeros(0), np.zeros(0, bool))
-        turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(positions), 1)) if quaternions is None else quaternions
-        parts = in_parts(lambda part: self._part(positions[part], turns[part]), len(positions), PART)
-        margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
-        verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
-        verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
-        verdict = np.where(is_outside, Verdict.SINGULAR, verdict)
-        verdict = np.where(np.isnan(margin), Verdict.NOT_FINITE, verdict)
-        return WorkspaceAnswers(verdict.astype(np.uint16), margin, is_exact)
-
-    def _base_order(self) -> tuple[int, ...]:
-        # The block that is the farthest from singular at poses among the spools.
-        rng, base = np.random.default_rng(1), np.asarray(self._robot.base_points)
-        low, high = base.min(0), base.max(0)
-        middle, half = 0.5 * (low + high), 0.4 * (high - low)
-        half[2] = max(half[2], 0.2 * half.max())
-        places = middle + half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
-        turns = np.array([1.0, 0.0, 0.0, 0.0]) + 0.2 * rng.normal(size=(TRIALS, 4))
-        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-        return kernels.base_order(self._matrices(places, turns))
-
-    def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        # Wrench matrices, moments over the length.
-        found = in_batches(lambda x: kernels.wrench_matrices(self._robot, *x), (positions, quaternions), size=ARRAYS)
-        return found / self._unit[:, None]
-
-    def _wrenches(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        # What the cables must supply, (n, k, dof), moments over the length.
-        if self._asked.wrenches is not None:
-            every = self._asked.wrenches[None]
-        elif PATTERNS[self._robot.pattern].is_jointed:
-            poses = positions, quaternions
-            every = in_batches(lambda x: kernels.weights(self._robot, *x), poses, size=ARRAYS)[:, None]
-        else:  # the same everywhere
-            every = np.asarray(kernels.weights(self._robot, positions[:1], quaternions[:1]))[None]
-        return np.broadcast_to(every / self._unit, (len(positions), *every.shape[1:]))
-
-    def _part(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        wrenches = self._wrenches(positions, quaternions)
-        compiled, size = (self._lanes, BATCH) if self._by_lanes else (self._arrays, ARRAYS)
-        found = in_batches(compiled, (positions, quaternions, wrenches), size=size)
-        margin, is_exact = np.array(found.value), np.array(found.is_open)
-        is_exact |= np.abs(margin) <= self._boundary
-        is_outside = np.zeros(len(positions), bool)
-        open_ones = np.flatnonzero(is_exact)
-        if len(open_ones):
-            poses = positions[open_ones], quaternions[open_ones]
-            margin[open_ones], is_outside[open_ones] = self._exactly(self._matrices(*poses), wrenches[open_ones])
-        return margin, is_exact, is_outside
-
-    def _lanes(self, batch):
-        places, turns, loads = batch
-        turned = tuple(turns.T) if PATTERNS[self._robot.pattern].is_body else None
-        units = kernels.unit_vectors(self._robot, tuple(places.T), turned)
-        given = units, turned, [tuple(load.T) for load in np.moveaxis(loads, 1, 0)]
-        return kernels.margins(self._robot, *given, *self._limits, order=self._order, **self._options)
-
-    def _arrays(self, batch):
-        return kernels.array_margins(self._robot, *batch, *self._limits, **self._options)
-
-    @property
-    def _limits(self) -> tuple[tuple[np.ndarray, np.ndarray], np.float64]:
-        return (self._asked.low, self._high), np.float64(self._length)
-
-    @property
-    def _options(self) -> dict[str, Any]:
-        return {"condition": self._kind, "unbounded": self._unbounded}
-
-    def _exactly(self, matrices: np.ndarray, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        margins, is_outside = np.full(len(matrices), np.nan), np.zeros(len(matrices), bool)
-        for i, (columns, loads) in enumerate(zip(matrices, wrenches, strict=True)):
-            if not np.isfinite(columns).all():
-                continue
-            if self._kind == "closure":
-                margins[i] = exact.closure_margin(columns)
-                is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
-            else:
-                margins[i] = exact.tension_margin(columns, loads, self._asked.low, self._asked.high)
-                is_outside[i] = margins[i] == -np.inf
-        return margins, is_outside
-
-
-def _length(robot: AnyRobot) -> float:
-    # By which moments are divided: the size of the platform.
-    if not isinstance(robot, PlatformRobot):
-        return 1.0
-    points = np.asarray(robot.platform_points)
-    return float(np.sqrt((points**2).sum(1).mean())) or 1.0

@@ -5,30 +5,162 @@ limits, if and only if for each cocircuit y and any tensions t0 with W t0 = w th
 what the limits allow (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and Krut 2010). Every wrench
 can be resisted if and only if the rank is full and each cocircuit has components of both signs.
 
-One lane a pose: all numbers here are arrays (...) of any one shape.
+There are two ways to all of them: y = c . W, with c normal to dof - 1 columns; and, of six components and up to two
+cables more, the relations among the rows of the null space. One lane a pose: all numbers are arrays (...) of one shape.
 """
 
+import functools
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
+import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.lanes import cross, dot
+from cspr_jax.arithmetic.lanes import cross, dot, largest
 
 CABLES = 6  # of a base block, in two groups of three
+# Further cables beside a base block.
+MOST_OTHERS = 2
+# Of unit columns: a cocircuit that is shorter at every pose that was tried is none.
+NOTHING = 1e-12
+
+Column = Sequence[Array]
 
 
-class Cocircuit(NamedTuple):
-    """One of them, of any length; its negative counts as well.
+@functools.cache
+def subsets(count: int, dof: int) -> np.ndarray:
+    """Choices of dof - 1 cables, the others behind them.
+
+    Args:
+        count: number of cables.
+        dof: number of components.
+
+    Returns:
+        (n_choices, count) numbers of cables from 0 on.
+    """
+    chosen = itertools.combinations(range(count), dof - 1)
+    rows = [(*some, *(k for k in range(count) if k not in some)) for some in chosen]
+    return np.array(rows, np.int32).reshape(-1, count)
+
+
+class Choices(NamedTuple):
+    """Choices of dof - 1 cables whose columns have a normal that is not normal to all others.
 
     Fields:
-        entries: by cable, those that need not be zero.
-        products: for each wrench y . t0, where W t0 is the wrench.
+        table: (n_choices, n_cables) the dof - 1 cables, the others behind them.
+        counts: (n_choices, n_cables - dof + 1) whether the component of each of the others can differ from zero, as
+            numbers; None: all can.
     """
 
-    entries: Mapping[int, Array]
-    products: Sequence[Array]
+    table: np.ndarray
+    counts: np.ndarray | None
+
+
+def spanning(matrices: np.ndarray) -> Choices:
+    """Choices of `subsets` that are one at some pose: four cables at one point are none, wherever they are.
+
+    Args:
+        matrices: (n, dof, n_cables) wrench matrices of some poses, of unit columns.
+
+    Returns:
+        the choices.
+    """
+    dof, count = matrices.shape[1:]
+    table = subsets(count, dof)
+    chosen = matrices[:, :, table[:, : dof - 1]].transpose(0, 2, 1, 3)  # (n, n_choices, dof, dof - 1)
+    rows = [np.delete(np.arange(dof), k) for k in range(dof)]
+    normals = np.stack([(-1.0) ** k * np.linalg.det(chosen[:, :, row]) for k, row in enumerate(rows)], -1)
+    rest = matrices[:, :, table[:, dof - 1 :]]
+    sizes = np.abs(np.einsum("nsk,nksj->nsj", normals, rest)).max(0)
+    is_one = (sizes > NOTHING).any(1)
+    counts = (sizes > NOTHING)[is_one]
+    return Choices(table[is_one], None if counts.all() else counts.astype(float))
+
+
+def normal(columns: Sequence[Column]) -> Column:
+    """Normal to dof - 1 columns: their generalised cross product.
+
+    Args:
+        columns: of dof components each, dof - 1 of them, at least one.
+
+    Returns:
+        dof components; the product with another column is the determinant of all together.
+    """
+    dof = len(columns) + 1
+    if dof == 2:
+        return (-columns[0][1], columns[0][0])
+    if dof == 3:
+        return cross(*columns)
+    half = len(columns) - 2
+    head, tail = _minors(columns[:half]), _minors(columns[half:])
+    return [_laplace(head, tail, [row for row in range(dof) if row != k], (-1) ** (k + dof - 1)) for k in range(dof)]
+
+
+def _minors(columns: Sequence[Column]) -> dict[tuple[int, ...], Array]:
+    # Determinants of all choices of as many rows as columns.
+    dof = len(columns[0])
+    found: dict[tuple[int, ...], Array] = {(row,): columns[0][row] for row in range(dof)}
+    for size, column in enumerate(columns[1:], 2):
+        larger = {}
+        for rows in itertools.combinations(range(dof), size):
+            terms = [column[row] * found[rows[:i] + rows[i + 1 :]] for i, row in enumerate(rows)]
+            larger[rows] = _signed_sum(terms, [(-1) ** (i + size - 1) for i in range(size)])
+        found = larger
+    return found
+
+
+def _laplace(head: dict, tail: dict, rows: Sequence[int], sign: int) -> Array:
+    # The determinant of some rows by the minors of the first columns and those of the last.
+    terms, signs, size = list[Array](), list[int](), len(next(iter(head)))
+    for places in itertools.combinations(range(len(rows)), size):
+        rest = [place for place in range(len(rows)) if place not in places]
+        terms.append(head[tuple(rows[i] for i in places)] * tail[tuple(rows[i] for i in rest)])
+        signs.append(sign * (-1) ** (sum(places) + size * (size - 1) // 2))
+    return _signed_sum(terms, signs)
+
+
+def _signed_sum(terms: Sequence[Array], signs: Sequence[int]) -> Array:
+    total = terms[0] if signs[0] > 0 else -terms[0]
+    for term, sign in zip(terms[1:], signs[1:], strict=True):
+        total = total + term if sign > 0 else total - term
+    return total
+
+
+def product(a: Sequence[Array], b: Sequence[Array]) -> Array:
+    """Scalar product of vectors of any length.
+
+    Args:
+        a: at least one array (...).
+        b: as many.
+
+    Returns:
+        (...).
+    """
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total = total + x * y
+    return total
+
+
+def relation(rows: Sequence[Sequence[Array]]) -> Sequence[Array]:
+    """Relation among rows of the null space, one more than it has columns: a cocircuit of their cables.
+
+    Args:
+        rows: one, of no column; two, of one; or three, of two.
+
+    Returns:
+        as many components.
+    """
+    if len(rows) == 2:
+        return (rows[1][0], -rows[0][0])
+    i, j, k = rows
+
+    def minor(a, b):
+        return a[0] * b[1] - a[1] * b[0]
+
+    return (minor(j, k), minor(k, i), minor(i, j))
 
 
 class Block(NamedTuple):
@@ -37,45 +169,15 @@ class Block(NamedTuple):
     Fields:
         tensions: for each wrench six, in the order of the block.
         common: what they are multiplied by: the cube of a volume and the determinant of the block.
+        scale: of what their last digits are.
     """
 
     tensions: Sequence[Sequence[Array]]
     common: Array
+    scale: Array
 
 
-def direct(columns: Sequence[Sequence[Array]], wrenches: Sequence[Sequence[Array]]) -> Iterator[Cocircuit]:
-    """Cocircuits of up to three components, from the normals to dof - 1 columns.
-
-    Args:
-        columns: of the wrench matrix, one a cable, of dof components each.
-        wrenches: of dof components each.
-
-    Yields:
-        one for each choice of dof - 1 cables; of columns that are parallel all is 0.
-    """
-    dof = len(columns[0])
-    for chosen in itertools.combinations(range(len(columns)), dof - 1):
-        normal = _normal([columns[k] for k in chosen], columns[0])
-        rest = [k for k in range(len(columns)) if k not in chosen]
-        yield Cocircuit({k: _product(normal, columns[k]) for k in rest}, [_product(normal, w) for w in wrenches])
-
-
-def _normal(columns: Sequence[Sequence[Array]], like: Sequence[Array]) -> Sequence[Array]:
-    if not columns:
-        return (0.0 * like[0] + 1.0,)
-    if len(columns) == 1:
-        return (-columns[0][1], columns[0][0])
-    return cross(*columns)
-
-
-def _product(a: Sequence[Array], b: Sequence[Array]) -> Array:
-    total = a[0] * b[0]
-    for x, y in zip(a[1:], b[1:], strict=True):
-        total = total + x * y
-    return total
-
-
-def block(columns: Sequence[Sequence[Array]], wrenches: Sequence[Sequence[Array]]) -> Block:
+def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
     """Tensions of six cables by adjugates, the cables in two groups of three; no division.
 
     Args:
@@ -104,62 +206,33 @@ def block(columns: Sequence[Sequence[Array]], wrenches: Sequence[Sequence[Array]
         last = [dot(row, left) for row in inner]
         first = [given[j] * determinant - sum(pulls[n][j] * last[n] for n in range(3)) for j in range(3)]
         tensions.append([*first, *(volume * x for x in last)])
-    return Block(tensions, volume * determinant)
+    # All are products of two of what is left of columns, and of more that is not above 1.
+    most = largest([jnp.abs(x) for left in lefts for x in left])
+    return Block(tensions, volume * determinant, most * most)
 
 
-def by_block(
-    columns: Sequence[Sequence[Array]], wrenches: Sequence[Sequence[Array]], order: Sequence[int]
-) -> tuple[Iterator[Cocircuit], Array]:
-    """Cocircuits of six components and six to eight cables, from what pulls on nothing.
+def base_order(matrices: np.ndarray) -> tuple[int, ...]:
+    """Order of cables in space whose first six, and of these the first three forces, are the farthest from singular.
 
     Args:
-        columns: of the wrench matrix, one a cable.
-        wrenches: of six components each.
-        order: the cables, the six of the base block first, of these three whose forces span space.
+        matrices: (n, 6, n_cables) of some poses, moments over a length.
 
     Returns:
-        the cocircuits, scaled so that their entries are products of as many unit columns; (...) what they are divided
-        by, near 0 where the base block is singular: nothing of them can be trusted there.
+        the cables.
     """
-    base, others = order[:CABLES], order[CABLES:]
-    found = block([columns[k] for k in base], [*[columns[k] for k in others], *wrenches])
-    # Row k of the null space: how cable k changes with the tension of each further cable.
-    null = {k: [tensions[i] for tensions in found.tensions[: len(others)]] for i, k in enumerate(base)}
-    for i, k in enumerate(others):
-        null[k] = [-found.common if i == j else 0.0 * found.common for j in range(len(others))]
-    inverse = 1.0 / found.common
-    particular = [{k: tensions[i] * inverse for i, k in enumerate(base)} for tensions in found.tensions[len(others) :]]
-    return _relations(null, others, particular), found.common
+    count = matrices.shape[2]
 
+    def size(chosen, rows):
+        return np.quantile(np.abs(np.linalg.det(matrices[:, :rows][:, :, list(chosen)])), 0.02)
 
-def _relations(
-    null: Mapping[int, Sequence[Array]], others: Sequence[int], particular: Sequence[Mapping[int, Array]]
-) -> Iterator[Cocircuit]:
-    cables = sorted(null)
-    freedom = len(others)
-    products = _products(null, cables) if freedom == 2 else {}
-    for chosen in itertools.combinations(cables, freedom + 1):
-        if freedom == 0:
-            entries = {chosen[0]: 0.0 * particular[0][chosen[0]] + 1.0}
-        elif freedom == 1:
-            i, j = chosen
-            entries = {i: null[j][0], j: -null[i][0]}
-        else:
-            i, j, k = chosen
-            entries = {i: products[j, k], j: -products[i, k], k: products[i, j]}
-        held = [k for k in entries if k not in others]
-        yield Cocircuit(entries, [_total(entries, tensions, held) for tensions in particular])
+    triples = {chosen: size(chosen, 3) for chosen in itertools.combinations(range(count), 3)}
+    sixes = {chosen: size(chosen, CABLES) for chosen in itertools.combinations(range(count), CABLES)}
 
+    def worth(pair):
+        six, three = pair
+        return sixes[six] * triples[three] ** 3
 
-def _products(null: Mapping[int, Sequence[Array]], cables: Sequence[int]) -> dict[tuple[int, int], Array]:
-    return {(i, j): null[i][0] * null[j][1] - null[i][1] * null[j][0] for i, j in itertools.combinations(cables, 2)}
-
-
-def _total(entries: Mapping[int, Array], tensions: Mapping[int, Array], held: Sequence[int]) -> Array:
-    # Further cables have no tension in it.
-    if not held:
-        return 0.0 * next(iter(entries.values()))
-    total = entries[held[0]] * tensions[held[0]]
-    for k in held[1:]:
-        total = total + entries[k] * tensions[k]
-    return total
+    pairs = [(six, three) for six in sixes for three in itertools.combinations(six, 3)]
+    six, three = max(pairs, key=worth)
+    last = [k for k in range(count) if k not in six]
+    return (*three, *(k for k in six if k not in three), *last)

@@ -4,6 +4,8 @@ import itertools
 
 import numpy as np
 
+from cspr_jax.feasibility.workspace.required import RequiredWrenches
+
 # Of unit columns: smaller singular values, of the largest and at all, are zero.
 RANK, NOTHING = 1e-9, 1e-13
 # Of the largest component of a cocircuit: smaller ones are zero.
@@ -38,28 +40,38 @@ def cocircuits(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return found, (normals / sizes[:rank]) @ left[:, :rank].T, left[:, :rank]
 
 
-def tension_margin(matrix: np.ndarray, wrenches: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
-    """Largest s such that tensions between low + s and high - s give each of some wrenches.
+def wrench_margin(
+    matrix: np.ndarray, wrenches: RequiredWrenches, low: np.ndarray, high: np.ndarray, measure: str = "tensions"
+) -> float:
+    """Margin of wrenches: the largest s such that tensions between low + s and high - s give each of them; or capacity.
 
     Args:
         matrix: (dof, n_cables).
-        wrenches: (k, dof).
+        wrenches: what the cables must supply.
         low: (n_cables,) N.
         high: (n_cables,) N; inf where there is none: a margin counts against finite limits alone.
+        measure: "tensions"; "capacity": the distance of the wrenches from the faces of what can be supplied.
 
     Returns:
         N; inf where nothing bounds it, -inf where a wrench is outside of the span of the cables.
     """
     found, normals, basis = cocircuits(matrix)
-    outside = np.linalg.norm(wrenches - wrenches @ basis @ basis.T, axis=1)
-    if (outside > OUTSIDE * np.linalg.norm(wrenches, axis=1)).any():
+    if any(_is_outside(some, basis) for some in wrenches.spanning):
         return -np.inf
     rows, normals = np.concatenate([found, -found]), np.concatenate([normals, -normals])
     finite = np.where(np.isfinite(high), high, 0.0)
     is_void = ((rows > 0.0) & np.isinf(high)).any(1)
     reach = np.where(rows > 0.0, rows * finite, rows * low).sum(1)
-    slacks = (reach - (wrenches @ normals.T).max(0)) / np.abs(rows).sum(1)
+    slacks = reach - wrenches.supports(normals)
+    if measure == "capacity":
+        return float((slacks / np.linalg.norm(normals, axis=1))[~is_void].min(initial=np.inf))
+    slacks = slacks / np.abs(rows).sum(1)
     return float(min(slacks[~is_void].min(initial=np.inf), 0.5 * (high - low).min()))
+
+
+def _is_outside(wrenches: np.ndarray, basis: np.ndarray) -> bool:
+    outside = np.linalg.norm(wrenches - wrenches @ basis @ basis.T, axis=1)
+    return bool((outside > OUTSIDE * np.linalg.norm(wrenches, axis=1)).any())
 
 
 def closure_margin(matrix: np.ndarray) -> float:
@@ -74,5 +86,9 @@ def closure_margin(matrix: np.ndarray) -> float:
     found, _, basis = cocircuits(matrix)
     if basis.shape[1] < len(matrix):
         return -1.0
-    rarer = np.minimum(found.max(1), -found.min(1)) / np.abs(found).max(1)
-    return float(rarer.min())
+    other = found != 0.0
+    most, least = found.max(1, initial=-np.inf, where=other), found.min(1, initial=np.inf, where=other)
+    rarer = np.minimum(most, -least) / np.abs(found).max(1)
+    # A component that is zero beside those of a hyperplane's columns may have either sign.
+    has_more = (~other).sum(1) >= len(matrix)
+    return float(np.where(has_more, np.maximum(rarer, 0.0), rarer).min())

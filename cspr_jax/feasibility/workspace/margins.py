@@ -1,128 +1,168 @@
-"""Margins from cocircuits: how far tensions can keep from their limits, and how far every wrench can be resisted.
+"""Margins of poses, cocircuit by cocircuit, between two bounds: what rounding may have decided shows.
 
-A component that rounding may have made of a zero decides nothing: where it would, the pose is open, and
-`feasibility.workspace.exact` answers it by singular values.
+Where the bounds lie apart, `feasibility.workspace.exact` answers the pose by singular values.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.lanes import largest, smallest
-from cspr_jax.feasibility.workspace.cocircuits import Cocircuit
+from cspr_jax.arithmetic.lanes import largest
+from cspr_jax.feasibility.workspace.cocircuits import Column, product
 
-# Of the largest component of a cocircuit, in units of rounding: what is smaller may be zero.
-NOISE = 1e3
-# Of the longest cocircuit of a pose, in units of rounding: what is shorter has lost its direction.
-SHORT = 1e5
+# Error of a product of unit columns, in units of rounding; of 200,000 poses the largest was 24.
+ROUNDING = 64.0
+BLOCK_ROUNDING = 8.0
 
 
-class Tensions(NamedTuple):
-    """Limits of the tensions.
+class Wrenches(NamedTuple):
+    """Wrenches that cables must supply: all sums of one of a finite set, one of a box and one of each ellipsoid.
 
     Fields:
-        low: n_cables arrays (), N.
-        high: n_cables arrays (), N; of a cable without a largest tension any number.
-        unbounded: by cable, whether it has no largest tension; known when a function is compiled.
+        points: the finite set, of dof components each, () or one a pose, moments over a length, N.
+        box: (dof,) half widths of a box about zero, N; None: there is none.
+        ellipsoids: (dof,) semi-axes each of ellipsoids about zero, N.
     """
 
+    points: Sequence[Column]
+    box: Array | None = None
+    ellipsoids: Sequence[Array] = ()
+
+
+class Pull(NamedTuple):
+    """A cocircuit, with what the limits of its cables are.
+
+    Fields:
+        entries: components that need not be zero, of any common length.
+        low: smallest tensions of these cables, () each, N.
+        high: largest ones, () each, N; inf where there is none.
+        size: what the margin is over: the sum of the components' sizes for tensions, the length of the normal for the
+            capacity margin.
+        noises: errors of the components.
+        error: error of what the tensions give beyond the wrenches, in units of size times N.
+    """
+
+    entries: Sequence[Array]
     low: Sequence[Array]
     high: Sequence[Array]
-    unbounded: Sequence[bool]
+    size: Array
+    noises: Sequence[Array]
+    error: Array
 
 
-class Margin(NamedTuple):
-    """Margin of a pose.
-
-    Fields:
-        value: (...) inf where nothing bounds it.
-        is_open: (...) whether rounding may have decided.
-    """
-
-    value: Array
-    is_open: Array
+Bounds = tuple[Array, Array]
 
 
-def tension_margin(cocircuits: Iterable[Cocircuit], limits: Tensions, unit: float) -> Margin:
-    """Largest s such that tensions between low + s and high - s give each of some wrenches.
+def one_norm(entries: Sequence[Array]) -> Array:
+    """Sum of the sizes of components.
 
     Args:
-        cocircuits: of the wrench matrix, with their products with the wrenches.
-        limits: of the tensions; a margin counts against those that are finite.
-        unit: length that a cocircuit of columns far from parallel has; 0: none is known.
+        entries: arrays (...).
 
     Returns:
-        the margin, N.
+        (...).
     """
-    # Twice: what may be a zero is one, and then it is not.
-    least, other, sizes = [], [], []
-    for row in cocircuits:
-        size, most = _sizes(row.entries)
-        tiny = NOISE * jnp.finfo(size.dtype).eps * most
-        sizes.append(size)
-        for sign in (1.0, -1.0):
-            slack = _slack(row, sign, limits) / jnp.where(size > 0.0, size, 1.0)
-            free = [sign * row.entries[k] for k in row.entries if limits.unbounded[k]]
-            least.append(_without(slack, [*(entry > tiny for entry in free), size == 0.0]))
-            other.append(_without(slack, [*(entry > 0.0 for entry in free), size == 0.0]))
-    value, as_given = smallest(least), smallest(other)
-    is_open = (value != as_given) | _has_short(sizes, unit) | jnp.isnan(value)
-    return Margin(smallest([value, *_half_ranges(limits, value)]), is_open)
+    parts = [jnp.abs(entry) for entry in entries]
+    return sum(parts[1:], parts[0])
 
 
-def _sizes(entries: Mapping[int, Array]) -> tuple[Array, Array]:
-    parts = [jnp.abs(entry) for entry in entries.values()]
-    return sum(parts[1:], parts[0]), largest(parts)
-
-
-def _slack(row: Cocircuit, sign: float, limits: Tensions) -> Array:
-    # The largest product that tensions within their limits give, above the largest that a wrench asks for.
-    parts = []
-    for k, entry in row.entries.items():
-        low, y = limits.low[k], sign * entry
-        parts.append(y * low if limits.unbounded[k] else jnp.maximum(y * low, y * limits.high[k]))
-    return sum(parts[1:], parts[0]) - largest([sign * product for product in row.products])
-
-
-def _without(value: Array, free: Sequence[Array]) -> Array:
-    # What a cable without a largest tension frees bounds nothing.
-    is_free = free[0]
-    for one in free[1:]:
-        is_free = is_free | one
-    return jnp.where(is_free, jnp.inf, value)
-
-
-def _half_ranges(limits: Tensions, like: Array) -> list[Array]:
-    # No margin is larger than half of what a cable has.
-    every = zip(limits.low, limits.high, limits.unbounded, strict=True)
-    return [jnp.broadcast_to(0.5 * (high - low), like.shape) for low, high, unbounded in every if not unbounded]
-
-
-def _has_short(sizes: Sequence[Array], unit: float) -> Array:
-    longest = jnp.maximum(largest(sizes), unit)
-    return ~(smallest(sizes) > SHORT * jnp.finfo(longest.dtype).eps * longest)
-
-
-def closure_margin(cocircuits: Iterable[Cocircuit], unit: float) -> Margin:
-    """Margin of wrench closure: whether cables that are pulled hard enough resist every wrench.
+def length(vector: Sequence[Array]) -> Array:
+    """Length of a vector.
 
     Args:
-        cocircuits: of the wrench matrix.
-        unit: as for `tension_margin`.
+        vector: its components (...).
 
     Returns:
-        the margin, a pure number in [-1, 1]: of every cocircuit the largest component of the rarer sign, over the
-        largest of all; positive where there is closure.
+        (...).
     """
-    rarer, sizes = [], []
-    for row in cocircuits:
-        size, most = _sizes(row.entries)
-        entries = list(row.entries.values())
-        fewest = jnp.minimum(largest(entries), -smallest(entries))
-        rarer.append(fewest / jnp.where(most > 0.0, most, 1.0))
-        sizes.append(size)
-    least = smallest(rarer)
-    near_zero = jnp.abs(least) < NOISE * jnp.finfo(least.dtype).eps
-    return Margin(least, near_zero | _has_short(sizes, unit) | jnp.isnan(least))
+    return jnp.sqrt(product(vector, vector))
+
+
+def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
+    """Largest products of a normal, and of its negative, with the wrenches of a set.
+
+    Args:
+        normal: dof components.
+        wrenches: the set.
+
+    Returns:
+        both (...), in units of the normal times N.
+    """
+    products = [product(normal, point) for point in wrenches.points]
+    most, least = largest(products), largest([-value for value in products])
+    spreads = list[Array]()
+    if wrenches.box is not None:
+        spreads.append(product([jnp.abs(x) for x in normal], list(wrenches.box)))
+    spreads += [length([x * axis for x, axis in zip(normal, axes, strict=True)]) for axes in wrenches.ellipsoids]
+    for spread in spreads:
+        most, least = most + spread, least + spread
+    return most, least
+
+
+def bounded_margin(pull: Pull, most: Array, least: Array) -> Bounds:
+    """Bounds of the margin of one cocircuit whose cables all have a largest tension.
+
+    Args:
+        pull: the cocircuit.
+        most: the largest product that a wrench asks for.
+        least: that of the negative.
+
+    Returns:
+        lower and upper bound, N.
+    """
+    limits = list(zip(pull.entries, pull.low, pull.high, strict=True))
+    ranges = [(0.5 * (high - low)) * jnp.abs(y) for y, low, high in limits]
+    middles = [(0.5 * (high + low)) * y for y, low, high in limits]
+    middle = sum(middles[1:], middles[0])
+    slack = sum(ranges[1:], ranges[0]) - jnp.maximum(most - middle, least + middle)
+    return _between(pull, slack, slack)
+
+
+def _between(pull: Pull, sure: Array, possible: Array) -> Bounds:
+    # Over a size that has an error as well.
+    inverse = 1.0 / pull.size
+    lower, upper, loss = sure * inverse, possible * inverse, sum(pull.noises[1:], pull.noises[0])
+    less, more = (jnp.where(jnp.isinf(x), 0.0, loss * jnp.abs(x)) for x in (lower, upper))
+    return lower - (pull.error + less) * inverse, upper + (pull.error + more) * inverse
+
+
+def free_margin(pull: Pull, most: Array, least: Array) -> Bounds:
+    """Bounds of the margin of one cocircuit; any of its cables may have no largest tension.
+
+    A component that rounding may have made of a zero frees the upper bound, and does not free the lower one.
+
+    Args:
+        pull: the cocircuit.
+        most: the largest product that a wrench asks for.
+        least: that of the negative.
+
+    Returns:
+        lower and upper bound, N; inf where a cable without a largest tension frees the cocircuit.
+    """
+    lower, upper = list[Array](), list[Array]()
+    for sign, asked in ((1.0, most), (-1.0, least)):
+        sure = possible = -asked
+        for entry, noise, low, high in zip(pull.entries, pull.noises, pull.low, pull.high, strict=True):
+            y = sign * entry
+            sure = sure + jnp.where(y > noise, y * high, y * low)
+            possible = possible + jnp.where(y > -noise, (y + 2.0 * noise) * high, y * low)
+        lower.append(sure)
+        upper.append(possible)
+    return _between(pull, jnp.minimum(*lower), jnp.minimum(*upper))
+
+
+def closure_margin(pull: Pull) -> Bounds:
+    """Bounds of the margin of wrench closure of one cocircuit.
+
+    Args:
+        pull: the cocircuit.
+
+    Returns:
+        lower and upper bound of its largest component of the rarer sign, over the largest of all, in [-1, 1].
+    """
+    fewest = jnp.minimum(largest(pull.entries), largest([-entry for entry in pull.entries]))
+    inverse = 1.0 / largest([jnp.abs(entry) for entry in pull.entries])
+    error = 2.0 * largest(pull.noises) * inverse
+    return fewest * inverse - error, fewest * inverse + error

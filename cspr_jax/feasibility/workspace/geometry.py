@@ -1,0 +1,190 @@
+"""Geometry of many poses: unit vectors of the cables, columns of the wrench matrix, weights.
+
+Arrays are (n_cables, n): a row a cable, a lane a pose. Turned arms, unit vectors, columns and what follows come from
+compiled calls of their own: in one call XLA would compute each length three times, and loops over what the call itself
+has stored are three times as slow as over its arguments.
+"""
+
+from collections.abc import Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic import lanes
+from cspr_jax.arithmetic.lanes import Vector
+from cspr_jax.arithmetic.rotations import matrix
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.platform import PlatformRobot, across_line
+from cspr_jax.robots.pulleys import Pulleys, exit_lanes, exits
+from cspr_jax.robots.state import State
+
+
+def wrench_columns(robot: AnyRobot, position: Vector, quaternion: Vector | None, length: Array) -> list[Array]:
+    """Columns of the wrench matrix.
+
+    Args:
+        robot: z down.
+        position: of the mass centre, or of the joint, three arrays (n,), m.
+        quaternion: unit quaternion, scalar first, four arrays (n,); None: no rotation.
+        length: () by which moments are divided, m.
+
+    Returns:
+        dof arrays (n_cables, n), a component each.
+    """
+    arms = None if quaternion is None else turned_arms(robot, quaternion)
+    units = unit_vectors(robot, position, arms)
+    return _columns(robot, units, arms, quaternion, length)
+
+
+@jax.jit
+def turned_arms(robot: AnyRobot, quaternion: Vector) -> Vector | None:
+    """Arms from the mass centre, or from the joint, to the attachment points.
+
+    Args:
+        robot: the robot.
+        quaternion: unit quaternion, scalar first, four arrays (n,).
+
+    Returns:
+        three arrays (n_cables, n), fixed axes, m; None of a point mass.
+    """
+    if not isinstance(robot, PlatformRobot):
+        return None
+    shape = robot.n_cables, len(quaternion[0])
+    turn = [[_along(x, shape) for x in row] for row in lanes.rotation(quaternion)]
+    return lanes.turned(turn, _down(robot.platform_points, shape))
+
+
+def _along(lane: Array, shape: tuple[int, int]) -> Array:
+    return jnp.broadcast_to(lane[None], shape)
+
+
+def _down(points: Array, shape: tuple[int, int]) -> Vector:
+    return tuple(jnp.broadcast_to(points[:, i, None], shape) for i in range(3))
+
+
+@jax.jit
+def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> Vector:
+    """Unit vectors of the cables, from the effector on; with pulleys those of the free cables.
+
+    Args:
+        robot: z down.
+        position: of the mass centre, or of the joint, three arrays (n,), m.
+        arms: of `turned_arms`; None: of a platform, those of its file.
+
+    Returns:
+        three arrays (n_cables, n).
+    """
+    shape = robot.n_cables, len(position[0])
+    if arms is None and isinstance(robot, PlatformRobot):
+        arms = _down(robot.platform_points, shape)
+    target, base = [_along(x, shape) for x in position], _down(robot.base_points, shape)
+    if arms is not None:
+        target = [x + arm for x, arm in zip(target, arms, strict=True)]
+    if robot.pulleys is not None:
+        radius = jnp.broadcast_to(robot.pulleys.radius[:, None], shape)
+        way = exit_lanes(base, _down(robot.pulleys.axes, shape), radius, target).direction
+        return tuple(-x for x in way)
+    ray = tuple(base[i] - target[i] for i in range(3))
+    inverse = 1.0 / jnp.sqrt(lanes.dot(ray, ray))
+    return tuple(x * inverse for x in ray)
+
+
+@jax.jit
+def _columns(
+    robot: AnyRobot, units: Vector, arms: Vector | None, quaternion: Vector | None, length: Array
+) -> list[Array]:
+    row, shape = PATTERNS[robot.pattern], (robot.n_cables, units[0].shape[1])
+    if not row.is_body or not isinstance(robot, PlatformRobot):
+        return [units[i] for i in row.forces]
+    moment = lanes.cross(_down(robot.platform_points, shape) if arms is None else arms, units)
+    if row.along_line:
+        axes = [_down(jnp.broadcast_to(axis, (shape[0], 3)), shape) for axis in across_line(robot).T]
+        if quaternion is not None:
+            turn = [[_along(x, shape) for x in line] for line in lanes.rotation(quaternion)]
+            axes = [lanes.turned(turn, axis) for axis in axes]
+        about: Sequence[Array] = [lanes.dot(axis, moment) for axis in axes]
+    else:
+        about = [moment[i] for i in row.moments]
+    return [*(units[i] for i in row.forces), *(component / length for component in about)]
+
+
+def scales(robot: AnyRobot) -> np.ndarray:
+    """Which components of a wrench are moments.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        (dof,).
+    """
+    row = PATTERNS[robot.pattern]
+    return np.arange(robot.dof) >= len(row.forces)
+
+
+def at_rest(position: Array, quaternion: Array) -> State:
+    """State of an effector that rests.
+
+    Args:
+        position: (3,) m.
+        quaternion: (4,) unit quaternion, scalar first.
+
+    Returns:
+        the state.
+    """
+    still = jnp.zeros_like(position)
+    return State(position, still, still, matrix(quaternion), still, still, quaternion)
+
+
+@jax.jit
+def wrench_matrices(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
+    """Wrench matrices of poses.
+
+    Args:
+        robot: z down.
+        positions: (n, 3) m.
+        quaternions: (n, 4).
+
+    Returns:
+        (n, dof, n_cables).
+    """
+    return jax.vmap(lambda p, q: robot.wrench_matrix(at_rest(p, q)))(positions, quaternions)
+
+
+@jax.jit
+def exit_points(robot: AnyRobot, pulleys: Pulleys, positions: Array, quaternions: Array) -> Array:
+    """Where cables leave their pulleys.
+
+    Args:
+        robot: z down.
+        pulleys: of the robot.
+        positions: (n, 3) m.
+        quaternions: (n, 4).
+
+    Returns:
+        (n, n_cables, 3) m.
+    """
+
+    def one(position, quaternion):
+        arms = robot.platform_points @ matrix(quaternion).T if isinstance(robot, PlatformRobot) else 0.0
+        targets = jnp.broadcast_to(position[None] + arms, robot.base_points.shape)
+        return exits(robot.base_points, pulleys.axes, pulleys.radius, targets).point
+
+    return jax.vmap(one)(positions, quaternions)
+
+
+@jax.jit
+def weights(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
+    """Wrenches that hold a robot still.
+
+    Args:
+        robot: z down.
+        positions: (n, 3) m.
+        quaternions: (n, 4).
+
+    Returns:
+        (n, dof) N and N m.
+    """
+    return jax.vmap(lambda p, q: robot.inertial_wrench(at_rest(p, q)))(positions, quaternions)

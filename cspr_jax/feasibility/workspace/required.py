@@ -1,0 +1,80 @@
+"""Wrenches that cables must supply, as they are asked for; no jax."""
+
+import dataclasses
+
+import numpy as np
+
+
+@dataclasses.dataclass(frozen=True)
+class RequiredWrenches:
+    """Wrenches that cables must supply: all sums of one of a finite set, one of a box and one of each ellipsoid.
+
+    Fields:
+        points: (k, dof) the finite set, N and N m; or all of them over a length, as the kernels take them. None: the
+            weight of a body on a joint, which turns with it.
+        box: (dof,) half widths of a box about zero; None: there is none.
+        ellipsoids: (dof,) semi-axes each of ellipsoids about zero.
+    """
+
+    points: np.ndarray | None
+    box: np.ndarray | None = None
+    ellipsoids: tuple[np.ndarray, ...] = ()
+
+    def over(self, unit: np.ndarray) -> "RequiredWrenches":
+        """The same wrenches in other units.
+
+        Args:
+            unit: (dof,) by which components are divided.
+
+        Returns:
+            the wrenches.
+        """
+        box = None if self.box is None else self.box / unit
+        points = None if self.points is None else self.points / unit
+        return RequiredWrenches(points, box, tuple(axes / unit for axes in self.ellipsoids))
+
+    def of(self, weight: np.ndarray) -> "RequiredWrenches":
+        """The same box and ellipsoids about one wrench, if there is no finite set.
+
+        Args:
+            weight: (dof,) the wrench.
+
+        Returns:
+            the wrenches.
+        """
+        return self if self.points is not None else dataclasses.replace(self, points=weight[None])
+
+    def supports(self, normals: np.ndarray) -> np.ndarray:
+        """Largest products of normals with these wrenches.
+
+        Args:
+            normals: (n, dof).
+
+        Returns:
+            (n,).
+
+        Raises:
+            TypeError: there is no finite set.
+        """
+        if self.points is None:
+            raise TypeError("the weight of a body on a joint is known at a pose: see of()")
+        found = (self.points @ normals.T).max(0)
+        if self.box is not None:
+            found = found + np.abs(normals) @ self.box
+        return found + sum(np.linalg.norm(normals * axes, axis=1) for axes in self.ellipsoids)
+
+    @property
+    def spanning(self) -> list[np.ndarray]:
+        """Wrenches (n, dof) that span all of them."""
+        spreads = [axes for axes in (self.box, *self.ellipsoids) if axes is not None]
+        return [*([] if self.points is None else [self.points]), *(np.diag(axes) for axes in spreads)]
+
+    @property
+    def is_one(self) -> bool:
+        """Whether it is a single wrench at each pose."""
+        return (self.points is None or len(self.points) == 1) and self.box is None and not self.ellipsoids
+
+    @property
+    def size(self) -> float:
+        """Largest number of it; of a weight that is not known 0."""
+        return max((float(np.abs(part).max()) for part in self.spanning), default=0.0)
