@@ -1,15 +1,12 @@
 """Workspaces of robots on any number of cables, beside linear programs and singular values."""
 
 import dataclasses
-import math
 
-import h5py
 import numpy as np
 import pytest
 from oracles import workspaces as oracle
 from scipy.spatial.transform import Rotation
 from support import cable_robots
-from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.errors import InputError
@@ -143,57 +140,8 @@ def test_every_verdict_has_a_colour():
     assert set(REASONS) == set(Verdict) - set(NO_REASON) - {Verdict.FEASIBLE}
 
 
-SWEEP = """
-schema = 1
-map = "workspace"
-robot = "{robot}"
-[axes]
-x = {{ start = -1.5, stop = 1.5, count = 7 }}
-y = [0]
-z = {{ start = -1.2, stop = 1.2, count = 5 }}
-[workspace]
-conditions = {conditions}
-{more}
-"""
-
-
-def swept(folder, robot="kntu-planar", conditions='["wrench-feasible", "wrench-closure"]', more=""):
-    (folder / "w.toml").write_text(SWEEP.format(robot=robot, conditions=conditions, more=more))
-    return cspr("run", folder / "w.toml", "-o", folder / "run")
-
-
-def test_a_map_is_what_python_says(tmp_path):
-    """Every cell, both conditions, a turned platform; and its picture."""
-    turn = [math.cos(0.1), 0.0, math.sin(0.1), 0.0]
-    code, out, error = swept(tmp_path, more=f"orientation = {turn}")
-    assert (code, error) == (0, "")
-    robot, places = (
-        cspr_jax.load_robot("kntu-planar"),
-        grid(np.linspace(-1.5, 1.5, 7), [0.0], np.linspace(-1.2, 1.2, 5)),
-    )
-    turns = np.tile(turn, (len(places), 1))
-    held = cspr_jax.workspace(robot, places, turns)
-    closed = cspr_jax.workspace(robot, places, turns, condition="wrench-closure")
-    with h5py.File(out.strip()) as file:
-        np.testing.assert_allclose(file["wrench_margin"][...].ravel(), held.margin, atol=1e-9)
-        np.testing.assert_allclose(file["closure_margin"][...].ravel(), closed.margin, atol=1e-9)
-        assert (file["verdict"][...].ravel() == held.verdict | closed.verdict).all()
-        assert 0 < (file["verdict"][...] == 0).sum() < len(places)
-    assert cspr("plot", out.strip(), "-o", tmp_path / "w.png")[0] == 0
-    assert cspr("plot", out.strip(), "--quantity", "verdict", "-o", tmp_path / "v.png")[0] == 0
-
-
-def test_interference_and_the_floor_of_a_map(tmp_path):
-    """Cables of the platform on seven meet nowhere at these places; below the floor is no workspace."""
-    text = SWEEP.format(robot="caspr-seven", conditions='["interference-free"]', more="[limits]\nfloor = 0.0\n")
-    (tmp_path / "w.toml").write_text(text)
-    code, out, error = cspr("run", tmp_path / "w.toml", "-o", tmp_path / "run")
-    assert (code, error) == (0, "")
-    with h5py.File(out.strip()) as file:
-        clearance, verdict, z = file["clearance"][...], file["verdict"][...], file["z"][...]
-    assert (((verdict & Verdict.CABLE_CABLE) != 0) == (clearance <= 0.0)).all()
-    below = np.broadcast_to((z < 0.0)[None, None], verdict.shape)
-    assert (((verdict & Verdict.BELOW_FLOOR) != 0) == below).all()
+def grid(*axes):
+    return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
 
 
 def test_cables_that_leave_pulleys_are_kept_apart_from_there():
@@ -209,35 +157,6 @@ def test_cables_that_leave_pulleys_are_kept_apart_from_there():
         moved = dataclasses.replace(plain, base_points=ends)
         assert value == pytest.approx(apart(moved, place[None], turns[:1])[0][0], abs=1e-9)
         assert value != pytest.approx(apart(plain, place[None], turns[:1])[0][0], abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"conditions": '["dexterous"]'}, "workspace.conditions"),
-        ({"conditions": '["static", "static"]'}, "workspace.conditions"),
-        ({"conditions": "[]"}, "workspace.conditions"),
-        ({"more": "wrenches = [[1, 2]]"}, "workspace.wrenches"),
-        ({"more": "wrenches = [[1, 2], [1, 2, 3]]"}, "workspace.wrenches"),
-        ({"more": "orientation = [1, 1, 0, 0]"}, "workspace.orientation"),
-        ({"more": "orientation = [0.8, 0.6, 0, 0]"}, "workspace.orientation"),
-        ({"more": "obstacle = 1"}, "workspace.obstacle"),
-        ({"conditions": '["static"]', "more": "wrenches = [[0, 0, 0]]"}, "workspace.wrenches"),
-        ({"conditions": '["static"]', "more": "[limits]\ntension_max = 9"}, "limits.tension_max"),
-        ({"more": "[limits]\ncable_speed_max = 1"}, "limits.cable_speed_max"),
-        ({"more": "[limits]\ntension_min = 100"}, "tension_min"),
-        ({"robot": "prototype", "more": "orientation = [1, 0, 0, 0]"}, "workspace.orientation"),
-        ({"robot": "nothing"}, "robot"),
-    ],
-)
-def test_mistakes_are_one_line(tmp_path, changes, words):
-    code, out, error = swept(tmp_path, **changes)
-    assert (code, out) == (2, "") and words in error and len(error.splitlines()) == 1
-    assert not (tmp_path / "run").exists()
-
-
-def grid(*axes):
-    return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
 
 
 def test_cogiro():

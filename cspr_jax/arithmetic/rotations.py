@@ -92,6 +92,21 @@ def product(left: Array, right: Array) -> Array:
     return jnp.concatenate([scalar[None], vector])
 
 
+def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Products of quaternions, each with each: the right rotation first; see `product`.
+
+    Args:
+        left: (n, 4), or (1, 4) one for all.
+        right: likewise.
+
+    Returns:
+        (n, 4).
+    """
+    scalar = left[:, :1] * right[:, :1] - (left[:, 1:] * right[:, 1:]).sum(1, keepdims=True)
+    vector = left[:, :1] * right[:, 1:] + right[:, :1] * left[:, 1:] + np.cross(left[:, 1:], right[:, 1:])
+    return np.concatenate([scalar, vector], axis=1)
+
+
 def conjugate(quaternion: Array) -> Array:
     """The opposite rotation.
 

@@ -1,5 +1,6 @@
 """The [workspace] table of sweeps: what a pose must meet to belong to the workspace."""
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
@@ -25,6 +26,25 @@ class WorkspaceTable(Table):
     orientation: Quaternion | None = Field(
         None, description="orientation of a platform, a unit quaternion, scalar first; absent: that of its file"
     )
+    orientations: Literal["inclusion", "total", "maximum", "dextrous"] | None = Field(
+        None,
+        description='places at which a platform can have some ("inclusion") or every one ("total") orientation of a '
+        'set, that of tilt_max and torsion_max or of quaternions; "maximum", "dextrous": likewise of all orientations; '
+        "absent: one orientation, or those of the axes",
+    )
+    tilt_max: Annotated[float, Field(ge=0.0, le=math.pi)] | None = Field(
+        None,
+        description="inclusion, total: largest tilt from orientation, of a planar platform largest turn, rad",
+    )
+    torsion_max: Annotated[float, Field(ge=0.0, le=math.pi)] | None = Field(
+        None, description="with tilt_max: largest torsion of either sign, rad; absent: 0"
+    )
+    quaternions: Annotated[list[Quaternion], Field(min_length=1, max_length=100_000)] | None = Field(
+        None, description="inclusion, total: the orientations one by one, in place of tilt_max"
+    )
+    divisions: Annotated[int, Field(ge=2, le=128)] | None = Field(
+        None, description="of sets of orientations: the step is pi / divisions; absent: 12"
+    )
     wrenches: Annotated[list[list[Component]], Field(min_length=1, max_length=64)] | None = Field(
         None,
         description="wrench-feasible: what the cables must supply, forces, N, then moments about the mass centre, or "
@@ -49,6 +69,20 @@ class WorkspaceTable(Table):
         if len(set(names)) < len(names):
             raise ValueError("a list without repetitions")
         return names
+
+    @model_validator(mode="after")
+    def _one_set(self) -> "WorkspaceTable":
+        is_of_some = self.orientations in ("inclusion", "total")
+        for name in ("tilt_max", "quaternions"):
+            if getattr(self, name) is not None and not is_of_some:
+                raise fault(name, None, 'absent: workspace.orientations is neither "inclusion" nor "total"')
+        if is_of_some and (self.tilt_max is None) == (self.quaternions is None):
+            raise fault("tilt_max", self.tilt_max, f'given, or quaternions, one of them, with "{self.orientations}"')
+        if self.torsion_max is not None and self.tilt_max is None:
+            raise fault("torsion_max", self.torsion_max, "absent without tilt_max")
+        if self.divisions is not None and (self.orientations is None or self.quaternions is not None):
+            raise fault("divisions", self.divisions, "absent: there is no set of orientations to divide")
+        return self
 
     @model_validator(mode="after")
     def _somebody_asks(self) -> "WorkspaceTable":

@@ -1,59 +1,99 @@
-"""Maps of workspaces: whether a robot of any pattern on any number of cables can hold each place."""
+"""Maps of workspaces: whether a robot of any pattern on any number of cables can hold each pose."""
+
+import math
+from collections.abc import Sequence
 
 import numpy as np
-from jax import Array
 
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.arithmetic.rotations import from_tilt_torsion, products
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.maps.poses import TILT_TORSION
 from cspr_jax.problem import build_limits, build_robot, centred, given_quaternion
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.tiles import Grid
-from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.workspace_clearances import apart
-from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, question, required_wrenches
-from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
+from cspr_jax.search.orientation_grids import cone_grid, equal_volume_grid, turn_grid
+from cspr_jax.search.rest_poses import MARGINS, OrientationSet, RestPoses, over_orientations
+from cspr_jax.search.workspace_questions import FEASIBLE, question, required_wrenches
+from cspr_jax.search.workspaces import WorkspaceSearch
 
 INTERFERENCE = "interference-free"
 # Limits of poses at rest: others belong to motions.
 TENSIONS = ("tension_min", "tension_max")
-HELD = (*TENSIONS, "floor")
+HELD = (*TENSIONS, "floor", "cable_length_max")
+# Of pi, of sets of orientations where the file does not say.
+DIVISIONS = 12
 
 
 class WorkspaceMap(GridMap):
-    """The workspace of a robot, at one orientation; see `GridMap`."""
+    """The workspace of a robot: of poses, or of places with sets of orientations; see `GridMap`."""
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse what the robot cannot be asked."""
         self._keys, self._file = keys, file
         self._frame, self._z_axis = frame_of(spec.base_points, spec.z_axis), spec.z_axis
         self._asked = keys.workspace or WorkspaceTable()
-        for limit in LIMITS:
-            if getattr(keys.limits, limit.name) is None:
-                continue
-            if limit.name not in HELD:
-                raise ConfigError(file, f"limits.{limit.name}: must be absent in this map, whose cells are at rest")
-            if limit.name in TENSIONS and FEASIBLE not in self._asked.conditions:
-                allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
-                raise ConfigError(file, f"limits.{limit.name}: {allowed}")
+        self._refuse_unused()
         self._limits = build_limits(spec, keys.limits, file)
         self._robot = centred(build_robot(spec, keys.trajectory, file))[0]
-        row = PATTERNS[self._robot.pattern]
-        if self._asked.orientation is not None and not row.is_body:
-            raise ConfigError(file, f"workspace.orientation: must be absent: {spec.kind} has none")
-        given = given_quaternion(self._asked.orientation, "workspace.orientation", file)
-        if row.is_planar and given[[1, 3]].any():
-            raise ConfigError(file, "workspace.orientation: must turn about y: that of a planar robot")
-        self._turn = self._frame.turned_quaternions(given[None])[0]
+        self._row = PATTERNS[self._robot.pattern]
+        if not self._row.is_body:
+            for name in ("orientation", "orientations"):
+                if getattr(self._asked, name) is not None:
+                    raise ConfigError(file, f"workspace.{name}: must be absent: {spec.kind} has none")
+        self._turn = self._given_turns([self._asked.orientation], "workspace.orientation")
+        self._samples, self._volume = self._orientation_set()
         try:
             names = [name for name in self._asked.conditions if name != INTERFERENCE]
-            self._searches = {name: self._search(name) for name in names}
+            searches = {name: self._search(name) for name in names}
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
+        self._poses = RestPoses(self._robot, searches, INTERFERENCE in self._asked.conditions, self._limits)
+
+    def _refuse_unused(self) -> None:
+        for limit in LIMITS:
+            if getattr(self._keys.limits, limit.name) is None:
+                continue
+            if limit.name not in HELD:
+                raise ConfigError(
+                    self._file, f"limits.{limit.name}: must be absent in this map, whose cells are at rest"
+                )
+            if limit.name in TENSIONS and FEASIBLE not in self._asked.conditions:
+                allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
+                raise ConfigError(self._file, f"limits.{limit.name}: {allowed}")
+
+    def _given_turns(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
+        # (k, 4) in the kernels' axes.
+        given = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
+        if self._row.is_planar and given[:, [1, 3]].any():
+            raise ConfigError(self._file, f"{key}: must turn about y: that of a planar robot")
+        return self._frame.turned_quaternions(given)
+
+    def _orientation_set(self) -> tuple[np.ndarray | None, np.ndarray]:
+        # (k, 4) orientations and the part of the set that each stands for; None: there is no set.
+        asked = self._asked
+        if asked.orientations is None:
+            return None, np.ones(1)
+        if asked.quaternions is not None:
+            every = self._given_turns(asked.quaternions, "workspace.quaternions")
+            return products(every, self._turn), np.full(len(every), 1.0 / len(every))
+        divisions = asked.divisions or DIVISIONS
+        tilt = math.pi if asked.tilt_max is None else asked.tilt_max
+        if self._row.is_planar:
+            if asked.torsion_max is not None:
+                raise ConfigError(self._file, "workspace.torsion_max: must be absent for a planar robot")
+            angles, volume = turn_grid(divisions, tilt)
+        elif asked.tilt_max is None:
+            grid = equal_volume_grid(divisions)
+            angles, volume = grid.angles, grid.volume
+        else:
+            angles, volume = cone_grid(divisions, tilt, asked.torsion_max or 0.0)
+        return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._turn), volume
 
     def _search(self, name: str) -> WorkspaceSearch:
         loads = None
@@ -65,31 +105,33 @@ class WorkspaceMap(GridMap):
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        places = mass_centres(self._robot, self._targets(cells), self._turn[None])
-        turns = np.tile(self._turn, (len(places), 1))
-        verdict = np.zeros(len(places), np.uint16)
-        found = {name: np.full(len(places), np.nan) for name in ("wrench_margin", "closure_margin", "clearance")}
-        for condition, asked in self._searches.items():
-            answers = asked(places, turns)
-            verdict |= answers.verdict
-            name = "closure_margin" if condition == CLOSURE else "wrench_margin"
-            found[name] = np.fmin(found[name], answers.margin)
-        if INTERFERENCE in self._asked.conditions:
-            found["clearance"], flags = apart(self._robot, places, turns)
-            verdict |= flags
-        floor: Array | None = self._limits.floor
-        if floor is not None:
-            verdict |= np.where(places[:, 2] > float(floor), Verdict.BELOW_FLOOR, 0).astype(np.uint16)
-        return {"verdict": verdict, **found}
+        places = self._targets(cells)
+        if self._samples is not None:
+            kind: OrientationSet = "total" if self._asked.orientations in ("total", "dextrous") else "inclusion"
+            return over_orientations(self._poses, places, self._samples, self._volume, kind)
+        turns = np.repeat(self._turn, len(places), axis=0)
+        if any(name in cells for name in TILT_TORSION):
+            angles = np.stack([cells.get(name, np.zeros(len(places))) for name in TILT_TORSION], axis=1)
+            if self._row.is_planar:
+                angles[:, 0] = 0.5 * math.pi
+            turns = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), turns)
+        answers = self._poses(places, turns)
+        return answers | {"orientation_fraction": (answers["verdict"] == 0).astype(float)}
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
-        row = PATTERNS[self._robot.pattern]
+        row = self._row
         if row.is_planar and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
             raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
+        turning = [name for name in TILT_TORSION if name in grid.axes]
+        if turning and not row.is_body:
+            raise ConfigError(self._file, f"axes.{turning[0]}: must be absent: a point mass has no orientation")
+        if turning and self._samples is not None:
+            raise ConfigError(self._file, f"axes.{turning[0]}: must be absent beside workspace.orientations")
+        if row.is_planar and turning not in ([], ["tilt"]):
+            raise ConfigError(self._file, f"axes.{turning[0]}: must be tilt alone for a planar robot, about y")
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         inside = answers["verdict"] == 0
-        margins = ("wrench_margin", "closure_margin", "clearance")
-        return {f"a cell inside with a {name} below zero": inside & (answers[name] < 0.0) for name in margins}
+        return {f"a cell inside with a {name} below zero": inside & (answers[name] < 0.0) for name in MARGINS}

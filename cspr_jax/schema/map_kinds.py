@@ -105,7 +105,7 @@ _OF_LAUNCHES = (
     *("release_x", "release_y", "release_z"),
 )
 _OF_LENGTHS = ("sigma_p", "sigma_r")
-_OF_WORKSPACES = ("verdict", "wrench_margin", "closure_margin", "clearance")
+_OF_WORKSPACES = ("verdict", "wrench_margin", "closure_margin", "clearance", "orientation_fraction")
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 
@@ -270,14 +270,14 @@ MAP_KINDS: dict[str, MapKind] = {
         MapKind(
             name="workspace",
             title="Workspace",
-            description="places that the cables of a robot of any pattern can hold, at one orientation",
+            description="poses that a robot of any pattern can hold, or places at which it can hold sets of them",
             implementation="cspr_jax.maps.workspace:WorkspaceMap",
             quantities=_OF_WORKSPACES,
             stored=_OF_WORKSPACES,
             pictured=("wrench_margin", "closure_margin", "clearance"),
             motionless=_OF_WORKSPACES,
             families=(),
-            takes=("workspace", "limits"),
+            takes=("workspace", "limits", "axes.tilt_azimuth", "axes.tilt", "axes.torsion"),
         ),
     )
 }

@@ -236,6 +236,12 @@ QUANTITIES = {
             signed=True,
         ),
         Quantity(
+            "orientation_fraction",
+            "1",
+            "part of the orientations",
+            "Part of a set of orientations, by volume, that is inside the workspace at a place; of one pose 0 or 1.",
+        ),
+        Quantity(
             "level_acceleration",
             "m s-2",
             "level acceleration in every direction",

@@ -97,6 +97,57 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
     return OrientationGrid(angles, np.full(len(angles), 1.0 / len(angles)), _near(angles, NEAR * step), 0)
 
 
+def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, np.ndarray]:
+    """Orientations of a cone of tilts, its boundary included, some pi / divisions apart.
+
+    Rings of tilts times torsions, each at the middle of the part of SO(3) that it stands for, but for those of the
+    boundary, which lie on it.
+
+    Args:
+        divisions: of pi.
+        tilt: the largest, in [0, pi], rad.
+        torsion: the largest of either sign, in [0, pi], rad.
+
+    Returns:
+        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of the cone that each stands for.
+    """
+    step = math.pi / divisions
+    rings = math.ceil(tilt / step - 1e-9)
+    tilts = np.linspace(0.0, tilt, rings + 1)
+    edges = np.concatenate([[0.0], 0.5 * (tilts[1:] + tilts[:-1]), [tilt]])
+    areas = np.diff(-np.cos(edges)) if rings else np.ones(1)
+    counts = [max(1, math.ceil(2.0 * math.pi * math.sin(x) / step - 1e-9)) for x in tilts]
+    azimuth = np.concatenate([np.arange(n) * 2.0 * math.pi / n for n in counts])
+    turns = math.ceil(torsion / step - 1e-9)
+    sigma = np.linspace(-torsion, torsion, 2 * turns + 1)
+    widths = np.ones(len(sigma))
+    if turns:
+        widths[[0, -1]] = 0.5
+    angles = np.stack(
+        [np.repeat(azimuth, len(sigma)), np.repeat(np.repeat(tilts, counts), len(sigma)), np.tile(sigma, len(azimuth))],
+        axis=1,
+    )
+    volume = np.repeat(np.repeat(areas / np.array(counts), counts), len(sigma)) * np.tile(widths, len(azimuth))
+    return angles, volume / volume.sum()
+
+
+def turn_grid(divisions: int, turn: float) -> tuple[np.ndarray, np.ndarray]:
+    """Turns about y, some pi / divisions apart.
+
+    Args:
+        divisions: of pi.
+        turn: the largest of either sign, in [0, pi], rad.
+
+    Returns:
+        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of the turns that each stands for.
+    """
+    steps = math.ceil(turn * divisions / math.pi - 1e-9)
+    theta, widths = np.linspace(-turn, turn, 2 * steps + 1), np.ones(2 * steps + 1)
+    if steps:
+        widths[[0, -1]] = 0.5
+    return np.stack([np.full_like(theta, 0.5 * math.pi), theta, np.zeros_like(theta)], axis=1), widths / widths.sum()
+
+
 def _near(angles: np.ndarray, angle: float) -> np.ndarray:
     # Both quaternions of an orientation are in the tree; each pair is counted once.
     own = from_tilt_torsion(angles)

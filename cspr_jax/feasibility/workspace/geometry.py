@@ -166,13 +166,36 @@ def exit_points(robot: AnyRobot, pulleys: Pulleys, positions: Array, quaternions
     Returns:
         (n, n_cables, 3) m.
     """
+    targets = _attachments(robot, positions, quaternions)
+    return jax.vmap(lambda x: jnp.asarray(exits(robot.base_points, pulleys.axes, pulleys.radius, x).point))(targets)
 
-    def one(position, quaternion):
-        arms = robot.platform_points @ matrix(quaternion).T if isinstance(robot, PlatformRobot) else 0.0
-        targets = jnp.broadcast_to(position[None] + arms, robot.base_points.shape)
-        return exits(robot.base_points, pulleys.axes, pulleys.radius, targets).point
 
-    return jax.vmap(one)(positions, quaternions)
+@jax.jit
+def cable_lengths(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
+    """Lengths of the cables, from where they enter their pulleys, or from the base points.
+
+    Args:
+        robot: z down.
+        positions: (n, 3) m.
+        quaternions: (n, 4).
+
+    Returns:
+        (n, n_cables) m.
+    """
+    targets, pulleys = _attachments(robot, positions, quaternions), robot.pulleys
+    if pulleys is None:
+        return jnp.linalg.norm(robot.base_points[None] - targets, axis=2)
+    way = jax.vmap(lambda x: exits(robot.base_points, pulleys.axes, pulleys.radius, x))(targets)
+    return way.wrapped + way.free
+
+
+def _attachments(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
+    # (n, n_cables, 3) of all cables.
+    arms = jnp.zeros((len(positions), *robot.base_points.shape), positions.dtype)
+    if isinstance(robot, PlatformRobot):
+        points = robot.platform_points
+        arms = jax.vmap(lambda quaternion: points @ matrix(quaternion).T)(quaternions)
+    return positions[:, None] + arms
 
 
 @jax.jit

@@ -1,0 +1,179 @@
+"""Maps of workspaces: what Python says cell by cell, sets of orientations, and mistakes."""
+
+import math
+
+import h5py
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from support.commands import cspr
+
+import cspr_jax
+from cspr_jax.arithmetic.rotations import from_tilt_torsion
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.orientation_grids import cone_grid, turn_grid
+
+SWEEP = """
+schema = 1
+map = "workspace"
+robot = "{robot}"
+[axes]
+x = {{ start = -1.5, stop = 1.5, count = 7 }}
+y = [0]
+z = {{ start = -1.2, stop = 1.2, count = 5 }}
+[workspace]
+conditions = {conditions}
+{more}
+"""
+
+
+def swept(folder, robot="kntu-planar", conditions='["wrench-feasible", "wrench-closure"]', more=""):
+    (folder / "w.toml").write_text(SWEEP.format(robot=robot, conditions=conditions, more=more))
+    return cspr("run", folder / "w.toml", "-o", folder / "run")
+
+
+def test_a_map_is_what_python_says(tmp_path):
+    """Every cell, both conditions, a turned platform; and its picture."""
+    turn = [math.cos(0.1), 0.0, math.sin(0.1), 0.0]
+    code, out, error = swept(tmp_path, more=f"orientation = {turn}")
+    assert (code, error) == (0, "")
+    robot, places = (
+        cspr_jax.load_robot("kntu-planar"),
+        grid(np.linspace(-1.5, 1.5, 7), [0.0], np.linspace(-1.2, 1.2, 5)),
+    )
+    turns = np.tile(turn, (len(places), 1))
+    held = cspr_jax.workspace(robot, places, turns)
+    closed = cspr_jax.workspace(robot, places, turns, condition="wrench-closure")
+    with h5py.File(out.strip()) as file:
+        np.testing.assert_allclose(file["wrench_margin"][...].ravel(), held.margin, atol=1e-9)
+        np.testing.assert_allclose(file["closure_margin"][...].ravel(), closed.margin, atol=1e-9)
+        assert (file["verdict"][...].ravel() == held.verdict | closed.verdict).all()
+        assert 0 < (file["verdict"][...] == 0).sum() < len(places)
+    assert cspr("plot", out.strip(), "-o", tmp_path / "w.png")[0] == 0
+    assert cspr("plot", out.strip(), "--quantity", "verdict", "-o", tmp_path / "v.png")[0] == 0
+
+
+def test_interference_and_the_floor_of_a_map(tmp_path):
+    """Cables of the platform on seven meet nowhere at these places; below the floor is no workspace."""
+    text = SWEEP.format(robot="caspr-seven", conditions='["interference-free"]', more="[limits]\nfloor = 0.0\n")
+    (tmp_path / "w.toml").write_text(text)
+    code, out, error = cspr("run", tmp_path / "w.toml", "-o", tmp_path / "run")
+    assert (code, error) == (0, "")
+    with h5py.File(out.strip()) as file:
+        clearance, verdict, z = file["clearance"][...], file["verdict"][...], file["z"][...]
+    assert (((verdict & Verdict.CABLE_CABLE) != 0) == (clearance <= 0.0)).all()
+    below = np.broadcast_to((z < 0.0)[None, None], verdict.shape)
+    assert (((verdict & Verdict.BELOW_FLOOR) != 0) == below).all()
+
+
+KNTU = np.linspace(-1.5, 1.5, 7), [0.0], np.linspace(-1.2, 1.2, 5)
+
+
+@pytest.mark.parametrize("kind", ["inclusion", "total", "maximum", "dextrous"])
+def test_sets_of_orientations(tmp_path, kind):
+    """Beside every orientation asked from Python; about the orientation that is given."""
+    base, tilt, divisions = 0.1, 0.6 if kind in ("inclusion", "total") else math.pi, 16
+    more = f'orientation = [{math.cos(0.5 * base)}, 0.0, {math.sin(0.5 * base)}, 0.0]\norientations = "{kind}"\n'
+    more += f"divisions = {divisions}\n" + (f"tilt_max = {tilt}\n" if tilt < 3.0 else "")
+    code, out, error = swept(tmp_path, conditions='["wrench-feasible"]', more=more)
+    assert (code, error) == (0, "")
+    places, robot = grid(*KNTU), cspr_jax.load_robot("kntu-planar")
+    angles, volume = turn_grid(divisions, tilt)
+    inside, margins = [], []
+    for angle in angles[:, 1]:
+        turn = Rotation.from_euler("y", angle + base).as_quat(scalar_first=True)
+        found = cspr_jax.workspace(robot, places, np.tile(turn, (len(places), 1)))
+        inside.append(found.verdict == 0)
+        margins.append(found.margin)
+    with h5py.File(out.strip()) as file:
+        verdict, fraction, margin = (
+            file[name][...].ravel() for name in ("verdict", "orientation_fraction", "wrench_margin")
+        )
+    is_total = kind in ("total", "dextrous")
+    wanted = np.all(inside, axis=0) if is_total else np.any(inside, axis=0)
+    assert ((verdict == 0) == wanted).all() and (kind == "dextrous" or 0 < wanted.sum() < len(wanted))
+    np.testing.assert_allclose(fraction, volume @ np.array(inside), atol=1e-12)
+    np.testing.assert_allclose(margin, np.min(margins, axis=0) if is_total else np.max(margins, axis=0), atol=1e-7)
+
+
+def test_orientations_one_by_one_and_axes_of_orientations(tmp_path):
+    """Three turns as a list, as an axis, and asked each."""
+    turns, robot, places = [-0.3, 0.0, 0.4], cspr_jax.load_robot("kntu-planar"), grid(*KNTU)
+    quaternions = [Rotation.from_euler("y", turn).as_quat(scalar_first=True).tolist() for turn in turns]
+    more = f'orientations = "total"\nquaternions = {quaternions}'
+    out = swept(tmp_path, conditions='["wrench-feasible"]', more=more)[1]
+    text = SWEEP.format(robot="kntu-planar", conditions='["wrench-feasible"]', more="").replace(
+        "[workspace]", f"tilt = {turns}\n[workspace]"
+    )
+    (tmp_path / "axis.toml").write_text(text)
+    along = cspr("run", tmp_path / "axis.toml", "-o", tmp_path / "other")[1]
+    each = [cspr_jax.workspace(robot, places, np.tile(turn, (len(places), 1))).verdict == 0 for turn in quaternions]
+    with h5py.File(out.strip()) as file, h5py.File(along.strip()) as axis:
+        assert ((file["verdict"][...].ravel() == 0) == np.all(each, axis=0)).all()
+        assert ((axis["verdict"][...].reshape(-1, 3) == 0) == np.transpose(each)).all()
+
+
+@pytest.mark.parametrize(("tilt", "torsion"), [(0.0, 0.0), (0.3, 0.0), (0.7, 0.5), (math.pi, math.pi)])
+def test_a_cone_of_orientations(tilt, torsion):
+    """Its boundary is there; parts add up, and weigh a mean as the integral does."""
+    angles, volume = cone_grid(24, tilt, torsion)
+    assert volume.sum() == pytest.approx(1.0) and (volume > 0.0).all()
+    assert angles[:, 1].max() == pytest.approx(tilt) and np.abs(angles[:, 2]).max() == pytest.approx(torsion)
+    steps = Rotation.from_quat(from_tilt_torsion(angles), scalar_first=True).magnitude()
+    assert steps.min() == pytest.approx(0.0, abs=1e-7)
+    if tilt:
+        mean = 0.5 * (1.0 + math.cos(tilt)) if tilt < math.pi else 0.0
+        assert volume @ np.cos(angles[:, 1]) == pytest.approx(mean, abs=0.01)
+        assert volume @ np.cos(angles[:, 0]) == pytest.approx(0.0, abs=0.02 + volume[0])
+
+
+def test_cables_that_are_too_long(tmp_path):
+    """A cell is outside where one of them exceeds its largest length."""
+    robot, places = cspr_jax.load_robot("kntu-planar"), grid(*KNTU)
+    out = swept(tmp_path, conditions='["static"]', more="[limits]\ncable_length_max = 1.9")[1]
+    rays = places[:, None] + np.asarray(robot.platform_points) - np.asarray(robot.base_points)
+    is_long = (np.linalg.norm(rays, axis=2) > 1.9).any(1)
+    assert 0 < is_long.sum() < len(is_long)
+    with h5py.File(out.strip()) as file:
+        assert (((file["verdict"][...].ravel() & Verdict.CABLE_TOO_LONG) != 0) == is_long).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"conditions": '["dexterous"]'}, "workspace.conditions"),
+        ({"conditions": '["static", "static"]'}, "workspace.conditions"),
+        ({"conditions": "[]"}, "workspace.conditions"),
+        ({"more": "wrenches = [[1, 2]]"}, "workspace.wrenches"),
+        ({"more": "wrenches = [[1, 2], [1, 2, 3]]"}, "workspace.wrenches"),
+        ({"more": "orientation = [1, 1, 0, 0]"}, "workspace.orientation"),
+        ({"more": "orientation = [0.8, 0.6, 0, 0]"}, "workspace.orientation"),
+        ({"more": "obstacle = 1"}, "workspace.obstacle"),
+        ({"conditions": '["static"]', "more": "wrenches = [[0, 0, 0]]"}, "workspace.wrenches"),
+        ({"conditions": '["static"]', "more": "[limits]\ntension_max = 9"}, "limits.tension_max"),
+        ({"more": "[limits]\ncable_speed_max = 1"}, "limits.cable_speed_max"),
+        ({"more": "[limits]\ntension_min = 100"}, "tension_min"),
+        ({"robot": "prototype", "more": "orientation = [1, 0, 0, 0]"}, "workspace.orientation"),
+        ({"robot": "nothing"}, "robot"),
+        ({"more": 'orientations = "some"'}, "workspace.orientations"),
+        ({"more": 'orientations = "total"'}, "workspace.tilt_max"),
+        ({"more": 'orientations = "maximum"\ntilt_max = 0.1'}, "workspace.tilt_max"),
+        ({"more": "tilt_max = 0.1"}, "workspace.tilt_max"),
+        ({"more": "divisions = 8"}, "workspace.divisions"),
+        ({"more": 'orientations = "total"\ntilt_max = 4.0'}, "workspace.tilt_max"),
+        ({"more": 'orientations = "total"\ntilt_max = 0.2\ntorsion_max = 0.1'}, "workspace.torsion_max"),
+        ({"more": 'orientations = "total"\nquaternions = [[0.8, 0.6, 0, 0]]'}, "workspace.quaternions"),
+        ({"robot": "prototype", "more": 'orientations = "dextrous"'}, "workspace.orientations"),
+        ({"more": "wrench_box = [1, 2]"}, "workspace.wrench_box"),
+        ({"more": "wrench_ellipsoid = [-1, 2, 3]"}, "workspace.wrench_ellipsoid"),
+        ({"more": "acceleration = -1"}, "workspace.acceleration"),
+    ],
+)
+def test_mistakes_are_one_line(tmp_path, changes, words):
+    code, out, error = swept(tmp_path, **changes)
+    assert (code, out) == (2, "") and words in error and len(error.splitlines()) == 1
+    assert not (tmp_path / "run").exists()
+
+
+def grid(*axes):
+    return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
