@@ -151,7 +151,11 @@ def apart(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray) -> tu
 
 
 class WorkspaceSearch:
-    """A question to poses of one robot; what it needs of the robot alone is found once."""
+    """A question to poses of one robot; what it needs of the robot alone is found once.
+
+    Fields:
+        unit: (dof,) by what the components of wrenches are divided: moments by a length of the robot, m.
+    """
 
     def __init__(self, robot: AnyRobot, asked: Question) -> None:
         """Of a robot, centred, z down."""
@@ -159,7 +163,7 @@ class WorkspaceSearch:
         self._kind = "closure" if asked.condition == CLOSURE else "tensions"
         self._unbounded = tuple(np.isinf(asked.high).tolist())
         self._high = np.where(np.isinf(asked.high), 0.0, asked.high)
-        self._unit = np.where(kernels.scales(robot), self._length, 1.0)
+        self.unit = np.where(kernels.scales(robot), self._length, 1.0)
         self._boundary = BOUNDARY
         if self._kind != "closure":
             loads = [float(robot.mass * robot.gravity)] if asked.wrenches is None else np.ravel(asked.wrenches)
@@ -202,10 +206,18 @@ class WorkspaceSearch:
     def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Wrench matrices, moments over the length.
         found = in_batches(lambda x: kernels.wrench_matrices(self._robot, *x), (positions, quaternions), size=ARRAYS)
-        return found / self._unit[:, None]
+        return found / self.unit[:, None]
 
-    def _wrenches(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        # What the cables must supply, (n, k, dof), moments over the length.
+    def wrenches(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        """What the cables must supply at poses.
+
+        Args:
+            positions: (n, 3) of the mass centre, or of the joint, m.
+            quaternions: (n, 4) unit quaternions, scalar first.
+
+        Returns:
+            (n, k, dof) over `unit`, N.
+        """
         if self._asked.wrenches is not None:
             every = self._asked.wrenches[None]
         elif PATTERNS[self._robot.pattern].is_jointed:
@@ -213,10 +225,10 @@ class WorkspaceSearch:
             every = in_batches(lambda x: kernels.weights(self._robot, *x), poses, size=ARRAYS)[:, None]
         else:  # the same everywhere
             every = np.asarray(kernels.weights(self._robot, positions[:1], quaternions[:1]))[None]
-        return np.broadcast_to(every / self._unit, (len(positions), *every.shape[1:]))
+        return np.broadcast_to(every / self.unit, (len(positions), *every.shape[1:]))
 
     def _part(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        wrenches = self._wrenches(positions, quaternions)
+        wrenches = self.wrenches(positions, quaternions)
         compiled, size = (self._lanes, BATCH) if self._by_lanes else (self._arrays, ARRAYS)
         found = in_batches(compiled, (positions, quaternions, wrenches), size=size)
         margin, is_exact = np.array(found.value), np.array(found.is_open)
