@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from cspr_jax.api.sweeps import run as run
     from cspr_jax.api.tables import table as table
     from cspr_jax.api.tables import table_names as table_names
+    from cspr_jax.api.volumes import WorkspaceVolume as WorkspaceVolume
+    from cspr_jax.api.volumes import workspace_volume as workspace_volume
     from cspr_jax.api.workspaces import workspace as workspace
     from cspr_jax.problem import load_robot as load_robot
     from cspr_jax.robots.cables import with_cables as with_cables
@@ -65,6 +67,7 @@ _PUBLIC = {
     "LaunchErrors": ("cspr_jax.search.landings", "LaunchErrors"),
     "Limits": ("cspr_jax.robots.limits", "Limits"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
+    "WorkspaceVolume": ("cspr_jax.api.volumes", "WorkspaceVolume"),
     "accessible": ("cspr_jax.api.platform_searches", "accessible"),
     "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
     "attainable": ("cspr_jax.api.platform_searches", "attainable"),
@@ -111,12 +114,14 @@ _PUBLIC = {
     "verify": ("cspr_jax.api.runs", "verify"),
     "with_cables": ("cspr_jax.robots.cables", "with_cables"),
     "workspace": ("cspr_jax.api.workspaces", "workspace"),
+    "workspace_volume": ("cspr_jax.api.volumes", "workspace_volume"),
 }
 __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "ImportedRobot",
     "LaunchErrors",
     "Limits",
     "Verdict",
+    "WorkspaceVolume",
     "accessible",
     "amplitude",
     "attainable",
@@ -163,6 +168,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "verify",
     "with_cables",
     "workspace",
+    "workspace_volume",
 ]
 
 

@@ -113,9 +113,11 @@ def _parser() -> argparse.ArgumentParser:
     for name, command, text in (
         ("status", _status, "say how far a run has come, without touching it"),
         ("verify", _verify, "read again everything of a run, or a result or motion file, and check it"),
+        ("volume", _volume, "say how large the workspace of a map is, with the error that its grid leaves"),
     ):
         sub = add(name, command, text)
-        sub.add_argument("path", type=Path, help="run directory" + (", result or motion" if name == "verify" else ""))
+        what = {"verify": "run directory, result or motion", "volume": "result"}
+        sub.add_argument("path", type=Path, help=what.get(name, "run directory"))
         sub.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan = add("plan", _plan, "plan a sequence of poses")
     plan.add_argument("plan", type=Path, help="plan file (TOML)")
@@ -259,6 +261,16 @@ def _verify(options: argparse.Namespace) -> int:
     for fault in report["faults"]:
         sys.stderr.write(f"cspr: {fault}: {again} again to make it anew\n")
     return ExitCode.INPUT_OUTPUT if report["faults"] else ExitCode.DONE
+
+
+def _volume(options: argparse.Namespace) -> int:
+    from cspr_jax.api import volumes
+
+    found = volumes.workspace_volume(options.path)
+    sys.stdout.write("" if options.json else "".join(f"{line}\n" for line in found.lines()))
+    if options.json:
+        _print_json(found.to_dict())
+    return ExitCode.DONE
 
 
 def _plan(options: argparse.Namespace) -> int:

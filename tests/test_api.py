@@ -53,6 +53,7 @@ FUNCTIONS = {
     "run": ("run", "compute"),
     "status": ("status",),
     "verify": ("verify",),
+    "volume": ("workspace_volume",),
     "plan": ("plan",),
     "plot": ("plot", "open_result"),
     "table": ("table", "table_names"),
@@ -105,7 +106,7 @@ def test_every_command_has_its_function():
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
         own = NAMES | {"run": {"output": "directory"}, "plan": {"output": "path"}}.get(name, {})
         own |= {"name": "names", "output": "folder"} if name == "examples" else {}
-        own |= {"path": "directory"} if name == "status" else {}
+        own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
         options = {action.dest for action in parser._actions} - PRINTING
         assert {own.get(option, option) for option in options} <= known, name

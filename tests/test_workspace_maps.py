@@ -27,8 +27,11 @@ conditions = {conditions}
 """
 
 
-def swept(folder, robot="kntu-planar", conditions='["wrench-feasible", "wrench-closure"]', more=""):
-    (folder / "w.toml").write_text(SWEEP.format(robot=robot, conditions=conditions, more=more))
+def swept(folder, robot="kntu-planar", conditions='["wrench-feasible", "wrench-closure"]', more="", finer=1):
+    text = SWEEP.format(robot=robot, conditions=conditions, more=more)
+    for count in (7, 5):
+        text = text.replace(f"count = {count} ", f"count = {finer * (count - 1) + 1} ")
+    (folder / "w.toml").write_text(text)
     return cspr("run", folder / "w.toml", "-o", folder / "run")
 
 
@@ -125,6 +128,88 @@ def test_a_cone_of_orientations(tilt, torsion):
         mean = 0.5 * (1.0 + math.cos(tilt)) if tilt < math.pi else 0.0
         assert volume @ np.cos(angles[:, 1]) == pytest.approx(mean, abs=0.01)
         assert volume @ np.cos(angles[:, 0]) == pytest.approx(0.0, abs=0.02 + volume[0])
+
+
+PRISM = """
+schema = 1
+map = "workspace"
+[robot]
+name = "square"
+mass = 1.0
+z_axis = "down"
+base_points = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]]
+[axes]
+{axes}
+[workspace]
+conditions = ["static"]
+{more}
+"""
+
+
+def volume_of(folder, name, axes, more=""):
+    (folder / f"{name}.toml").write_text(PRISM.format(axes=axes, more=more))
+    code, out, error = cspr("run", folder / f"{name}.toml", "-o", folder / name)
+    assert (code, error) == (0, "")
+    return cspr_jax.workspace_volume(out.strip()), out.strip()
+
+
+def test_whole_cells_and_the_volume_of_a_prism(tmp_path):
+    """A mass hangs still below the square of its spools: 4 m^2 times the height."""
+    axes = "x = {{ start = -1.5, stop = 1.5, count = {n} }}\ny = {{ start = -1.5, stop = 1.5, count = {n} }}\nz = {z}"
+    z = "{ start = 0.5, stop = 1.0, count = 3 }"
+    found, path = volume_of(tmp_path, "coarse", axes.format(n=12, z=z), "prove = true")
+    assert found.units == "m3" and found.axes == {} and found.undecided_fraction == 0.0
+    assert abs(found.volume - 2.0) <= found.error
+    assert found.least <= 2.0 <= found.most and found.least > 1.2
+    with h5py.File(path) as file:
+        side, x, y = file["cell_side"][...], file["x"][...], file["y"][...]
+    half = 0.5 * (x[1] - x[0])
+    farther = np.maximum(np.abs(x)[:, None], np.abs(y))
+    assert (side[farther + half < 1.0 - 1e-9] == 1).all() and (side[farther - half > 1.0 + 1e-9] == 2).all()
+    assert (side[(farther + half > 1.0) & (farther - half < 1.0)] == 0).all()
+    finer, _ = volume_of(tmp_path, "fine", axes.format(n=48, z="[0.7]"))
+    assert finer.units == "m2" and abs(finer.volume - 4.0) <= finer.error < 0.3
+    assert finer.least == 0.0 and finer.proved_fraction == 0.0
+    polar, _ = volume_of(
+        tmp_path,
+        "polar",
+        "radius = { start = 0.0, stop = 1.6, count = 41 }\nazimuth = { start = -3.141592653589793, "
+        "stop = 3.141592653589793, count = 73 }\nz = [0.7]",
+    )
+    assert abs(polar.volume - 4.0) <= polar.error < 0.3
+    code, out, _ = cspr("volume", path)
+    assert code == 0 and out.startswith("2") and "m3" in out and "proved between" in out
+    assert cspr("volume", tmp_path / "fine.toml")[0] != 0
+
+
+def test_cells_near_meeting_cables_lengths_and_floors(tmp_path):
+    """A cell is on one side only where all positions that were tried are."""
+    limits = "prove = true\n[limits]\nfloor = -0.31\ncable_length_max = 1.9"
+    out = swept(tmp_path, conditions='["wrench-feasible", "interference-free"]', more=limits, finer=4)[1]
+    with h5py.File(out.strip()) as file:
+        side, x, z = file["cell_side"][...], file["x"][...], file["z"][...]
+    robot, rng = cspr_jax.load_robot("kntu-planar"), np.random.default_rng(0)
+    half = np.array([0.5 * (x[1] - x[0]), 0.0, 0.5 * (z[1] - z[0])])
+    for (i, _, k), value in np.ndenumerate(side):
+        tried = np.array([x[i], 0.0, z[k]]) + half * rng.uniform(-1.0, 1.0, (20, 3))
+        tried = np.r_[tried, [[x[i], 0.0, z[k]] + half * np.array([a, 0.0, b]) for a in (-1, 1) for b in (-1, 1)]]
+        rays = tried[:, None] + np.asarray(robot.platform_points) - np.asarray(robot.base_points)
+        is_short = (np.linalg.norm(rays, axis=2) <= 1.9).all(1)
+        inside = (cspr_jax.workspace(robot, tried).verdict == 0) & is_short & (tried[:, 2] >= -0.31)
+        assert value == 0 or (inside.all() if value == 1 else not inside.any())
+    assert set(np.unique(side)) == {0, 1, 2}
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ('orientations = "maximum"\nprove = true', "workspace.prove"),
+        ("prove = 1", "workspace.prove"),
+    ],
+)
+def test_what_cannot_be_proved(tmp_path, more, words):
+    code, out, error = swept(tmp_path, more=more)
+    assert (code, out) == (2, "") and words in error and len(error.splitlines()) == 1
 
 
 def test_cables_that_are_too_long(tmp_path):

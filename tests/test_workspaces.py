@@ -7,12 +7,12 @@ import pytest
 from oracles import workspaces as oracle
 from scipy.spatial.transform import Rotation
 from support import cable_robots
+from support.workspaces import ROUND, made
 
 import cspr_jax
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.reasons import REASONS
 from cspr_jax.problem import centred
-from cspr_jax.robots import point_mass
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
@@ -23,17 +23,6 @@ from cspr_jax.search.workspace_questions import question
 from cspr_jax.search.workspaces import WorkspaceSearch
 
 G = cable_robots.GRAVITY
-ROUND = np.diag([0.05, 0.05, 0.05])
-
-
-def made(drawn):
-    """The package's robot of a drawn one, z up."""
-    name = {"1T": "guided_robot", "2T": "planar_robot", "3T": "point_mass_robot"}
-    common = {"mass": drawn.mass, "gravity": G, "z_axis": "up", "name": drawn.name}
-    if drawn.pattern in name:
-        return getattr(point_mass, name[drawn.pattern])(drawn.base, **common)
-    more = {"inertia": ROUND, "centre_of_mass": drawn.arm, "pattern": drawn.pattern}
-    return platform_robot(drawn.base, drawn.platform, **common, **more)
 
 
 def poses(drawn, rng, count):

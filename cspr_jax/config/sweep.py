@@ -2,6 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from cspr_jax.config.launch import LaunchSearch
@@ -37,6 +38,22 @@ Axis = Annotated[
     | Annotated[list[Coordinate], Field(min_length=1, max_length=LARGEST_COUNT, fail_fast=True), Tag("~values")],
     Discriminator(lambda value: "~range" if isinstance(value, dict | AxisRange) else "~values"),
 ]
+
+
+def axis_points(axis: AxisRange | list[float]) -> np.ndarray:
+    """Points of an axis.
+
+    Args:
+        axis: as the file has it.
+
+    Returns:
+        (n,) float64.
+    """
+    if isinstance(axis, AxisRange):
+        return np.linspace(axis.start, axis.stop, axis.count)
+    return np.array(axis, float)
+
+
 _OF_TARGETS = "{} of the targets, m: {{ start, stop, count }} or a list"
 _OF_STARTS = "{} of the start points, m, in place of that in trajectory.from"
 

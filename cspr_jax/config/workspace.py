@@ -45,6 +45,11 @@ class WorkspaceTable(Table):
     divisions: Annotated[int, Field(ge=2, le=128)] | None = Field(
         None, description="of sets of orientations: the step is pi / divisions; absent: 12"
     )
+    prove: bool | None = Field(
+        None,
+        description="true: prove of whole cells, boxes half-way to the next points, that they lie inside or outside; "
+        "of one orientation",
+    )
     wrenches: Annotated[list[list[Component]], Field(min_length=1, max_length=64)] | None = Field(
         None,
         description="wrench-feasible: what the cables must supply, forces, N, then moments about the mass centre, or "
@@ -78,6 +83,8 @@ class WorkspaceTable(Table):
                 raise fault(name, None, 'absent: workspace.orientations is neither "inclusion" nor "total"')
         if is_of_some and (self.tilt_max is None) == (self.quaternions is None):
             raise fault("tilt_max", self.tilt_max, f'given, or quaternions, one of them, with "{self.orientations}"')
+        if self.prove and self.orientations is not None:
+            raise fault("prove", True, "absent beside workspace.orientations")
         if self.torsion_max is not None and self.tilt_max is None:
             raise fault("torsion_max", self.torsion_max, "absent without tilt_max")
         if self.divisions is not None and (self.orientations is None or self.quaternions is not None):

@@ -8,7 +8,7 @@ import numpy as np
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.arithmetic.rotations import from_tilt_torsion, products
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import SweepFile
+from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
@@ -108,7 +108,8 @@ class WorkspaceMap(GridMap):
         places = self._targets(cells)
         if self._samples is not None:
             kind: OrientationSet = "total" if self._asked.orientations in ("total", "dextrous") else "inclusion"
-            return over_orientations(self._poses, places, self._samples, self._volume, kind)
+            found = over_orientations(self._poses, places, self._samples, self._volume, kind)
+            return found | {"cell_side": np.zeros(len(places), np.int16)}
         turns = np.repeat(self._turn, len(places), axis=0)
         if any(name in cells for name in TILT_TORSION):
             angles = np.stack([cells.get(name, np.zeros(len(places))) for name in TILT_TORSION], axis=1)
@@ -116,7 +117,20 @@ class WorkspaceMap(GridMap):
                 angles[:, 0] = 0.5 * math.pi
             turns = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), turns)
         answers = self._poses(places, turns)
-        return answers | {"orientation_fraction": (answers["verdict"] == 0).astype(float)}
+        sides = np.zeros(len(places), np.int16)
+        if self._asked.prove:
+            sides = self._poses.sides(places, self._half_sizes(cells), self._turn[0])
+        return answers | {"orientation_fraction": (answers["verdict"] == 0).astype(float), "cell_side": sides}
+
+    def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:
+        # (n, 3) of the cells: half of the way to the farther neighbour along each axis.
+        found = []
+        for name in "xyz":
+            points = np.sort(axis_points(getattr(self._keys.axes, name)))
+            gaps = np.diff(points)
+            farther = np.maximum(np.append(gaps, 0.0), np.append(0.0, gaps))
+            found.append(0.5 * farther[np.searchsorted(points, cells[name])])
+        return np.stack(found, axis=1)
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
@@ -128,10 +142,15 @@ class WorkspaceMap(GridMap):
             raise ConfigError(self._file, f"axes.{turning[0]}: must be absent: a point mass has no orientation")
         if turning and self._samples is not None:
             raise ConfigError(self._file, f"axes.{turning[0]}: must be absent beside workspace.orientations")
+        if self._asked.prove and (turning or "radius" in grid.axes):
+            name = turning[0] if turning else "radius"
+            raise ConfigError(self._file, f"axes.{name}: must be absent beside workspace.prove")
         if row.is_planar and turning not in ([], ["tilt"]):
             raise ConfigError(self._file, f"axes.{turning[0]}: must be tilt alone for a planar robot, about y")
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         inside = answers["verdict"] == 0
-        return {f"a cell inside with a {name} below zero": inside & (answers[name] < 0.0) for name in MARGINS}
+        side = answers["cell_side"]
+        found = {f"a cell inside with a {name} below zero": inside & (answers[name] < 0.0) for name in MARGINS}
+        return found | {"a cell proved to be on the other side": (side == 1) & ~inside | (side == 2) & inside}

@@ -105,7 +105,7 @@ _OF_LAUNCHES = (
     *("release_x", "release_y", "release_z"),
 )
 _OF_LENGTHS = ("sigma_p", "sigma_r")
-_OF_WORKSPACES = ("verdict", "wrench_margin", "closure_margin", "clearance", "orientation_fraction")
+_OF_WORKSPACES = ("verdict", "wrench_margin", "closure_margin", "clearance", "orientation_fraction", "cell_side")
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 

@@ -28,10 +28,28 @@ def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
     return ("none", *("cables " + ", ".join(map(str, row)) for row in chosen), "max_acceleration", *moving)
 
 
+CELL_SIDES = ("not decided", "inside", "outside")
+
+
+def cell_sides(_: Mapping[str, Any]) -> tuple[str, ...]:
+    """Sides of a workspace on which a whole cell is proved to lie.
+
+    Args:
+        _: settings of a sweep; the words are the same for all.
+
+    Returns:
+        the words of 0, 1 and 2.
+    """
+    return CELL_SIDES
+
+
 # More words than these nobody reads, nor can HDF5 keep them beside a dataset.
 MOST = 1000
 # By the name that a quantity's row gives: words of 0, 1, 2, ... for the settings of a sweep.
-MEANINGS: dict[str, Callable[[Mapping[str, Any]], tuple[str, ...]]] = {"line-bounds": line_bounds}
+MEANINGS: dict[str, Callable[[Mapping[str, Any]], tuple[str, ...]]] = {
+    "line-bounds": line_bounds,
+    "cell-sides": cell_sides,
+}
 
 
 def meanings_of(quantity: Quantity, settings: Mapping[str, Any] | None) -> tuple[str, ...]:

@@ -236,6 +236,15 @@ QUANTITIES = {
             signed=True,
         ),
         Quantity(
+            "cell_side",
+            "1",
+            "side of the whole cell",
+            "1: every position of the cell, the box half-way to the next points, is proved inside; 2: every one is "
+            "proved outside; 0: not decided, or nobody asks.",
+            "int16",
+            meanings="cell-sides",
+        ),
+        Quantity(
             "orientation_fraction",
             "1",
             "part of the orientations",

@@ -11,12 +11,15 @@ from cspr_jax.feasibility.workspace import geometry
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.workspace_cells import WorkspaceCells
 from cspr_jax.search.workspace_clearances import apart
 from cspr_jax.search.workspace_questions import CLOSURE
 from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
 
 MARGINS = ("wrench_margin", "closure_margin", "clearance")
 BATCH = 4096
+# Rounding of distances, m: far above what coordinates below 1e6 m have, far below what anybody measures.
+CLOSE = 1e-9
 # Poses that are answered at a time, where each place has many orientations.
 AT_ONCE = 1 << 19
 
@@ -63,14 +66,47 @@ class RestPoses:
             verdict |= flags
         return {"verdict": verdict | self._limited(places, quaternions), **found}
 
+    def sides(self, origins: np.ndarray, half: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
+        """Which cells, at one orientation, are proved to lie wholly on one side of the workspace.
+
+        While a robot moves by a distance without a turn, its heights, the lengths of its cables and the distances
+        between them change by no more than that.
+
+        Args:
+            origins: (n, 3) of the platform frame at the centres of the cells, kernels' coordinates, m.
+            half: (n, 3) half sizes of the cells, m.
+            quaternion: (4,) unit quaternion, scalar first.
+
+        Returns:
+            (n,) 0: neither is proved; 1: inside; 2: outside, as `schema.meanings.CELL_SIDES` has them.
+        """
+        turns = np.repeat(quaternion[None], len(origins), axis=0)
+        places, reach = mass_centres(self.robot, origins, turns), np.linalg.norm(half, axis=1)
+        inside, outside = np.ones(len(origins), bool), np.zeros(len(origins), bool)
+        for asked in self.searches.values():
+            kept, lost = WorkspaceCells(self.robot, asked.asked)(places, half, quaternion, asked(places, turns))
+            inside, outside = inside & kept, outside | lost
+        slacks = list[np.ndarray]()
+        if self.is_apart:
+            slacks.append(apart(self.robot, places, turns)[0])
+        if self.limits.floor is not None:
+            slacks.append(float(self.limits.floor) - places[:, 2])
+        if self.limits.cable_length_max is not None:
+            slacks.append((np.asarray(self.limits.cable_length_max) - self._lengths(places, turns)).min(1))
+        for slack in slacks:
+            inside, outside = inside & (slack > reach + CLOSE), outside | (slack < -reach - CLOSE)
+        return np.where(inside, 1, np.where(outside, 2, 0)).astype(np.int16)
+
+    def _lengths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        poses = places, quaternions
+        return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
+
     def _limited(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         verdict = np.zeros(len(places), np.uint16)
         if self.limits.floor is not None:
             verdict |= np.where(places[:, 2] > float(self.limits.floor), Verdict.BELOW_FLOOR, 0).astype(np.uint16)
         if self.limits.cable_length_max is not None:
-            poses = places, quaternions
-            lengths = in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
-            is_long = (lengths > np.asarray(self.limits.cable_length_max)).any(1)
+            is_long = (self._lengths(places, quaternions) > np.asarray(self.limits.cable_length_max)).any(1)
             verdict |= np.where(is_long, Verdict.CABLE_TOO_LONG, 0).astype(np.uint16)
         return verdict
 

@@ -14,6 +14,7 @@ from cspr_jax.arithmetic.batches import in_batches, in_parts
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.feasibility.workspace import cocircuits, exact, geometry, kernels
 from cspr_jax.feasibility.workspace.margins import Wrenches
+from cspr_jax.feasibility.workspace.required import RequiredWrenches
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
@@ -51,7 +52,12 @@ Stage = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 class WorkspaceSearch:
-    """A question to poses of one robot; what it needs of the robot alone is found once."""
+    """A question to poses of one robot; what it needs of the robot alone is found once.
+
+    Fields:
+        asked: the question.
+        unit: (dof,) by what the components of wrenches are divided: moments by a length of the robot, m.
+    """
 
     def __init__(self, robot: AnyRobot, asked: Question, *, precision: str = "float64") -> None:
         """Of a robot, centred, z down.
@@ -59,10 +65,10 @@ class WorkspaceSearch:
         With precision "float32" that decides the poses of which it can, and float64 the others; margins of the former
         are good to some 1e-5 of the limits.
         """
-        self._robot, self._asked, self._precision = robot, asked, precision
+        self._robot, self.asked, self._precision = robot, asked, precision
         self._length = asked.capacity_length or _length(robot)
-        self._unit = np.where(geometry.scales(robot), self._length, 1.0)
-        self._wrenches = asked.wrenches.over(self._unit)
+        self.unit = np.where(geometry.scales(robot), self._length, 1.0)
+        self._wrenches = asked.wrenches.over(self.unit)
         self._measure = "tensions" if asked.capacity_length is None else "capacity"
         self._boundary = BOUNDARY
         if asked.condition == CLOSURE:
@@ -115,7 +121,7 @@ class WorkspaceSearch:
         # Wrench matrices, moments over the length.
         poses = positions, quaternions
         found = in_batches(lambda x: geometry.wrench_matrices(self._robot, *x), poses, size=TRIALS)
-        return found / self._unit[:, None]
+        return found / self.unit[:, None]
 
     def _part(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         count = len(positions)
@@ -157,10 +163,10 @@ class WorkspaceSearch:
         def lanes(array):
             return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
-        is_bounded, is_body = bool(np.isfinite(self._asked.high).all()), PATTERNS[self._robot.pattern].is_body
+        is_bounded, is_body = bool(np.isfinite(self.asked.high).all()), PATTERNS[self._robot.pattern].is_body
         options = {"measure": self._measure, "is_bounded": is_bounded}
         robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
-        limits = leaf(self._asked.low[ordered]), leaf(self._asked.high[ordered])
+        limits = leaf(self.asked.low[ordered]), leaf(self.asked.high[ordered])
         asked, length, fixed = cast((kernels.Range(*limits), leaf(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
@@ -190,12 +196,25 @@ class WorkspaceSearch:
         ordered = None if counts is None else np.take_along_axis(counts, sorting, 1)
         return cocircuits.Choices(np.take_along_axis(places, sorting, 1), ordered)
 
+    def required(self, position: np.ndarray, quaternion: np.ndarray) -> RequiredWrenches:
+        """What the cables must supply at a pose.
+
+        Args:
+            position: (3,) of the mass centre, or of the joint, m.
+            quaternion: (4,) unit quaternion, scalar first.
+
+        Returns:
+            the wrenches over `unit`, N.
+        """
+        load = self._weights(position[None], quaternion[None])
+        return self._wrenches if load is None else self._wrenches.of(load[0])
+
     def _weights(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray | None:
         # Of a body on a joint.
         if self._wrenches.points is not None:
             return None
         poses = positions, quaternions
-        return in_batches(lambda x: geometry.weights(self._robot, *x), poses, size=BATCH) / self._unit
+        return in_batches(lambda x: geometry.weights(self._robot, *x), poses, size=BATCH) / self.unit
 
     @property
     def _fixed(self) -> Wrenches:
@@ -215,7 +234,7 @@ class WorkspaceSearch:
                 is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
             else:
                 asked = self._wrenches if loads is None else self._wrenches.of(loads[i])
-                margins[i] = exact.wrench_margin(columns, asked, self._asked.low, self._asked.high, self._measure)
+                margins[i] = exact.wrench_margin(columns, asked, self.asked.low, self.asked.high, self._measure)
                 is_outside[i] = margins[i] == -np.inf
         return margins, is_outside
 

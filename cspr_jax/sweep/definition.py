@@ -15,7 +15,7 @@ from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import checked, parse_toml, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
-from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile
+from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_points
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
@@ -119,7 +119,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     usual = tile_shape(shape, kind.cells)
     tile = usual if keys.run.tile is None else _tile(keys.run.tile, shape, path)
     _check_size(counts, tile, usual, bytes_needed(shape, store, keys.run.dtype), path)
-    axes = {name: _points(getattr(keys.axes, name)) for name in data["axes"]}
+    axes = {name: axis_points(getattr(keys.axes, name)) for name in data["axes"]}
     check_points(axes, path)
     axes |= own
     # What is not given decides nothing: a key that a later version adds leaves old identities as they are.
@@ -131,12 +131,6 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
 
 def _count(axis: AxisRange | list[float]) -> int:
     return axis.count if isinstance(axis, AxisRange) else len(axis)
-
-
-def _points(axis: AxisRange | list[float]) -> np.ndarray:
-    if isinstance(axis, AxisRange):
-        return np.linspace(axis.start, axis.stop, axis.count)
-    return np.asarray(axis, float)
 
 
 def _orientation_axes(keys: SweepFile) -> dict[str, np.ndarray]:

@@ -1,8 +1,11 @@
 """Wrenches that cables must supply, as they are asked for; no jax."""
 
 import dataclasses
+import itertools
 
 import numpy as np
+
+NO_POINTS = "the weight of a body on a joint is known at a pose: see of()"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,6 +47,15 @@ class RequiredWrenches:
         """
         return self if self.points is not None else dataclasses.replace(self, points=weight[None])
 
+    @property
+    def corners(self) -> np.ndarray:
+        """(n, dof) the finite set, at every corner of the box."""
+        if self.points is None:
+            raise TypeError(NO_POINTS)
+        half = np.zeros(self.points.shape[1]) if self.box is None else self.box
+        signs = itertools.product(*[(-1.0, 1.0) if size else (0.0,) for size in half])
+        return np.concatenate([self.points + np.array(sign) * half for sign in signs])
+
     def supports(self, normals: np.ndarray) -> np.ndarray:
         """Largest products of normals with these wrenches.
 
@@ -57,7 +69,7 @@ class RequiredWrenches:
             TypeError: there is no finite set.
         """
         if self.points is None:
-            raise TypeError("the weight of a body on a joint is known at a pose: see of()")
+            raise TypeError(NO_POINTS)
         found = (self.points @ normals.T).max(0)
         if self.box is not None:
             found = found + np.abs(normals) @ self.box

@@ -1,0 +1,165 @@
+"""Cells of a workspace: boxes of positions at one orientation, and bounds of what varies linearly over them; no jax.
+
+Let a cable's force density be its tension over its length, f_i = t_i / L_i(p), and its ray r_i(p) = e_i - p, where e_i
+is its base point less the arm of its attachment point. At one orientation the wrench of a cable is linear in its ray,
+A_i r_i, so that W(p) t = w is Z(p) f = w, whose columns Z_i(p) = A_i (e_i - p) are affine in the position: of the unit
+vectors' curvature nothing is left but the lengths, which enter the limits of the tensions alone. With positions
+p = p0 + H x, H the half sizes and |x_k| <= 1,
+
+    Z(p) = Z0 - sum_k x_k N_k,        N_k = H_k [A_1 e_k, ..., A_n e_k],
+
+and a solution that keeps its basis is a power series in x, of which `inside_cells` and `outside_cells` take the terms
+of first and second order as they are and bound the rest by norms.
+
+Arrays are (cells, ...); those over x have an axis of length 3, of the second order two of them.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+# Share of the sizes that enter a sum of up to some hundred products of float64 (2.2e-16 each): what rounding may have
+# added to it, with room for rays, arms and rotations that are rounded themselves.
+ROUNDING = 1e-12
+
+
+class Cells(NamedTuple):
+    """Cells of a robot at one orientation.
+
+    Fields:
+        matrices: (n, m, n_cables) Z0 at the centres, moments over a length, m.
+        changes: (n, 3, m, n_cables) N_k, m.
+        rays: (n, n_cables, 3) from attachment point to base point at the centres, m.
+        steps: (n, n_cables, 3) products of unit vectors of the cables with the half sizes, m: by how much lengths fall.
+        lengths: (n, n_cables) L_i at the centres, m.
+        radius: (n,) from centre to corner, m.
+        rounding: (n, n_cables) bound of the rounding of a column of Z, m.
+    """
+
+    matrices: np.ndarray
+    changes: np.ndarray
+    rays: np.ndarray
+    steps: np.ndarray
+    lengths: np.ndarray
+    radius: np.ndarray
+    rounding: np.ndarray
+
+    @property
+    def shortest(self) -> np.ndarray:
+        """Lower bound of the lengths over the cells, (n, n_cables), m; not positive where there is none."""
+        return (self.lengths - self.radius[:, None]) * (1.0 - ROUNDING) - self.rounding
+
+    def take(self, chosen: np.ndarray) -> "Cells":
+        """Some of them.
+
+        Args:
+            chosen: (k,) their places, or (n,) of bool.
+
+        Returns:
+            the cells.
+        """
+        return Cells(*(values[chosen] for values in self))
+
+
+def cells_about(centres: np.ndarray, half: np.ndarray, exits: np.ndarray, wrenches: np.ndarray) -> Cells:
+    """Cells of some centres.
+
+    Args:
+        centres: (n, 3) m.
+        half: (n, 3) half sizes, m.
+        exits: (n_cables, 3) e_i, m.
+        wrenches: (3, m, n_cables) wrenches of unit forces along the axes at the attachment points, moments over a
+            length.
+
+    Returns:
+        the cells.
+    """
+    rays = exits - centres[:, None]
+    lengths = np.linalg.norm(rays, axis=2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = rays * half[:, None] / lengths[..., None]
+    matrices = (rays.transpose(0, 2, 1)[:, :, None] * wrenches).sum(1)
+    spans = np.linalg.norm(exits, axis=1) + np.linalg.norm(centres, axis=1)[:, None]
+    rounding = ROUNDING * np.sqrt((wrenches**2).sum((0, 1))) * spans
+    changes = half[:, :, None, None] * wrenches
+    return Cells(matrices, changes, rays, steps, lengths, np.linalg.norm(half, axis=1), rounding)
+
+
+def reach(linear: np.ndarray) -> np.ndarray:
+    """Largest value of a linear function over the cells.
+
+    Args:
+        linear: (..., 3) its coefficients of x.
+
+    Returns:
+        (...).
+    """
+    return np.abs(linear).sum(-1)
+
+
+def least_quadratic(quadratic: np.ndarray) -> np.ndarray:
+    """Lower bound of a quadratic form over the cells, each product of two components on its own.
+
+    Args:
+        quadratic: (..., 3, 3) its coefficients, not symmetric.
+
+    Returns:
+        (...) at most 0.
+    """
+    squares = np.minimum(np.diagonal(quadratic, axis1=-2, axis2=-1), 0.0).sum(-1)
+    both = quadratic + np.swapaxes(quadratic, -1, -2)
+    return squares - np.abs(both[..., (0, 0, 1), (1, 2, 2)]).sum(-1)
+
+
+def norm_reach(vectors: np.ndarray) -> np.ndarray:
+    """Bound of the Euclidean norm of a linear function over the cells, of matrices Frobenius'.
+
+    |sum_k x_k v_k|^2 is at most the sum of all |v_k . v_l|.
+
+    Args:
+        vectors: (n, 3, ...) its coefficients of x.
+
+    Returns:
+        (n,).
+    """
+    rows = vectors.reshape(*vectors.shape[:2], math.prod(vectors.shape[2:]))
+    return np.sqrt(np.abs(rows @ rows.transpose(0, 2, 1)).sum((1, 2)))
+
+
+def pair_norm(vectors: np.ndarray) -> np.ndarray:
+    """Bound of the Euclidean norm of a quadratic function over the cells.
+
+    Args:
+        vectors: (n, 3, 3, m) its coefficients, not symmetric.
+
+    Returns:
+        (n,).
+    """
+    both = vectors + vectors.transpose(0, 2, 1, 3)
+    norms = np.linalg.norm(both, axis=3)
+    return 0.5 * norms.sum((1, 2))
+
+
+def inverse_factor(squares: np.ndarray) -> np.ndarray:
+    """Inverse of the lower Cholesky factor of symmetric matrices; no error where one is not positive definite.
+
+    Args:
+        squares: (n, m, m).
+
+    Returns:
+        (n, m, m) lower triangular; not finite where there is none.
+    """
+    size = squares.shape[1]
+    left = np.ascontiguousarray(squares.transpose(1, 2, 0))
+    inverse = np.zeros_like(left)
+    with np.errstate(all="ignore"):
+        for k in range(size):
+            scale = 1.0 / np.sqrt(left[k, k])
+            column = left[k:, k] * scale
+            inverse[k, k] = 1.0
+            inverse[k, : k + 1] *= scale
+            for i in range(k + 1, size):
+                left[i, k + 1 : i + 1] -= column[i - k] * column[1 : i - k + 1]
+                inverse[i, : k + 1] -= column[i - k] * inverse[k, : k + 1]
+    return inverse.transpose(2, 0, 1)
