@@ -151,28 +151,41 @@ def apart(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray) -> tu
 
 
 class WorkspaceSearch:
-    """A question to poses of one robot; what it needs of the robot alone is found once."""
+    """A question to poses of one robot; what it needs of the robot alone is found once.
 
-    def __init__(self, robot: AnyRobot, asked: Question) -> None:
-        """Of a robot, centred, z down."""
+    Args:
+        robot: centred, z down.
+        asked: what is asked of each pose.
+        unrolled: whether lanes, which compile twenty times as long as arrays and are five times as fast, are worth it
+            for robots that may go by them: from some 500,000 poses on.
+
+    Fields:
+        unit: (dof,) by which the components of wrenches are divided: 1, and of moments a length, m.
+    """
+
+    def __init__(self, robot: AnyRobot, asked: Question, *, unrolled: bool = True) -> None:
+        """Find what depends on the robot alone."""
         self._robot, self._asked, self._length = robot, asked, _length(robot)
         self._kind = "closure" if asked.condition == CLOSURE else "tensions"
         self._unbounded = tuple(np.isinf(asked.high).tolist())
         self._high = np.where(np.isinf(asked.high), 0.0, asked.high)
-        self._unit = np.where(kernels.scales(robot), self._length, 1.0)
+        self.unit = np.where(kernels.scales(robot), self._length, 1.0)
         self._boundary = BOUNDARY
         if self._kind != "closure":
             loads = [float(robot.mass * robot.gravity)] if asked.wrenches is None else np.ravel(asked.wrenches)
             self._boundary *= np.abs(np.concatenate([asked.low, self._high, loads])).max()
-        self._by_lanes = kernels.is_unrolled(robot)
+        self._by_lanes = unrolled and kernels.is_unrolled(robot)
         self._order = self._base_order() if self._by_lanes and robot.dof == kernels.CABLES else ()
 
-    def __call__(self, positions: np.ndarray, quaternions: np.ndarray | None) -> WorkspaceAnswers:
+    def __call__(
+        self, positions: np.ndarray, quaternions: np.ndarray | None, wrenches: np.ndarray | None = None
+    ) -> WorkspaceAnswers:
         """Whether poses belong to the workspace.
 
         Args:
             positions: (n, 3) of the mass centre, or of the joint, m.
             quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
+            wrenches: (n, k, dof) what the cables must supply at each pose, N and N m; None: those of the question.
 
         Returns:
             the answers.
@@ -180,7 +193,8 @@ class WorkspaceSearch:
         if len(positions) == 0:
             return WorkspaceAnswers(np.zeros(0, np.uint16), np.zeros(0), np.zeros(0, bool))
         turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(positions), 1)) if quaternions is None else quaternions
-        parts = in_parts(lambda part: self._part(positions[part], turns[part]), len(positions), PART)
+        loads = self._wrenches(positions, turns) if wrenches is None else wrenches / self.unit
+        parts = in_parts(lambda part: self._part(positions[part], turns[part], loads[part]), len(positions), PART)
         margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
         verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
         verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
@@ -202,7 +216,7 @@ class WorkspaceSearch:
     def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Wrench matrices, moments over the length.
         found = in_batches(lambda x: kernels.wrench_matrices(self._robot, *x), (positions, quaternions), size=ARRAYS)
-        return found / self._unit[:, None]
+        return found / self.unit[:, None]
 
     def _wrenches(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # What the cables must supply, (n, k, dof), moments over the length.
@@ -213,10 +227,11 @@ class WorkspaceSearch:
             every = in_batches(lambda x: kernels.weights(self._robot, *x), poses, size=ARRAYS)[:, None]
         else:  # the same everywhere
             every = np.asarray(kernels.weights(self._robot, positions[:1], quaternions[:1]))[None]
-        return np.broadcast_to(every / self._unit, (len(positions), *every.shape[1:]))
+        return np.broadcast_to(every / self.unit, (len(positions), *every.shape[1:]))
 
-    def _part(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        wrenches = self._wrenches(positions, quaternions)
+    def _part(
+        self, positions: np.ndarray, quaternions: np.ndarray, wrenches: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         compiled, size = (self._lanes, BATCH) if self._by_lanes else (self._arrays, ARRAYS)
         found = in_batches(compiled, (positions, quaternions, wrenches), size=size)
         margin, is_exact = np.array(found.value), np.array(found.is_open)

@@ -1,6 +1,7 @@
 """Margins of poses one by one, by singular values: of any robot, and where the wrench matrix loses rank; no jax."""
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,43 @@ def cocircuits(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return found, (normals / sizes[:rank]) @ left[:, :rank].T, left[:, :rank]
 
 
+class Planes(NamedTuple):
+    """What bounds the margin of a wrench w: offsets - normals @ w, and half of the narrowest range of tensions.
+
+    Fields:
+        offsets: (k,) N.
+        normals: (k, dof).
+        half_range: N; inf without largest tensions.
+        basis: (dof, rank) orthonormal, of the wrenches that the cables span.
+    """
+
+    offsets: np.ndarray
+    normals: np.ndarray
+    half_range: float
+    basis: np.ndarray
+
+
+def margin_planes(matrix: np.ndarray, low: np.ndarray, high: np.ndarray) -> Planes:
+    """Planes whose distances, in newtons of tension, are the margin: one for each cocircuit and sign that bounds it.
+
+    Args:
+        matrix: (dof, n_cables).
+        low: (n_cables,) N.
+        high: (n_cables,) N; inf where there is none.
+
+    Returns:
+        the planes.
+    """
+    found, normals, basis = cocircuits(matrix)
+    rows, normals = np.concatenate([found, -found]), np.concatenate([normals, -normals])
+    finite = np.where(np.isfinite(high), high, 0.0)
+    bounds = ~((rows > 0.0) & np.isinf(high)).any(1)
+    rows, normals = rows[bounds], normals[bounds]
+    sizes = np.abs(rows).sum(1)
+    reach = np.where(rows > 0.0, rows * finite, rows * low).sum(1)
+    return Planes(reach / sizes, normals / sizes[:, None], float(0.5 * (high - low).min()), basis)
+
+
 def tension_margin(matrix: np.ndarray, wrenches: np.ndarray, low: np.ndarray, high: np.ndarray) -> float:
     """Largest s such that tensions between low + s and high - s give each of some wrenches.
 
@@ -50,16 +88,12 @@ def tension_margin(matrix: np.ndarray, wrenches: np.ndarray, low: np.ndarray, hi
     Returns:
         N; inf where nothing bounds it, -inf where a wrench is outside of the span of the cables.
     """
-    found, normals, basis = cocircuits(matrix)
-    outside = np.linalg.norm(wrenches - wrenches @ basis @ basis.T, axis=1)
+    planes = margin_planes(matrix, low, high)
+    outside = np.linalg.norm(wrenches - wrenches @ planes.basis @ planes.basis.T, axis=1)
     if (outside > OUTSIDE * np.linalg.norm(wrenches, axis=1)).any():
         return -np.inf
-    rows, normals = np.concatenate([found, -found]), np.concatenate([normals, -normals])
-    finite = np.where(np.isfinite(high), high, 0.0)
-    is_void = ((rows > 0.0) & np.isinf(high)).any(1)
-    reach = np.where(rows > 0.0, rows * finite, rows * low).sum(1)
-    slacks = (reach - (wrenches @ normals.T).max(0)) / np.abs(rows).sum(1)
-    return float(min(slacks[~is_void].min(initial=np.inf), 0.5 * (high - low).min()))
+    slacks = planes.offsets - (wrenches @ planes.normals.T).max(0)
+    return float(min(slacks.min(initial=np.inf), planes.half_range))
 
 
 def closure_margin(matrix: np.ndarray) -> float:
