@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import json
 
+import jax
 import numpy as np
 import pytest
 from oracles import workspaces as oracle
@@ -12,7 +13,7 @@ from support.commands import cspr, plan
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.reading import read_toml
-from cspr_jax.errors import ConfigError
+from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.outputs import example_files, motion_files
 from cspr_jax.problem import limits_over, load_robot, prepared
@@ -267,6 +268,38 @@ def test_the_example_is_feasible_and_a_rule_that_misses_says_so(tmp_path):
     text = EXAMPLE.read_text().replace('"centred"', '"closed-form"')
     code, out, err = plan(tmp_path, text)
     assert code == 0 and 'tensions = "closed-form": finds none within their limits' in err
+
+
+@pytest.mark.soak
+def test_one_motion_from_python_is_that_of_the_plan():
+    """Its states, and its tensions by a rule."""
+    own = cspr_jax.load_robot("cogiro")
+    found = cspr_jax.plan(FIXED | {"pose": [{"rest": True}, POSE], "samples": 3, "tensions": "least-norm"})
+    table, place = found.rows(), found.motions[0].state(np.asarray(1.0))
+    with double_precision():
+        swing = cspr_jax.platform_motion(
+            own,
+            None,
+            POSE["position"],
+            z0=4.0,
+            arcs=1,
+            orientations=([1.0, 0.0, 0.0, 0.0], place.quaternion),
+            beta_hat=found.answers.beta_hat[0],
+            amplitude=found.problem.amplitude,
+        )
+        state = jax.jit(swing.state)(0.5)
+        pull = jax.jit(lambda at: cspr_jax.tensions(own, at, "least-norm"))(state)
+    np.testing.assert_allclose(state.position, table["position"][1], atol=1e-12)
+    np.testing.assert_allclose(state.quaternion, table["quaternion"][1], atol=1e-12)
+    np.testing.assert_allclose(pull, table["tension"][1], rtol=1e-9)
+
+
+@pytest.mark.parametrize("rule", ["middle", "closed-form"])
+def test_rules_that_cannot_be_used_are_refused(rule):
+    """None of that name; no largest tension."""
+    robot = dataclasses.replace(load_robot("cogiro"), limits=Limits())
+    with pytest.raises(InputError, match=f'^rule = "{rule}": must be '):
+        cspr_jax.tensions(robot, None, rule)
 
 
 @pytest.mark.soak
