@@ -15,9 +15,7 @@ from cspr_jax.arithmetic.minima import narrowed
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.point_mass import plane_normal
-from cspr_jax.robots.tension_distribution import beyond
 from cspr_jax.robots.tension_rule_table import CENTRED
-from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories.motion import Motion
 
@@ -40,7 +38,7 @@ class Demands:
         length_max: of a cable, m.
         speed_max: of a cable, m/s.
         acceleration_max: of a cable, m/s^2.
-        tension_excess: farthest that a tension is beyond its limits, of redundant cables, N.
+        are_found: whether the rule of redundant cables found tensions within their limits at all instants; 1 or 0.
         samples: number of instants looked at.
     """
 
@@ -52,12 +50,12 @@ class Demands:
     length_max: np.ndarray
     speed_max: np.ndarray
     acceleration_max: np.ndarray
-    tension_excess: np.ndarray
+    are_found: np.ndarray
     samples: np.ndarray
 
 
 # Largest values are smallest ones of the negative.
-_SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0])
+_SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0])
 _NAMES = [field.name for field in dataclasses.fields(Demands)][:-1]
 
 
@@ -65,7 +63,11 @@ _NAMES = [field.name for field in dataclasses.fields(Demands)][:-1]
 def _values(robot, limits: Limits, arguments, *, rule: str) -> Array:
     def one(motion, tau):
         state = motion.state(tau)
-        force = cables.tensions(robot, state, limits, rule)
+        if robot.n_cables > robot.dof:
+            chosen = cables.shared(robot, state, limits, rule)
+            force, are_found = chosen.tensions, jnp.where(chosen.is_within, 1.0, 0.0)
+        else:
+            force, are_found = cables.tensions(robot, state), jnp.asarray(1.0)
         length, rate, rate_slope = cables.cable_motion(robot, state)
         extremes = [
             jnp.min(force),
@@ -76,7 +78,7 @@ def _values(robot, limits: Limits, arguments, *, rule: str) -> Array:
             -jnp.max(length),
             -jnp.max(jnp.abs(rate)),
             -jnp.max(jnp.abs(rate_slope)),
-            -jnp.max(jnp.abs(beyond(force, *tension_range(robot, limits)))),
+            are_found,
         ]
         return jnp.stack(extremes)
 

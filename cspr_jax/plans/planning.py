@@ -24,7 +24,6 @@ from cspr_jax.plans.sequence import Sequence
 from cspr_jax.problem import build_problem
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.point_mass import spool_radius
-from cspr_jax.robots.tension_distribution import WITHIN
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.families import FAMILIES
@@ -194,7 +193,7 @@ def _missed(keys: PlanFile, is_feasible: np.ndarray, asked: Demands) -> list[str
     # A rule that is not exact can find no tensions within the limits where there are some.
     if TENSION_RULES[keys.tension_rule].is_exact:
         return []
-    missed = np.flatnonzero(is_feasible & (asked.tension_excess > WITHIN * np.abs(asked.tension_max))) + 1
+    missed = np.flatnonzero(is_feasible & (asked.are_found == 0.0)) + 1
     if not len(missed):
         return []
     names = ", ".join(f"pose[{i}]" for i in missed.tolist())
