@@ -88,7 +88,7 @@ class PlanFile(TrajectoryKeys, LimitTable):
         None,
         description="more cables than degrees of freedom: rule that chooses the tensions of motion files; "
         + "; ".join(f'"{name}", {row.sentence}' for name, row in TENSION_RULES.items())
-        + f'; absent: "{CENTRED}"',
+        + f' (here 4, about the middles of their ranges); absent: "{CENTRED}"',
     )
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
     limits: LimitTable | None = Field(
