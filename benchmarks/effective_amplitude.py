@@ -12,7 +12,8 @@ import numpy as np
 
 from cspr_jax import load_robot
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
+from cspr_jax.feasibility.platform.checker import PoseChecker
+from cspr_jax.feasibility.platform.motion_checker import MANY
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.reference_pose import aligned

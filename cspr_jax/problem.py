@@ -152,7 +152,8 @@ def kernel_robot(spec: RobotFile, keys: TrajectoryKeys, file: object, *, any_cab
     place, key = spec.placed("base_points", file)
     try:
         check_moved(robot)
-        check_bounded(robot.limits)
+        if not _is_redundant_platform(robot):
+            check_bounded(robot.limits)
     except InputError as error:
         raise ConfigError(place, key.removesuffix("base_points") + str(error)) from error
     if robot.n_cables != robot.dof and not any_cables:
@@ -328,12 +329,18 @@ def build_problem(
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     given = build_limits(spec, limits, file)
+    robot = kernel_robot(spec, keys, file, any_cables=any_cables)
     try:
-        check_bounded(given)
+        if not _is_redundant_platform(robot):
+            check_bounded(given)
     except InputError as error:
         raise ConfigError(file, str(error)) from error
-    robot = kernel_robot(spec, keys, file, any_cables=any_cables)
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
+
+
+def _is_redundant_platform(robot: PointMassRobot | PlatformRobot) -> bool:
+    # Judged by margins of its tensions, which know cables without a largest one.
+    return isinstance(robot, PlatformRobot) and robot.n_cables > robot.dof
 
 
 def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> Kind:

@@ -139,11 +139,12 @@ def test_a_platform_is_the_same_whatever_wrote_it(tmp_path, kind, capsys):
             np.testing.assert_array_equal(getattr(again, name), getattr(robot, name))
     assert main(["import", str(path)]) == 0
     assert capsys.readouterr().out == (tmp_path / "out.toml").read_text()
-    plan = f'schema = 1\nrobot = "{path.name}"\nfamily = "hypocycloid"\nz0 = 1.0\n'
+    plan = f'schema = 1\nrobot = "{path.name}"\nfamily = "s-curve"\nz0 = 1.0\n'
     plan += "[[pose]]\nrest = true\n[[pose]]\nposition = [0, 0, 1]\n"
     (tmp_path / "plan.toml").write_text(plan)
     assert main(["plan", str(tmp_path / "plan.toml")]) == 2
-    assert f"{path}: base_points: 8 points: must be 6" in capsys.readouterr().err
+    wanted = 'must be "hypocycloid-standard" or "hypocycloid" for a platform'
+    assert f'{wanted} ("{found.keys["name"]}")' in capsys.readouterr().err
 
 
 def test_caspr_bodies(tmp_path):

@@ -20,7 +20,7 @@ from cspr_jax.robots.pulleys import exits
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 from cspr_jax.search.workspace_clearances import apart
 from cspr_jax.search.workspace_questions import question
-from cspr_jax.search.workspaces import WorkspaceSearch
+from cspr_jax.search.workspaces import Poses, WorkspaceSearch
 
 G = cable_robots.GRAVITY
 
@@ -306,11 +306,12 @@ def test_every_margin_lies_between_its_bounds(pattern, n, precision):
         quaternions = frame.turned_quaternions(Rotation.from_matrix(turns).as_quat(scalar_first=True))
     limits = Limits(tension_min=drawn.low, tension_max=drawn.high)
     search = WorkspaceSearch(own, question(own, "wrench-feasible", limits), precision=precision)
-    exact = search._exactly(inner, quaternions)[0]
+    every = Poses(inner, quaternions, None)
+    exact = search._exactly(every)[0]
     stages = list(search._stages())
     assert len(stages) == (1 + (pattern == "3R3T") + (precision == "float32"))
     for stage, _ in stages:
-        found = stage(inner, quaternions)
+        found = stage(every)
         tiny = 1e-13 * drawn.high.max()  # of singular values
         assert (found.real <= exact + tiny).all() and (exact <= found.imag + tiny).all()
 

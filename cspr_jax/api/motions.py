@@ -6,7 +6,9 @@ float64, as searches use whatever jax is set to.
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from cspr_jax.api.arguments import amplitude_of, kernel_problem
@@ -23,6 +25,7 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
 from cspr_jax.robots.state import State
+from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
 from cspr_jax.search.pose_targets import REFERENCE
 from cspr_jax.trajectories import transition as transitions
 from cspr_jax.trajectories.amplitudes import Amplitude
@@ -116,7 +119,7 @@ def platform_motion(
     """Motion of a platform between two poses, thesis chapter 3.
 
     Args:
-        robot: a platform on six cables; jax may trace its spools, but not its platform points.
+        robot: a platform on six cables or more; jax may trace its spools, but not its platform points.
         start: (3,) position of the mass centre in the robot's axes, m; None: P0.
         end: (3,) likewise.
         z0: () depth of P0 below the centroid of the spools, m.
@@ -132,7 +135,7 @@ def platform_motion(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (2.49).
     """
-    own, frame = _prepared(robot, ("3R3T",), "a platform on six cables")
+    own, frame = _prepared(robot, ("3R3T",), "a platform on six cables or more", any_cables=True)
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     places = _places(frame, start, end, z0)
     turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
@@ -142,22 +145,34 @@ def platform_motion(
     return Placed(PlatformMotion(geometry, function, p, Kind(variable)), frame)
 
 
-def tensions(robot: AnyRobot, state: State) -> Array:
+def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
     """Tensions of the cables in a state.
 
     Args:
-        robot: a platform with as many cables as degrees of freedom, or a point mass.
+        robot: a platform or a point mass.
         state: in the robot's axes, as motions give it.
+        rule: that chooses the tensions of more cables than degrees of freedom: "centred", "least-norm",
+            "closed-form", "improved-closed-form" or "p-norm".
 
     Returns:
-        (n_cables,) in cable order, N; negative where a cable would have to push. Of a point mass on more cables than
-        it needs those that keep farthest from the robot's limits.
+        (n_cables,) in cable order, N; negative where a cable would have to push. Of redundant cables those of the rule,
+        by the robot's limits; where it finds none within them, those of least norm.
 
     Raises:
-        InputError: a platform on more cables than degrees of freedom.
+        InputError: an unknown rule, or one that needs a largest tension of every cable, without it.
     """
     own, frame = prepared(robot)
-    return cables.tensions(own, inward(frame, state), robot.limits)
+    if rule not in TENSION_RULES:
+        raise InputError("rule", rule, f"one of {', '.join(TENSION_RULES)}")
+    high = robot.limits.tension_max
+    if TENSION_RULES[rule].is_bounded and robot.n_cables > robot.dof and (high is None or not _is_finite(high)):
+        raise InputError("rule", rule, "another one without a largest tension of every cable")
+    return cables.tensions(own, inward(frame, state), robot.limits, rule)
+
+
+def _is_finite(numbers: Array) -> bool:
+    # What jax traces counts as finite.
+    return isinstance(numbers, jax.core.Tracer) or bool(np.isfinite(np.asarray(numbers)).all())
 
 
 def slacks(problem: Problem, motion: Motion, tau) -> Array:
@@ -200,7 +215,7 @@ def _inner(motion: Motion) -> Motion:
     return motion.motion if isinstance(motion, Placed) else motion
 
 
-def _prepared(robot: Any, patterns: tuple[str, ...], allowed: str) -> tuple[Any, Any]:
-    if getattr(robot, "pattern", None) not in patterns or robot.n_cables != robot.dof:
+def _prepared(robot: Any, patterns: tuple[str, ...], allowed: str, *, any_cables: bool = False) -> tuple[Any, Any]:
+    if getattr(robot, "pattern", None) not in patterns or not (any_cables or robot.n_cables == robot.dof):
         raise InputError("robot", getattr(robot, "name", robot), allowed)
     return prepared(robot)

@@ -8,8 +8,9 @@ from cspr_jax.api.answers import PlatformAnswers
 from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
+from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
+from cspr_jax.feasibility.platform.motion_checker import MANY
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot

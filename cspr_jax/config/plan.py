@@ -9,10 +9,12 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.launch import LaunchTable, Seconds
 from cspr_jax.config.limits import LimitTable, Point, Positive
+from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml
 from cspr_jax.config.trajectory import LARGEST_MAX_ARCS, BetaHat, FamilyName, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
 
 
 class Choice(Table):
@@ -82,6 +84,12 @@ class PlanFile(TrajectoryKeys, LimitTable):
         description='bezier: what durations "least" minimise: "each", the default, their own, one segment after the '
         'other, those before it as they are; "total" their sum, by search',
     )
+    tensions: Annotated[str, name_of(lambda: TENSION_RULES)] | None = Field(
+        None,
+        description="more cables than degrees of freedom: rule that chooses the tensions of motion files; "
+        + "; ".join(f'"{name}", {row.sentence}' for name, row in TENSION_RULES.items())
+        + f' (here 4, about the middles of their ranges); absent: "{CENTRED}"',
+    )
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
     limits: LimitTable | None = Field(
         None, description="[limits], as in a sweep: the same keys as here, each in one of the two places"
@@ -106,6 +114,11 @@ class PlanFile(TrajectoryKeys, LimitTable):
     def families(self) -> tuple[str, ...]:
         """Names of the families in use, in the order of their first segments."""
         return tuple(dict.fromkeys(map(self.family_of, range(len(self.pose) - 1))))
+
+    @property
+    def tension_rule(self) -> str:
+        """Rule that chooses the tensions of redundant cables."""
+        return self.tensions or CENTRED
 
     @model_validator(mode="after")
     def _first_family(self) -> "PlanFile":

@@ -1,7 +1,7 @@
 """Demands of motions on the robot: tensions, heights, cable lengths and speeds, at their extremes."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,6 +15,7 @@ from cspr_jax.arithmetic.minima import narrowed
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.tension_rule_table import CENTRED
 from cspr_jax.runtime.stages import stage
 from cspr_jax.trajectories.motion import Motion
 
@@ -37,6 +38,7 @@ class Demands:
         length_max: of a cable, m.
         speed_max: of a cable, m/s.
         acceleration_max: of a cable, m/s^2.
+        are_found: whether the rule of redundant cables found tensions within their limits at all instants; 1 or 0.
         samples: number of instants looked at.
     """
 
@@ -48,19 +50,24 @@ class Demands:
     length_max: np.ndarray
     speed_max: np.ndarray
     acceleration_max: np.ndarray
+    are_found: np.ndarray
     samples: np.ndarray
 
 
 # Largest values are smallest ones of the negative.
-_SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0])
+_SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0])
 _NAMES = [field.name for field in dataclasses.fields(Demands)][:-1]
 
 
-@jax.jit
-def _values(robot, limits: Limits, arguments) -> Array:
+@partial(jax.jit, static_argnames="rule")
+def _values(robot, limits: Limits, arguments, *, rule: str) -> Array:
     def one(motion, tau):
         state = motion.state(tau)
-        force = cables.tensions(robot, state, limits)
+        if robot.n_cables > robot.dof:
+            chosen = cables.shared(robot, state, limits, rule)
+            force, are_found = chosen.tensions, jnp.where(chosen.is_within, 1.0, 0.0)
+        else:
+            force, are_found = cables.tensions(robot, state), jnp.asarray(1.0)
         length, rate, rate_slope = cables.cable_motion(robot, state)
         extremes = [
             jnp.min(force),
@@ -71,20 +78,28 @@ def _values(robot, limits: Limits, arguments) -> Array:
             -jnp.max(length),
             -jnp.max(jnp.abs(rate)),
             -jnp.max(jnp.abs(rate_slope)),
+            are_found,
         ]
         return jnp.stack(extremes)
 
     return jax.vmap(one)(*arguments)
 
 
-def demands(robot: Any, motions: Sequence[Motion], samples: Sequence[int], limits: Limits = NO_LIMITS) -> Demands:
+def demands(
+    robot: Any,
+    motions: Sequence[Motion],
+    samples: Sequence[int],
+    limits: Limits = NO_LIMITS,
+    rule: str = CENTRED,
+) -> Demands:
     """Demands of motions on the robot, narrowed down where a value is extreme.
 
     Args:
-        robot: centred; a platform with as many cables as degrees of freedom.
+        robot: centred.
         motions: n of them, from the centroid of the spools, z down.
         samples: of each motion, equidistant instants from 0 to 1 to begin with.
         limits: from which the tensions of redundant cables keep away.
+        rule: that chooses these tensions, a name of `robots.tension_rule_table`.
 
     Returns:
         the demands.
@@ -100,18 +115,18 @@ def demands(robot: Any, motions: Sequence[Motion], samples: Sequence[int], limit
         for first in range(0, len(members), size):
             stage(f"demands of {len(motions)} segments")
             some = members[first : first + size]
-            table[some] = _of_alike(robot, limits, [motions[i] for i in some], count)
+            table[some] = _of_alike(partial(_values, robot, limits, rule=rule), [motions[i] for i in some], count)
     columns = (table * _SIGNS + 0.0).T  # no -0
     return Demands(**dict(zip(_NAMES, columns, strict=True)), samples=np.array(samples))
 
 
-def _of_alike(robot, limits: Limits, motions: list[Motion], count: int) -> np.ndarray:
+def _of_alike(kernel: Callable, motions: list[Motion], count: int) -> np.ndarray:
     stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf, float) for leaf in leaves]), *motions)
 
     def at(tau: np.ndarray) -> np.ndarray:
         row = np.repeat(np.arange(len(tau)), tau.shape[1])
         items = jax.tree.map(lambda leaf: leaf[row], stacked)
-        values = in_batches(partial(_values, robot, limits), (items, tau.ravel()), size=BATCH)
+        values = in_batches(kernel, (items, tau.ravel()), size=BATCH)
         return values.reshape(*tau.shape, -1)
 
     tau = np.linspace(0.0, 1.0, count)

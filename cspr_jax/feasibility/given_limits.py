@@ -57,7 +57,9 @@ def check_bounded(limits: Limits) -> None:
     high = limits.tension_max
     if high is not None and not np.isfinite(high).all():
         raise InputError(
-            "tension_max", np.asarray(high).tolist(), "finite, or absent (only workspaces take infinite ones)"
+            "tension_max",
+            np.asarray(high).tolist(),
+            "finite, or absent (only workspaces and platforms on more than six cables take infinite ones)",
         )
 
 

@@ -5,7 +5,8 @@ import numpy as np
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Orientations, SweepFile
 from cspr_jax.feasibility.limits import given
-from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
+from cspr_jax.feasibility.platform.checker import PoseChecker
+from cspr_jax.feasibility.platform.motion_checker import MANY
 from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.problem import motion_kind
 from cspr_jax.robots.symmetries import NONE, folded, symmetries

@@ -5,8 +5,9 @@ import numpy as np
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
+from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
+from cspr_jax.feasibility.platform.motion_checker import MANY
 from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.problem import given_quaternion, motion_kind, orientations
 from cspr_jax.robots.reference_pose import reference_pose

@@ -42,17 +42,22 @@ LARGEST_ROWS = 20_000_000
 # Rows of the flight of a released object.
 FLIGHT_ROWS = 101
 # What may be infinite on the way of a motion that is finite.
-OPEN = ("tension", "tension_each", "tension_couple", "path_acceleration")
+OPEN = ("tension", "tension_residual", "tension_each", "tension_couple", "path_acceleration")
 # A tick that lies so near to the end of a segment, in parts of a tick, is that end.
 SAME_TICK = 1e-6
 
 
-@partial(jax.jit, static_argnames="with_couples")
-def _states(robot, limits: Limits, motion: Motion, tau, *, with_couples: bool):
+@partial(jax.jit, static_argnames=("rule", "with_couples"))
+def _states(robot, limits: Limits, motion: Motion, tau, *, rule: str, with_couples: bool):
     def one(t):
         state = motion.state(t)
         length, rate, _ = cables.cable_motion(robot, state)
-        of_cables = {"length": length, "rate": rate, "tension": cables.tensions(robot, state, limits)}
+        of_cables = {"length": length, "rate": rate}
+        if robot.n_cables > robot.dof:
+            chosen = cables.shared(robot, state, limits, rule)
+            of_cables |= {"tension": chosen.tensions, "tension_residual": chosen.residual}
+        else:
+            of_cables["tension"] = cables.tensions(robot, state)
         if with_couples:
             of_cables["tension_couple"] = tension_couples(robot, state.position, state.acceleration)
         if isinstance(motion, TimedLine):
@@ -73,9 +78,9 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
 
     Returns:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
-        axes; "quaternion", "omega" and "omega_dot" only for a platform, "tension_each" (n, 6) only for one that only
-        translates, "tension_couple" only for four spools at the corners of a level rectangle, "path_acceleration" only
-        where all segments are straight lines.
+        axes; "tension_residual" (n,) only of redundant cables, "quaternion", "omega" and "omega_dot" only for a
+        platform, "tension_each" (n, 6) only for one that only translates, "tension_couple" only for four spools at the
+        corners of a level rectangle, "path_acceleration" only where all segments are straight lines.
 
     Raises:
         ConfigError: a rate that is no number > 0, or too many rows.
@@ -104,7 +109,9 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
             tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
             if i == len(duration) - 1:
                 tau = np.append(tau, 1.0)
-        some = _states(plan.problem.robot, limits, motions[i], tau, with_couples=with_couples)
+        some = _states(
+            plan.problem.robot, limits, motions[i], tau, rule=plan.keys.tension_rule, with_couples=with_couples
+        )
         state, of_cables = jax.tree.map(np.asarray, some)
         state = outward(plan.frame, state)
         part = {name: getattr(state, field) for name, field in _FIELDS.items()} | of_cables
@@ -148,7 +155,8 @@ def _feasible_rows(plan: Plan, t: np.ndarray) -> np.ndarray:
 def _csv(columns: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
     heads = ["t"]
     for name in list(columns)[1:]:
-        heads += [f"{name}_{part}" for part in _parts(name, columns[name].shape[1])]
+        is_one = columns[name].ndim == 1
+        heads += [name] if is_one else [f"{name}_{part}" for part in _parts(name, columns[name].shape[1])]
     table = np.column_stack(list(columns.values()))
     last = [[]] * len(table) if feasible is None else [[int(flag)] for flag in feasible]
     text = io.StringIO()
@@ -184,6 +192,7 @@ def _write_hdf5(plan: Plan, path: Path, columns: dict[str, np.ndarray]) -> None:
             describe(data, TRAJECTORY[name])
             if name != "t":
                 data.dims[0].attach_scale(file["t"])
+            if name in ACROSS:
                 data.dims[1].attach_scale(file[ACROSS[name]])
         for name, values in of_segments.items():
             data = file[name] if name == "segment" else file.create_dataset(name, data=values)

@@ -88,6 +88,7 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "margin": float(answers.margin[i]),
         "margin_bound": float(answers.margin_bound[i]),
         "limit_margin": float(answers.limit_margin[i]),
+        "tension_margin": _tension_margin(plan, i),
         "det_sign_constant": bool(asked.depth_min[i] > 0.0),
         "verdict": verdict_text(answers.verdict[i], bool(plan.is_feasible[i])),
         "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
@@ -99,6 +100,14 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "samples": int(asked.samples[i]),
     }
     return fields | dict.fromkeys(_OF_SOME) | plan.details(i)
+
+
+def _tension_margin(plan: Plan, i: int) -> float | None:
+    # Of platforms on redundant cables, N: the margin is over the weight a cable.
+    robot = plan.problem.robot
+    if not plan.spec.is_platform or robot.n_cables == robot.dof:
+        return None
+    return float(plan.answers.margin[i] * robot.mass * robot.gravity / robot.n_cables)
 
 
 def _finite(value: Any) -> Any:
@@ -153,6 +162,8 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     columns["tension (N)"] = lambda segment: " .. ".join(
         _number(segment[name], ".3f") for name in ("tension_min", "tension_max")
     )
+    if all(segment["tension_margin"] is not None for segment in segments):
+        columns["margin (N)"] = _of("tension_margin", ".1f")
     if lines:
         return columns | {"held back by": lambda segment: "; ".join(segment["active"])}
     if beziers:

@@ -24,6 +24,8 @@ from cspr_jax.plans.sequence import Sequence
 from cspr_jax.problem import build_problem
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.robots.tension_rule_table import TENSION_RULES
+from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.search.answers import Answers, joined
 from cspr_jax.trajectories.motion import Motion, Placed
@@ -148,8 +150,9 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     legs_of = [FAMILIES[name].legs for name in keys.families]
     spec = as_moved(resolve_robot(keys.robot, path, path.parent), legs_of)
     sequence = Sequence(spec, keys, path)
-    any_cables = all(FAMILIES[name].any_cables for name in keys.families)
+    any_cables = all(spec.own_pattern in FAMILIES[name].any_cables for name in keys.families)
     problem = build_problem(spec, keys, keys, path, epsilon=FIRST_EPSILON, any_cables=any_cables)
+    _check_rule(problem, keys, path)
     for leg in sequence.legs:
         leg.check(problem)
     z0 = chosen_depth(problem, sequence)
@@ -159,24 +162,54 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     legs = tuple(JoinedLeg(leg.stops.family, *leg.join(problem, z0)) for leg in sequence.legs)
     _refuse_jumps(problem, sequence, legs)
     frame = sequence.stops.frame
-    asked = _demands(problem, legs, keys.samples)
+    asked = _demands(problem, legs, keys)
     asked = dataclasses.replace(asked, lowest=frame.height(asked.lowest))
     points = np.array(frame.outward(sequence.stops.points(z0)))
     if keys.launch is not None:  # whose segment ends where it follows from the launch
         motions = [motion for leg in legs for motion in leg.motions]
         end = motions[keys.launch.segment].state(jnp.asarray(1.0)).position
         points[keys.launch.segment + 1] = frame.outward(np.asarray(end))
-    warnings = tuple(dict.fromkeys(line for leg in sequence.legs for line in leg.warnings(problem)))
-    return Plan(spec, keys, problem, z0, frame, points, legs, asked, warnings)
+    lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
+    lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), asked)
+    return Plan(spec, keys, problem, z0, frame, points, legs, asked, tuple(dict.fromkeys(lines)))
 
 
-def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], samples: int) -> Demands:
+def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:
+    robot, rule = problem.robot, keys.tensions
+    if rule is None:
+        return
+    if robot.n_cables == robot.dof:
+        raise ConfigError(
+            path,
+            f'tensions = "{rule}": must be absent: on {robot.n_cables} cables, as many as degrees of freedom, the '
+            "motion determines them",
+        )
+    if TENSION_RULES[rule].is_bounded and not np.isfinite(np.asarray(tension_range(robot, problem.limits)[1])).all():
+        others = " or ".join(f'"{name}"' for name, row in TENSION_RULES.items() if not row.is_bounded)
+        raise ConfigError(path, f'tensions = "{rule}": must be {others} without tension_max of every cable')
+
+
+def _missed(keys: PlanFile, is_feasible: np.ndarray, asked: Demands) -> list[str]:
+    # A rule that is not exact can find no tensions within the limits where there are some.
+    if TENSION_RULES[keys.tension_rule].is_exact:
+        return []
+    missed = np.flatnonzero(is_feasible & (asked.are_found == 0.0)) + 1
+    if not len(missed):
+        return []
+    names = ", ".join(f"pose[{i}]" for i in missed.tolist())
+    return [
+        f'tensions = "{keys.tension_rule}": finds none within their limits somewhere before {names}, where there are '
+        "some: those of least norm stand in for them"
+    ]
+
+
+def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile) -> Demands:
     motions = [motion for leg in legs for motion in leg.motions]
     arcs = np.concatenate([leg.answers.tried_arcs for leg in legs])
     # Of redundant cables alone the tensions depend on limits, and what is compiled on which are given.
     is_redundant = problem.robot.n_cables > problem.robot.dof
     limits = problem.limits if is_redundant else NO_LIMITS
-    return demands(problem.robot, motions, np.maximum(SAMPLES * arcs, samples) + 1, limits)
+    return demands(problem.robot, motions, np.maximum(SAMPLES * arcs, keys.samples) + 1, limits, keys.tension_rule)
 
 
 @jax.jit

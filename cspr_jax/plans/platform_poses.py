@@ -14,8 +14,9 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import Pose
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.feasibility.platform.checker import FEW, MANY, TOUCH, PoseChecker
-from cspr_jax.feasibility.platform.end_acceleration import AT_REST, endpoint
+from cspr_jax.feasibility.platform.checker import TOUCH
+from cspr_jax.feasibility.platform.end_acceleration import AT_REST
+from cspr_jax.feasibility.platform.motion_checker import FEW, MANY, MotionChecker
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg, each
 from cspr_jax.plans.stops import Stops
@@ -29,6 +30,7 @@ from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.search.beta_hat import BEYOND, cheapest_path, options
 from cspr_jax.search.platform_answers import PoseAnswers, settled
 from cspr_jax.search.platform_arcs import Candidates, Found, smallest_arcs
+from cspr_jax.search.pose_checkers import pose_checker
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.motion import Motion
 from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, PoseSegment
@@ -71,13 +73,15 @@ class _Poses(Leg):
         points = stops.points(1.0)
         hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.spec))
         for i, (position, quaternion) in enumerate(zip(points, self._quaternions(points), strict=True)):
-            if not stops.poses[i].rest:
+            # On more cables poses are judged by the margin of their tensions alone.
+            if not stops.poses[i].rest and _is_determined(problem):
                 _check_pose(problem.robot, stops.name(i), position, quaternion, stops.path, hint)
 
     def join(self, problem: Problem, z0: float) -> tuple[PoseAnswers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
         try:
-            reference_pose(problem.robot, z0)
+            if _is_determined(problem):
+                reference_pose(problem.robot, z0)
         except InputError as error:
             raise ConfigError(self.stops.path, self.stops.spec.typed(error)) from error
         answers, segments = self._found(problem, np.array([z0]))
@@ -97,9 +101,9 @@ class _Poses(Leg):
         count, z0 = len(self), np.repeat(depths, len(self))
         points = self.stops.points(depths)
         quaternions = self._quaternions(points[0])
-        checker = PoseChecker(problem, self._kind, batch=FEW if len(z0) <= SOME else MANY)
+        checker = pose_checker(problem, self._kind, batch=FEW if len(z0) <= SOME else MANY)
         beta_hats = [
-            self._beta_hats(problem, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)
+            self._beta_hats(checker, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)
         ]
         if len(depths) == 1:
             self._refuse_slack(beta_hats[0])
@@ -129,7 +133,9 @@ class _Poses(Leg):
         start, end = ((points[depth, i + k], quaternions[i + k]) for k in (0, 1))
         return Candidates(start, end, z0, motion, beta_hats)
 
-    def _beta_hats(self, problem: Problem, points: np.ndarray, quaternions: np.ndarray, z0: float) -> list[np.ndarray]:
+    def _beta_hats(
+        self, checker: MotionChecker, points: np.ndarray, quaternions: np.ndarray, z0: float
+    ) -> list[np.ndarray]:
         # Values of beta-hat to try at each pose; NaN where none keeps every cable taut.
         tries: list[np.ndarray] = []
         stops, changes = self.stops, self._changes()
@@ -140,8 +146,11 @@ class _Poses(Leg):
             if pose.beta_hat is not None or pose.rest:
                 tries.append(np.array([AT_REST if pose.beta_hat is None else pose.beta_hat]))
                 continue
-            preferred, lowest, highest = (np.atleast_1d(x) for x in _end(problem.robot, position, quaternion, z0)[2:])
+            end = checker.end_interval(position, quaternion, z0)
+            preferred, lowest, highest = (np.atleast_1d(x) for x in end)
             values = options(preferred, lowest, highest)[0]
+            if np.isnan(values[0]) and not _is_determined(checker.problem):
+                values[0] = end[0]  # the verdict says what is wrong
             is_one = np.isnan(values[0]) or i in changes
             tries.append(values[:1] if is_one else values[~np.isnan(values)])
         return tries
@@ -201,8 +210,9 @@ def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
     return given_quaternion(pose.quaternion, f"{name}.quaternion", path)
 
 
-# One function for XLA instead of some hundred small ones.
-_end = jax.jit(endpoint)
+def _is_determined(problem: Problem) -> bool:
+    # Whether the motion determines the tensions, and a reference pose what is singular.
+    return problem.robot.n_cables == problem.robot.dof
 
 
 @jax.jit

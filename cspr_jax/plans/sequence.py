@@ -80,7 +80,7 @@ def _check_families(spec: RobotFile, keys: PlanFile, path: Path) -> None:
 
 
 def _check_lines(keys: PlanFile, path: Path) -> None:
-    lines = [name for name, row in FAMILIES.items() if row.any_cables]
+    lines = [name for name, row in FAMILIES.items() if row.is_line]
     known = (
         ("max_acceleration", lines),
         ("rule", ["s-curve"]),

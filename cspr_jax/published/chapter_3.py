@@ -8,7 +8,8 @@ import numpy as np
 
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.feasibility.platform.checker import MANY, PoseChecker
+from cspr_jax.feasibility.platform.checker import PoseChecker
+from cspr_jax.feasibility.platform.motion_checker import MANY
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.problem import kernel_robot
 from cspr_jax.published.chapter_1 import Key

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any, TypeAlias, TypeVar
 
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
@@ -15,7 +16,9 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.pulleys import pulleys_of
 from cspr_jax.robots.state import State
-from cspr_jax.robots.tension_distribution import centred
+from cspr_jax.robots.tension_distribution import Distribution
+from cspr_jax.robots.tension_rule_table import CENTRED
+from cspr_jax.robots.tension_rules import by_rule
 from cspr_jax.robots.wrench_sets import tension_range
 
 AnyRobot: TypeAlias = PointMassRobot | PlatformRobot
@@ -52,24 +55,50 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
     return dataclasses.replace(robot, **changes) if changes else robot
 
 
-def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS) -> Array:
-    """Cable tensions; of a point mass on more cables than it needs those that keep farthest from their limits.
+def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS, rule: str = CENTRED) -> Array:
+    """Cable tensions; of redundant cables those of a rule.
 
     Args:
-        robot: z down; a platform with as many cables as degrees of freedom.
+        robot: z down.
         state: in the robot's axes.
         limits: of the tensions of redundant cables; 0 and none where they are not given.
+        rule: that chooses these, a name of `robots.tension_rule_table`; known when a function is compiled.
 
     Returns:
         (n_cables,) in cable order, N; negative where a cable would have to push. Of redundant cables, where no tensions
         keep the limits, those of least norm.
     """
-    if isinstance(robot, PointMassRobot) and robot.n_cables > robot.dof:
-        low, high = tension_range(robot, limits)
-        return centred(robot.wrench_matrix(state), robot.inertial_wrench(state), low, high)[0].tensions
+    if robot.n_cables > robot.dof:
+        return shared(robot, state, limits, rule).tensions
     if isinstance(robot, PlatformRobot):
         return wrench_balance.tensions(robot, state)
     return force_balance.tensions(robot, state.position, state.acceleration)
+
+
+def shared(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Distribution:
+    """Tensions of redundant cables, with their residual.
+
+    Args:
+        robot: z down.
+        state: in the robot's axes.
+        limits: of the tensions.
+        rule: as for `tensions`.
+
+    Returns:
+        the tensions (n_cables,) N, () residual, moments over the size of the platform, () whether they keep the limits.
+    """
+    low, high = tension_range(robot, limits)
+    unit = _units(robot)
+    return by_rule(rule, robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit, low, high)
+
+
+def _units(robot: AnyRobot) -> Array:
+    # (dof,) by which the components of wrenches are divided: moments by the size of the platform.
+    forces = np.ones(len(PATTERNS[robot.pattern].forces))
+    if not isinstance(robot, PlatformRobot):
+        return jnp.asarray(forces)
+    size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    return jnp.concatenate([jnp.asarray(forces), jnp.full(robot.dof - len(forces), size)])
 
 
 def cable_motion(robot: AnyRobot, state: State) -> tuple[Array, Array, Array]:

@@ -58,12 +58,17 @@ class Reference(NamedTuple):
 def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
     """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
 
+    On more cables than degrees of freedom a platform hangs still in many orientations: the reference one is then that
+    in which its axes are parallel to those of the robot file.
+
     Args:
         robot: centred, in any platform axes; jax may be tracing its spools, but not its platform points.
 
     Returns:
         the robot, and the rotation (3, 3) from its former axes to these.
     """
+    if robot.n_cables > robot.dof:
+        return robot, np.eye(3)
     if isinstance(robot.base_points, jax.core.Tracer):
         rotation = _traced(robot)
     else:

@@ -30,6 +30,7 @@ from cspr_jax.robots.tension_distribution import (
     projected,
 )
 from cspr_jax.robots.tension_lanes import FREE, least_norms
+from cspr_jax.robots.tension_rule_table import TENSION_RULES
 
 BATCH = 4096
 # Of the p-norm: steps of Newton's method, over which the weight of the limits falls from first to last; lengths of
@@ -40,7 +41,7 @@ FIRST_WEIGHT, LAST_WEIGHT, LAST_STEPS = 1e-1, 1e-14, 12
 NEAR = 1e-9
 # Cables without a largest tension: over the largest tension in sight, where the search may begin.
 FAR = 10.0
-LEAST_EXPONENT, LARGEST_EXPONENT = 1.01, 100.0
+EXPONENT, LEAST_EXPONENT, LARGEST_EXPONENT = 4.0, 1.01, 100.0
 
 
 @jax.jit
@@ -199,46 +200,68 @@ class Rule(NamedTuple):
     """A rule that chooses tensions.
 
     Fields:
-        name: as callers write it.
-        sentence: what it finds.
         function: of matrix, wrench, smallest and largest tensions; the p-norm's of reference and exponent too.
         is_bounded: whether every cable needs a largest tension.
-        is_exact: whether it finds tensions wherever there are any.
     """
 
-    name: str
-    sentence: str
     function: Callable[..., Distribution]
     is_bounded: bool
-    is_exact: bool
 
 
 def _centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> Distribution:
     return centred(matrix, wrench, tension_min, tension_max)[0]
 
 
-RULES = {
-    rule.name: rule
-    for rule in (
-        Rule("least-norm", "the feasible tensions whose sum of squares is the least", least_norm, False, True),
-        Rule("centred", "the tensions farthest from their limits, of these the least", _centred, False, True),
-        Rule(
-            "closed-form", "the nearest to the middles of their ranges, whatever the limits", closed_form, True, False
-        ),
-        Rule(
-            "improved-closed-form",
-            "the closed form, with the worst cable held at its limit, again and again",
-            improved_closed_form,
-            True,
-            False,
-        ),
-        Rule("p-norm", "the feasible tensions of the least p-norm about a reference", p_norm, False, True),
-    )
+_FUNCTIONS: dict[str, Callable[..., Distribution]] = {
+    "least-norm": least_norm,
+    "centred": _centred,
+    "closed-form": closed_form,
+    "improved-closed-form": improved_closed_form,
+    "p-norm": p_norm,
 }
+RULES = {name: Rule(_FUNCTIONS[name], row.is_bounded) for name, row in TENSION_RULES.items()}
+
+
+def by_rule(rule: str, matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> Distribution:
+    """Tensions at one instant by a rule, the p-norm with the exponent 4 about `middles`.
+
+    Args:
+        rule: a name of `RULES`; known when a function is compiled.
+        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
+        wrench: (dof,) what the cables must supply, N.
+        tension_min: (n_cables,) N.
+        tension_max: (n_cables,) N, inf for none; finite where the rule is bounded.
+
+    Returns:
+        the tensions (n_cables,), () residual, () whether they keep the limits.
+    """
+    more = (middles(tension_min, tension_max), jnp.asarray(EXPONENT)) if rule == "p-norm" else ()
+    return RULES[rule].function(matrix, wrench, tension_min, tension_max, *more)
+
+
+def middles(tension_min: Array, tension_max: Array) -> Array:
+    """Middles of the ranges of the tensions, about which the p-norm is taken where nothing else is given.
+
+    Args:
+        tension_min: (...) N.
+        tension_max: (...) N, inf for none.
+
+    Returns:
+        (...) N; the smallest tension where there is no largest.
+    """
+    is_bounded = jnp.isfinite(tension_max)
+    return jnp.where(is_bounded, 0.5 * (tension_min + jnp.where(is_bounded, tension_max, 0.0)), tension_min)
 
 
 def distributions(
-    matrices, wrenches, tension_min, tension_max, *, rule: str = "least-norm", reference=None, exponent: float = 4.0
+    matrices,
+    wrenches,
+    tension_min,
+    tension_max,
+    *,
+    rule: str = "least-norm",
+    reference=None,
+    exponent: float = EXPONENT,
 ) -> Distribution:
     """Tensions of many poses by a rule.
 
@@ -276,7 +299,8 @@ def distributions(
     if rule == "p-norm":
         if not LEAST_EXPONENT <= exponent <= LARGEST_EXPONENT:
             raise InputError("exponent", exponent, f"from {LEAST_EXPONENT} to {LARGEST_EXPONENT}")
-        middle = np.where(np.isfinite(high), 0.5 * (low + np.where(np.isfinite(high), high, 0.0)), low)
+        with double_precision():
+            middle = np.asarray(middles(jnp.asarray(low), jnp.asarray(high)))
         about = middle if reference is None else _each("reference", reference, (count, cables))
         given += [about, np.full(count, float(exponent))]
     with double_precision():

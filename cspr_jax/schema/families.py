@@ -22,7 +22,8 @@ class Family:
         free_end: whether A''(1) of its amplitude function is free: (1.27) and (1.28) in place of (2.49).
         rests_anywhere: whether its poses are at rest wherever they are, so that it knows neither P0 nor an amplitude
             function.
-        any_cables: whether the robot may have more cables than degrees of freedom.
+        any_cables: patterns of the robots that may have more cables than degrees of freedom.
+        is_line: whether its motions are straight lines, in the least time of their law.
     """
 
     name: str
@@ -30,7 +31,8 @@ class Family:
     legs: Mapping[str, str]
     free_end: bool = False
     rests_anywhere: bool = False
-    any_cables: bool = False
+    any_cables: tuple[str, ...] = ()
+    is_line: bool = False
 
     def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.
@@ -56,6 +58,7 @@ _ROWS = (
         "hypocycloid-standard",
         "standard hypocycloids between any poses (thesis chapter 2)",
         {"3T": _LEGS.format("hypocycloids:Hypocycloids"), "3R3T": _LEGS.format("platform_poses:StandardPoses")},
+        any_cables=("3R3T",),
     ),
     Family(
         "transition",
@@ -67,6 +70,7 @@ _ROWS = (
         "hypocycloid",
         "hypocycloids of variable amplitude (3), for platforms",
         {"3R3T": _LEGS.format("platform_poses:VariablePoses")},
+        any_cables=("3R3T",),
     ),
     *(
         Family(
@@ -74,7 +78,8 @@ _ROWS = (
             f"straight lines from rest to rest {law}",
             dict.fromkeys(("2T", "3T"), _LEGS.format("timed_lines:TimedLines")),
             rests_anywhere=True,
-            any_cables=True,
+            any_cables=("2T", "3T"),
+            is_line=True,
         )
         for name, law in (
             ("s-curve", "by the S-model (Boralugoda), in the least time"),

@@ -82,7 +82,7 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
     axes |= {name: arrays[name] for name in ("segment", "flight_t", "throw") if name in arrays}
     own = dict.fromkeys(SEGMENTS, ("segment",)) | FLIGHT_DIMS
     variables = {
-        name: (own[name] if name in own else ("t", ACROSS[name]), values)
+        name: (own[name] if name in own else ("t", ACROSS[name]) if name in ACROSS else ("t",), values)
         for name, values in arrays.items()
         if name not in axes
     }

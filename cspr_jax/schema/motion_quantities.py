@@ -6,7 +6,8 @@ from cspr_jax.schema.quantity import Quantity
 HOW = ", proved for point masses, from refined samples for platforms"
 MARGIN = (
     "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
-    "or depth below the spools over z0."
+    "or depth below the spools over z0; platforms on more cables: how far all tensions can keep from their limits, "
+    "over the weight a cable."
 )
 TRAJECTORY = {
     q.name: q
@@ -24,7 +25,15 @@ TRAJECTORY = {
             "tension",
             "N",
             "cable tension",
-            "Tension of each cable, in cable order; of redundant cables those that keep farthest from their limits.",
+            "Tension of each cable, in cable order; of redundant cables those of the rule of the plan, `tensions`; "
+            "where it finds none within their limits, those of least norm.",
+        ),
+        Quantity(
+            "tension_residual",
+            "1",
+            "residual of the tensions",
+            "Of redundant cables: size of the difference between the wrench of the tensions and that which the motion "
+            "asks for, over 1 N and the size of the latter; moments over the platform's size.",
         ),
         Quantity(
             "tension_each",

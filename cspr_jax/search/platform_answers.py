@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
+from cspr_jax.feasibility.platform.motion_checker import MotionChecker
 from cspr_jax.feasibility.platform.samples import rows
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.answers import Answers
@@ -23,7 +23,8 @@ class PoseAnswers(Answers):
 
     Fields:
         beta_hat: (n, 2) at both ends.
-        det_margin: (n,) smallest determinant over its value at rest in P0.
+        det_margin: (n,) smallest determinant over its value at rest in P0; NaN on more than six cables, where there is
+            none, and cables are not held against the platform.
         cable_distance: (n,) smallest distance between cables that can meet, m.
     """
 
@@ -33,13 +34,13 @@ class PoseAnswers(Answers):
 
     def details(self, i: int) -> dict[str, Any]:
         """Determinant, contacts and beta-hat; see `Answers.details`."""
-        verdict = Verdict(int(self.verdict[i]))
+        verdict, has_determinant = Verdict(int(self.verdict[i])), not np.isnan(self.det_margin[i])
         return {
-            "det_sign_constant": bool(self.det_margin[i] > 0.0),
+            "det_sign_constant": bool(self.det_margin[i] > 0.0) if has_determinant else None,
             "det_margin": float(self.det_margin[i]),
             "cable_interference": bool(verdict & Verdict.CABLE_CABLE),
             "cable_distance_min": float(self.cable_distance[i]),
-            "platform_interference": bool(verdict & Verdict.CABLE_PLATFORM),
+            "platform_interference": bool(verdict & Verdict.CABLE_PLATFORM) if has_determinant else None,
             "beta_hat": [float(value) for value in self.beta_hat[i]],
         }
 
@@ -49,7 +50,7 @@ class PoseAnswers(Answers):
 
 
 def settled(
-    checker: PoseChecker, candidates: Candidates, smallest: Found, *, max_arcs: int, fixed: np.ndarray | None = None
+    checker: MotionChecker, candidates: Candidates, smallest: Found, *, max_arcs: int, fixed: np.ndarray | None = None
 ) -> tuple[PoseAnswers, PoseSegment]:
     """Answers with all margins.
 
@@ -111,7 +112,7 @@ def trials(motions: Candidates, values: np.ndarray, *, same: bool = False) -> tu
 
 
 def reached(
-    checker: PoseChecker, motions: Candidates, values: np.ndarray, *, max_arcs: int, same: bool = False
+    checker: MotionChecker, motions: Candidates, values: np.ndarray, *, max_arcs: int, same: bool = False
 ) -> PoseAnswers:
     """Smallest numbers of arcs of motions, each with several values of beta-hat at its end.
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.platform.checker import PoseChecker, PoseChecks
+from cspr_jax.feasibility.platform.motion_checker import MotionChecker, PoseChecks
 from cspr_jax.feasibility.platform.samples import rows
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
@@ -94,7 +94,7 @@ class _Segments:
 
 
 def smallest_arcs(
-    checker: PoseChecker, candidates: Candidates, *, max_arcs: int, fixed: np.ndarray | None = None, beyond: int = -1
+    checker: MotionChecker, candidates: Candidates, *, max_arcs: int, fixed: np.ndarray | None = None, beyond: int = -1
 ) -> Found:
     """The smallest number of arcs that passes all tests.
 
@@ -141,14 +141,14 @@ def smallest_arcs(
     return Found(smallest, undecided, checks)
 
 
-def _sieved(checker: PoseChecker, segments: _Segments, arcs: int, alive: np.ndarray, tau: np.ndarray) -> np.ndarray:
+def _sieved(checker: MotionChecker, segments: _Segments, arcs: int, alive: np.ndarray, tau: np.ndarray) -> np.ndarray:
     # Those that some instants do not refute.
     if not len(alive):
         return alive
     return alive[~checker.prefilter.refuted(segments(arcs, alive), arcs, tau)]
 
 
-def best_candidates(checker: PoseChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:
+def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:
     """The number of arcs with the largest smallest tension over some samples, where none is feasible.
 
     Args:

@@ -6,6 +6,7 @@ cables in space, by the normals to dof - 1 cables, by singular values.
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -48,7 +49,33 @@ class WorkspaceAnswers(Columns):
     is_exact: np.ndarray
 
 
-Stage = Callable[[np.ndarray, np.ndarray], np.ndarray]
+class Poses(NamedTuple):
+    """Poses, and what the cables must supply at each.
+
+    Fields:
+        positions: (n, 3) m.
+        quaternions: (n, 4) unit quaternions, scalar first.
+        wrenches: (n, dof) moments over a length, N; None: what is asked at all of them.
+    """
+
+    positions: np.ndarray
+    quaternions: np.ndarray
+    wrenches: np.ndarray | None
+
+    def some(self, which: Any) -> "Poses":
+        """Some of them.
+
+        Args:
+            which: an index of NumPy.
+
+        Returns:
+            those.
+        """
+        wrenches = None if self.wrenches is None else self.wrenches[which]
+        return Poses(self.positions[which], self.quaternions[which], wrenches)
+
+
+Stage = Callable[[Poses], np.ndarray]
 
 
 class WorkspaceSearch:
@@ -83,12 +110,16 @@ class WorkspaceSearch:
         if robot.dof == cocircuits.CABLES and is_few and self._wrenches.is_one and self._measure != "capacity":
             self._order = cocircuits.base_order(matrices)
 
-    def __call__(self, positions: np.ndarray, quaternions: np.ndarray | None) -> WorkspaceAnswers:
+    def __call__(
+        self, positions: np.ndarray, quaternions: np.ndarray | None, wrenches: np.ndarray | None = None
+    ) -> WorkspaceAnswers:
         """Whether poses belong to the workspace.
 
         Args:
             positions: (n, 3) of the mass centre, or of the joint, m.
             quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
+            wrenches: (n, dof) what the cables must supply at each pose in place of the question's finite set, N and
+                N m; None: that.
 
         Returns:
             the answers.
@@ -96,7 +127,9 @@ class WorkspaceSearch:
         if len(positions) == 0:
             return WorkspaceAnswers(np.zeros(0, np.uint16), np.zeros(0), np.zeros(0, bool))
         turns = np.repeat(UNTURNED, len(positions), 0) if quaternions is None else quaternions
-        parts = in_parts(lambda part: self._part(positions[part], turns[part]), len(positions), PART)
+        loads = self._weights(positions, turns) if wrenches is None else wrenches / self.unit
+        poses = Poses(positions, turns, loads)
+        parts = in_parts(lambda part: self._part(poses.some(part)), len(positions), PART)
         margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
         verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
         verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
@@ -123,14 +156,14 @@ class WorkspaceSearch:
         found = in_batches(lambda x: geometry.wrench_matrices(self._robot, *x), poses, size=TRIALS)
         return found / self.unit[:, None]
 
-    def _part(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        count = len(positions)
+    def _part(self, poses: Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        count = len(poses.positions)
         margin, is_open, is_outside = np.full(count, np.nan), np.ones(count, bool), np.zeros(count, bool)
         for stage, accepts in self._stages():
             places = np.flatnonzero(is_open)
             if len(places) == 0 or len(places) < min(FEW, count):
                 break
-            found = stage(positions[places], quaternions[places])
+            found = stage(poses.some(places))
             is_known = accepts(found)
             known = found[is_known]
             margin[places[is_known]] = 0.5 * (known.real + known.imag)
@@ -138,7 +171,7 @@ class WorkspaceSearch:
         is_open |= np.abs(margin) <= self._boundary
         places = np.flatnonzero(is_open)
         if len(places):
-            margin[places], is_outside[places] = self._exactly(positions[places], quaternions[places])
+            margin[places], is_outside[places] = self._exactly(poses.some(places))
         return margin, is_open, is_outside
 
     def _stages(self):
@@ -180,10 +213,10 @@ class WorkspaceSearch:
             space = kernels.null_space(columns, wrenches.points[0], order=self._order)
             return kernels.by_null_space(space, asked, choices, **options)
 
-        def stage(positions, quaternions):
-            loads = self._weights(positions, quaternions)
-            poses = lanes(positions), lanes(quaternions) if is_body else None, None if loads is None else lanes(loads)
-            return in_batches(compiled, poses, size=BATCH)
+        def stage(poses):
+            turns = lanes(poses.quaternions) if is_body else None
+            loads = None if poses.wrenches is None else lanes(poses.wrenches)
+            return in_batches(compiled, (lanes(poses.positions), turns, loads), size=BATCH)
 
         return stage
 
@@ -207,7 +240,7 @@ class WorkspaceSearch:
             the wrenches over `unit`, N.
         """
         load = self._weights(position[None], quaternion[None])
-        return self._wrenches if load is None else self._wrenches.of(load[0])
+        return self._wrenches if load is None else self._wrenches.about(load[0])
 
     def _weights(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray | None:
         # Of a body on a joint.
@@ -223,8 +256,8 @@ class WorkspaceSearch:
         points = [] if asked.points is None else [[leaf(x) for x in point] for point in asked.points]
         return Wrenches(points, None if asked.box is None else leaf(asked.box), [leaf(x) for x in asked.ellipsoids])
 
-    def _exactly(self, positions: np.ndarray, quaternions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        matrices, loads = self._matrices(positions, quaternions), self._weights(positions, quaternions)
+    def _exactly(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+        matrices = self._matrices(poses.positions, poses.quaternions)
         margins, is_outside = np.full(len(matrices), np.nan), np.zeros(len(matrices), bool)
         for i, columns in enumerate(matrices):
             if not np.isfinite(columns).all():
@@ -233,7 +266,7 @@ class WorkspaceSearch:
                 margins[i] = exact.closure_margin(columns)
                 is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
             else:
-                asked = self._wrenches if loads is None else self._wrenches.of(loads[i])
+                asked = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
                 margins[i] = exact.wrench_margin(columns, asked, self.asked.low, self.asked.high, self._measure)
                 is_outside[i] = margins[i] == -np.inf
         return margins, is_outside

@@ -168,7 +168,7 @@ def _map(
 
 
 # Quantities of a motion that may be infinite.
-_OPEN = ("tension", "tension_each", "tension_couple", "path_acceleration", "landing")
+_OPEN = ("tension", "tension_residual", "tension_each", "tension_couple", "path_acceleration", "landing")
 
 
 def _motion(
@@ -195,7 +195,7 @@ def _motion(
     segments = {name: array for name, array in arrays.items() if name in SEGMENTS}
     for name, array in arrays.items():
         wanted: tuple[int, ...] = (len(time), widths.get(name, 3))
-        if name == "t":
+        if name in ("t", "tension_residual"):
             wanted = (len(time),)
         elif name in FLIGHT_DIMS:
             first, *rest = FLIGHT_DIMS[name]

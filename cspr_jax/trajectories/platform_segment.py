@@ -61,7 +61,8 @@ class PoseSegment:
         sense: () +1 (p odd) or -1 (p even).
         rate: () lambda of (3.50), 1/s^2.
         turn: of the orientation.
-        regular: () determinant (`wrench_balance.normalised_determinant`) at rest in P0, whose sign must not change.
+        regular: () determinant (`wrench_balance.normalised_determinant`) at rest in P0, whose sign must not change; 1
+            of a robot on more cables, which has none.
     """
 
     plane: Array
@@ -102,7 +103,9 @@ def pose_segment(
     plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, spool_radius(robot), upright, odd)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
     how = turn(start[1], end[1], *beta_hats, odd=odd)
-    regular = normalised_determinant(robot, hub, jnp.eye(3, dtype=hub.dtype))
+    is_determined = robot.n_cables == robot.dof
+    one = jnp.eye(3, dtype=hub.dtype)
+    regular = normalised_determinant(robot, hub, one) if is_determined else one[0, 0]
     return PoseSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, how, regular)
 
 

@@ -6,17 +6,19 @@ value is then narrowed down. Between samples cables are followed with halved ste
 within the tolerance of zero is undecided: nothing here is a proof.
 """
 
-import dataclasses
 import threading
 from collections.abc import Callable
 from functools import partial
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, room
 from cspr_jax.feasibility.platform.crossings import passed_over
+from cspr_jax.feasibility.platform.end_acceleration import endpoint
 from cspr_jax.feasibility.platform.kernels import cable_vectors, moving_along, still_along
+from cspr_jax.feasibility.platform.motion_checker import FEW, MANY, TOLERANCE, MotionChecker, PoseChecks
 from cspr_jax.feasibility.platform.prefilter import FIRST, Prefilter
 from cspr_jax.feasibility.platform.samples import Motions, Narrowing, Places, Samples, along, low_points
 from cspr_jax.feasibility.platform.slack_lanes import order
@@ -24,61 +26,22 @@ from cspr_jax.feasibility.platform.slacks import flags
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.interference import contacts
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment, duration
+from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
 
-# Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
-FEW, MANY = 256, 2048
 # Where the determinant changes by more than this factor from sample to sample, so many pieces have two samples more.
 STEEP, PIECES = 1.25, 4
 # So many arcs are held at a time: each is 64 samples of several criteria.
 ARCS = 8 * MANY
-TOLERANCE = 1e-7
 TOUCH = 1e-6  # of the platform's size
 BESIDE_KNOT = 1e-12
 
 
-@dataclasses.dataclass(frozen=True)
-class PoseChecks:
-    """Verdicts, slacks and gaps of n motions.
-
-    Fields:
-        verdict: (n,) `Verdict` flags; 0 is feasible.
-        slack: (n, n_criteria) smallest of each criterion of `slacks.flags`; NaN where unknown.
-        gap: (n,) smallest distance between cables that can meet, m; infinite where none can.
-    """
-
-    verdict: np.ndarray
-    slack: np.ndarray
-    gap: np.ndarray
-
-    def put(self, which: np.ndarray, others: "PoseChecks") -> None:
-        """Write others into it.
-
-        Args:
-            which: (m,) their places.
-            others: of m motions.
-        """
-        self.verdict[which], self.slack[which], self.gap[which] = others.verdict, others.slack, others.gap
-
-    def rows(self, which: np.ndarray) -> "PoseChecks":
-        """Checks of some of the motions.
-
-        Args:
-            which: (m,) indices.
-
-        Returns:
-            those of m motions.
-        """
-        return PoseChecks(self.verdict[which], self.slack[which], self.gap[which])
+# One function for XLA instead of some hundred small ones.
+_end = jax.jit(endpoint)
 
 
-@jax.jit
-def _durations(arguments) -> jax.Array:
-    return jax.vmap(duration)(*arguments)
-
-
-class PoseChecker:
-    """Checker of motions of one robot.
+class PoseChecker(MotionChecker):
+    """Checker of motions of one robot on six cables.
 
     Args:
         problem: robot, limits, amplitude.
@@ -93,11 +56,11 @@ class PoseChecker:
 
     def __init__(self, problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> None:
         """Find what can meet."""
-        self.problem, self.kind, self.batch = problem, kind, batch
+        super().__init__(problem, kind, batch=batch)
         self.done, self._lock = {"prefilter": 0, "checks": 0, "motions": 0}, threading.Lock()
         near = contacts(problem.robot)
         self._platform, self._pairs = (near.sides, near.normal), tuple((int(i), int(j)) for i, j in near.pairs)
-        self._flags = flags(problem.limits)
+        self.flags = flags(problem.limits)
         self._size = float(np.linalg.norm(np.asarray(problem.robot.platform_points), axis=1).max())
         knots = np.asarray(problem.amplitude.knots)
         count = partial(self._count, "prefilter")
@@ -110,29 +73,13 @@ class PoseChecker:
         with self._lock:
             self.done[what] += many
 
-    def durations(self, segments: PoseSegment, arcs: np.ndarray) -> np.ndarray:
-        """Durations of segments.
-
-        Args:
-            segments: leaves (n, ...).
-            arcs: (n,).
-
-        Returns:
-            (n,) s.
-        """
-        return in_batches(_durations, (segments, arcs.astype(float)), size=self.batch)
+    def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
+        """Values of (3.91) and (3.92); see `MotionChecker.end_interval`."""
+        end = _end(self.problem.robot, position, quaternion, jnp.asarray(z0))
+        return float(end.preferred), float(end.lowest), float(end.highest)
 
     def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True) -> PoseChecks:
-        """Check motions in full.
-
-        Args:
-            segments: leaves (n, ...), of the parity of `arcs`.
-            arcs: (n,).
-            whole: whether to go on where the motion itself is infeasible; else the rest is NaN there.
-
-        Returns:
-            the checks.
-        """
+        """Check motions in full; see `MotionChecker.check`."""
         checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         self._count("motions", len(arcs))
         size = max(room(ARCS) // max(arcs, default=1), 1)
@@ -156,17 +103,6 @@ class PoseChecker:
         if is_open.any():
             checks.put(rest[is_open], self._still(motions.rows(is_open), moving[:, is_open]))
         return checks
-
-    def nothing(self, count: int) -> PoseChecks:
-        """Checks to be filled.
-
-        Args:
-            count: of motions.
-
-        Returns:
-            verdicts 0, the rest NaN.
-        """
-        return PoseChecks(np.zeros(count, int), np.full((count, len(self._flags)), np.nan), np.full(count, np.nan))
 
     def _along(self, kernel: Callable, motions: Motions) -> Samples:
         samples = along(partial(kernel, self.problem, kind=self.kind), motions, size=self.batch)
@@ -205,7 +141,7 @@ class PoseChecker:
 
     def _verdict(self, least: np.ndarray, nearest: np.ndarray, met: np.ndarray, hit: np.ndarray) -> np.ndarray:
         verdict = Verdict.CABLE_CABLE.value * met | Verdict.CABLE_PLATFORM.value * hit
-        for flag, value in zip(self._flags, least, strict=True):
+        for flag, value in zip(self.flags, least, strict=True):
             verdict |= np.where(value <= -TOLERANCE, flag.value, 0)
             verdict |= np.where(np.abs(value) <= TOLERANCE, Verdict.UNDECIDED.value, 0)
         verdict |= np.where(~met & (nearest < TOUCH * self._size), Verdict.UNDECIDED.value, 0)

@@ -14,7 +14,7 @@ CableVectors = tuple[np.ndarray, np.ndarray]  # between cables (k, n_pairs, 3), 
 
 def passed_over(
     cable_vectors: Callable[[np.ndarray, np.ndarray], CableVectors],
-    platform: tuple[np.ndarray, np.ndarray],
+    platform: tuple[np.ndarray, np.ndarray] | None,
     row: np.ndarray,
     ends: tuple[np.ndarray, np.ndarray],
     count: int,
@@ -23,7 +23,7 @@ def passed_over(
 
     Args:
         cable_vectors: of motions (k,) at instants (k,).
-        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
+        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`; None: it is not looked at.
         row: (k,) whose step it is.
         ends: (k,) instants before and after each.
         count: n, of motions.
@@ -40,7 +40,8 @@ def passed_over(
         turns = _turns_much(gap, next_gap) | _turns_much(direction, next_direction)
         closed = ~turns if level < HALVINGS else np.ones(len(row), bool)
         met[row[closed & cables_cross(gap, next_gap).any(1)]] = True
-        hit[row[closed & platform_hit(*platform, direction, next_direction).any(1)]] = True
+        if platform is not None:
+            hit[row[closed & platform_hit(*platform, direction, next_direction).any(1)]] = True
         row, before, after = row[~closed], ends[0][~closed], ends[1][~closed]
         if not len(row):
             break

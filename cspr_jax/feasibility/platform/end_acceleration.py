@@ -12,6 +12,8 @@ from jax import Array
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import length, solved
 from cspr_jax.robots.platform import PlatformRobot, rays
+from cspr_jax.robots.point_mass import rest_point
+from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_balance import jacobian
 
 # At rest the reference orientation makes beta-hat free; this value swings like a pendulum.
@@ -75,6 +77,25 @@ def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array
         jnp.where(is_flat, -taut, lowest),  # (3.92)
         jnp.where(is_flat, taut, highest),
     )
+
+
+def end_state(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array, beta_hat: Array) -> State:
+    """State at one end of a segment, of a robot on any number of cables.
+
+    Args:
+        robot: the robot.
+        position: (3,) from the centroid of the spools, z down, m.
+        quaternion: (4,) unit.
+        z0: () depth of p0 below the centroid of the spools, m.
+        beta_hat: () of (3.81).
+
+    Returns:
+        the state: at rest, accelerated towards p0, and about the axis of the orientation.
+    """
+    eta, still = robot.gravity / z0, jnp.zeros(3)
+    away = position - rest_point(z0)
+    rotation = rotations.matrix(quaternion)
+    return State(position, still, -eta * away, rotation, still, beta_hat * eta * _angle_vector(quaternion))
 
 
 def _angle_vector(quaternion: Array) -> Array:

@@ -1,6 +1,7 @@
 """Margins of poses one by one, by singular values: of any robot, and where the wrench matrix loses rank; no jax."""
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,43 @@ def cocircuits(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return found, (normals / sizes[:rank]) @ left[:, :rank].T, left[:, :rank]
 
 
+class Planes(NamedTuple):
+    """What bounds the margin of a wrench w: offsets - normals @ w, and half of the narrowest range of tensions.
+
+    Fields:
+        offsets: (k,) N.
+        normals: (k, dof).
+        half_range: N; inf without largest tensions.
+        basis: (dof, rank) orthonormal, of the wrenches that the cables span.
+    """
+
+    offsets: np.ndarray
+    normals: np.ndarray
+    half_range: float
+    basis: np.ndarray
+
+
+def margin_planes(matrix: np.ndarray, low: np.ndarray, high: np.ndarray) -> Planes:
+    """Planes whose distances, in newtons of tension, are the margin: one for each cocircuit and sign that bounds it.
+
+    Args:
+        matrix: (dof, n_cables).
+        low: (n_cables,) N.
+        high: (n_cables,) N; inf where there is none.
+
+    Returns:
+        the planes.
+    """
+    found, normals, basis = cocircuits(matrix)
+    rows, normals = np.concatenate([found, -found]), np.concatenate([normals, -normals])
+    finite = np.where(np.isfinite(high), high, 0.0)
+    bounds = ~((rows > 0.0) & np.isinf(high)).any(1)
+    rows, normals = rows[bounds], normals[bounds]
+    sizes = np.abs(rows).sum(1)
+    reach = np.where(rows > 0.0, rows * finite, rows * low).sum(1)
+    return Planes(reach / sizes, normals / sizes[:, None], float(0.5 * (high - low).min()), basis)
+
+
 def wrench_margin(
     matrix: np.ndarray, wrenches: RequiredWrenches, low: np.ndarray, high: np.ndarray, measure: str = "tensions"
 ) -> float:
@@ -55,18 +93,13 @@ def wrench_margin(
     Returns:
         N; inf where nothing bounds it, -inf where a wrench is outside of the span of the cables.
     """
-    found, normals, basis = cocircuits(matrix)
-    if any(_is_outside(some, basis) for some in wrenches.spanning):
+    planes = margin_planes(matrix, low, high)
+    if any(_is_outside(some, planes.basis) for some in wrenches.spanning):
         return -np.inf
-    rows, normals = np.concatenate([found, -found]), np.concatenate([normals, -normals])
-    finite = np.where(np.isfinite(high), high, 0.0)
-    is_void = ((rows > 0.0) & np.isinf(high)).any(1)
-    reach = np.where(rows > 0.0, rows * finite, rows * low).sum(1)
-    slacks = reach - wrenches.supports(normals)
+    slacks = planes.offsets - wrenches.supports(planes.normals)
     if measure == "capacity":
-        return float((slacks / np.linalg.norm(normals, axis=1))[~is_void].min(initial=np.inf))
-    slacks = slacks / np.abs(rows).sum(1)
-    return float(min(slacks[~is_void].min(initial=np.inf), 0.5 * (high - low).min()))
+        return float((slacks / np.linalg.norm(planes.normals, axis=1)).min(initial=np.inf))
+    return float(min(slacks.min(initial=np.inf), planes.half_range))
 
 
 def _is_outside(wrenches: np.ndarray, basis: np.ndarray) -> bool:

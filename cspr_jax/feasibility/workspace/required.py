@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 
-NO_POINTS = "the weight of a body on a joint is known at a pose: see of()"
+NO_POINTS = "the weight of a body on a joint is known at a pose: see about()"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -36,16 +36,16 @@ class RequiredWrenches:
         points = None if self.points is None else self.points / unit
         return RequiredWrenches(points, box, tuple(axes / unit for axes in self.ellipsoids))
 
-    def of(self, weight: np.ndarray) -> "RequiredWrenches":
-        """The same box and ellipsoids about one wrench, if there is no finite set.
+    def about(self, wrench: np.ndarray) -> "RequiredWrenches":
+        """The same box and ellipsoids about one wrench, in place of the finite set.
 
         Args:
-            weight: (dof,) the wrench.
+            wrench: (dof,).
 
         Returns:
             the wrenches.
         """
-        return self if self.points is not None else dataclasses.replace(self, points=weight[None])
+        return dataclasses.replace(self, points=wrench[None])
 
     @property
     def corners(self) -> np.ndarray:

@@ -6,6 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.labels import COLOURS, STYLES, robot_name
 from cspr_jax.schema.motion_quantities import PARTS
 from cspr_jax.store.result import Result
@@ -14,6 +17,9 @@ from cspr_jax.store.result import Result
 BOUNDARIES = 200
 # Share of the distance between spools that typed digits may leave between points of one plane.
 ONE_PLANE = 1e-9
+# Limits of tensions beyond this many times the largest are written and not drawn.
+FAR = 3.0
+BESIDE = ("axes fraction", "data")
 
 
 def motion_figure(result: Result) -> Figure:
@@ -60,6 +66,8 @@ def motion_figure(result: Result) -> Figure:
     word = "pair" if "tension_each" in result.data else "cable"
     names = [f"{word} {k + 1}" for k in range(tension.shape[1])]
     _tensions(drawn["tension"], time, tension, names, result.attributes.get("mass"))
+    if "tension_residual" in result.data:
+        _limits(drawn["tension"], tension, *kept(result, "plan", "tension"))
     if "couple" in drawn:
         _lines(drawn["couple"], time, result.data["tension_couple"], [f"couple {name}" for name in PARTS["couple"]])
         drawn["couple"].set_ylabel("tension couple (N)")
@@ -123,6 +131,25 @@ def _flight(panel: Axes, position: np.ndarray, j: int) -> None:
 def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:
     _lines(panel, time, quaternion, list("wxyz"), axis=False)
     panel.set_ylabel("quaternion")
+
+
+def _limits(panel: Axes, tension: np.ndarray, spec: RobotFile, keys: PlanFile) -> None:
+    # The rule by which redundant cables share the load, and the limits that it heeds.
+    panel.set_ylabel(f"tension (N)\n{keys.tension_rule}")
+    beyond = []
+    for name, word in (("tension_min", "smallest"), ("tension_max", "largest")):
+        own = getattr(keys, name)
+        given = getattr(spec, name) if own is None else own
+        values = np.unique(np.atleast_1d([] if given is None else given))
+        for value in values[np.isfinite(values) & (values > 0.0)].tolist():
+            if value > FAR * np.nanmax(tension, initial=0.0):
+                beyond.append(f"{value:.4g}")
+                continue
+            panel.axhline(value, color="black", linewidth=0.8, linestyle="--")
+            panel.annotate(f"{word} {value:.4g} N", (0.01, value), xycoords=BESIDE, va="bottom", fontsize="small")
+    if beyond:
+        text = f"largest {beyond[0]}{' .. ' + beyond[-1] if len(beyond) > 1 else ''} N, above the picture"
+        panel.annotate(text, (0.01, 0.97), xycoords="axes fraction", va="top", fontsize="small")
 
 
 def _lines(panel: Axes, time: np.ndarray, values: np.ndarray, names: list[str], *, axis: bool = True) -> None:

@@ -1,0 +1,158 @@
+"""Checkers of a platform's motions: what searches and plans ask of them, whatever the number of cables."""
+
+import abc
+import dataclasses
+from typing import Protocol
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment, duration
+
+# Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
+FEW, MANY = 256, 2048
+TOLERANCE = 1e-7
+
+
+@dataclasses.dataclass(frozen=True)
+class PoseChecks:
+    """Verdicts, slacks and gaps of n motions.
+
+    Fields:
+        verdict: (n,) `Verdict` flags; 0 is feasible.
+        slack: (n, n_criteria) smallest of each criterion of `MotionChecker.flags`; NaN where unknown.
+        gap: (n,) smallest distance between cables that can meet, m; infinite where none can.
+    """
+
+    verdict: np.ndarray
+    slack: np.ndarray
+    gap: np.ndarray
+
+    def put(self, which: np.ndarray, others: "PoseChecks") -> None:
+        """Write others into it.
+
+        Args:
+            which: (m,) their places.
+            others: of m motions.
+        """
+        self.verdict[which], self.slack[which], self.gap[which] = others.verdict, others.slack, others.gap
+
+    def rows(self, which: np.ndarray) -> "PoseChecks":
+        """Checks of some of the motions.
+
+        Args:
+            which: (m,) indices.
+
+        Returns:
+            those of m motions.
+        """
+        return PoseChecks(self.verdict[which], self.slack[which], self.gap[which])
+
+
+class FirstLook(Protocol):
+    """First look at motions: a few instants that refute most of what is infeasible."""
+
+    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slack of the tensions over some instants.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants.
+
+        Returns:
+            (n,); -inf where not finite.
+        """
+        ...
+
+    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Motions that some instants refute.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants, the most telling ones first.
+
+        Returns:
+            (n,).
+        """
+        ...
+
+
+@jax.jit
+def _durations(arguments) -> jax.Array:
+    return jax.vmap(duration)(*arguments)
+
+
+class MotionChecker(abc.ABC):
+    """Checker of motions of one robot.
+
+    Args:
+        problem: robot, limits, amplitude.
+        kind: of the motions.
+        batch: how many are computed at a time.
+
+    Fields:
+        flags: of each criterion, the verdict where it is broken: of the tensions, of singular poses, of poses above the
+            spools, then of the other limits. Where one does not apply, its slack is NaN or infinite.
+        prefilter: the first look, which comes before checks.
+    """
+
+    flags: tuple[Verdict, ...]
+    prefilter: FirstLook
+
+    def __init__(self, problem: Problem, kind: Kind, *, batch: int) -> None:
+        """Keep what is asked about."""
+        self.problem, self.kind, self.batch = problem, kind, batch
+
+    def durations(self, segments: PoseSegment, arcs: np.ndarray) -> np.ndarray:
+        """Durations of segments.
+
+        Args:
+            segments: leaves (n, ...).
+            arcs: (n,).
+
+        Returns:
+            (n,) s.
+        """
+        return in_batches(_durations, (segments, arcs.astype(float)), size=self.batch)
+
+    def nothing(self, count: int) -> PoseChecks:
+        """Checks to be filled.
+
+        Args:
+            count: of motions.
+
+        Returns:
+            verdicts 0, the rest NaN.
+        """
+        return PoseChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), np.full(count, np.nan))
+
+    @abc.abstractmethod
+    def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True) -> PoseChecks:
+        """Check motions in full.
+
+        Args:
+            segments: leaves (n, ...), of the parity of `arcs`.
+            arcs: (n,).
+            whole: whether to go on where the motion itself is infeasible; else the rest is NaN there.
+
+        Returns:
+            the checks.
+        """
+
+    @abc.abstractmethod
+    def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
+        """Values of beta-hat at which a segment can end in a pose.
+
+        Args:
+            position: (3,) from the centroid of the spools, z down, m.
+            quaternion: (4,) unit.
+            z0: m.
+
+        Returns:
+            the preferred value; the lowest and the highest feasible one, the other way round if there are none.
+        """
