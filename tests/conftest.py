@@ -167,7 +167,7 @@ def figures(monkeypatch):
 @pytest.fixture
 def small_bench(monkeypatch):
     """Sizes with which `cspr bench` takes seconds."""
-    from cspr_jax.bench import six_cables, three_cables, timing
+    from cspr_jax.bench import six_cables, three_cables, timing, workspaces
 
     monkeypatch.setattr(timing, "REPEATS", 1)
     monkeypatch.setattr(timing, "SIDE", 8)
@@ -177,3 +177,5 @@ def small_bench(monkeypatch):
     monkeypatch.setattr(six_cables, "NUMPY_TRAJECTORIES", 2)
     monkeypatch.setattr(six_cables, "TRAJECTORIES", 400)
     monkeypatch.setattr(six_cables, "LANES", 64)
+    for name, few in (("BATCHES", 1), ("FEW_BATCHES", 1), ("BATCH", 64), ("PAIRS_BATCH", 64), ("SAMPLE", 2)):
+        monkeypatch.setattr(workspaces, name, few)

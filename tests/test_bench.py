@@ -37,6 +37,7 @@ def test_bench(capsys, small_bench, kernels):
     assert found["taut_share"]["float32"] == found["taut_share"]["float64"]
     assert (found["hand_written"] is None) == (kernels is None)
     assert 300 < found["operations_per_check"] < 900
+    assert len(found["workspaces"]) == 8 and all(x > 0 for row in found["workspaces"].values() for x in row.values())
     assert "x NumPy" in cspr(capsys, "bench", *options)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.table_layout import Cell, grid
 from cspr_jax.plans.planning import plan
-from cspr_jax.published import boralugoda, chapter_1, chapter_3, table_3_2
+from cspr_jax.published import boralugoda, chapter_1, chapter_3, peers, table_3_2
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.published.chapter_3 import Choice
 from cspr_jax.runtime.stages import within
@@ -111,6 +111,12 @@ TABLES = {
         "Boralugoda thesis, Table 4.3: how far the S-model passes its boundaries, 1/s^2, and the first node without",
         boralugoda.PUBLISHED["4.3"],
         boralugoda.table_4_3,
+    ),
+    "peers": Source(
+        "Workspaces in papers on other tools: poses, and microseconds a pose here (compiling included), by linear "
+        "programs and by least squares; for all poses of the first row CASPR prints 89 to 455 s (IROS 2016, Table I)",
+        {},
+        peers.peers,
     ),
 }
 

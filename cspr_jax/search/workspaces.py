@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts
 from cspr_jax.arithmetic.elementary import leaf
@@ -189,23 +190,30 @@ class WorkspaceSearch:
         if len(self._choices.table):
             yield self._stage(np.float64, False), is_known
 
-    def _stage(self, dtype: type, by_null_space: bool) -> Stage:
+    def kernel(self, dtype: type, *, by_null_space: bool = False) -> Callable[..., Array]:
+        """Compiled margins of a batch of poses.
+
+        Args:
+            dtype: of the numbers.
+            by_null_space: whether by the null space, which only some robots and questions take.
+
+        Returns:
+            a function of lanes: three arrays (n,) of positions, m; four of quaternions, None of a point mass; dof
+            arrays of wrenches in place of the question's, over `unit`, or None. It gives (n,) lower bound + i upper
+            bound of the margin.
+        """
+
         def cast(tree):
             return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
 
-        def lanes(array):
-            return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
-
-        is_bounded, is_body = bool(np.isfinite(self.asked.high).all()), PATTERNS[self._robot.pattern].is_body
-        options = {"measure": self._measure, "is_bounded": is_bounded}
+        options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.asked.high).all())}
         robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
         limits = leaf(self.asked.low[ordered]), leaf(self.asked.high[ordered])
         asked, length, fixed = cast((kernels.Range(*limits), leaf(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
 
-        def compiled(batch):
-            place, turn, load = batch
+        def compiled(place, turn, load):
             columns = geometry.wrench_columns(robot, place, turn, length)
             wrenches = fixed if load is None else fixed._replace(points=[load])
             if not by_null_space:
@@ -213,10 +221,19 @@ class WorkspaceSearch:
             space = kernels.null_space(columns, wrenches.points[0], order=self._order)
             return kernels.by_null_space(space, asked, choices, **options)
 
+        return compiled
+
+    def _stage(self, dtype: type, by_null_space: bool) -> Stage:
+        compiled, is_body = self.kernel(dtype, by_null_space=by_null_space), PATTERNS[self._robot.pattern].is_body
+
+        def lanes(array):
+            return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
+
         def stage(poses):
             turns = lanes(poses.quaternions) if is_body else None
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
-            return in_batches(compiled, (lanes(poses.positions), turns, loads), size=BATCH)
+            batch = lanes(poses.positions), turns, loads
+            return in_batches(lambda x: compiled(*x), batch, size=BATCH)
 
         return stage
 

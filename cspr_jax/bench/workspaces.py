@@ -1,0 +1,206 @@
+"""Workspaces: margins of poses a second, clearances of cables, least tensions; beside linear programs and squares."""
+
+import time
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_threads, room
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.bench.timing import best
+from cspr_jax.feasibility.workspace import geometry
+from cspr_jax.problem import centred, load_robot
+from cspr_jax.published import peers
+from cspr_jax.robots import clearance_kernels
+from cspr_jax.robots.clearance import scene
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.platform import PlatformRobot, platform_robot
+from cspr_jax.robots.point_mass import PointMassRobot, point_mass_robot
+from cspr_jax.robots.tension_lanes import least_norms
+from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, question
+from cspr_jax.search.workspaces import BATCH, WorkspaceSearch
+
+# Batches of poses; of the arrays of twelve cables fewer.
+BATCHES, FEW_BATCHES = 32, 4
+# Poses of one call where cables are held apart, and poses of the others' ways.
+PAIRS_BATCH, SAMPLE = 65_536, 100
+
+
+class Poses(NamedTuple):
+    """Random poses among the spools, as lanes.
+
+    Fields:
+        place: three arrays (n,), of the mass centre, m.
+        turn: four arrays (n,), unit quaternions; None of a point mass.
+    """
+
+    place: tuple[np.ndarray, ...]
+    turn: tuple[np.ndarray, ...] | None
+
+
+def _poses(robot: PointMassRobot | PlatformRobot, count: int, dtype: str) -> Poses:
+    rng, base = np.random.default_rng(0), np.asarray(robot.base_points)
+    half = np.maximum(0.4 * np.ptp(base, axis=0), 0.5)
+    turns = np.array([1.0, 0.0, 0.0, 0.0]) + 0.1 * rng.normal(size=(count, 4))
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+
+    def lanes(array):
+        return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
+
+    place = lanes(half * rng.uniform(-1.0, 1.0, (count, 3)))
+    return Poses(place, lanes(turns) if isinstance(robot, PlatformRobot) else None)
+
+
+def _four_cables() -> PointMassRobot:
+    spools = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [2.0, 1.0, 0.0], [-2.0, 1.0, 0.0]]
+    limits = Limits(tension_min=leaf(np.full(4, 1.0)), tension_max=leaf(np.full(4, 100.0)))
+    return point_mass_robot(spools, mass=2.0, limits=limits)
+
+
+def _twelve_cables() -> PlatformRobot:
+    # The eight of a box, and four more at the middles of its edges.
+    signs = (-1.0, 1.0)
+    corners = np.array(
+        [[x, y, z] for x in signs for y in signs for z in signs] + [[x, y, 0.0] for x in signs for y in signs]
+    )
+    shape = np.array([0.3, 0.2, 0.25]) * corners[:, [1, 2, 0]] * np.array([1.0, -1.0, 1.0])
+    limits = Limits(tension_min=leaf(np.full(12, 10.0)), tension_max=leaf(np.full(12, 2000.0)))
+    return platform_robot(3.0 * corners, shape, mass=50.0, inertia=np.eye(3), limits=limits)
+
+
+def margin_rate(
+    robot: PointMassRobot | PlatformRobot, condition: str, dtype: str, *, by_null_space: bool, batches: int
+) -> tuple[float, float]:
+    """Margins of one condition a second, from poses as lanes to their two bounds.
+
+    Args:
+        robot: the robot.
+        condition: of `search.workspace_questions.CONDITIONS`.
+        dtype: "float32" or "float64".
+        by_null_space: which of the two ways.
+        batches: of poses.
+
+    Returns:
+        the rate; s that the first batch takes, mostly of compiling.
+    """
+    own = centred(robot)[0]
+    start = time.perf_counter()
+    kernel = WorkspaceSearch(own, question(own, condition, robot.limits)).kernel(
+        np.dtype(dtype).type, by_null_space=by_null_space
+    )
+    size = room(BATCH)
+    every = _poses(own, batches * size, dtype)
+    parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::batches], every)) for i in range(batches)]
+
+    def one(poses):
+        return jax.block_until_ready(kernel(poses.place, poses.turn, None))
+
+    one(parts[0])
+    first = time.perf_counter() - start
+    return batches * size / best(partial(in_threads, one, parts)), first
+
+
+def clearance_rate(dtype: str) -> float:
+    """Poses a second of which the nearest two of eight cables are found, among 28 pairs.
+
+    Args:
+        dtype: "float32" or "float64".
+
+    Returns:
+        the rate.
+    """
+    signs = (-1.0, 1.0)
+    corners = np.array([[x, y, z] for x in signs for y in signs for z in signs])
+    robot = platform_robot(corners * [5.0, 4.0, 3.0], corners * [0.4, 0.3, 0.2], mass=1.0, inertia=np.eye(3))
+    among = scene(robot, diameter=0.01)
+    of_robot = clearance_kernels.Points(*map(leaf, (among.base_points, among.platform_points, among.diameters)))
+    points = jax.tree.map(lambda x: np.asarray(x, dtype), of_robot)
+    size = room(PAIRS_BATCH)
+    every = _poses(robot, 4 * size, dtype)
+    parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::4], every)) for i in range(4)]
+
+    def one(poses):
+        given = clearance_kernels.Poses(poses.place, poses.turn, None)
+        return jax.block_until_ready(clearance_kernels.of_cables(points, given, among.pairs))
+
+    return 4 * size / best(partial(in_threads, one, parts))
+
+
+def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
+    """Least tensions within limits a second, from arrays of wrench matrices to arrays of tensions.
+
+    Args:
+        robot: on eight cables.
+
+    Returns:
+        the rate.
+    """
+    count = 8 * BATCH
+    own = centred(robot)[0]
+    search = WorkspaceSearch(own, question(own, FEASIBLE, robot.limits))
+    poses = _poses(own, count, "float64")
+    places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
+    matrices = np.asarray(geometry.wrench_matrices(own, places, turns)) / search.unit[:, None]
+    wrenches = np.repeat(search.required(places[0], turns[0]).corners, count, axis=0)
+    limits = [np.broadcast_to(x, (count, own.n_cables)) for x in (search.asked.low, search.asked.high)]
+    return count / best(lambda: least_norms(matrices, wrenches, *limits))
+
+
+def rates() -> dict[str, Any]:
+    """Rates of all of these.
+
+    Returns:
+        poses a second by what is asked and by type of numbers; "first_s", what compiling and the first batch take.
+    """
+    eight, four, twelve = load_robot("cogiro"), _four_cables(), _twelve_cables()
+    found: dict[str, Any] = {}
+    for name, robot, condition, by_null_space, batches in (
+        ("4 cables, point mass", four, FEASIBLE, False, BATCHES),
+        ("8 cables", eight, FEASIBLE, True, BATCHES),
+        ("8 cables, closure", eight, CLOSURE, True, BATCHES),
+        ("8 cables, by normals", eight, FEASIBLE, False, BATCHES),
+        ("12 cables", twelve, FEASIBLE, False, FEW_BATCHES),
+    ):
+        measured = {
+            dtype: margin_rate(robot, condition, dtype, by_null_space=by_null_space, batches=batches)
+            for dtype in ("float32", "float64")
+        }
+        found[name] = {dtype: rate for dtype, (rate, _) in measured.items()} | {"first_s": measured["float32"][1]}
+    found["28 pairs of cables"] = {dtype: clearance_rate(dtype) for dtype in ("float32", "float64")}
+    found["least tensions, 8 cables"] = {"float64": tension_rate(eight)}
+    return found | {"8 cables, others": _others(eight)}
+
+
+def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
+    # Poses a second of linear programs and of least squares.
+    own = centred(robot)[0]
+    search = WorkspaceSearch(own, question(own, FEASIBLE, robot.limits))
+    poses = _poses(own, SAMPLE, "float64")
+    places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
+    matrices = np.asarray(geometry.wrench_matrices(own, places, turns)) / search.unit[:, None]
+    wrench = search.required(places[0], turns[0]).corners[0]
+
+    def rate(way) -> float:
+        return SAMPLE / best(lambda: [way(matrix, wrench, search.asked) for matrix in matrices])
+
+    return {"HiGHS": rate(peers.by_program), "NNLS": rate(peers.by_squares)}
+
+
+def lines(found: dict[str, Any]) -> list[str]:
+    """Lines for people.
+
+    Args:
+        found: of `rates`.
+
+    Returns:
+        the lines.
+    """
+    text = ["workspaces, poses a second"]
+    for name, row in found.items():
+        words = [f"{key} {value / 1e6:8.3g} M/s" for key, value in row.items() if key != "first_s"]
+        text.append(
+            f"  {name:26s} {', '.join(words)}" + (f", first {row['first_s']:.1f} s" if "first_s" in row else "")
+        )
+    return text

@@ -1,0 +1,180 @@
+"""Workspaces that papers on other tools compute: counts of poses, and times beside other ways to the same answers.
+
+The grids are those of CASPR (Lau et al., IROS 2016, Table I: IPAnema 2, wrench closure, for which it prints 89 to
+455 s), of CASPR's model of IPAnema 1, and of the CoGiRo robot in cdpyr. No source prints the counts of poses.
+"""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog, nnls
+from scipy.spatial.transform import Rotation
+
+from cspr_jax.feasibility.workspace import geometry
+from cspr_jax.problem import centred, load_robot
+from cspr_jax.published.chapter_1 import Key
+from cspr_jax.robots.limits import Limits
+from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, STATIC, Question, question
+from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
+
+# Poses of which linear programs and least squares are asked as well, evenly over the grid.
+SAMPLE = 60
+MICRO = 1e6
+# Of the largest limit: what a residual, and a margin, may be off.
+CLOSE = 1e-6
+
+
+class Grid(NamedTuple):
+    """Poses of a study.
+
+    Fields:
+        name: of the row.
+        robot: of the catalogue.
+        condition: of `search.workspace_questions.CONDITIONS`.
+        positions: (n, 3) of the platform frame's origin, axes of the file, m.
+        quaternions: (n, 4) unit quaternions, scalar first.
+    """
+
+    name: str
+    robot: str
+    condition: str
+    positions: np.ndarray
+    quaternions: np.ndarray
+
+
+def _product(*axes: np.ndarray) -> np.ndarray:
+    return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
+
+
+def _turns(angles: np.ndarray) -> np.ndarray:
+    # As CASPR has them: R = Rx Ry Rz.
+    return Rotation.from_euler("XYZ", angles).as_quat(scalar_first=True)
+
+
+def grids() -> list[Grid]:
+    """The studies.
+
+    Returns:
+        one a row of the table.
+    """
+    level = _product(np.linspace(-4.0, 4.0, 81), np.linspace(-3.0, 3.0, 61), np.array([2.0, 3.0, 4.0]))
+    turned = np.repeat(_turns(np.deg2rad([[30.0, -30.0, 5.0]])), len(level), axis=0)
+    found = [
+        Grid(f"{name}, closure", robot, CLOSURE, level, turned)
+        for name, robot in (("IPAnema 2", "ipanema-2"), ("IPAnema 2, set IROS 2016", "ipanema-2-iros"))
+    ]
+    ends, steps = np.array([2.0, 1.5, 1.0, 0.5, 0.5, 0.1]), (11, 11, 11, 5, 5, 3)
+    poses = _product(*[np.linspace(-end, end, count) for end, count in zip(ends, steps, strict=True)])
+    poses[:, 2] += 1.0
+    for condition in (FEASIBLE, STATIC, CLOSURE):
+        found.append(Grid(f"IPAnema 1, {condition}", "ipanema-1", condition, poses[:, :3], _turns(poses[:, 3:])))
+    cube = _product(np.linspace(-6.0, 6.0, 10), np.linspace(-4.0, 4.0, 10), np.linspace(0.0, 4.0, 10))
+    still = np.repeat(_turns(np.zeros((1, 3))), len(cube), axis=0)
+    found += [Grid(f"CoGiRo, {condition}", "cogiro", condition, cube, still) for condition in (FEASIBLE, STATIC)]
+    return found
+
+
+def peers() -> dict[Key, float | None]:
+    """The table: poses, those inside and on the boundary, and microseconds a pose of three ways.
+
+    The first poses, with which programs are compiled, are timed as well; those of linear programs (HiGHS) and of least
+    squares (NNLS) are some of the grid, in the same run.
+
+    Returns:
+        computed cells, by row, column and variant.
+    """
+    cells: dict[Key, float | None] = {}
+    for grid in grids():
+        for column, value in _row(grid).items():
+            cells[grid.name, column, ""] = value
+    return cells
+
+
+def _row(grid: Grid) -> dict[str, float]:
+    robot = load_robot(grid.robot)
+    own, frame = centred(robot)
+    asked = question(own, grid.condition, robot.limits if grid.condition == FEASIBLE else Limits())
+    turns = frame.turned_quaternions(grid.quaternions)
+    places = mass_centres(own, np.asarray(frame.inward(grid.positions)), turns)
+    start = time.perf_counter()
+    search = WorkspaceSearch(own, asked)
+    answers = search(places, turns)
+    count, seconds = len(places), time.perf_counter() - start
+    some = np.linspace(0, count - 1, min(SAMPLE, count)).astype(int)
+    matrices = np.asarray(geometry.wrench_matrices(own, places[some], turns[some]))
+    matrices = matrices / search.unit[:, None]
+    wrench = search.required(places[0], turns[0]).corners[0]
+    inside, clear = answers.verdict[some] == 0, np.abs(answers.margin[some]) > CLOSE * _size(asked)
+    found = {
+        "poses": float(count),
+        "inside": float((answers.verdict == 0).sum()),
+        "on the boundary": float((np.abs(answers.margin) <= 1e-9 * _size(asked)).sum()),
+        "us a pose": MICRO * seconds / count,
+    }
+    for name, way in (("HiGHS", by_program), ("NNLS", by_squares)):
+        start = time.perf_counter()
+        verdicts = np.array([way(matrix, wrench, asked) for matrix in matrices])
+        found[f"us, {name}"] = MICRO * (time.perf_counter() - start) / len(some)
+        found[f"differ, {name}"] = float(((verdicts != inside) & clear).sum())
+    return found
+
+
+def _size(asked: Question) -> float:
+    finite = asked.high[np.isfinite(asked.high)]
+    return 1.0 if asked.condition == CLOSURE else float(max([*asked.low, *finite, asked.wrenches.size]))
+
+
+def by_program(matrix: np.ndarray, wrench: np.ndarray, asked: Question) -> bool:
+    """Verdict of one pose by a linear program: the largest s with low + s <= t <= high - s; of closure s <= t <= 1.
+
+    Args:
+        matrix: (dof, n_cables) wrench matrix, moments over a length.
+        wrench: (dof,) what the cables must supply, N.
+        asked: limits and condition.
+
+    Returns:
+        whether the pose is inside.
+    """
+    dof, count = matrix.shape
+    low, high, load = _limits(asked, wrench)
+    keeps = [np.c_[-np.eye(count), np.ones(count)], np.c_[np.eye(count), np.ones(count)]]
+    bounds = np.r_[-low, high]
+    finite = np.isfinite(bounds)
+    found = linprog(
+        np.r_[np.zeros(count), -1.0],
+        A_ub=np.vstack(keeps)[finite],
+        b_ub=bounds[finite],
+        A_eq=np.c_[matrix, np.zeros(dof)],
+        b_eq=load,
+        bounds=[*[(None, None)] * count, (None, asked.wrenches.size + 1.0)],
+    )
+    return bool(found.status == 0 and found.x[-1] > 0.0)
+
+
+def by_squares(matrix: np.ndarray, wrench: np.ndarray, asked: Question) -> bool:
+    """Verdict of one pose by least squares: tensions above the smallest ones, of closure above 1, and what is left.
+
+    Args:
+        matrix: (dof, n_cables) wrench matrix, moments over a length.
+        wrench: (dof,) what the cables must supply, N.
+        asked: limits and condition.
+
+    Returns:
+        whether the pose is inside.
+    """
+    low, high, load = _limits(asked, wrench)
+    if asked.condition == CLOSURE:
+        low, high = np.ones_like(low), np.full_like(high, np.inf)
+    given, wanted = matrix, load - matrix @ low
+    if np.isfinite(high).all():
+        count = matrix.shape[1]
+        given = np.block([[matrix, np.zeros_like(matrix)], [np.eye(count), np.eye(count)]])
+        wanted = np.r_[wanted, high - low]
+    return bool(nnls(given, wanted)[1] <= CLOSE * np.linalg.norm(wanted))
+
+
+def _limits(asked: Question, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    if asked.condition == CLOSURE:
+        return np.zeros_like(asked.low), np.ones_like(asked.high), np.zeros_like(wrench)
+    return asked.low, asked.high, wrench
