@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any, TypeAlias, TypeVar
 
+import jax
 import numpy as np
 from jax import Array
 
@@ -52,6 +53,7 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
     return dataclasses.replace(robot, **changes) if changes else robot
 
 
+@jax.jit
 def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS) -> Array:
     """Cable tensions; of a point mass on more cables than it needs those that keep farthest from their limits.
 

@@ -11,6 +11,7 @@ is a swing that stays between the target and its opposite point.
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -20,6 +21,7 @@ from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment
 
 
+@jax.jit
 def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: Array) -> Segment:
     """The transition from rest in p0 to a target.
 
@@ -63,6 +65,7 @@ def inclination(segment: Segment) -> Array:
     return segment.end_radius * segment.tilt[..., 0]
 
 
+@jax.jit
 def weights(segment: Segment) -> Array:
     """The weighted trajectory parameters w_k: (1.37) and (1.93) for their robots.
 
