@@ -115,6 +115,12 @@ def pytest_configure(config):
                 path.unlink()
 
 
+def pytest_collection_finish():
+    """What is imported stays: Python's collector need not look at it again."""
+    gc.collect()
+    gc.freeze()
+
+
 def pytest_collection_modifyitems(items):
     """The long groups first, so that both processes end together."""
     items.sort(key=lambda item: _ORDER.get(item.path.stem, len(_ORDER)))
