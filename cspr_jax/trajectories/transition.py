@@ -39,6 +39,7 @@ def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: A
     return dataclasses.replace(segment, end_curvature=bend)
 
 
+@jax.jit
 def steady(segment: Segment) -> Segment:
     """The swing of one size that a transition ends in.
 
@@ -81,6 +82,7 @@ def weights(segment: Segment) -> Array:
     return load - inclination(segment)[..., None]
 
 
+@jax.jit
 def depth_for(robot: PointMassRobot, target: Array, inclination: Array) -> Array:
     """The depth z0 of p0 that gives a target an inclination, from (1.31).
 
