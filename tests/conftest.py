@@ -106,13 +106,21 @@ def pytest_xdist_make_scheduler(config, log):
 def pytest_configure(config):
     """Before jax compiles anything. The soak takes batches and flags of users."""
     if config.option.markexpr == "not soak":
-        os.environ["XLA_FLAGS"] = " ".join([*CHEAP, os.environ.get("XLA_FLAGS", "")]).strip()
+        # Workers find them set already. Twice, they would be other keys of compiled code than those of one process.
+        given = os.environ.get("XLA_FLAGS", "").split()
+        os.environ["XLA_FLAGS"] = " ".join([*(flag for flag in CHEAP if flag not in given), *given])
         batches.LARGEST = LARGEST_BATCH
     is_first = not hasattr(config, "workerinput")
     if is_first and sum(path.stat().st_size for path in COMPILED.rglob("*") if path.is_file()) > LARGEST:
         for path in COMPILED.rglob("*"):
             if path.is_file():
                 path.unlink()
+
+
+def pytest_collection_finish():
+    """What is imported stays: Python's collector need not look at it again."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items):

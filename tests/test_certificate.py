@@ -235,7 +235,7 @@ def test_undecided_only_within_the_tolerance():
         assert (np.diff(verdict) >= 0).all()
         low, high = z[np.flatnonzero(verdict == -1)[-1]], z[np.flatnonzero(verdict == 1)[0]]
     assert (verdict == 0).sum() > n // 2
-    near = float(tolerance(QUINTIC, jax.tree.map(lambda leaf: leaf[0], segments), jnp.asarray(float(arcs))))
+    near = float(jax.jit(tolerance)(QUINTIC, jax.tree.map(lambda leaf: np.asarray(leaf)[0], segments), float(arcs)))
     assert 1e-9 <= near < 1.1e-9
     for edge, sign in ((low, -1.0), (high, 1.0)):
         start = np.array([-1.1, -1.1, edge])
@@ -277,6 +277,7 @@ def test_rounding_stays_below_a_tenth_of_the_tolerance(name):
     segments, tau = segments_of(name, starts, ends, arcs), rng.uniform(0.0, 1.0, (n, 60))
     found = np.asarray(KAPPA_ETA(None, None, of_one_shape(QUINTIC), segments, arcs.astype(float), tau))
     error = np.abs(found - extended_kappa_eta(segments, QUINTIC, arcs, tau)).max((1, 2))
-    allowed = np.asarray(jax.vmap(partial(tolerance, QUINTIC))(segments, arcs.astype(float))) - SMALLEST_MARGIN
+    lanes = jax.jit(jax.vmap(tolerance, (None, 0, 0)))
+    allowed = np.asarray(lanes(QUINTIC, segments, arcs.astype(float))) - SMALLEST_MARGIN
     assert (error < 0.1 * allowed).all()
     assert (allowed < 1e-4 * (1.0 + np.abs(found).max((1, 2)))).all()

@@ -305,7 +305,8 @@ def test_boxes_that_meet():
     known = scene(robot, body, [shapes.box([0.0, 0.0, 3.0], [1.0, 1.0, 1.0], [1.0, 0.0, 0.0, 0.0])])
     place = np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 2.3], [0.0, 0.0, 2.5], [1.0, 0.0, 3.0]])
     last = clearance.Scene(**{**vars(known), "pairs": ()})
-    found = clearance.clearances(last, place)
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (4, 1))  # given, as above: compiled once
+    found = clearance.clearances(last, place, upright)
     of_body = [clearance._terms(last, np.zeros(3), np.dtype(float))]
     *_, (kind, _, term) = of_body[0]
     poses = clearance.kernels.Poses(tuple(place.T), None, None)

@@ -30,6 +30,10 @@ SMALL = np.array([[0.3, -0.2, 0.1], [-0.3, 0.2, 0.1], [0.2, 0.3, -0.1], [-0.2, -
 CORNERS = np.r_[SMALL, -1.1 * SMALL]
 FLAT = BOX * np.array([1.0, 0.0, 1.0]) + np.c_[np.linspace(0.0, 0.3, 8), np.zeros(8), np.zeros(8)]
 LINE = np.array([0.2, -0.1, 0.4])
+MATRIX = jax.jit(lambda robot, at: robot.wrench_matrix(at))
+INERTIAL = jax.jit(lambda robot, at: robot.inertial_wrench(at))
+ACROSS = jax.jit(across_line)
+EXITS = jax.jit(pulleys.exits)
 # A body of point masses has its mass centre and inertia by sums.
 MASSES = np.array([0.5, 0.7, 0.3, 0.9])
 PLACES = np.array([[0.1, 0.0, 0.2], [-0.2, 0.3, 0.0], [0.3, -0.1, 0.1], [0.0, 0.1, -0.3]])
@@ -77,7 +81,7 @@ def directions(robot, rotation):
     row, still, eye = PATTERNS[robot.pattern], np.zeros(3), np.eye(3)
     moves = [(eye[i], still) for i in row.forces] + [(still, eye[i]) for i in row.moments]
     if row.along_line:
-        moves += [(still, rotation @ axis) for axis in np.asarray(across_line(robot)).T]
+        moves += [(still, rotation @ axis) for axis in np.asarray(ACROSS(robot)).T]
     return moves
 
 
@@ -88,22 +92,22 @@ def length(base, axis, radius, target):
     side = side / np.linalg.norm(side)
 
     def at(angle):
-        point = base + radius * (1.0 - np.cos(angle)) * side + radius * np.sin(angle) * axis
-        return point, np.sin(angle) * side + np.cos(angle) * axis
+        sine, cosine = np.sin(angle)[..., None], np.cos(angle)[..., None]
+        return base + radius * (1.0 - cosine) * side + radius * sine * axis, sine * side + cosine * axis
 
     def miss(angle):  # of the target from the tangent, outwards
         point, _ = at(angle)
-        normal = -np.cos(angle) * side + np.sin(angle) * axis
-        return (target - point) @ normal
+        normal = np.sin(angle)[..., None] * axis - np.cos(angle)[..., None] * side
+        return np.sum((target - point) * normal, axis=-1)
 
     grid = np.linspace(0.0, 2.0 * np.pi, 721)
+    missed = miss(grid)
     found = []
-    for low, up in itertools.pairwise(grid):
-        if miss(low) * miss(up) <= 0.0:
-            angle = brentq(miss, low, up, xtol=1e-14)
-            point, along = at(angle)
-            if (target - point) @ along > 0.0:
-                found.append((radius * angle + np.linalg.norm(target - point), along, point))
+    for i in np.flatnonzero(missed[:-1] * missed[1:] <= 0.0):
+        angle = brentq(miss, grid[i], grid[i + 1], xtol=1e-14)
+        point, along = at(angle)
+        if (target - point) @ along > 0.0:
+            found.append((radius * angle + np.linalg.norm(target - point), along, point))
     return min(found, key=lambda one: one[0])
 
 
@@ -126,7 +130,7 @@ def test_wrenches_are_those_of_virtual_work(pattern, wheels):
         robot = cspr_jax.with_cables(robot, pulley_radius=np.linspace(0.02, 0.09, 8), pulley_axes=axis)
     at = state_of(pattern, rng)
     with double_precision():
-        matrix = np.asarray(jax.jit(lambda robot, at: robot.wrench_matrix(at))(robot, at))
+        matrix = np.asarray(MATRIX(robot, at))
     position, rotation, step = np.asarray(at.position), np.asarray(at.rotation), 1e-6
     moves = directions(robot, rotation)
     assert matrix.shape == (robot.dof, 8) and len(moves) == robot.dof == PATTERNS[pattern].dof
@@ -142,7 +146,7 @@ def test_wrenches_are_those_of_virtual_work(pattern, wheels):
 def test_inertial_wrenches_are_those_of_point_masses(pattern):
     robot, at = made(pattern), state_of(pattern, np.random.default_rng(4))
     with double_precision():
-        found = np.asarray(robot.inertial_wrench(at))
+        found = np.asarray(INERTIAL(robot, at))
     rotation, omega, spin = (np.asarray(x) for x in (at.rotation, at.angular_velocity, at.angular_acceleration))
     about = np.zeros(3) if pattern == "3R" else np.asarray(robot.centre_of_mass)
     arms = (PLACED[pattern] - about) @ rotation.T
@@ -179,7 +183,7 @@ def test_any_pattern_is_loaded_from_a_file(tmp_path, pattern):
     turned = signs[:, None] * np.asarray(at.rotation) * signs
     moved = at._replace(position=jnp.asarray(frame.inward(at.position)), rotation=jnp.asarray(turned))
     with double_precision():
-        pair = np.asarray(loaded.wrench_matrix(at)), np.asarray(own.wrench_matrix(moved))
+        pair = np.asarray(MATRIX(loaded, at)), np.asarray(MATRIX(own, moved))
     np.testing.assert_allclose(np.abs(pair[0]), np.abs(pair[1]), atol=1e-12)
     if pattern not in ("2T", "3T", "3R3T"):
         assert "not known" in fault_at_rest(read_robot(path))
@@ -271,9 +275,10 @@ def test_pulleys_are_those_of_a_root_finder():
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     radius = rng.uniform(0.0, 0.3, 200)
     with double_precision():
-        found = jax.tree.map(np.asarray, jax.jit(pulleys.exits)(entry, axis, radius, target))
-        lanes = pulleys.exit_lanes(*(tuple(x.T) for x in (entry, axis)), radius, tuple(target.T))
-        rates = jax.grad(lambda to: jnp.sum(sum(pulleys.exits(entry, axis, radius, to)[2:])))(jnp.asarray(target))
+        found = jax.tree.map(np.asarray, EXITS(entry, axis, radius, target))
+        lanes = jax.jit(pulleys.exit_lanes)(*(tuple(x.T) for x in (entry, axis)), radius, tuple(target.T))
+        total = jax.jit(jax.grad(lambda to: jnp.sum(sum(pulleys.exits(entry, axis, radius, to)[2:]))))
+        rates = total(jnp.asarray(target))
     lanes = pulleys.Exit(*(np.stack(part, axis=-1) for part in lanes[:2]), *map(np.asarray, lanes[2:]))
     for one, other in zip(found, lanes, strict=True):
         np.testing.assert_allclose(other, one, atol=1e-13)
@@ -294,11 +299,11 @@ def test_small_pulleys_are_points():
     ray = target - entry
     for radius in (0.0, 1e-9):
         with double_precision():
-            found = pulleys.exits(entry, np.array([[0.0, 0.0, 1.0]]), np.array([radius]), target)
+            found = EXITS(entry, np.array([[0.0, 0.0, 1.0]]), np.array([radius]), target)
         assert float(found.free[0] + found.wrapped[0]) == pytest.approx(np.linalg.norm(ray), abs=3e-9)
         np.testing.assert_allclose(found.direction, ray / np.linalg.norm(ray), atol=3e-9)
     with double_precision():  # straight above the pulley nothing is wrapped
-        found = pulleys.exits(entry, np.array([[0.0, 0.0, 1.0]]), np.array([0.1]), entry + np.array([0, 0, 0.5]))
+        found = EXITS(entry, np.array([[0.0, 0.0, 1.0]]), np.array([0.1]), entry + np.array([0, 0, 0.5]))
     assert float(found.free[0]) == pytest.approx(0.5) and abs(float(found.wrapped[0])) < 1e-12
 
 
@@ -324,5 +329,5 @@ def test_a_rigid_platform_is_as_before():
     parts = body(PLACES)
     moved = platform_robot(BOX, CORNERS - parts["centre_of_mass"], mass=parts["mass"], inertia=parts["inertia"])
     with double_precision():
-        np.testing.assert_allclose(robot.wrench_matrix(at), moved.wrench_matrix(at), atol=1e-14)
-        np.testing.assert_allclose(robot.inertial_wrench(at), moved.inertial_wrench(at), atol=1e-12)
+        np.testing.assert_allclose(MATRIX(robot, at), MATRIX(moved, at), atol=1e-14)
+        np.testing.assert_allclose(INERTIAL(robot, at), INERTIAL(moved, at), atol=1e-12)

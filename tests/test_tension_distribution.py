@@ -220,7 +220,7 @@ def test_fewer_cables_than_components():
         tension_distribution.least_norm(jnp.ones((3, 2)), jnp.ones(3), jnp.zeros(2), jnp.ones(2))
 
 
-@pytest.mark.parametrize("count", [4, 8])
+@pytest.mark.parametrize("count", [4, pytest.param(8, marks=pytest.mark.soak)])
 def test_gradients(count):
     """What designs are improved by: of a sum of all answers, along a random change of all that is given."""
     rng, cases = np.random.default_rng(5), random_cases(3, count, seed=5)

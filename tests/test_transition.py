@@ -31,8 +31,9 @@ FUNCTIONS = {
 PRINTED = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}  # (1.101)
 LEAST, BEST = jax.jit(counts.least_oscillations), jax.jit(counts.best_inclination)
 LEAST_OF_MANY = jax.jit(jax.vmap(counts.least_oscillations, (None, None, 0)))
+FEWEST = jax.jit(zero_tension.least_oscillations)
 ROOT = jax.jit(jax.vmap(counts.squared_oscillations_at, (None, 0, 0, 0)))
-TRANSITION, WEIGHTS, MOTION = (jax.jit(f) for f in (transitions.transition, transitions.weights, hypocycloid.motion))
+TRANSITION, WEIGHTS, MOTION = transitions.transition, transitions.weights, jax.jit(hypocycloid.motion)
 PULL, DERIVATIVES = jax.jit(force_balance.pseudotensions), jax.jit(derivatives, static_argnames="order")
 
 
@@ -166,7 +167,7 @@ def test_far_targets_need_oscillations_in_proportion(name):
         weights = np.array([w, -w, 0.0])
         n = float(LEAST(amplitude, weights, 0.0))
         if name not in ("A1", "A3") or w > 1.0:
-            assert n >= float(zero_tension.least_oscillations(jnp.asarray(weights), jnp.asarray(0.0))) * (1.0 - 1e-12)
+            assert n >= float(FEWEST(weights, 0.0)) * (1.0 - 1e-12)
     assert n == pytest.approx(float(counts.many_oscillations(amplitude, jnp.asarray(weights))), rel=1e-5)
     assert n == pytest.approx(3000.0 * float(amplitude.largest[1]) / math.pi, rel=1e-5)
 

@@ -33,6 +33,10 @@ from cspr_jax.trajectories.hypocycloid import Hypocycloid, segment
 from cspr_jax.trajectories.motion import Motion, Placed, inward
 from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, pose_segment
 
+# Compiled whole: XLA would compile each of their operations by itself.
+_SLACKS = jax.jit(feasibility.slacks)
+_MARGIN = jax.jit(feasibility.sampled_margin, static_argnames="samples")
+
 
 def make_problem(
     robot: AnyRobot, *, amplitude: str | Amplitude = "quintic", limits: Limits | None = None
@@ -186,7 +190,7 @@ def slacks(problem: Problem, motion: Motion, tau) -> Array:
     Returns:
         (n_slacks,) without a unit, in the order of `feasibility.slacks`; all positive while the motion is feasible.
     """
-    return feasibility.slacks(problem, _inner(motion), jnp.asarray(tau, float))
+    return _SLACKS(problem, _inner(motion), jnp.asarray(tau, float))
 
 
 def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array:
@@ -202,7 +206,7 @@ def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array
     Returns:
         () without a unit.
     """
-    return feasibility.sampled_margin(problem, _inner(motion), samples)
+    return _MARGIN(problem, _inner(motion), samples=samples)
 
 
 def _places(frame: Frame, start, end, z0) -> tuple[Array, Array]:

@@ -11,8 +11,8 @@ from cspr_jax.arithmetic.batches import in_threads, room
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.bench.timing import best
 from cspr_jax.feasibility.workspace import geometry
+from cspr_jax.feasibility.workspace.programs import by_program, by_squares
 from cspr_jax.problem import centred, load_robot
-from cspr_jax.published import peers
 from cspr_jax.robots import clearance_kernels
 from cspr_jax.robots.clearance import scene
 from cspr_jax.robots.limits import Limits
@@ -183,9 +183,9 @@ def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
     wrench = search.required(places[0], turns[0]).corners[0]
 
     def rate(way) -> float:
-        return SAMPLE / best(lambda: [way(matrix, wrench, search.asked) for matrix in matrices])
+        return SAMPLE / best(lambda: [way(matrix, wrench, search.asked.low, search.asked.high) for matrix in matrices])
 
-    return {"HiGHS": rate(peers.by_program), "NNLS": rate(peers.by_squares)}
+    return {"HiGHS": rate(by_program), "NNLS": rate(by_squares)}
 
 
 def lines(found: dict[str, Any]) -> list[str]:

@@ -8,10 +8,10 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog, nnls
 from scipy.spatial.transform import Rotation
 
 from cspr_jax.feasibility.workspace import geometry
+from cspr_jax.feasibility.workspace.programs import CLOSE, by_program, by_squares
 from cspr_jax.problem import centred, load_robot
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.limits import Limits
@@ -21,8 +21,6 @@ from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
 # Poses of which linear programs and least squares are asked as well, evenly over the grid.
 SAMPLE = 60
 MICRO = 1e6
-# Of the largest limit: what a residual, and a margin, may be off.
-CLOSE = 1e-6
 
 
 class Grid(NamedTuple):
@@ -105,6 +103,7 @@ def _row(grid: Grid) -> dict[str, float]:
     matrices = np.asarray(geometry.wrench_matrices(own, places[some], turns[some]))
     matrices = matrices / search.unit[:, None]
     wrench = search.required(places[0], turns[0]).corners[0]
+    limits = (None, None) if grid.condition == CLOSURE else (asked.low, asked.high)
     inside, clear = answers.verdict[some] == 0, np.abs(answers.margin[some]) > CLOSE * _size(asked)
     found = {
         "poses": float(count),
@@ -114,7 +113,7 @@ def _row(grid: Grid) -> dict[str, float]:
     }
     for name, way in (("HiGHS", by_program), ("NNLS", by_squares)):
         start = time.perf_counter()
-        verdicts = np.array([way(matrix, wrench, asked) for matrix in matrices])
+        verdicts = np.array([way(matrix, wrench, *limits) for matrix in matrices])
         found[f"us, {name}"] = MICRO * (time.perf_counter() - start) / len(some)
         found[f"differ, {name}"] = float(((verdicts != inside) & clear).sum())
     return found
@@ -123,58 +122,3 @@ def _row(grid: Grid) -> dict[str, float]:
 def _size(asked: Question) -> float:
     finite = asked.high[np.isfinite(asked.high)]
     return 1.0 if asked.condition == CLOSURE else float(max([*asked.low, *finite, asked.wrenches.size]))
-
-
-def by_program(matrix: np.ndarray, wrench: np.ndarray, asked: Question) -> bool:
-    """Verdict of one pose by a linear program: the largest s with low + s <= t <= high - s; of closure s <= t <= 1.
-
-    Args:
-        matrix: (dof, n_cables) wrench matrix, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
-        asked: limits and condition.
-
-    Returns:
-        whether the pose is inside.
-    """
-    dof, count = matrix.shape
-    low, high, load = _limits(asked, wrench)
-    keeps = [np.c_[-np.eye(count), np.ones(count)], np.c_[np.eye(count), np.ones(count)]]
-    bounds = np.r_[-low, high]
-    finite = np.isfinite(bounds)
-    found = linprog(
-        np.r_[np.zeros(count), -1.0],
-        A_ub=np.vstack(keeps)[finite],
-        b_ub=bounds[finite],
-        A_eq=np.c_[matrix, np.zeros(dof)],
-        b_eq=load,
-        bounds=[*[(None, None)] * count, (None, asked.wrenches.size + 1.0)],
-    )
-    return bool(found.status == 0 and found.x[-1] > 0.0)
-
-
-def by_squares(matrix: np.ndarray, wrench: np.ndarray, asked: Question) -> bool:
-    """Verdict of one pose by least squares: tensions above the smallest ones, of closure above 1, and what is left.
-
-    Args:
-        matrix: (dof, n_cables) wrench matrix, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
-        asked: limits and condition.
-
-    Returns:
-        whether the pose is inside.
-    """
-    low, high, load = _limits(asked, wrench)
-    if asked.condition == CLOSURE:
-        low, high = np.ones_like(low), np.full_like(high, np.inf)
-    given, wanted = matrix, load - matrix @ low
-    if np.isfinite(high).all():
-        count = matrix.shape[1]
-        given = np.block([[matrix, np.zeros_like(matrix)], [np.eye(count), np.eye(count)]])
-        wanted = np.r_[wanted, high - low]
-    return bool(nnls(given, wanted)[1] <= CLOSE * np.linalg.norm(wanted))
-
-
-def _limits(asked: Question, wrench: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    if asked.condition == CLOSURE:
-        return np.zeros_like(asked.low), np.ones_like(asked.high), np.zeros_like(wrench)
-    return asked.low, asked.high, wrench

@@ -1,8 +1,10 @@
 """Cables of any robot: what they are made of; their tensions, lengths and rates, by the balance of its kind."""
 
 import dataclasses
+from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -55,6 +57,7 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
     return dataclasses.replace(robot, **changes) if changes else robot
 
 
+@partial(jax.jit, static_argnames=("rule",))
 def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS, rule: str = CENTRED) -> Array:
     """Cable tensions; of redundant cables those of a rule.
 

@@ -220,6 +220,7 @@ def acceleration_faces(robot: PointMassRobot, position: Array, tension_min: Arra
     return dataclasses.replace(faces, normals=normals, apex=apex + falling, offsets=faces.offsets + normals @ falling)
 
 
+@jax.jit
 def tension_range(robot: Robot, limits: Limits) -> tuple[Array, Array]:
     """Smallest and largest tension of each cable.
 

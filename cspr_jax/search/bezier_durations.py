@@ -65,7 +65,7 @@ def feasible_durations(robot: PointMassRobot, ends: Ends, z0: np.ndarray) -> lis
         of each segment (n_intervals, 2), both ends of each interval proved feasible, the last one inf where any longer
         duration is; s.
     """
-    rows, arms = (np.asarray(x) for x in adjugate(robot))
+    rows, arms = (np.asarray(x) for x in jax.jit(adjugate)(robot))
     roots = critical_durations(rows, arms, np.asarray(plane_normal(robot)), float(robot.gravity), ends)
     segment, tests = _between(roots)
     pick = Ends(*(x[segment] for x in ends))

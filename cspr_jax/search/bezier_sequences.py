@@ -43,6 +43,7 @@ class Anchored(NamedTuple):
     z0: Any
 
 
+@jax.jit
 def segments_of(sequence: Anchored, durations: Array) -> Bezier:
     """Segments of given durations.
 

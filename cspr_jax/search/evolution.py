@@ -15,7 +15,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
-from scipy.stats import qmc
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts
 
@@ -130,6 +129,8 @@ def evolved(
     Returns:
         (n, n_asked, d) in [0, 1]; where no place found has the margin, the one with the largest.
     """
+    from scipy.stats import qmc  # it takes a second to import
+
     places = qmc.Halton(unknowns, seed=0).random(GROUP * population)
     own = moves_of(unknowns, population)
     # Each search its own ones: what one misses, another one may find.

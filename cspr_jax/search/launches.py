@@ -6,6 +6,7 @@ accelerations of the whole sequence from that control point.
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -63,6 +64,7 @@ class Found(NamedTuple):
     velocity: Any
 
 
+@jax.jit
 def _found(arguments: Any, x: Array) -> Found:
     # Unknowns: logarithms of the free durations, then the release, then the logarithm of the flight's time.
     problem, launch, durations, free = arguments

@@ -103,10 +103,12 @@ class Placed(Generic[Kind]):
         """Depth of P0; see `Motion.z0`."""
         return self.motion.z0
 
+    @jax.jit
     def duration(self) -> Array:
         """Duration; see `Motion.duration`."""
         return self.motion.duration()
 
+    @jax.jit
     def state(self, tau: Array) -> State:
         """State; see `Motion.state`."""
         return outward(self.frame, self.motion.state(tau))

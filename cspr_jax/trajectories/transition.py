@@ -11,6 +11,7 @@ is a swing that stays between the target and its opposite point.
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -20,6 +21,7 @@ from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.hypocycloid import Segment
 
 
+@jax.jit
 def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: Array) -> Segment:
     """The transition from rest in p0 to a target.
 
@@ -37,6 +39,7 @@ def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: A
     return dataclasses.replace(segment, end_curvature=bend)
 
 
+@jax.jit
 def steady(segment: Segment) -> Segment:
     """The swing of one size that a transition ends in.
 
@@ -63,6 +66,7 @@ def inclination(segment: Segment) -> Array:
     return segment.end_radius * segment.tilt[..., 0]
 
 
+@jax.jit
 def weights(segment: Segment) -> Array:
     """The weighted trajectory parameters w_k: (1.37) and (1.93) for their robots.
 
@@ -78,6 +82,7 @@ def weights(segment: Segment) -> Array:
     return load - inclination(segment)[..., None]
 
 
+@jax.jit
 def depth_for(robot: PointMassRobot, target: Array, inclination: Array) -> Array:
     """The depth z0 of p0 that gives a target an inclination, from (1.31).
 

@@ -61,10 +61,15 @@ def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
     Returns:
         of `robots.wrench_balance.normalised_determinant`; NaN if it has not, or the place is not below the spools.
     """
-    upright, depth = jnp.eye(3), plane_normal(robot) @ jnp.asarray(place)
-    here = float(normalised_determinant(robot, jnp.asarray(place), upright))
-    is_free = is_regular(determinant_share(robot, jnp.asarray(place), upright))
-    return here if float(depth) > 0.0 and bool(is_free) else np.nan
+    here, depth, share = _upright(robot, np.asarray(place, float))
+    return float(here) if float(depth) > 0.0 and bool(is_regular(share)) else np.nan
+
+
+@jax.jit
+def _upright(robot: PlatformRobot, place: Array) -> tuple[Array, Array, Array]:
+    upright = jnp.eye(3)
+    share = determinant_share(robot, place, upright)
+    return normalised_determinant(robot, place, upright), plane_normal(robot) @ place, share
 
 
 class OrientationSteps:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import jax
 import numpy as np
 
 from cspr_jax.arithmetic.block_minima import Blocks, Proved, smallest
@@ -77,7 +78,7 @@ def _tables(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.n
     growth = np.stack([slope, 2.0 * square], axis=-1)[:, None]
     per_time = product(u, np.array([1.0, 0.0, -1.0]))
     along = _dot(rays, growth)
-    rows, arms = (np.asarray(x)[0] for x in adjugate(problem.robot))
+    rows, arms = (np.asarray(x)[0] for x in jax.jit(adjugate)(problem.robot))
     level = np.einsum("i,nij->nj", np.cross(arms, a[0]) - rows, place)
     level[:, 0] += rows @ a[0]
     return {

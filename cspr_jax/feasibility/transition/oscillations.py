@@ -72,6 +72,7 @@ def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]
     return jnp.where(d > 0.0, omega, jnp.inf)
 
 
+@jax.jit
 def _samples(amplitude: Amplitude) -> Array:
     # Every knot among them; dense towards the ends of each piece, where steep inclinations have their maximum.
     ends = jnp.concatenate([jnp.zeros(1), jnp.asarray(amplitude.knots), jnp.ones(1)])
@@ -162,6 +163,7 @@ def least_oscillations(amplitude: Amplitude, weights: Array, inclination: Array)
     return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), _extreme(weights), inclination), 0.0))
 
 
+@jax.jit
 def _extreme(weights: Array) -> Array:
     # What a load may be, for a given N, is an interval about zero: only the extreme cables count.
     return jnp.stack([jnp.max(weights), jnp.min(weights)])
