@@ -1,8 +1,9 @@
 """Volumes of workspaces from Python: of a map, with the error that its grid leaves."""
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from cspr_jax.errors import InputError
 from cspr_jax.schema.meanings import CELL_SIDES
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result, open_result
+
+if TYPE_CHECKING:
+    import xarray
 
 __all__ = ["WorkspaceVolume", "workspace_volume"]
 _, INSIDE, OUTSIDE = range(len(CELL_SIDES))
@@ -76,11 +80,11 @@ class WorkspaceVolume:
         return found
 
 
-def workspace_volume(result: Result | str | Path) -> WorkspaceVolume:
+def workspace_volume(result: "Result | xarray.Dataset | str | Path") -> WorkspaceVolume:
     """Volume of the workspace that a map has found, or its area where the map is a section.
 
     Args:
-        result: of a sweep of a map with verdicts, in memory or its file.
+        result: of a sweep of a map with verdicts: its file, what `open_result` or `compute` gave.
 
     Returns:
         the volume; arrays over the axes that are no coordinates of places, () without any.
@@ -89,33 +93,31 @@ def workspace_volume(result: Result | str | Path) -> WorkspaceVolume:
         InputError: no map, no stored verdicts, or a single place.
         StoreError: no result file.
     """
-    found = result if isinstance(result, Result) else open_result(Path(result))
-    if not found.is_map or "verdict" not in found.data:
-        raise InputError("result", None, "must be a map that stores verdict", fault="no verdicts")
-    names, axes = list(found.axes), POLAR if "radius" in found.axes else LEVEL
-    spread = [name for name in axes if len(found.axes.get(name, ())) > 1]
+    axes, data = _read(result)
+    names, spatial = list(axes), POLAR if "radius" in axes else LEVEL
+    spread = [name for name in spatial if len(axes.get(name, ())) > 1]
     if not spread:
         raise InputError("result", None, "must have two places or more", fault="a single place")
     order = [names.index(name) for name in spread]
     others = [i for i in range(len(names)) if names[i] not in spread]
-    weights = _weights([_widths(found.axes[name], name) for name in spread])
+    weights = _weights([_widths(axes[name], name) for name in spread])
 
     def placed(name: str) -> np.ndarray:
-        values = found.data[name].transpose(*others, *order)
+        values = data[name].transpose(*others, *order)
         # Of places that have only one coordinate here there is one cell.
-        singles = tuple(i for i, k in enumerate(others) if names[k] in axes)
+        singles = tuple(i for i, k in enumerate(others) if names[k] in spatial)
         return values.squeeze(axis=singles)
 
     verdict = placed("verdict")
     inside, count = verdict == 0, len(spread)
-    side = placed("cell_side") if "cell_side" in found.data else np.zeros(verdict.shape, np.int16)
+    side = placed("cell_side") if "cell_side" in data else np.zeros(verdict.shape, np.int16)
     total, over = weights.sum(), tuple(range(-count, 0))
 
     def volume(chosen: np.ndarray) -> np.ndarray:
         return np.asarray((chosen * weights).sum(axis=over))
 
     return WorkspaceVolume(
-        axes={names[i]: found.axes[names[i]] for i in others if names[i] not in axes},
+        axes={names[i]: axes[names[i]] for i in others if names[i] not in spatial},
         units="m" if count == 1 else f"m{count}",
         volume=volume(inside),
         error=0.25 * volume(_at_border(inside, count)),
@@ -124,6 +126,20 @@ def workspace_volume(result: Result | str | Path) -> WorkspaceVolume:
         proved_fraction=volume(side != 0) / total,
         undecided_fraction=volume(verdict == Verdict.UNDECIDED) / total,
     )
+
+
+def _read(result) -> tuple[dict[str, np.ndarray], Mapping[str, np.ndarray]]:
+    # Axes in the order of the dimensions, and quantities.
+    if hasattr(result, "data_vars"):  # of xarray
+        data = {name: np.asarray(values) for name, values in result.data_vars.items()}
+        names = result["verdict"].dims if "verdict" in data else ()
+        axes = {str(name): np.asarray(result[name]) for name in names}
+    else:
+        found = result if isinstance(result, Result) else open_result(Path(result))
+        axes, data = found.axes, found.data if found.is_map else {}
+    if "verdict" not in data:
+        raise InputError("result", None, "must be a map that stores verdict", fault="no verdicts")
+    return axes, data
 
 
 def _widths(points: np.ndarray, name: str) -> np.ndarray:
