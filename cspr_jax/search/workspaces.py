@@ -27,6 +27,8 @@ from cspr_jax.search.workspace_questions import CLOSURE, UNTURNED, Question
 # Of the largest limit of the tensions, or of the wrench: a margin nearer to zero is that of the boundary.
 BOUNDARY = 1e-9
 BATCH, PART = 8192, 65536
+# Of robots whose normals are cheap.
+FEW_COMPONENTS, LONG_BATCH = 3, 32768
 # Poses by which the base block is chosen, and those by which cocircuits that are none are left out.
 TRIALS, FEW_TRIALS = 200, 8
 # So many open poses go to singular values at once: to compile for them would take longer.
@@ -190,6 +192,11 @@ class WorkspaceSearch:
         if len(self._choices.table):
             yield self._stage(np.float64, False), is_known
 
+    @property
+    def batch(self) -> int:
+        """Length of a batch on a CPU: so many that what starts a call is short beside it, and arrays fit caches."""
+        return LONG_BATCH if self._robot.dof <= FEW_COMPONENTS else BATCH
+
     def kernel(self, dtype: type, *, by_null_space: bool = False) -> Callable[..., Array]:
         """Compiled margins of a batch of poses.
 
@@ -233,7 +240,7 @@ class WorkspaceSearch:
             turns = lanes(poses.quaternions) if is_body else None
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
             batch = lanes(poses.positions), turns, loads
-            return in_batches(lambda x: compiled(*x), batch, size=BATCH)
+            return in_batches(lambda x: compiled(*x), batch, size=self.batch)
 
         return stage
 

@@ -36,7 +36,9 @@ def wrench_columns(robot: AnyRobot, position: Vector, quaternion: Vector | None,
     """
     arms = None if quaternion is None else turned_arms(robot, quaternion)
     units = unit_vectors(robot, position, arms)
-    return _columns(robot, units, arms, quaternion, length)
+    if isinstance(robot, PlatformRobot):
+        return _columns(robot, units, arms, quaternion, length)
+    return [units[i] for i in PATTERNS[robot.pattern].forces]
 
 
 @jax.jit
@@ -94,11 +96,9 @@ def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> Vect
 
 @jax.jit
 def _columns(
-    robot: AnyRobot, units: Vector, arms: Vector | None, quaternion: Vector | None, length: Array
+    robot: PlatformRobot, units: Vector, arms: Vector | None, quaternion: Vector | None, length: Array
 ) -> list[Array]:
     row, shape = PATTERNS[robot.pattern], (robot.n_cables, units[0].shape[1])
-    if not row.is_body or not isinstance(robot, PlatformRobot):
-        return [units[i] for i in row.forces]
     moment = lanes.cross(_down(robot.platform_points, shape) if arms is None else arms, units)
     if row.along_line:
         axes = [_down(jnp.broadcast_to(axis, (shape[0], 3)), shape) for axis in across_line(robot).T]

@@ -156,10 +156,13 @@ def null_space(every: Sequence[Array], wrench: Column, *, order: tuple[int, ...]
         the tensions.
     """
     rows, held, *others = _by_block(every, wrench, order=order)
-    return NullSpace([_stacked(row) for row in rows], _stacked(held), *others)
+    *stacked, tensions = _stacked([*rows, held])
+    return NullSpace(stacked, tensions, *others)
 
 
-_stacked = jax.jit(jnp.stack)
+@jax.jit
+def _stacked(lanes: Sequence[Sequence[Array]]) -> list[Array]:
+    return [jnp.stack(row) for row in lanes]
 
 
 @partial(jax.jit, static_argnames=("order",))
