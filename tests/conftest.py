@@ -185,5 +185,4 @@ def small_bench(monkeypatch):
     monkeypatch.setattr(six_cables, "NUMPY_TRAJECTORIES", 2)
     monkeypatch.setattr(six_cables, "TRAJECTORIES", 400)
     monkeypatch.setattr(six_cables, "LANES", 64)
-    for name, few in (("BATCHES", 1), ("FEW_BATCHES", 1), ("BATCH", 64), ("PAIRS_BATCH", 64), ("SAMPLE", 2)):
-        monkeypatch.setattr(workspaces, name, few)
+    monkeypatch.setattr(workspaces, "rates", lambda: {"8 cables": {"float32": 2e6, "float64": 1e6, "first_s": 1.0}})

@@ -10,7 +10,7 @@ from oracles import point_mass
 from test_outputs import cspr, strict_json
 
 from cspr_jax import load_robot
-from cspr_jax.bench import six_cables, three_cables
+from cspr_jax.bench import six_cables, three_cables, timing, workspaces
 from cspr_jax.cli import main
 from cspr_jax.search import arc_sieve
 
@@ -37,8 +37,30 @@ def test_bench(capsys, small_bench, kernels):
     assert found["taut_share"]["float32"] == found["taut_share"]["float64"]
     assert (found["hand_written"] is None) == (kernels is None)
     assert 300 < found["operations_per_check"] < 900
-    assert len(found["workspaces"]) == 8 and all(x > 0 for row in found["workspaces"].values() for x in row.values())
+    assert found["workspaces"]["8 cables"]["first_s"] == 1.0
     assert "x NumPy" in cspr(capsys, "bench", *options)
+
+
+@pytest.fixture
+def few_poses(monkeypatch):
+    """Sizes with which rates of workspaces take seconds."""
+    for name, few in (("BATCHES", 1), ("FEW_BATCHES", 1), ("TENSIONS", 64), ("PAIRS_BATCH", 64), ("SAMPLE", 2)):
+        monkeypatch.setattr(workspaces, name, few)
+    monkeypatch.setattr(timing, "REPEATS", 1)
+
+
+def test_the_rate_of_four_cables(few_poses):
+    rate, first = workspaces.margin_rate(
+        workspaces._four_cables(), "wrench-feasible", "float32", by_null_space=False, batches=1
+    )
+    assert rate > 0.0 and first > 0.0
+
+
+@pytest.mark.soak
+def test_rates_of_workspaces(few_poses):
+    found = workspaces.rates()
+    assert len(found) == 8 and all(x > 0 for row in found.values() for x in row.values())
+    assert len(workspaces.lines(found)) == 9 and "first" in workspaces.lines(found)[1]
 
 
 @with_compiler

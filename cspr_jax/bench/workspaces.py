@@ -20,12 +20,12 @@ from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import PointMassRobot, point_mass_robot
 from cspr_jax.robots.tension_lanes import least_norms
 from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, question
-from cspr_jax.search.workspaces import BATCH, WorkspaceSearch
+from cspr_jax.search.workspaces import WorkspaceSearch
 
-# Batches of poses; of the arrays of twelve cables fewer.
-BATCHES, FEW_BATCHES = 32, 4
-# Poses of one call where cables are held apart, and poses of the others' ways.
-PAIRS_BATCH, SAMPLE = 65_536, 100
+# Batches of poses; of twelve cables fewer.
+BATCHES, FEW_BATCHES = 16, 4
+# Poses of one call where cables are held apart, of which tensions are found, and of the others' ways.
+PAIRS_BATCH, TENSIONS, SAMPLE = 65_536, 65_536, 100
 
 
 class Poses(NamedTuple):
@@ -135,7 +135,7 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
     Returns:
         the rate.
     """
-    count = 8 * BATCH
+    count = TENSIONS
     own = centred(robot)[0]
     search = WorkspaceSearch(own, question(own, FEASIBLE, robot.limits))
     poses = _poses(own, count, "float64")

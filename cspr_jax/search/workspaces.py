@@ -26,9 +26,12 @@ from cspr_jax.search.workspace_questions import CLOSURE, UNTURNED, Question
 
 # Of the largest limit of the tensions, or of the wrench: a margin nearer to zero is that of the boundary.
 BOUNDARY = 1e-9
-BATCH, PART = 8192, 65536
-# Of robots whose normals are cheap.
-FEW_COMPONENTS, LONG_BATCH = 3, 32768
+PART = 1 << 18
+# Poses of a batch where few are asked about, and of what is only prepared here.
+BATCH = 1024
+MOST_SHORT = 8  # short batches
+# Of the wrench matrices of a batch where many are: what starts a call is then short beside it.
+NUMBERS = 1_600_000
 # Poses by which the base block is chosen, and those by which cocircuits that are none are left out.
 TRIALS, FEW_TRIALS = 200, 8
 # So many open poses go to singular values at once: to compile for them would take longer.
@@ -194,8 +197,9 @@ class WorkspaceSearch:
 
     @property
     def batch(self) -> int:
-        """Length of a batch on a CPU: so many that what starts a call is short beside it, and arrays fit caches."""
-        return LONG_BATCH if self._robot.dof <= FEW_COMPONENTS else BATCH
+        """Length of a batch on a CPU where many poses are asked about."""
+        rows = self._robot.dof * self._robot.n_cables
+        return 1 << int(np.log2(NUMBERS / rows))
 
     def kernel(self, dtype: type, *, by_null_space: bool = False) -> Callable[..., Array]:
         """Compiled margins of a batch of poses.
@@ -240,7 +244,9 @@ class WorkspaceSearch:
             turns = lanes(poses.quaternions) if is_body else None
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
             batch = lanes(poses.positions), turns, loads
-            return in_batches(lambda x: compiled(*x), batch, size=self.batch)
+            # Two lengths, since each is compiled.
+            size = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch
+            return in_batches(lambda x: compiled(*x), batch, size=size)
 
         return stage
 
