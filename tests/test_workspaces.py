@@ -335,6 +335,15 @@ def test_cables_at_one_point_do_not_slow_the_others():
         assert margin == pytest.approx(oracle.tension_margin(matrix, held, 0.0, np.inf), abs=1e-6)
 
 
+def test_cables_without_end_are_refused():
+    """What would take more memory than there is, in one line."""
+    angles = np.linspace(0.0, 6.0, 40)
+    spools = np.c_[np.cos(angles), np.sin(angles), 0.1 * angles]
+    robot = platform_robot(spools, 0.1 * spools[::-1] + 0.05 * spools**2, mass=1.0, inertia=ROUND)
+    with pytest.raises(InputError, match="40 cables: must have at most 28"):
+        cspr_jax.workspace(robot, [[0.0, 0.0, 1.0]])
+
+
 def test_the_prism_below_the_spools():
     """A point mass hangs still below the rectangle of its spools, and nowhere else."""
     spools = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [2.0, 1.0, 0.0], [-2.0, 1.0, 0.0]]

@@ -11,7 +11,7 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.search.workspace_questions import CONDITIONS, FEASIBLE, question, required_wrenches
+from cspr_jax.search.workspace_questions import CONDITIONS, FEASIBLE, check_cables, question, required_wrenches
 from cspr_jax.search.workspaces import WorkspaceAnswers, WorkspaceSearch, mass_centres
 
 __all__ = ["WorkspaceAnswers", "workspace"]
@@ -61,12 +61,14 @@ def workspace(  # noqa: PLR0913
         verdicts, 0 inside, and margins.
 
     Raises:
-        InputError: another kind of robot, an unknown condition, shapes that do not fit, values that are not finite,
-            quaternions that are not of unit length, orientations of a point mass, moments of a rod, accelerations of a
-            robot on a joint, limits or wrenches where the condition has none, limits that contradict each other.
+        InputError: another kind of robot, or one on too many cables, an unknown condition, shapes that do not fit,
+            values that are not finite, quaternions that are not of unit length, orientations of a point mass,
+            moments of a rod, accelerations of a robot on a joint, limits or wrenches where the condition has none,
+            limits that contradict each other.
     """
     if not isinstance(robot, PointMassRobot | PlatformRobot):
         raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
+    check_cables(robot)
     if condition not in CONDITIONS:
         raise InputError("condition", condition, " or ".join(f'"{name}"' for name in CONDITIONS))
     if precision not in PRECISIONS:

@@ -19,7 +19,7 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.orientation_grids import cone_grid, equal_volume_grid, turn_grid
 from cspr_jax.search.rest_poses import MARGINS, OrientationSet, RestPoses, over_orientations
-from cspr_jax.search.workspace_questions import FEASIBLE, question, required_wrenches
+from cspr_jax.search.workspace_questions import FEASIBLE, check_cables, question, required_wrenches
 from cspr_jax.search.workspaces import WorkspaceSearch
 
 INTERFERENCE = "interference-free"
@@ -48,6 +48,10 @@ class WorkspaceMap(GridMap):
                     raise ConfigError(file, f"workspace.{name}: must be absent: {spec.kind} has none")
         self._turn = self._given_turns([self._asked.orientation], "workspace.orientation")
         self._samples, self._volume = self._orientation_set()
+        try:
+            check_cables(self._robot)
+        except InputError as error:
+            raise ConfigError(file, str(error)) from error
         try:
             names = [name for name in self._asked.conditions if name != INTERFERENCE]
             searches = {name: self._search(name) for name in names}

@@ -1,6 +1,7 @@
 """Questions about workspaces: a condition, limits of the tensions, and the wrenches that the cables must supply."""
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from cspr_jax.robots.wrench_sets import tension_range
 
 STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
 CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
+# Of dof - 1 cables each: seconds of a pose, and as many megabytes.
+MOST_CHOICES = 100_000
 UNTURNED = np.array([[1.0, 0.0, 0.0, 0.0]])
 
 
@@ -37,6 +40,21 @@ class Question:
     high: np.ndarray
     wrenches: RequiredWrenches
     capacity_length: float | None = None
+
+
+def check_cables(robot: AnyRobot) -> None:
+    """Refuse more cables than workspaces can be computed for: their number grows with a power of it.
+
+    Args:
+        robot: the robot.
+
+    Raises:
+        InputError: of the robot.
+    """
+    if math.comb(robot.n_cables, robot.dof - 1) > MOST_CHOICES:
+        most = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MOST_CHOICES)
+        allowed = f"at most {most} for workspaces of {robot.dof} degrees of freedom"
+        raise InputError("robot", None, f"must have {allowed}", fault=f"{robot.n_cables} cables")
 
 
 def question(

@@ -69,11 +69,13 @@ def spanning(matrices: np.ndarray) -> Choices:
     """
     dof, count = matrices.shape[1:]
     table = subsets(count, dof)
-    chosen = matrices[:, :, table[:, : dof - 1]].transpose(0, 2, 1, 3)  # (n, n_choices, dof, dof - 1)
     rows = [np.delete(np.arange(dof), k) for k in range(dof)]
-    normals = np.stack([(-1.0) ** k * np.linalg.det(chosen[:, :, row]) for k, row in enumerate(rows)], -1)
-    rest = matrices[:, :, table[:, dof - 1 :]]
-    sizes = np.abs(np.einsum("nsk,nksj->nsj", normals, rest)).max(0)
+    sizes = np.zeros((len(table), count - dof + 1))
+    for matrix in matrices:
+        chosen = matrix[:, table[:, : dof - 1]].transpose(1, 0, 2)  # (n_choices, dof, dof - 1)
+        normals = np.stack([(-1.0) ** k * np.linalg.det(chosen[:, row]) for k, row in enumerate(rows)], -1)
+        rest = matrix[:, table[:, dof - 1 :]]
+        np.maximum(sizes, np.abs(np.einsum("sk,ksj->sj", normals, rest)), out=sizes)
     is_one = (sizes > NOTHING).any(1)
     counts = (sizes > NOTHING)[is_one]
     return Choices(table[is_one], None if counts.all() else counts.astype(float))
