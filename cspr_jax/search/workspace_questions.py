@@ -118,9 +118,8 @@ def required_wrenches(
     row, ellipsoids = PATTERNS[robot.pattern], list[np.ndarray]()
     asked = _weight(robot)
     if points is not None:
-        signs = np.ones(robot.dof)
-        if not row.along_line:
-            signs = np.array([frame.signs[i] for i in (*row.forces, *row.moments)])
+        signs = np.ones(robot.dof)  # moments of a rod are 0
+        signs[: len(row.forces) + len(row.moments)] = [frame.signs[i] for i in (*row.forces, *row.moments)]
         asked = RequiredWrenches(_finite(robot, "wrenches", points, 2) * signs)
     half = None if box is None else _not_negative("wrench_box", _finite(robot, "wrench_box", box, 1))
     if ellipsoid is not None:
