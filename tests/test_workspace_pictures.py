@@ -392,4 +392,4 @@ def test_a_legend_that_is_too_wide_is_broken(tmp_path):
         figure = cspr_jax.plot(list(SHAPES.values()), at={"z": 1.25}, size=size, output=tmp_path / "a.png")
         (legend,) = figure.legends
         assert legend.get_window_extent().width <= figure.bbox.width
-        assert [text.get_text() for text in legend.get_texts()][0] == "static" and len(legend.get_texts()) == 3
+        assert legend.get_texts()[0].get_text() == "static" and len(legend.get_texts()) == 3

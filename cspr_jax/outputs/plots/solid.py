@@ -24,10 +24,10 @@ from cspr_jax.store.result import Result
 SPACE = ["x", "y", "z"]
 ELEVATION, AZIMUTH = 20.0, -62.0  # degrees, of the eye
 SURFACE, END, LINES, CABLES = COLOURS[5], "#9a9a9a", COLOURS[0], COLOURS[1]
-BACK, FRONT = 0.6, 0.5  # opacities
+BACK, FRONT = 0.4, 0.3  # opacities
 # Inches, and parts of the figure: width and least height; what the box takes, the rest is for ticks, title and legend.
 WIDTH, LEAST_HEIGHT = 7.2, 4.4
-WIDE, HIGH, MIDDLE = 0.76, 0.66, 0.52
+WIDE, HIGH, MIDDLE = 0.76, 0.68, 0.51
 MARGIN = 0.02  # around what is drawn, of its largest side
 # Of the side of a panel: what the diagonal of a box takes that mplot3d shows without zoom.
 DIAGONAL = 1.03
@@ -111,11 +111,12 @@ def _axes(panel: Axes3D, result: Result, box: np.ndarray) -> _Eye:
     signs = np.array([1.0, -1.0, -1.0]) if is_down else np.ones(3)
     for name, sign, (low, high) in zip(SPACE, signs, box.T, strict=True):
         panel.set(**{f"{name}lim": (low, high) if sign > 0.0 else (high, low)})
-    for name, axis in zip(SPACE, (panel.xaxis, panel.yaxis, panel.zaxis), strict=True):
-        axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+    parts = np.ptp(box, axis=0) / np.ptp(box, axis=0).max()
+    for name, part, axis in zip(SPACE, parts, (panel.xaxis, panel.yaxis, panel.zaxis), strict=True):
+        axis.set_major_locator(MaxNLocator(max(2, round((15.0 if name == "z" else 9.0) * part)), steps=[1, 2, 5, 10]))
         axis.set_rotate_label(False)
         axis.set_label_text(axis_label(result, name), rotation=90.0 if name == "z" else 0.0)
-        axis.labelpad = rcParams["font.size"] * (0.2 if name == "z" else 1.0)
+        axis.labelpad = rcParams["font.size"] * (0.2 if name == "z" else 1.3)
     elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
     level = np.cos(elevation)
     return _Eye(signs, signs * np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]))
@@ -154,9 +155,10 @@ def _level_lines(triangles: np.ndarray, heights: np.ndarray) -> np.ndarray:
 
 
 def _fainter(opacity: float, image: np.ndarray, dpi: float) -> tuple[np.ndarray, float, float]:
+    # matplotlib calls it twice of a collection in space.
     del dpi
     faint = image.copy()
-    faint[..., 3] *= opacity
+    faint[..., 3] = np.minimum(faint[..., 3], opacity)
     return faint, 0.0, 0.0
 
 
