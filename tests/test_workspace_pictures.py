@@ -119,7 +119,8 @@ def test_the_surface_lies_where_margins_are_zero():
     assert (beside > -1e-12).all()
     np.testing.assert_allclose(beside[:, np.unique(found.pieces[~found.is_end])].min(0), 0.0, atol=1e-12)
     half = np.where(places[..., 2] > 0.5, FLOOR, 0)
-    for margins in ([], [np.full(half.shape, np.nan)], [np.where(half == 0, np.inf, -1.0)]):
+    unknown, endless, beyond = np.full(half.shape, np.nan), np.where(half, -1.0, np.inf), np.where(half, -0.1, 0.9)
+    for margins in ([], [unknown], [endless], [beyond]):
         found = boundary(Sides(points, half, margins))
         assert volume(found.corners, found.pieces) == pytest.approx(0.5, rel=1e-9)
 
@@ -143,7 +144,7 @@ def test_the_surface_encloses_the_volume():
 def test_outlines_part_the_points_as_their_verdicts_do(kind):
     """A ray in no direction of the grid crosses them an odd number of times from points inside alone."""
     rng = np.random.default_rng(6)
-    for shape in ((7, 9), (2, 5), (12, 4)):
+    for shape in ((7, 9), (2, 5), (12, 4), (20, 17)):
         sides = random_sides(rng, shape, kind)
         lines = outlines(sides)
         places, is_in = grid(sides.points), sides.verdict == 0
@@ -160,6 +161,7 @@ def test_outlines_part_the_points_as_their_verdicts_do(kind):
         for line, is_end in lines:
             on = [np.isin(line[:, k], sides.points[k]) for k in range(2)]
             assert (on[0] | on[1]).all()
+            assert (line[0] == line[-1]).all() or all(at_the_end(sides, line[k]) for k in (0, -1))
             if not is_end:
                 for corner in line:
                     assert {0, OUTSIDE} <= set(beside(sides, corner)) or at_the_end(sides, corner)
@@ -214,7 +216,9 @@ def test_a_solid_is_its_surface_with_the_robot_in_it(drawn, z_axis):
     turn = Rotation.from_euler("zyx", [0.4, -0.2, 0.3])
     table = {"orientation": turn.as_quat(scalar_first=True).tolist(), "conditions": ["wrench-feasible", "static"]}
     angles = {"tilt_azimuth": [0.3], "tilt": [0.1, 0.2], "torsion": [-0.5]}
-    given = ball(AXES | angles, table=table, robot=ROBOT | {"z_axis": z_axis})
+    mixed = {name: (AXES | angles)[name] for name in ("tilt", "z", "torsion", "y", "x", "tilt_azimuth")}
+    given = ball(mixed, table=table, robot=ROBOT | {"z_axis": z_axis})
+    given.data["verdict"][0] = OUTSIDE
     figure = cspr_jax.plot(given, solid=True, at={"tilt": 0.2})
     (panel,) = figure.axes
     behind, before, platform = (parts for parts, _ in drawn["triangles"])
@@ -240,14 +244,14 @@ def test_a_solid_is_its_surface_with_the_robot_in_it(drawn, z_axis):
     told = cspr_jax.workspace_volume(given)
     title = figure.get_suptitle()
     assert "eight: workspace, wrench-feasible 1 to 50 N, static, orientation (" in title
-    assert f"volume {told.volume[0, 1, 0]:.1f} ± {told.error[0, 1, 0]:.1f} m³" in title
+    assert f"volume {told.volume[1, 0, 0]:.1f} ± {told.error[1, 0, 0]:.1f} m³" in title
     assert "tilt = 11.46°" in title and f"z axis {z_axis}" in title
     assert [panel.get_xlabel(), panel.get_ylabel(), panel.get_zlabel()] == ["x (m)", "y (m)", "z (m)"]
 
 
 def parts_of(given: Result, name: str) -> np.ndarray:
-    """Of the second tilt, with rising y."""
-    return given.data[name][:, ::-1, :, 0, 1, 0]
+    """Of the second tilt, over x, rising y and z."""
+    return given.data[name][1, :, 0, ::-1, :, 0].transpose(2, 1, 0)
 
 
 def depth(panel, places: np.ndarray) -> np.ndarray:
@@ -279,7 +283,8 @@ def test_the_robot_stands_in_a_workspace_without_its_middle(drawn):
     assert "volume 8 m³" in full.get_suptitle() and "wrench-feasible above 0 N" in full.get_suptitle()
 
 
-SHAPES = {"static": ball(size=1.0, table={"conditions": ["static"]}), "own": ball(size=0.6)}
+HIGH = AXES | {"z": np.linspace(0.5, 2.75, 7)}
+SHAPES = {"static": ball(HIGH, size=1.0, table={"conditions": ["static"]}), "own": ball(HIGH, size=0.6)}
 
 
 def test_workspaces_are_compared_by_their_outlines():
