@@ -354,6 +354,7 @@ OTHER = ball(robot=ROBOT | {"base_points": CUBE.tolist()})
         (FLAT, {"solid": True}, "two points or more of each of x, y and z"),
         ([ball(), ball()], {"solid": True}, "of one result"),
         (EMPTY, {"solid": True}, "nothing is inside"),
+        (ball(table={"orientation": [0.0] * 4}), {"solid": True}, "workspace.orientation"),
         (ball(), {"solid": True, "at": {"z": 1.0}}, "--at"),
         (ball(), {"solid": True, "at": {"tilt": 1.0}}, "one of x, y, z"),
         (ball(), {"solid": True, "quantity": "verdict"}, "absent with --solid"),

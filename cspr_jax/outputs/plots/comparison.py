@@ -16,6 +16,7 @@ from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import COLOURS, PANELS, STYLES, axis_label, chosen, robot_name, values
 from cspr_jax.outputs.plots.layout import columns_of, panels
 from cspr_jax.outputs.plots.marks import mark
+from cspr_jax.outputs.plots.posed import robot_of
 from cspr_jax.outputs.plots.selection import SAME
 from cspr_jax.store.result import Result
 
@@ -110,7 +111,7 @@ def _check(every: list[Compared], plane: list[str]) -> None:
     if not plane:
         raise InputError("results", f"{first.file} over {first.across}", "maps over two or three of x, y and z")
     for one in every[1:]:
-        if not np.array_equal(*(x.result.attributes.get("base_points", ()) for x in (one, first))):
+        if robot_of(one.result).base_points != robot_of(first.result).base_points:
             raise InputError("results", one.file, f"of a robot with the spools of that in {first.file}")
         if set(one.across) != set(first.across):
             allowed = f"over {', '.join(first.across)}, as {first.file}; --at fixes the others"
@@ -146,7 +147,7 @@ def _agree(some: np.ndarray, others: np.ndarray) -> bool:
 def _box(every: list[Compared], plane: list[str]) -> np.ndarray:
     # (2, 2) corners: of the grids, and of the spools unless they are far.
     grids = np.array([[f(one.result.axes[axis]) for axis in plane] for one in every for f in (np.min, np.max)])
-    base = np.asarray(every[0].result.attributes.get("base_points", np.empty((0, 3))), float)
+    base = np.array(robot_of(every[0].result).base_points)
     both = np.concatenate([grids, base[:, ["xyz".index(axis) for axis in plane]]])
     shown = both if (np.ptp(both, axis=0) <= STRETCH * np.ptp(grids, axis=0)).all() else grids
     room = MARGIN * np.ptp(shown, axis=0).max()

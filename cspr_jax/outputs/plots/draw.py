@@ -129,7 +129,7 @@ def _refuse(option: str, others: dict[str, str | bool | None]) -> None:
 
 def _solid(results: list[Result], at: dict[str, float]) -> Figure:
     result = results[0]
-    counts = [len(result.axes.get(axis, ())) for axis in SPACE]
+    counts = [len(np.unique(result.axes.get(axis, ()))) for axis in SPACE]
     if len(results) > 1 or not _is_workspace(result) or min(counts) < 2:
         allowed = 'of one result of map = "workspace" that holds verdicts over two points or more of each of x, y and z'
         raise InputError("--solid", "no workspace in space", allowed)

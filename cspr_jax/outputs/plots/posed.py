@@ -6,8 +6,9 @@ import numpy as np
 
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.workspace import WorkspaceTable
+from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.notes import table
-from cspr_jax.robots.shapes import FLAT, hull, is_flat, rotation_matrix
+from cspr_jax.robots.shapes import FLAT, UNIT_TOLERANCE, hull, is_flat, rotation_matrix
 from cspr_jax.store.result import Result
 
 TURN = {"x": np.array([0.0, 1.0, 0.0, 0.0]), "z": np.array([0.0, 0.0, 0.0, 1.0])}
@@ -63,12 +64,18 @@ def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
 
     Returns:
         the robot, turned as the map says, from the orientation of its sets where it has one.
+
+    Raises:
+        InputError: the map has no orientation there, but numbers that are none.
     """
     spec = robot_of(result)
     azimuth, tilt, torsion = (angles.get(name, 0.0) for name in ("tilt_azimuth", "tilt", "torsion"))
     turn = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
     quaternion = np.array(asked(result).orientation or [1.0, 0.0, 0.0, 0.0])
-    turn = turn @ rotation_matrix(quaternion / np.linalg.norm(quaternion))
+    size = np.linalg.norm(quaternion)
+    if abs(size - 1.0) > UNIT_TOLERANCE:
+        raise InputError("workspace.orientation", quaternion.tolist(), "of length 1")
+    turn = turn @ rotation_matrix(quaternion / size)
     base = np.array(spec.base_points, float)
     own = np.zeros_like(base) if spec.platform_points is None else np.array(spec.platform_points, float)
     faces, edges = _shape(own)
