@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError, CsprError, ExitCode
-from cspr_jax.outputs.plots.options import ACCELERATION, add_style
+from cspr_jax.outputs.plots.options import ACCELERATION, add_plot
 from cspr_jax.runtime import compile_cache
 from cspr_jax.runtime.progress import progress, waiting
 from cspr_jax.sweep.signals import Prompt, prompt_end, stop_signals
@@ -116,7 +116,7 @@ def _parser() -> argparse.ArgumentParser:
         ("volume", _volume, "say how large the workspace of a map is, with the error that its grid leaves"),
     ):
         sub = add(name, command, text)
-        what = {"verify": "run directory, result or motion", "volume": "result"}
+        what = {"verify": "run directory, result or motion", "volume": "result, or run directory"}
         sub.add_argument("path", type=Path, help=what.get(name, "run directory"))
         sub.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     plan = add("plan", _plan, "plan a sequence of poses")
@@ -125,7 +125,7 @@ def _parser() -> argparse.ArgumentParser:
     plan.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the motion to FILE.csv or FILE.h5")
     plan.add_argument("--anyway", action="store_true", help="write the best candidate's motion if it is not feasible")
     plan.add_argument("--rate", type=float, metavar="HZ", help="rows a second (default: `samples` rows a segment)")
-    _add_plot(add)
+    add_plot(add("plot", _plot, "draw a result file, or several maps in one picture"))
     table = add("table", _table, "compute a published table again, beside the printed numbers")
     table.add_argument("name", nargs="?", help="such as 2.1")
     table.add_argument("--list", action="store_true", help="list the tables")
@@ -148,24 +148,6 @@ def _parser() -> argparse.ArgumentParser:
     foreign.add_argument("--set", metavar="NAME", help="set of cables of a model of CASPR (default: its own choice)")
     _add_listings(add)
     return parser
-
-
-def _add_plot(add: Callable[..., argparse.ArgumentParser]) -> None:
-    plot = add("plot", _plot, "draw a result file, or several maps as lines")
-    plot.add_argument("result", type=Path, nargs="+", help="result or run directory, or motion of `cspr plan -o`")
-    plot.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
-    plot.add_argument(
-        "--quantity",
-        help="quantity of a map (default arcs or oscillations; see `cspr quantities`); of a motion acceleration, "
-        "beside all that are feasible at an instant, or path_acceleration, over the way",
-    )
-    plot.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
-    plot.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
-    plot.add_argument(
-        "--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis: nearest point; t of a motion"
-    )
-    plot.set_defaults(device=None)
-    add_style(plot)
 
 
 def _add_listings(add: Callable[..., argparse.ArgumentParser]) -> None:
@@ -265,8 +247,9 @@ def _verify(options: argparse.Namespace) -> int:
 
 def _volume(options: argparse.Namespace) -> int:
     from cspr_jax.api import volumes
+    from cspr_jax.outputs.plots.selection import result_at
 
-    found = volumes.workspace_volume(options.path)
+    found = volumes.workspace_volume(result_at(options.path))
     sys.stdout.write("" if options.json else "".join(f"{line}\n" for line in found.lines()))
     if options.json:
         _print_json(found.to_dict())
@@ -316,7 +299,7 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or results[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
-    names = ("quantity", "lines", "envelope", "size", "dpi", "font_size")
+    names = ("quantity", "lines", "envelope", "solid", "size", "dpi", "font_size")
     with waiting():
         plot(results, at=at, output=output, **{name: getattr(options, name) for name in names})
     sys.stdout.write(f"{output}\n")

@@ -110,6 +110,19 @@ IMAGES = {
         "Wrench-feasible workspace of CoGiRo at four heights: by how many newtons all tensions keep from their limits.",
         20,
     ),
+    "workspace_solid": Image(
+        "The wrench-feasible workspace of CoGiRo, and the robot at its centroid; lines at the heights of the ticks.",
+        5,
+        "--solid",
+    ),
+    "workspace_conditions": Image(
+        "Workspaces of CoGiRo: of any tensions, of 100 to 5000 N, and of these with accelerations beside.",
+        15,
+        sources=("workspace_static", "workspace", "workspace_accelerations"),
+    ),
+    "wrench_closure": Image(
+        "Where the cables of IPAnema 2 resist every wrench if they are pulled hard enough.", 10, "--solid"
+    ),
     "launch_sensitivity": Image(
         "Largest displacement of the launch robot over the largest error of a cable; infinite on z = 0 (theory.md).", 10
     ),

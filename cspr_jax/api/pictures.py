@@ -15,19 +15,20 @@ from cspr_jax.store.publishing import publish
 from cspr_jax.store.result import Result, open_result
 
 
-def plot(
+def plot(  # noqa: PLR0913
     results: str | Path | Result | Sequence[str | Path | Result],
     *,
     quantity: str | None = None,
     at: Mapping[str, float] | None = None,
     lines: str | None = None,
     envelope: bool = False,
+    solid: bool = False,
     size: str | tuple[float, float] | None = None,
     dpi: float | None = None,
     font_size: float | None = None,
     output: str | Path | None = None,
 ) -> Figure:
-    """Draw one result, or several maps as lines in one picture.
+    """Draw one result, or several maps in one picture: as lines, of workspaces as outlines.
 
     Args:
         results: of `open_result`, or the path of a result, a run directory or a motion file; or several maps.
@@ -37,6 +38,7 @@ def plot(
         at: fixed values of axes, within their ranges; the nearest point is taken. Of a motion t, s.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
+        solid: whether to draw the boundary of a workspace over x, y and z, with its robot, in three dimensions.
         size: width and height, cm, as (16, 10) or "16x10"; None: what suits the picture.
         dpi: pixels an inch of a file; None: 160.
         font_size: points; None: 10.
@@ -61,9 +63,8 @@ def plot(
     stage("drawing")
     try:
         with in_style(style):
-            figure = drawn(
-                loaded, names, quantity=quantity, at=None if at is None else dict(at), lines=lines, envelope=envelope
-            )
+            given_at = None if at is None else dict(at)
+            figure = drawn(loaded, names, quantity=quantity, at=given_at, lines=lines, envelope=envelope, solid=solid)
             laid_out(figure, style)
             if output is not None:
                 picture = rendered(figure, Path(output).suffix, style)

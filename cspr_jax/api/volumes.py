@@ -1,83 +1,17 @@
 """Volumes of workspaces from Python: of a map, with the error that its grid leaves."""
 
-import dataclasses
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cspr_jax.errors import InputError
-from cspr_jax.schema.meanings import CELL_SIDES
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.store.result import Result, open_result
 
 if TYPE_CHECKING:
     import xarray
 
 __all__ = ["WorkspaceVolume", "workspace_volume"]
-_, INSIDE, OUTSIDE = range(len(CELL_SIDES))
-LEVEL, POLAR = ("x", "y", "z"), ("radius", "azimuth", "z")
-
-
-@dataclasses.dataclass(frozen=True)
-class WorkspaceVolume:
-    """Volume of a workspace, or area, or length, for each value of the other axes of its map.
-
-    Fields:
-        axes: the other axes, in the order of the dimensions of what follows.
-        units: of volumes, "m3", "m2" or "m".
-        volume: (...) of the cells that are inside, between the first and the last points, m^3, m^2 or m.
-        error: (...) what the grid leaves open, likewise, if the boundary passes at most once between two points: half
-            of the way between each two on different sides, a quarter of their cells.
-        least: (...) of the cells that are proved inside as a whole; 0 where nothing was proved.
-        most: (...) of all cells but those proved outside as a whole.
-        proved_fraction: (...) part of the grid whose side is proved.
-        undecided_fraction: (...) part of the grid whose points are undecided.
-    """
-
-    axes: dict[str, np.ndarray]
-    units: str
-    volume: np.ndarray
-    error: np.ndarray
-    least: np.ndarray
-    most: np.ndarray
-    proved_fraction: np.ndarray
-    undecided_fraction: np.ndarray
-
-    def to_dict(self) -> dict[str, Any]:
-        """The volume as plain numbers.
-
-        Returns:
-            numbers and nested lists by field, as `cspr volume --json` prints them.
-        """
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        axes = {name: points.tolist() for name, points in self.axes.items()}
-        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()} | {
-            "axes": axes
-        }
-
-    def lines(self) -> list[str]:
-        """The volume for people.
-
-        Returns:
-            a line for each value of the other axes.
-        """
-        found = []
-        for place in np.ndindex(self.volume.shape):
-            at = ", ".join(
-                f"{name} {points[i]:.6g}" for (name, points), i in zip(self.axes.items(), place, strict=True)
-            )
-            text = f"{self.volume[place]:.6g} {self.units}, give or take {self.error[place]:.3g}"
-            if self.proved_fraction[place] > 0.0:
-                text += (
-                    f"; proved between {self.least[place]:.6g} and {self.most[place]:.6g}, "
-                    f"{100.0 * self.proved_fraction[place]:.4g} % of the grid"
-                )
-            if self.undecided_fraction[place] > 0.0:
-                text += f"; {100.0 * self.undecided_fraction[place]:.4g} % of the grid undecided"
-            found.append(f"{at}: {text}" if at else text)
-        return found
 
 
 def workspace_volume(result: "Result | xarray.Dataset | str | Path") -> WorkspaceVolume:
@@ -93,77 +27,11 @@ def workspace_volume(result: "Result | xarray.Dataset | str | Path") -> Workspac
         InputError: no map, no stored verdicts, or a single place.
         StoreError: no result file.
     """
-    axes, data = _read(result)
-    names, spatial = list(axes), POLAR if "radius" in axes else LEVEL
-    spread = [name for name in spatial if len(axes.get(name, ())) > 1]
-    if not spread:
-        raise InputError("result", None, "must have two places or more", fault="a single place")
-    order = [names.index(name) for name in spread]
-    others = [i for i in range(len(names)) if names[i] not in spread]
-    weights = _weights([_widths(axes[name], name) for name in spread])
-
-    def placed(name: str) -> np.ndarray:
-        values = data[name].transpose(*others, *order)
-        # Of places that have only one coordinate here there is one cell.
-        singles = tuple(i for i, k in enumerate(others) if names[k] in spatial)
-        return values.squeeze(axis=singles)
-
-    verdict = placed("verdict")
-    inside, count = verdict == 0, len(spread)
-    side = placed("cell_side") if "cell_side" in data else np.zeros(verdict.shape, np.int16)
-    total, over = weights.sum(), tuple(range(-count, 0))
-
-    def volume(chosen: np.ndarray) -> np.ndarray:
-        return np.asarray((chosen * weights).sum(axis=over))
-
-    return WorkspaceVolume(
-        axes={names[i]: axes[names[i]] for i in others if names[i] not in spatial},
-        units="m" if count == 1 else f"m{count}",
-        volume=volume(inside),
-        error=0.25 * volume(_at_border(inside, count)),
-        least=volume(side == INSIDE),
-        most=total - volume(side == OUTSIDE),
-        proved_fraction=volume(side != 0) / total,
-        undecided_fraction=volume(verdict == Verdict.UNDECIDED) / total,
-    )
-
-
-def _read(result) -> tuple[dict[str, np.ndarray], Mapping[str, np.ndarray]]:
-    # Axes in the order of the dimensions, and quantities.
-    if hasattr(result, "data_vars"):  # of xarray
-        data = {name: np.asarray(values) for name, values in result.data_vars.items()}
-        names = result["verdict"].dims if "verdict" in data else ()
-        axes = {str(name): np.asarray(result[name]) for name in names}
-    else:
-        found = result if isinstance(result, Result) else open_result(Path(result))
-        axes, data = found.axes, found.data if found.is_map else {}
-    if "verdict" not in data:
-        raise InputError("result", None, "must be a map that stores verdict", fault="no verdicts")
-    return axes, data
-
-
-def _widths(points: np.ndarray, name: str) -> np.ndarray:
-    # Of the parts of an axis that its points stand for.
-    order = np.argsort(points)
-    gaps = np.diff(points[order])
-    widths = np.empty(len(points))
-    widths[order] = 0.5 * (np.append(gaps, 0.0) + np.append(0.0, gaps))
-    return widths * points if name == "radius" else widths
-
-
-def _weights(widths: list[np.ndarray]) -> np.ndarray:
-    found = widths[0]
-    for more in widths[1:]:
-        found = found[..., None] * more
-    return found
-
-
-def _at_border(inside: np.ndarray, count: int) -> np.ndarray:
-    # Cells with a neighbour, along one of the last axes, on the other side.
-    found = np.zeros(inside.shape, bool)
-    for axis in range(inside.ndim - count, inside.ndim):
-        values, border = np.moveaxis(inside, axis, 0), np.moveaxis(found, axis, 0)
-        differs = values[1:] != values[:-1]
-        border[1:] |= differs
-        border[:-1] |= differs
-    return found
+    if isinstance(result, Result):
+        return volume_of(result)
+    if isinstance(result, str | Path):
+        return volume_of(open_result(Path(result)))
+    data = {str(name): np.asarray(values) for name, values in result.data_vars.items()}
+    dims = result["verdict"].dims if "verdict" in data else ()
+    axes = {str(name): np.asarray(result[name]) for name in dims}
+    return volume_of(Result(axes, data, {}, {}, dict(result.attrs), {}))

@@ -143,7 +143,7 @@ def box(centre, size, quaternion=(1.0, 0.0, 0.0, 0.0), *, name: str = "box") -> 
         raise InputError("size", size, "three lengths, none negative")
     if turn.shape != (4,) or not abs(np.linalg.norm(turn) - 1.0) <= UNIT_TOLERANCE:
         raise InputError("quaternion", quaternion, "four numbers of a unit quaternion, scalar first")
-    return Box(_point("centre", centre), 0.5 * lengths, _matrix(turn / np.linalg.norm(turn)), name)
+    return Box(_point("centre", centre), 0.5 * lengths, rotation_matrix(turn / np.linalg.norm(turn)), name)
 
 
 def box_between(lowest, highest, *, name: str = "box") -> Box:
@@ -259,8 +259,16 @@ def _radius(given: float) -> float:
     return float(given)
 
 
-def _matrix(quaternion: np.ndarray) -> np.ndarray:
-    w, x, y, z = quaternion
+def rotation_matrix(quaternion) -> np.ndarray:
+    """The rotation matrix of a unit quaternion; as `arithmetic.rotations.matrix`, without jax.
+
+    Args:
+        quaternion: (4,) scalar first.
+
+    Returns:
+        (3, 3) from the turned axes.
+    """
+    w, x, y, z = np.asarray(quaternion, float)
     vector = np.array([x, y, z])
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return (w * w - vector @ vector) * np.eye(3) + 2.0 * np.outer(vector, vector) + 2.0 * w * skew

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
 from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, value, values
 from cspr_jax.outputs.plots.landings import landing_figure
@@ -17,6 +18,7 @@ from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERAT
 from cspr_jax.outputs.plots.path_accelerations import path_figure
 from cspr_jax.outputs.plots.sections import AROUND, POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
+from cspr_jax.outputs.plots.solid import SPACE, solid_figure
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
 
@@ -24,6 +26,8 @@ from cspr_jax.store.result import Result
 # vary, or the one of the others that has the most cells.
 PLANES = (("x", "y"), POLAR, ("from_x", "from_y"))
 OTHERS = (AROUND, ("x", "z"), ("y", "z"), ("radius", "z"))
+TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
+WORKSPACE = "workspace"
 
 
 class View(NamedTuple):
@@ -52,8 +56,9 @@ def drawn(
     at: dict[str, float] | None = None,
     lines: str | None = None,
     envelope: bool = False,
+    solid: bool = False,
 ) -> Figure:
-    """The picture of one result, or of several maps as lines; made inside `style.in_style`.
+    """The picture of one result, or of several maps as lines or outlines; made inside `style.in_style`.
 
     Args:
         results: of `cspr run`, or one motion of `cspr plan -o`.
@@ -63,6 +68,7 @@ def drawn(
         at: fixed values of axes, within their ranges; the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
+        solid: whether to draw the boundary of a workspace with its robot, in three dimensions.
 
     Returns:
         the figure.
@@ -70,6 +76,9 @@ def drawn(
     Raises:
         InputError: no such quantity or axis, or nothing to draw.
     """
+    if solid:
+        _refuse("--solid", {"--envelope": envelope, "--quantity": quantity, "--lines": lines})
+        return _solid(results, at or {})
     if envelope:
         return _envelope(results, quantity, at or {}, lines)
     if len(results) > 1:
@@ -102,9 +111,7 @@ def _envelope(results: list[Result], quantity: str | None, at: dict[str, float],
     result = results[0]
     if len(results) > 1 or not result.is_map or not set(AXES) <= set(result.axes) or "verdict" not in result.data:
         raise InputError("--envelope", "no orientations", 'of one result of map = "orientations" that holds verdicts')
-    for key, given in (("--quantity", quantity), ("--lines", lines)):
-        if given:
-            raise InputError(key, given, "absent with --envelope")
+    _refuse("--envelope", {"--quantity": quantity, "--lines": lines})
     elsewhere = {axis: points[0] for axis, points in result.axes.items() if axis not in AXES and len(points) > 1}
     view = _view(result, "verdict", elsewhere | at)
     if set(view.across) != set(AXES):
@@ -114,6 +121,50 @@ def _envelope(results: list[Result], quantity: str | None, at: dict[str, float],
     )
 
 
+def _refuse(option: str, others: dict[str, str | bool | None]) -> None:
+    for key, given in others.items():
+        if given:
+            raise InputError(key, given, f"absent with {option}")
+
+
+def _solid(results: list[Result], at: dict[str, float]) -> Figure:
+    result = results[0]
+    counts = [len(np.unique(result.axes.get(axis, ()))) for axis in SPACE]
+    if len(results) > 1 or not _is_workspace(result) or min(counts) < 2:
+        allowed = 'of one result of map = "workspace" that holds verdicts over two points or more of each of x, y and z'
+        raise InputError("--solid", "no workspace in space", allowed)
+    if set(at) & set(SPACE):
+        raise InputError("--at", sorted(at), "no axis of " + ", ".join(SPACE))
+    index, fixed = _fixed(result, at, SPACE)
+    return solid_figure(result, index, notes(result, "", fixed, [*SPACE, *index]))
+
+
+def _comparison(names: list[str], results: list[Result], at: dict[str, float]) -> Figure:
+    every, constant = [], list[list[str]]()
+    for name, result in zip(names, results, strict=True):
+        across = [axis for axis in _varying(result, at) if axis not in TILT_TORSION]
+        index, fixed = _fixed(result, at, across)
+        every.append(Compared(result, name, across, index))
+        constant.append(notes(result, "", fixed, [*across, *index]))
+    return comparison_figure(every, [note for note in constant[0] if all(note in other for other in constant)])
+
+
+def _is_workspace(result: Result) -> bool:
+    return result.attributes.get("map") == WORKSPACE and "verdict" in result.data
+
+
+def _varying(result: Result, at: dict[str, float]) -> list[str]:
+    return [axis for axis, points in result.axes.items() if len(points) > 1 and axis not in at]
+
+
+def _fixed(result: Result, at: dict[str, float], across: list[str]) -> tuple[dict[str, int], list[str]]:
+    # Which point of each other axis, the first where nobody says, and what the picture says of it.
+    chosen_points = {axis: nearest(result, axis, wanted) for axis, wanted in at.items()}
+    others = {axis: (0, value(result, axis, result.axes[axis][0])) for axis in result.axes if axis not in across}
+    every = others | chosen_points
+    return {axis: place for axis, (place, _) in every.items()}, [words for _, words in every.values()]
+
+
 def _overlay(
     paths: list[Path], results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None
 ) -> Figure:
@@ -121,6 +172,8 @@ def _overlay(
     constant: list[list[str]] = []
     if lines is not None:
         raise InputError("--lines", lines, "absent where several results are drawn")
+    if quantity in (None, "verdict") and all(_is_workspace(one) and len(_varying(one, at)) > 1 for one in results):
+        return _comparison([str(path) for path in paths], results, at)
     for path, result in zip(paths, results, strict=True):
         if not result.is_map:
             raise InputError("results", str(path), "maps, where several are drawn")
@@ -203,7 +256,9 @@ def _panelled(result: Result, view: View, order: list[str]) -> View:
 
 def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
     pictured = MAP_KINDS[result.attributes["map"]].pictured
-    name = quantity or next(name for name in (*pictured, *result.data) if name in result.data)
+    known = [name for name in (*pictured, *result.data) if name in result.data]
+    # Of a margin that nobody asks for there is no picture.
+    name = quantity or next((name for name in known if not np.isnan(result.data[name]).all()), known[0])
     if name not in result.data:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
     data, fixed, place = result.data[name], [], {}

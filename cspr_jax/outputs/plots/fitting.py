@@ -1,7 +1,10 @@
 """Text that fits into a picture: long names cut, long lines broken."""
 
+from typing import Literal
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 
 from cspr_jax.errors import one_line
@@ -27,7 +30,7 @@ def shortened(text: str, most: int = LONGEST_NAME) -> str:
 
 
 def fit(figure: Figure) -> None:
-    """Break titles and labels that are longer than their place, at commas or else at spaces.
+    """Break titles and labels that are longer than their place, at commas or else at spaces; legends likewise.
 
     Args:
         figure: with its final size.
@@ -35,6 +38,8 @@ def fit(figure: Figure) -> None:
     width, height = figure.bbox.width, figure.bbox.height
     if figure.get_suptitle():
         _break(figure.suptitle(figure.get_suptitle()), 0.97 * width)
+    for legend in list(figure.legends):
+        _fit_legend(figure, legend, 0.98 * width)
     for panel in figure.axes:
         if not panel.get_visible() or panel.name == "3d":
             continue
@@ -42,6 +47,22 @@ def fit(figure: Figure) -> None:
         _break(panel.title, 0.85 * width * columns)
         _break(panel.xaxis.label, 0.85 * width * columns)
         _break(panel.yaxis.label, 0.85 * height * rows, upright=True)
+
+
+def _fit_legend(figure: Figure, legend: Legend, room: float) -> None:
+    # Below the panels: as many entries side by side as fit, then entries on several lines.
+    handles = [handle for handle in legend.legend_handles if handle is not None]
+    words = [text.get_text() for text in legend.get_texts()]
+    where: Literal["lower center", "outside lower center"]
+    where = "lower center" if figure.get_layout_engine() is None else "outside lower center"
+    for columns in range(len(words) - 1, 0, -1):
+        if legend.get_window_extent().width <= room:
+            return
+        legend.remove()
+        legend = figure.legend(handles, words, loc=where, ncols=columns)
+    beside = legend.get_window_extent().width - max(text.get_window_extent().width for text in legend.get_texts())
+    for text in legend.get_texts():
+        _break(text, room - beside)
 
 
 def _shares(panel: Axes) -> tuple[float, float]:

@@ -1,17 +1,34 @@
 """Options of the command line for pictures; no matplotlib here, for `cspr --help` is to answer at once."""
 
 import argparse
+from pathlib import Path
 
 # Quantities of motions that have a picture of their own.
 ACCELERATION, PATH_ACCELERATION, LANDING = "acceleration", "path_acceleration", "landing"
 
 
-def add_style(parser: argparse.ArgumentParser) -> None:
-    """Options of size, resolution and letters; `style.style_of` reads them.
+def add_plot(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command that draws results; `style.style_of` reads the last three.
 
     Args:
-        parser: of a command that draws.
+        parser: of that command.
     """
+    parser.add_argument("result", type=Path, nargs="+", help="result or run directory, or motion of `cspr plan -o`")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
+    parser.add_argument(
+        "--quantity",
+        help="quantity of a map (default arcs or oscillations; see `cspr quantities`); of a motion acceleration, "
+        "beside all that are feasible at an instant, or path_acceleration, over the way",
+    )
+    parser.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
+    parser.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
+    parser.add_argument(
+        "--solid", action="store_true", help='boundary of a map = "workspace" over x, y and z, with the robot in it'
+    )
+    parser.add_argument(
+        "--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis: nearest point; t of a motion"
+    )
+    parser.set_defaults(device=None)
     parser.add_argument("--size", metavar="WIDTHxHEIGHT", help="of the picture, cm, such as 16x10")
     parser.add_argument("--dpi", type=float, metavar="N", help="pixels an inch (default 160)")
     parser.add_argument("--font-size", type=float, metavar="PT", help="points (default 10)")

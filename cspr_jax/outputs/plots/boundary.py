@@ -1,0 +1,192 @@
+"""Boundary of the points of a grid that are inside: a surface of triangles in space, lines in a plane."""
+
+import itertools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.store.result import Result
+
+# Where one of these is not positive, a pose is outside.
+MARGINS = ("wrench_margin", "closure_margin", "clearance")
+# Reasons to be outside that no margin tells.
+WITHOUT_MARGIN = (Verdict.BELOW_FLOOR | Verdict.CABLE_TOO_LONG).value
+# Of the way between two points: what keeps the boundary off the points themselves.
+OFF = 1e-6
+# Where a simplex is cut: its corners inside (first number) and outside (second) whose edges the pieces join. Of a
+# simplex that is right-handed in the order inside, outside, triangles turn their outer side to the outside.
+CUTS: dict[tuple[int, int], list[list[tuple[int, int]]]] = {
+    (1, 2): [[(0, 0), (0, 1)]],
+    (2, 1): [[(0, 0), (1, 0)]],
+    (1, 3): [[(0, 0), (0, 1), (0, 2)]],
+    (3, 1): [[(0, 0), (1, 0), (2, 0)]],
+    (2, 2): [[(0, 0), (0, 1), (1, 1)], [(0, 0), (1, 1), (1, 0)]],
+}
+
+
+class Sides(NamedTuple):
+    """Points of a grid, and on which side of the boundary each lies.
+
+    Fields:
+        points: of each of the d axes, rising.
+        verdict: (n_1, ..., n_d) flags; 0: inside.
+        margins: of that shape each, positive inside; NaN where nobody asks.
+    """
+
+    points: list[np.ndarray]
+    verdict: np.ndarray
+    margins: list[np.ndarray]
+
+
+class Boundary(NamedTuple):
+    """A closed boundary: it runs along the end of the grid where points there are inside.
+
+    Fields:
+        corners: (n, d) between two neighbours on different sides, or a point at the end of the grid.
+        pieces: (m, d) corners of each: triangles whose outer side is that from which they run anticlockwise, or lines.
+        is_end: (m,) whether a piece lies at the end of the grid, beyond which nobody has asked.
+    """
+
+    corners: np.ndarray
+    pieces: np.ndarray
+    is_end: np.ndarray
+
+
+def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Sides:
+    """Points of a map of a workspace, and their sides.
+
+    Args:
+        result: the map.
+        axes: those that vary.
+        index: of the others, which point.
+
+    Returns:
+        the sides, with rising axes.
+    """
+    # The points of an axis may come in any order, and twice.
+    orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in axes]
+
+    def part(name: str) -> np.ndarray:
+        data = result.data[name][tuple(index.get(axis, 0) if axis not in axes else slice(None) for axis in result.axes)]
+        kept = [axis for axis in result.axes if axis in axes]
+        return data.transpose([kept.index(axis) for axis in axes])[np.ix_(*orders)]
+
+    points = [result.axes[axis][order] for axis, order in zip(axes, orders, strict=True)]
+    margins = [part(name).astype(float) for name in MARGINS if name in result.data]
+    return Sides(points, part("verdict"), margins)
+
+
+def boundary(sides: Sides) -> Boundary:
+    """The boundary of what is inside, by marching simplices: six tetrahedra a cell, or two triangles.
+
+    It crosses every edge of the grid, and every diagonal of these simplices, between a point inside and one outside,
+    and no other, so that it parts the points exactly as their verdicts do. Where margins decide it crosses where the
+    first of them, linear on the edge, is zero; elsewhere half-way.
+
+    Args:
+        sides: of the points of a grid over two axes or three.
+
+    Returns:
+        the boundary; empty if nothing is inside.
+    """
+    # Around the grid lies a layer without thickness that is outside.
+    is_in = np.pad(sides.verdict == 0, 1)
+    number = np.pad(np.arange(sides.verdict.size).reshape(sides.verdict.shape), 1, constant_values=-1).reshape(-1)
+    edges = np.concatenate([_cut(is_in.reshape(-1), corners, sign) for corners, sign in _simplices(is_in)])
+    inner, outer = number[edges[..., 0]], number[edges[..., 1]]
+    pairs, pieces = np.unique(np.stack([inner, outer], -1).reshape(-1, 2), axis=0, return_inverse=True)
+    pieces = pieces.reshape(inner.shape)
+    # Of a layer without thickness some pieces have two corners in one.
+    whole = (np.diff(np.sort(pieces, axis=1), axis=1) > 0).all(1)
+    return Boundary(_crossings(sides, pairs), pieces[whole], (outer < 0).any(1)[whole])
+
+
+def _simplices(is_in: np.ndarray) -> list[tuple[np.ndarray, int]]:
+    # Of each cell that is cut, d! paths from its first corner to its last, one axis after the other: (n, d + 1) places
+    # in the flat grid, and 1 or -1 for their hand.
+    count = is_in.ndim
+    lower = np.arange(is_in.size).reshape(is_in.shape)[(slice(-1),) * count].reshape(-1)
+    steps = np.array([int(np.prod(is_in.shape[k + 1 :])) for k in range(count)])
+    every = np.array(list(itertools.product((0, 1), repeat=count))) @ steps
+    sure = np.stack([is_in.reshape(-1)[lower + step] for step in every])
+    lower = lower[sure.any(0) & ~sure.all(0)]
+    orders = list(itertools.permutations(range(count)))
+    paths = [np.concatenate([[0], np.cumsum(steps[list(order)])]) for order in orders]
+    return [(lower[:, None] + path, _hand(order)) for path, order in zip(paths, orders, strict=True)]
+
+
+def _hand(order: Sequence[int]) -> int:
+    # Of a permutation: 1 if it is even, else -1.
+    return 1 if sum(a > b for a, b in itertools.combinations(order, 2)) % 2 == 0 else -1
+
+
+def _cut(is_in: np.ndarray, simplices: np.ndarray, hand: int) -> np.ndarray:
+    # (n_pieces, d, 2): of each corner of a piece, the points inside and outside between which it lies.
+    count, sides = simplices.shape[1], is_in[simplices]
+    found = [np.empty((0, count - 1, 2), int)]
+    for pattern in itertools.product((True, False), repeat=count):
+        inner, outer = ([k for k in range(count) if pattern[k] is side] for side in (True, False))
+        some = simplices[(sides == pattern).all(1)]
+        for piece in CUTS.get((len(inner), len(outer)), []):
+            turned = piece if hand * _hand([*inner, *outer]) > 0 else piece[::-1]
+            ends = np.array([[inner[i], outer[j]] for i, j in turned])
+            found.append(some[:, ends])
+    return np.concatenate(found)
+
+
+def _crossings(sides: Sides, pairs: np.ndarray) -> np.ndarray:
+    # (n, d) of (n, 2) points, the first inside; -1 for one beyond the end of the grid, at the first.
+    inner, outer = pairs[:, 0], np.where(pairs[:, 1] < 0, pairs[:, 0], pairs[:, 1])
+    part = np.where(sides.verdict.reshape(-1)[outer] & WITHOUT_MARGIN, 0.5, np.inf)
+    for margin in sides.margins:
+        near, far = margin.reshape(-1)[inner], margin.reshape(-1)[outer]
+        with np.errstate(all="ignore"):
+            tells = np.isfinite(near) & np.isfinite(far) & (near > 0.0) & (far <= 0.0)
+            part = np.where(tells, np.minimum(part, near / (near - far)), part)
+    part = np.clip(np.where(np.isfinite(part), part, 0.5), OFF, 1.0 - OFF)
+    grid = np.stack([x.reshape(-1) for x in np.meshgrid(*sides.points, indexing="ij")], axis=1)
+    return grid[inner] + part[:, None] * (grid[outer] - grid[inner])
+
+
+def outlines(sides: Sides) -> list[tuple[np.ndarray, bool]]:
+    """The boundary in a plane, as long lines.
+
+    Args:
+        sides: of the points of a grid over two axes.
+
+    Returns:
+        (n, 2) corners of each line, on edges of the grid, the first again at the end of a closed one; and whether it
+        runs along the end of the grid.
+    """
+    found = boundary(sides)
+    lines = []
+    for is_end in (True, False):
+        for chain in _chains(found.pieces[found.is_end == is_end]):
+            corners = found.corners[chain]
+            # Without those on diagonals, where only chance has put them: the sides of a cell are parted as well.
+            kept = np.isin(corners[:, 0], sides.points[0]) | np.isin(corners[:, 1], sides.points[1])
+            if not kept[0]:  # a closed line that starts on one
+                corners, kept = np.roll(corners[:-1], -1, axis=0), np.roll(kept[:-1], -1)
+                corners, kept = np.append(corners, corners[:1], axis=0), np.append(kept, kept[:1])
+            lines.append((corners[kept], is_end))
+    return lines
+
+
+def _chains(lines: np.ndarray) -> list[np.ndarray]:
+    # Corners of pieces that meet in a corner, two at most, one after the other.
+    ends: dict[int, list[int]] = {}
+    for a, b in lines.tolist():
+        ends.setdefault(a, []).append(b)
+        ends.setdefault(b, []).append(a)
+    found = []
+    for start in sorted(ends, key=lambda corner: (len(ends[corner]) != 1, corner)):
+        while ends[start]:
+            chain = [start]
+            while ends[chain[-1]]:
+                following = ends[chain[-1]].pop()
+                ends[following].remove(chain[-1])
+                chain.append(following)
+            found.append(np.array(chain))
+    return found

@@ -1,0 +1,179 @@
+"""Workspaces of one robot under several conditions: outlines in the same sections."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.boundary import Sides, outlines, sides_of
+from cspr_jax.outputs.plots.conditions import conditions
+from cspr_jax.outputs.plots.fitting import shortened
+from cspr_jax.outputs.plots.labels import COLOURS, PANELS, STYLES, axis_label, chosen, robot_name, values
+from cspr_jax.outputs.plots.layout import columns_of, panels
+from cspr_jax.outputs.plots.marks import mark
+from cspr_jax.outputs.plots.posed import robot_of
+from cspr_jax.outputs.plots.selection import SAME
+from cspr_jax.store.result import Result
+
+PLANES = [["x", "y"], ["x", "z"], ["y", "z"]]
+SPACE = ("x", "y", "z")
+SIDE, ALONE = 3.1, 5.2  # inches, the longer side of a panel
+# Spools are shown if the panels do not get longer than this many times the grid.
+STRETCH, MARGIN = 1.5, 0.04
+_END: dict[str, Any] = {"linestyle": ":", "linewidth": 0.7}
+
+
+class Compared(NamedTuple):
+    """A result of a comparison.
+
+    Fields:
+        result: a map of a workspace.
+        file: its name.
+        across: axes that vary.
+        at: of the others, which point.
+    """
+
+    result: Result
+    file: str
+    across: list[str]
+    at: dict[str, int]
+
+    @property
+    def place(self) -> dict[str, float]:
+        """Coordinates that are the same in the whole picture."""
+        fixed = [axis for axis in self.result.axes if axis not in self.across]
+        return {axis: float(self.result.axes[axis][self.at[axis]]) for axis in fixed}
+
+
+def comparison_figure(every: list[Compared], fixed: list[str]) -> Figure:
+    """Outlines of workspaces, one a result, in the sections of the first.
+
+    Args:
+        every: the results.
+        fixed: what is constant, in words.
+
+    Returns:
+        the figure.
+
+    Raises:
+        InputError: too many, of different robots, or over other places.
+    """
+    plane = next((pair for pair in PLANES if set(pair) <= set(every[0].across)), [])
+    _check(every, plane)
+    first = every[0].result
+    over = next((axis for axis in every[0].across if axis not in plane), None)
+    heights = np.zeros(1) if over is None else _heights(every, over)
+    box = _box(every, plane)
+    figure = Figure(figsize=_size(box, len(heights), len(every)), layout="constrained")
+    drawn, bottom, left = panels(figure, len(heights))
+    titles = [""] if over is None else values(first, over, heights)
+    legend: dict[str, Artist] = {}
+    for panel, height, title in zip(drawn, heights, titles, strict=True):
+        panel.set(xlim=box[:, 0], ylim=box[:, 1], title=title)
+        panel.set_aspect("equal")
+        panel.grid(alpha=0.3)
+        place = every[0].place | ({} if over is None else {over: float(height)})
+        legend |= mark(panel, first, "verdict", plane, place)
+        for i, one in enumerate(every):
+            here = {} if over is None else {over: int(np.abs(one.result.axes[over] - height).argmin())}
+            legend |= _outline(panel, sides_of(one.result, plane, one.at | here), i)
+    if plane[1] == "z" and first.attributes.get("z_axis", "down") == "down":
+        drawn[0].yaxis.set_inverted(True)
+    for panel in bottom:
+        panel.set_xlabel(axis_label(first, plane[0]))
+    for panel in left:
+        panel.set_ylabel(axis_label(first, plane[1]))
+    _add_legend(figure, _names(every), legend)
+    robots = list(dict.fromkeys(robot_name(one.result) for one in every))
+    figure.suptitle("\n".join([f"{', '.join(robots)}: workspaces", ", ".join(fixed)]).strip())
+    return figure
+
+
+def _names(every: list[Compared]) -> list[str]:
+    # What tells the results apart: their conditions, with robot and file where these are the same.
+    words = [conditions(one.result) for one in every]
+    if len({robot_name(one.result) for one in every}) > 1:
+        words = [f"{robot_name(one.result)}: {text}" for one, text in zip(every, words, strict=True)]
+    stems = [Path(one.file).stem for one in every]
+    files = stems if len(set(stems)) == len(stems) else [one.file for one in every]
+    return [f"{w} ({shortened(f)})" if words.count(w) > 1 else w for w, f in zip(words, files, strict=True)]
+
+
+def _check(every: list[Compared], plane: list[str]) -> None:
+    first = every[0]
+    if len(every) > len(COLOURS):
+        raise InputError("results", len(every), f"at most {len(COLOURS)} in one picture")
+    if not plane:
+        raise InputError("results", f"{first.file} over {first.across}", "maps over two or three of x, y and z")
+    for one in every[1:]:
+        if robot_of(one.result).base_points != robot_of(first.result).base_points:
+            raise InputError("results", one.file, f"of a robot with the spools of that in {first.file}")
+        if set(one.across) != set(first.across):
+            allowed = f"over {', '.join(first.across)}, as {first.file}; --at fixes the others"
+            raise InputError("results", f"{one.file} over {one.across}", allowed)
+        for axis in SPACE:
+            if axis not in plane and not _agree(_points(one, axis), _points(first, axis)):
+                allowed = f"of the points of {first.file}; --at fixes axes"
+                raise InputError("results", f"{axis} of {one.file}", allowed)
+
+
+def _heights(every: list[Compared], over: str) -> np.ndarray:
+    # Evenly chosen of those where something is inside; of all if nothing is anywhere.
+    points = np.unique(every[0].result.axes[over])
+    told = np.zeros(len(points), bool)
+    for one in every:
+        inside = sides_of(one.result, one.across, one.at).verdict == 0
+        told |= np.moveaxis(inside, one.across.index(over), 0).reshape(len(points), -1).any(1)
+    shown = np.flatnonzero(told) if told.any() else np.arange(len(points))
+    return points[shown[chosen(len(shown), PANELS)]]
+
+
+def _points(one: Compared, axis: str) -> np.ndarray:
+    # Of an axis out of the plane, those that are drawn.
+    if axis in one.across:
+        return np.unique(one.result.axes[axis])
+    return np.array([one.place[axis]]) if axis in one.place else np.empty(0)
+
+
+def _agree(some: np.ndarray, others: np.ndarray) -> bool:
+    return len(some) == len(others) and bool(np.allclose(some, others, rtol=SAME, atol=SAME))
+
+
+def _box(every: list[Compared], plane: list[str]) -> np.ndarray:
+    # (2, 2) corners: of the grids, and of the spools unless they are far.
+    grids = np.array([[f(one.result.axes[axis]) for axis in plane] for one in every for f in (np.min, np.max)])
+    base = np.array(robot_of(every[0].result).base_points)
+    both = np.concatenate([grids, base[:, ["xyz".index(axis) for axis in plane]]])
+    shown = both if (np.ptp(both, axis=0) <= STRETCH * np.ptp(grids, axis=0)).all() else grids
+    room = MARGIN * np.ptp(shown, axis=0).max()
+    return np.stack([shown.min(0) - room, shown.max(0) + room])
+
+
+def _size(box: np.ndarray, count: int, lines: int) -> tuple[float, float]:
+    columns = columns_of(count)
+    width, height = (ALONE if count == 1 else SIDE) * np.clip((box[1] - box[0]) / (box[1] - box[0]).max(), 0.3, 1.0)
+    return columns * (float(width) + 0.15) + 0.9, -(-count // columns) * (float(height) + 0.35) + 1.2 + 0.21 * lines
+
+
+def _outline(panel: Axes, sides: Sides, number: int) -> dict[str, Artist]:
+    # Along the end of the grid it is thin: nobody has asked what lies beyond.
+    ends = False
+    for corners, is_end in outlines(sides):
+        ends |= is_end
+        panel.plot(*corners.T, color=COLOURS[number], **(_END if is_end else _look(number)))
+    return {"end of the grid": Line2D([], [], color="black", **_END)} if ends else {}
+
+
+def _look(number: int) -> dict[str, Any]:
+    return {"linestyle": STYLES[number], "linewidth": 1.6}
+
+
+def _add_legend(figure: Figure, words: list[str], marks: dict[str, Artist]) -> None:
+    lines = [Line2D([], [], color=COLOURS[i], **_look(i)) for i in range(len(words))]
+    every = [*words, *marks]
+    figure.legend([*lines, *marks.values()], every, loc="outside lower center", ncols=len(every))

@@ -1,0 +1,103 @@
+"""Robot of a map at a pose, as pictures draw it: spools, cables, platform. Without jax."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.workspace import WorkspaceTable
+from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.notes import table
+from cspr_jax.robots.shapes import FLAT, UNIT_TOLERANCE, hull, is_flat, rotation_matrix
+from cspr_jax.store.result import Result
+
+TURN = {"x": np.array([0.0, 1.0, 0.0, 0.0]), "z": np.array([0.0, 0.0, 0.0, 1.0])}
+
+
+class Posed(NamedTuple):
+    """A robot at a pose, in the axes of its file.
+
+    Fields:
+        base: (n_cables, 3) where the cables leave, m.
+        attached: (n_cables, 3) where they are attached; of a point mass its place, m.
+        faces: (m, 3, 3) triangles of the hull of these points, m; empty where they lie on a line.
+        edges: (k, 2, 3) edges of it, m.
+    """
+
+    base: np.ndarray
+    attached: np.ndarray
+    faces: np.ndarray
+    edges: np.ndarray
+
+
+def robot_of(result: Result) -> RobotFile:
+    """The robot of a map.
+
+    Args:
+        result: the map.
+
+    Returns:
+        it, as its file has it.
+    """
+    return RobotFile(**result.settings["robot"])
+
+
+def asked(result: Result) -> WorkspaceTable:
+    """What a map of a workspace asks of its poses.
+
+    Args:
+        result: the map.
+
+    Returns:
+        its table.
+    """
+    return WorkspaceTable(**table(result.settings, "workspace"))
+
+
+def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
+    """The robot of a map of a workspace, with the origin of the platform frame at a place.
+
+    Args:
+        result: the map.
+        place: (3,) in the axes of the file, m.
+        angles: tilt_azimuth, tilt and torsion, as far as the map has them, rad; `arithmetic.rotations`.
+
+    Returns:
+        the robot, turned as the map says, from the orientation of its sets where it has one.
+
+    Raises:
+        InputError: the map has no orientation there, but numbers that are none.
+    """
+    spec = robot_of(result)
+    azimuth, tilt, torsion = (angles.get(name, 0.0) for name in ("tilt_azimuth", "tilt", "torsion"))
+    turn = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
+    quaternion = np.array(asked(result).orientation or [1.0, 0.0, 0.0, 0.0])
+    size = np.linalg.norm(quaternion)
+    if abs(size - 1.0) > UNIT_TOLERANCE:
+        raise InputError("workspace.orientation", quaternion.tolist(), "of length 1")
+    turn = turn @ rotation_matrix(quaternion / size)
+    base = np.array(spec.base_points, float)
+    own = np.zeros_like(base) if spec.platform_points is None else np.array(spec.platform_points, float)
+    faces, edges = _shape(own)
+    return Posed(base, place + own @ turn.T, place + faces @ turn.T, place + edges @ turn.T)
+
+
+def _about(axis: str, angle: float) -> np.ndarray:
+    return rotation_matrix(np.array([np.cos(0.5 * angle), 0.0, 0.0, 0.0]) + np.sin(0.5 * angle) * TURN[axis])
+
+
+def _shape(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    # (m, 3, 3) faces and (k, 2, 3) edges of the hull of points; of points in a plane a polygon, of a line its ends.
+    if not is_flat(points):
+        found = hull(points)
+        return found.triangles, found.edges
+    from scipy.spatial import ConvexHull
+
+    _, spread, axes = np.linalg.svd(points - points.mean(0))
+    flat = points @ axes[:2].T
+    if len(points) < 3 or spread[1] <= FLAT * spread[0]:
+        ends = points[[flat[:, 0].argmin(), flat[:, 0].argmax()]]
+        return np.empty((0, 3, 3)), ends[None]
+    ring = points[ConvexHull(flat).vertices]
+    faces = [ring[[0, k, k + 1]] for k in range(1, len(ring) - 1)]
+    return np.array(faces), np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
