@@ -15,6 +15,7 @@ from cspr_jax.feasibility.workspace.programs import CLOSE, by_program, by_square
 from cspr_jax.problem import centred, load_robot
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, STATIC, Question, question
 from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
 
@@ -108,7 +109,7 @@ def _row(grid: Grid) -> dict[str, float]:
     found = {
         "poses": float(count),
         "inside": float((answers.verdict == 0).sum()),
-        "on the boundary": float((np.abs(answers.margin) <= 1e-9 * _size(asked)).sum()),
+        "on the boundary": float((answers.verdict == Verdict.UNDECIDED).sum()),
         "us a pose": MICRO * seconds / count,
     }
     for name, way in (("HiGHS", by_program), ("NNLS", by_squares)):

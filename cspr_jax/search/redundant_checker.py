@@ -120,6 +120,8 @@ class RedundantChecker(MotionChecker):
         matrix, wrenches = (np.asarray(x) for x in end_wrenches(self.problem.robot, position, quaternion, z0))
         unit = self._workspace.unit
         planes = exact.margin_planes(matrix / unit[:, None], self._asked.low, self._asked.high)
+        if exact.is_outside(wrenches / unit, planes.basis):
+            return AT_REST, *NONE
         first, second = planes.offsets - (wrenches / unit) @ planes.normals.T
         slope = second - first
         if len(slope) == 0 or np.abs(slope).max() <= FLAT * self._weight:

@@ -26,6 +26,8 @@ from cspr_jax.search.workspace_questions import CLOSURE, UNTURNED, Question
 
 # Of the largest limit of the tensions, or of the wrench: a margin nearer to zero is that of the boundary.
 BOUNDARY = 1e-9
+# Likewise: how far apart single precision may leave the bounds of a margin.
+TOLD = 1e-3
 PART = 1 << 18
 # Poses of a batch where few are asked about, and of what is only prepared here.
 BATCH = 1024
@@ -96,13 +98,14 @@ class WorkspaceSearch:
         """Of a robot, centred, z down.
 
         With precision "float32" that decides the poses of which it can, and float64 the others; margins of the former
-        are good to some 1e-5 of the limits.
+        are good to 1e-3 of the limits.
         """
-        self._robot, self.asked, self._precision = robot, asked, precision
-        self._length = asked.capacity_length or _length(robot)
+        self._robot, self.asked, self._precision, self._length = robot, asked, precision, _length(robot)
         self.unit = np.where(geometry.scales(robot), self._length, 1.0)
         self._wrenches = asked.wrenches.over(self.unit)
         self._measure = "tensions" if asked.capacity_length is None else "capacity"
+        capacity_length = asked.capacity_length or self._length
+        self._normals_unit = np.where(geometry.scales(robot), capacity_length / self._length, 1.0)
         self._boundary = BOUNDARY
         if asked.condition == CLOSURE:
             self._measure = "closure"
@@ -148,7 +151,9 @@ class WorkspaceSearch:
         rng, base, row = np.random.default_rng(1), np.asarray(self._robot.base_points), PATTERNS[self._robot.pattern]
         low, high = base.min(0), base.max(0)
         middle, half = 0.5 * (low + high), 0.4 * (high - low)
-        half[2] = max(half[2], 0.2 * half.max())
+        # Where all spools have one x, what vanishes in their plane does so nowhere else.
+        moves = np.isin(range(3), row.forces or range(3))
+        half = np.where(moves, np.maximum(half, 0.2 * half.max()), half)
         places = middle + half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
         turns = UNTURNED + 0.2 * rng.normal(size=(TRIALS, 4))
         if row.is_planar:
@@ -181,19 +186,22 @@ class WorkspaceSearch:
         return margin, is_open, is_outside
 
     def _stages(self):
-        def is_told(found):
-            return (found.real > self._boundary) | (found.imag < -self._boundary)
-
-        def is_known(found):
+        def is_known(found, apart=1.0):
             with np.errstate(invalid="ignore"):
-                return (found.real == found.imag) | (found.imag - found.real <= self._boundary)
+                return (found.real == found.imag) | (found.imag - found.real <= apart * self._boundary)
+
+        def is_told(found):
+            is_clear = (found.real > self._boundary) | (found.imag < -self._boundary)
+            return is_clear & is_known(found, TOLD / BOUNDARY)
+
+        if not len(self._choices.table):  # whatever the pose, the cables do not span all components
+            return
 
         if self._precision == "float32":
             yield self._stage(np.float32, bool(self._order)), is_told
         if self._order:
             yield self._stage(np.float64, True), is_known
-        if len(self._choices.table):
-            yield self._stage(np.float64, False), is_known
+        yield self._stage(np.float64, False), is_known
 
     @property
     def batch(self) -> int:
@@ -219,17 +227,17 @@ class WorkspaceSearch:
 
         options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.asked.high).all())}
         robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
-        limits = leaf(self.asked.low[ordered]), leaf(self.asked.high[ordered])
+        limits = leaf(self.asked.low[ordered]), leaf(self.asked.high[ordered]), leaf(self._normals_unit)
         asked, length, fixed = cast((kernels.Range(*limits), leaf(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
 
         def compiled(place, turn, load):
-            columns = geometry.wrench_columns(robot, place, turn, length)
+            columns, loss = geometry.wrench_columns(robot, place, turn, length)
             wrenches = fixed if load is None else fixed._replace(points=[load])
             if not by_null_space:
-                return kernels.by_normals(columns, wrenches, asked, choices, **options)
-            space = kernels.null_space(columns, wrenches.points[0], order=self._order)
+                return kernels.by_normals(columns, loss, wrenches, asked, choices, **options)
+            space = kernels.null_space(columns, loss, wrenches.points[0], order=self._order)
             return kernels.by_null_space(space, asked, choices, **options)
 
         return compiled
@@ -288,16 +296,17 @@ class WorkspaceSearch:
 
     def _exactly(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
         matrices = self._matrices(poses.positions, poses.quaternions)
+        measure = self._normals_unit if self._measure == "capacity" else None
         margins, is_outside = np.full(len(matrices), np.nan), np.zeros(len(matrices), bool)
         for i, columns in enumerate(matrices):
             if not np.isfinite(columns).all():
                 continue
             if self._measure == "closure":
-                margins[i] = exact.closure_margin(columns)
+                margins[i] = exact.closure_margin(columns, self._choices)
                 is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
             else:
                 asked = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
-                margins[i] = exact.wrench_margin(columns, asked, self.asked.low, self.asked.high, self._measure)
+                margins[i] = exact.wrench_margin(columns, asked, self.asked.low, self.asked.high, measure)
                 is_outside[i] = margins[i] == -np.inf
         return margins, is_outside
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.feasibility.workspace.cocircuits import Choices
 from cspr_jax.feasibility.workspace.required import RequiredWrenches
 
 # Of unit columns: smaller singular values, of the largest and at all, are zero.
@@ -79,7 +80,11 @@ def margin_planes(matrix: np.ndarray, low: np.ndarray, high: np.ndarray) -> Plan
 
 
 def wrench_margin(
-    matrix: np.ndarray, wrenches: RequiredWrenches, low: np.ndarray, high: np.ndarray, measure: str = "tensions"
+    matrix: np.ndarray,
+    wrenches: RequiredWrenches,
+    low: np.ndarray,
+    high: np.ndarray,
+    measure: np.ndarray | None = None,
 ) -> float:
     """Margin of wrenches: the largest s such that tensions between low + s and high - s give each of them; or capacity.
 
@@ -88,30 +93,41 @@ def wrench_margin(
         wrenches: what the cables must supply.
         low: (n_cables,) N.
         high: (n_cables,) N; inf where there is none: a margin counts against finite limits alone.
-        measure: "tensions"; "capacity": the distance of the wrenches from the faces of what can be supplied.
+        measure: (dof,) by what the components of normals are multiplied, for the capacity margin, the distance of the
+            wrenches from the faces of what can be supplied; None: the margin of the tensions.
 
     Returns:
         N; inf where nothing bounds it, -inf where a wrench is outside of the span of the cables.
     """
     planes = margin_planes(matrix, low, high)
-    if any(_is_outside(some, planes.basis) for some in wrenches.spanning):
+    if any(is_outside(some, planes.basis) for some in wrenches.spanning):
         return -np.inf
     slacks = planes.offsets - wrenches.supports(planes.normals)
-    if measure == "capacity":
-        return float((slacks / np.linalg.norm(planes.normals, axis=1)).min(initial=np.inf))
+    if measure is not None:
+        return float((slacks / np.linalg.norm(planes.normals * measure, axis=1)).min(initial=np.inf))
     return float(min(slacks.min(initial=np.inf), planes.half_range))
 
 
-def _is_outside(wrenches: np.ndarray, basis: np.ndarray) -> bool:
+def is_outside(wrenches: np.ndarray, basis: np.ndarray) -> bool:
+    """Whether some wrench is outside of what the cables span.
+
+    Args:
+        wrenches: (n, dof).
+        basis: (dof, rank) orthonormal.
+
+    Returns:
+        whether it is.
+    """
     outside = np.linalg.norm(wrenches - wrenches @ basis @ basis.T, axis=1)
     return bool((outside > OUTSIDE * np.linalg.norm(wrenches, axis=1)).any())
 
 
-def closure_margin(matrix: np.ndarray) -> float:
+def closure_margin(matrix: np.ndarray, choices: Choices) -> float:
     """Margin of wrench closure; see `feasibility.workspace.margins.closure_margin`.
 
     Args:
         matrix: (dof, n_cables).
+        choices: of the robot, which say what of its cocircuits is always zero.
 
     Returns:
         the margin, in [-1, 1]; -1 where the cables do not span all components.
@@ -122,6 +138,19 @@ def closure_margin(matrix: np.ndarray) -> float:
     other = found != 0.0
     most, least = found.max(1, initial=-np.inf, where=other), found.min(1, initial=np.inf, where=other)
     rarer = np.minimum(most, -least) / np.abs(found).max(1)
-    # A component that is zero beside those of a hyperplane's columns may have either sign.
-    has_more = (~other).sum(1) >= len(matrix)
+    # A component that is zero here and not everywhere may have either sign.
+    always = len(matrix) - 1 + _always_zero(found, choices)
+    has_more = (~other).sum(1) > always
     return float(np.where(has_more, np.maximum(rarer, 0.0), rarer).min())
+
+
+def _always_zero(found: np.ndarray, choices: Choices) -> np.ndarray:
+    # How many components more than those of a hyperplane's columns are zero at every pose of the robot.
+    if choices.counts is None:
+        return np.zeros(len(found), int)
+    size = found.shape[1] - choices.counts.shape[1]
+    more: dict[tuple[int, ...], int] = {}
+    for row, counts in zip(choices.table, choices.counts, strict=True):
+        support = tuple(sorted(row[size:][counts > 0.0].tolist()))
+        more[support] = int((counts == 0.0).sum())
+    return np.array([more.get(tuple(np.flatnonzero(row).tolist()), 0) for row in found])

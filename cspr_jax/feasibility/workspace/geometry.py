@@ -22,8 +22,10 @@ from cspr_jax.robots.pulleys import Pulleys, exit_lanes, exits
 from cspr_jax.robots.state import State
 
 
-def wrench_columns(robot: AnyRobot, position: Vector, quaternion: Vector | None, length: Array) -> list[Array]:
-    """Columns of the wrench matrix.
+def wrench_columns(
+    robot: AnyRobot, position: Vector, quaternion: Vector | None, length: Array
+) -> tuple[list[Array], Array]:
+    """Columns of the wrench matrix, and how much larger their errors are than rounding.
 
     Args:
         robot: z down.
@@ -32,13 +34,14 @@ def wrench_columns(robot: AnyRobot, position: Vector, quaternion: Vector | None,
         length: () by which moments are divided, m.
 
     Returns:
-        dof arrays (n_cables, n), a component each.
+        dof arrays (n_cables, n), a component each; (n,) at least 1: coordinates over the length of the shortest cable,
+        for a difference of coordinates keeps their rounding.
     """
     arms = None if quaternion is None else turned_arms(robot, quaternion)
-    units = unit_vectors(robot, position, arms)
+    units, loss = unit_vectors(robot, position, arms)
     if isinstance(robot, PlatformRobot):
-        return _columns(robot, units, arms, quaternion, length)
-    return [units[i] for i in PATTERNS[robot.pattern].forces]
+        return _columns(robot, units, arms, quaternion, length), loss
+    return [units[i] for i in PATTERNS[robot.pattern].forces], loss
 
 
 @jax.jit
@@ -68,7 +71,7 @@ def _down(points: Array, shape: tuple[int, int]) -> Vector:
 
 
 @jax.jit
-def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> Vector:
+def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> tuple[Vector, Array]:
     """Unit vectors of the cables, from the effector on; with pulleys those of the free cables.
 
     Args:
@@ -77,7 +80,7 @@ def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> Vect
         arms: of `turned_arms`; None: of a platform, those of its file.
 
     Returns:
-        three arrays (n_cables, n).
+        three arrays (n_cables, n); (n,) coordinates over the length of the shortest cable, or 1 if that is more.
     """
     shape = robot.n_cables, len(position[0])
     if arms is None and isinstance(robot, PlatformRobot):
@@ -85,13 +88,15 @@ def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> Vect
     target, base = [_along(x, shape) for x in position], _down(robot.base_points, shape)
     if arms is not None:
         target = [x + arm for x, arm in zip(target, arms, strict=True)]
+    ray = tuple(base[i] - target[i] for i in range(3))
+    inverse = 1.0 / jnp.sqrt(lanes.dot(ray, ray))
+    far = jnp.max(jnp.abs(robot.base_points)) + lanes.largest([jnp.abs(x) for x in position])
+    loss = jnp.maximum(1.0, far * jnp.max(inverse, axis=0))
     if robot.pulleys is not None:
         radius = jnp.broadcast_to(robot.pulleys.radius[:, None], shape)
         way = exit_lanes(base, _down(robot.pulleys.axes, shape), radius, target).direction
-        return tuple(-x for x in way)
-    ray = tuple(base[i] - target[i] for i in range(3))
-    inverse = 1.0 / jnp.sqrt(lanes.dot(ray, ray))
-    return tuple(x * inverse for x in ray)
+        return tuple(-x for x in way), loss
+    return tuple(x * inverse for x in ray), loss
 
 
 @jax.jit

@@ -37,15 +37,18 @@ class Range(NamedTuple):
     Fields:
         low: (n_cables,) smallest tensions, N.
         high: (n_cables,) largest ones, inf for none, N.
+        measure: (dof,) by what the components of a normal are multiplied before its length divides a capacity margin.
     """
 
     low: Array
     high: Array
+    measure: Array
 
 
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
 def by_normals(
     every: Sequence[Array],
+    loss: Array,
     wrenches: Wrenches,
     asked: Range,
     choices: Choices,
@@ -57,6 +60,7 @@ def by_normals(
 
     Args:
         every: columns of the wrench matrix, of `geometry.wrench_columns`.
+        loss: (n,) their errors over rounding, likewise.
         wrenches: what the cables must supply.
         asked: limits.
         choices: of `cocircuits.spanning`.
@@ -68,7 +72,7 @@ def by_normals(
     """
     dof, like = len(every), every[0][0]
     lanes = wrenches._replace(points=[[jnp.broadcast_to(x, like.shape) for x in point] for point in wrenches.points])
-    noise = jnp.asarray(ROUNDING * jnp.finfo(like.dtype).eps, like.dtype)
+    noise = jnp.asarray(ROUNDING * jnp.finfo(like.dtype).eps, like.dtype) * loss
     reach = jnp.where(jnp.isinf(asked.high), 0.0, jnp.abs(asked.high)) + jnp.abs(asked.low)
     size = _size(wrenches)
 
@@ -78,7 +82,9 @@ def by_normals(
         rest = [[_row(component, k) for component in every] for k in row[dof - 1 :]]
         entries = [product(across, column) for column in rest]
         low, high, counts, scale = limits
-        over = length(across) if measure == "capacity" else one_norm(entries)
+        over = one_norm(entries)
+        if measure == "capacity":
+            over = length([x * asked.measure[k] for k, x in enumerate(across)])
         error = 2.0 * noise * (scale + size)
         return _pull(entries, low, high, counts, over, noise, error), margins.supports(across, lanes)
 
@@ -144,18 +150,19 @@ class NullSpace(NamedTuple):
     largest: Array
 
 
-def null_space(every: Sequence[Array], wrench: Column, *, order: tuple[int, ...]) -> NullSpace:
+def null_space(every: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]) -> NullSpace:
     """What pulls on nothing, and what supplies one wrench, of robots on six to eight cables in space.
 
     Args:
         every: columns of the wrench matrix, of `geometry.wrench_columns`.
+        loss: (n,) their errors over rounding, likewise.
         wrench: six components, () or (n,), moments over a length, N.
         order: of the cables, those of the base block first.
 
     Returns:
         the tensions.
     """
-    rows, held, *others = _by_block(every, wrench, order=order)
+    rows, held, *others = _by_block(every, loss, wrench, order=order)
     *stacked, tensions = _stacked([*rows, held])
     return NullSpace(stacked, tensions, *others)
 
@@ -166,7 +173,7 @@ def _stacked(lanes: Sequence[Sequence[Array]]) -> list[Array]:
 
 
 @partial(jax.jit, static_argnames=("order",))
-def _by_block(every: Sequence[Array], wrench: Column, *, order: tuple[int, ...]):
+def _by_block(every: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]):
     # What `NullSpace` has, cable by cable.
     others, like = order[CABLES:], every[0][0]
     cables = [[component[k] for component in every] for k in order]
@@ -177,13 +184,13 @@ def _by_block(every: Sequence[Array], wrench: Column, *, order: tuple[int, ...])
     rows = [[*tensions[j], *beyond[j]] for j in range(len(others))]
     inverse = 1.0 / found.common
     held = [*(x * inverse for x in tensions[-1]), *[zero] * len(others)]
-    rounding = jnp.asarray(BLOCK_ROUNDING * jnp.finfo(like.dtype).eps, like.dtype) * found.scale
+    rounding = jnp.asarray(BLOCK_ROUNDING * jnp.finfo(like.dtype).eps, like.dtype) * loss * found.scale
     most_held = largest([jnp.abs(x) for x in held])
-    loss = rounding * (one_norm(given) + most_held) * jnp.abs(inverse)
+    uncertain = rounding * (one_norm(given) + most_held) * jnp.abs(inverse)
     noise = zero if not others else rounding
     if len(others) == MOST_OTHERS:
         noise = 4.0 * noise * largest([jnp.abs(x) for row in rows for x in row])
-    return rows, held, noise, loss, most_held
+    return rows, held, noise, uncertain, most_held
 
 
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))

@@ -13,7 +13,8 @@ def by_program(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
     Args:
         matrix: (dof, n_cables) wrench matrix, moments over a length.
         wrench: (dof,) what the cables must supply, N.
-        low: (n_cables,) N; None: wrench closure is asked about, s <= t <= 1 with no wrench at all.
+        low: (n_cables,) N; None: wrench closure is asked about, s <= t <= 1 - s with no wrench at all; the rank of the
+            matrix is not looked at.
         high: (n_cables,) N, inf for none; None: likewise.
 
     Returns:
@@ -43,7 +44,8 @@ def by_squares(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
     Args:
         matrix: (dof, n_cables) wrench matrix, moments over a length.
         wrench: (dof,) what the cables must supply, N.
-        low: (n_cables,) N; None: wrench closure is asked about, by tensions of 1 or more without a wrench.
+        low: (n_cables,) N; None: wrench closure is asked about, by tensions of 1 or more without a wrench; the rank of
+            the matrix is not looked at.
         high: (n_cables,) N, inf for none; None: likewise.
 
     Returns:
