@@ -7,7 +7,7 @@ import numpy as np
 from cspr_jax.errors import InputError
 from cspr_jax.schema.motion_quantities import FLIGHT, HOW, MARGIN, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.quantity import Quantity
-from cspr_jax.schema.verdicts import SENTENCES, Verdict
+from cspr_jax.schema.verdicts import FLAGS, SENTENCES, Verdict
 
 AXES = {
     q.name: q
@@ -55,7 +55,7 @@ QUANTITIES = {
     q.name: q
     for q in (
         Quantity("arcs", "1", "smallest number of arcs", f"Smallest number of feasible arcs{HOW}; 0: none.", "int16"),
-        Quantity("verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint16", unflagged="feasible"),
+        Quantity("verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint32", unflagged="feasible"),
         Quantity(
             "duration",
             "s",
@@ -188,7 +188,7 @@ QUANTITIES = {
             "1",
             "main reason",
             "Why most of the accessible orientations that are not attained are not: a verdict's flag; 0: all are.",
-            "uint16",
+            "uint32",
             unflagged="all attained",
         ),
         *(
@@ -384,5 +384,5 @@ def flag_attributes() -> dict[str, object]:
     Returns:
         flag_masks and flag_meanings.
     """
-    masks = np.array([flag.value for flag in SENTENCES], np.uint16)
+    masks = np.array([flag.value for flag in SENTENCES], FLAGS)
     return {"flag_masks": masks, "flag_meanings": " ".join(flag.text for flag in SENTENCES)}

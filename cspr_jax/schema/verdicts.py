@@ -2,6 +2,11 @@
 
 import enum
 
+import numpy as np
+
+# Of arrays of flags, in memory and in files.
+FLAGS = np.uint32
+
 
 class Verdict(enum.IntFlag):
     """Flags of the reasons why a trajectory is not, or not certainly, feasible; 0 is feasible."""

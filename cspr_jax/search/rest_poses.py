@@ -10,7 +10,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.workspace import geometry
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.workspace_cells import WorkspaceCells
 from cspr_jax.search.workspace_clearances import apart
 from cspr_jax.search.workspace_questions import CLOSURE
@@ -55,7 +55,7 @@ class RestPoses:
         """
         places, count = mass_centres(self.robot, origins, quaternions), len(origins)
         found: Answers = {name: np.full(count, np.nan) for name in MARGINS}
-        verdict = np.zeros(count, np.uint16)
+        verdict = np.zeros(count, FLAGS)
         for condition, asked in self.searches.items():
             answers = asked(places, quaternions)
             verdict |= answers.verdict
@@ -102,12 +102,12 @@ class RestPoses:
         return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
 
     def _limited(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        verdict = np.zeros(len(places), np.uint16)
+        verdict = np.zeros(len(places), FLAGS)
         if self.limits.floor is not None:
-            verdict |= np.where(places[:, 2] > float(self.limits.floor), Verdict.BELOW_FLOOR, 0).astype(np.uint16)
+            verdict |= np.where(places[:, 2] > float(self.limits.floor), Verdict.BELOW_FLOOR, 0).astype(FLAGS)
         if self.limits.cable_length_max is not None:
             is_long = (self._lengths(places, quaternions) > np.asarray(self.limits.cable_length_max)).any(1)
-            verdict |= np.where(is_long, Verdict.CABLE_TOO_LONG, 0).astype(np.uint16)
+            verdict |= np.where(is_long, Verdict.CABLE_TOO_LONG, 0).astype(FLAGS)
         return verdict
 
 
@@ -152,12 +152,12 @@ def _of_places(every: Answers, volume: np.ndarray, kind: OrientationSet) -> Answ
         may_be = ~is_met & (inside | is_open).all(1)
     flags = np.where(is_met, 0, np.where(may_be, Verdict.UNDECIDED.value, _most_frequent(verdict)))
     found = {name: best(every[name], axis=1) for name in MARGINS}
-    return {"verdict": flags.astype(np.uint16), **found, "orientation_fraction": inside @ volume}
+    return {"verdict": flags.astype(FLAGS), **found, "orientation_fraction": inside @ volume}
 
 
 def _most_frequent(verdict: np.ndarray) -> np.ndarray:
     # Of each row the flags that most of those have that are not inside.
     values = np.unique(verdict[verdict != 0])
     if len(values) == 0:
-        return np.zeros(len(verdict), np.uint16)
+        return np.zeros(len(verdict), FLAGS)
     return values[np.argmax([(verdict == value).sum(1) for value in values], axis=0)]

@@ -7,7 +7,7 @@ from cspr_jax.feasibility.workspace import geometry
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.clearance import clearances, scene
 from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 BATCH = 4096
 
@@ -30,4 +30,4 @@ def apart(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray) -> tu
         ends = in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
     found = clearances(scene(robot, diameter=diameter), positions, turns, ends=ends)
     verdict = np.where(found.clearance > 0.0, 0, Verdict.CABLE_CABLE)
-    return found.clearance, np.where(found.is_open, Verdict.UNDECIDED, verdict).astype(np.uint16)
+    return found.clearance, np.where(found.is_open, Verdict.UNDECIDED, verdict).astype(FLAGS)

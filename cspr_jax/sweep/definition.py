@@ -20,7 +20,7 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
 from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
-from cspr_jax.store.netcdf import bytes_needed
+from cspr_jax.store.netcdf import bytes_needed, dtype_of
 from cspr_jax.store.shards import Layout
 from cspr_jax.sweep.checks import check_map, check_points
 
@@ -43,6 +43,7 @@ class Sweep:
         store: quantities to keep.
         settings: everything that decides the result's numbers.
         text: of the file, as it was read.
+        types: NumPy's name of each stored quantity's type, which processes need that know no rows from outside.
     """
 
     file: Path
@@ -53,6 +54,7 @@ class Sweep:
     store: list[str]
     settings: dict[str, Any]
     text: str
+    types: dict[str, str]
 
     @functools.cached_property
     def identity(self) -> str:
@@ -126,7 +128,8 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     settings = keys.model_dump(mode="json", by_alias=True, exclude_none=True)
     settings |= {"robot": robot.settings, "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
-    return Sweep(path, kind, keys, robot, Grid(axes, tile), store, settings, text)
+    types = {name: dtype_of(name, keys.run.dtype) for name in store}
+    return Sweep(path, kind, keys, robot, Grid(axes, tile), store, settings, text, types)
 
 
 def _count(axis: AxisRange | list[float]) -> int:
