@@ -6,6 +6,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.schema.motion_quantities import FLIGHT, HOW, MARGIN, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.pose_quantities import POSES
 from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.verdicts import FLAGS, SENTENCES, Verdict
 
@@ -220,36 +221,7 @@ QUANTITIES = {
             "not even span the space. Never positive of suspended robots.",
             signed=True,
         ),
-        Quantity(
-            "wrench_margin",
-            "N",
-            "margin of the tensions",
-            "Largest distance that tensions which supply all wrenches can keep from their finite limits; negative "
-            "outside of the workspace, infinite where nothing bounds it.",
-            signed=True,
-        ),
-        Quantity(
-            "clearance",
-            "m",
-            "clearance of the cables",
-            "Smallest distance between cables without a common point, less their diameter.",
-            signed=True,
-        ),
-        Quantity(
-            "cell_side",
-            "1",
-            "side of the whole cell",
-            "1: every position of the cell, the box half-way to the next points, is proved inside; 2: every one is "
-            "proved outside; 0: not decided, or nobody asks.",
-            "int16",
-            meanings="cell-sides",
-        ),
-        Quantity(
-            "orientation_fraction",
-            "1",
-            "part of the orientations",
-            "Part of a set of orientations, by volume, that is inside the workspace at a place; of one pose 0 or 1.",
-        ),
+        *POSES,
         Quantity(
             "level_acceleration",
             "m s-2",

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import itertools
 import math
 import os
 import shutil
@@ -22,7 +23,7 @@ from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
 from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 from cspr_jax.store.netcdf import bytes_needed, dtype_of
 from cspr_jax.store.shards import Layout
-from cspr_jax.sweep.checks import check_map, check_points
+from cspr_jax.sweep.checks import check_map, check_points, is_given
 
 # Each tile is a file.
 LARGEST_TILES = 100_000
@@ -113,7 +114,8 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     own = _orientation_axes(keys) if kind.is_over_orientations else {}
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
     counts |= {name: len(points) for name, points in own.items()}
-    store = list(keys.run.store or kind.stored)
+    more = [names for key, names in kind.stored_with if is_given(keys, key)]
+    store = list(keys.run.store or dict.fromkeys((*kind.stored, *itertools.chain(*more))))
     for name in store:
         if name not in kind.quantities:
             raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(kind.quantities)} in this map")
