@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from support.commands import cspr
 
+import cspr_jax
 from cspr_jax.feasibility.workspace import geometry
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.platform import platform_robot
@@ -350,6 +351,37 @@ def test_no_velocity_needs_a_faster_cable(pattern):
 
     rates = np.abs(lengths(1.0) - lengths(-1.0)) / (2.0 * step)
     assert (rates <= fastest + 1e-6).all() and (rates.max(0) > 0.9 * fastest).all()
+
+
+def test_sets_of_orientations_among_obstacles(tmp_path):
+    """Two orientations, asked each and as a set: the better one's clearance, and what is nearest there."""
+    turns = [quaternion(Rotation.identity(), "up"), quaternion(Rotation.from_rotvec([0.0, 0.0, 0.5]), "up")]
+    (tmp_path / "set").mkdir()
+    text = file_of("up", "box", ("sphere",), more=f'orientations = "inclusion"\nquaternions = {turns}')
+    data = swept(tmp_path / "set", text)
+    each = []
+    for k, turn in enumerate(turns):
+        (tmp_path / f"{k}").mkdir()
+        together = Rotation.from_quat(turn, scalar_first=True) * TURN
+        one = file_of("up", "box", ("sphere",)).replace(f"{quaternion(TURN, 'up')}", f"{quaternion(together, 'up')}")
+        each.append(swept(tmp_path / f"{k}", one))
+    better = np.argmax([one["clearance"] for one in each], axis=0)
+    for name in ("clearance", "nearest_bodies"):
+        wanted = np.where(better == 0, each[0][name], each[1][name])
+        np.testing.assert_allclose(data[name], wanted, rtol=0, atol=1e-12)
+    assert ((data["verdict"] == 0) == (np.max([one["clearance"] for one in each], axis=0) > 0.0)).all()
+    assert {*better.ravel()} == {0, 1} and len(np.unique(data["nearest_bodies"])) >= 2
+
+
+def test_results_with_obstacles_are_read_and_drawn(tmp_path):
+    """Their settings hold tables in lists; words and reasons have colours."""
+    data = swept(tmp_path, file_of("down", "none"))
+    found = cspr_jax.open_result(tmp_path / "run" / "w.h5")
+    np.testing.assert_array_equal(found.data["nearest_bodies"], data["nearest_bodies"])
+    assert [table["kind"] for table in found.settings["workspace"]["obstacle"]] == list(KINDS)
+    for name in ("nearest_bodies", "verdict", "clearance_obstacles"):
+        path = tmp_path / f"{name}.png"
+        assert cspr("plot", tmp_path / "run" / "w.h5", "--quantity", name, "-o", path)[0] == 0 and path.exists()
 
 
 def test_what_nobody_asks_changes_no_identity():
