@@ -101,6 +101,9 @@ class RestPoses:
             kept, lost = WorkspaceCells(self.robot, asked.asked)(places, half, quaternion, asked(places, turns))
             inside, outside = inside & kept, outside | lost
         moved = shifts(self.robot, places, turns, reach)
+        if self.robot.pulleys is not None:
+            # A platform within a pulley has no cable there.
+            inside &= (moved.free > 0.0).all(1)
         slacks = list[tuple[np.ndarray, np.ndarray]]()
         if self.around is not None:
             every = at_rest(self.robot, self.around, places, turns)
