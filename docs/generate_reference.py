@@ -7,6 +7,7 @@ from pydantic import BaseModel
 
 from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.limits import LimitTable
+from cspr_jax.config.obstacles import ObstacleTable
 from cspr_jax.config.plan import Choice, PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepTrajectory
@@ -40,6 +41,7 @@ FILES = {
         ("[orientations]", Orientations),
         ("[launch]", LaunchSearch),
         ("[workspace]", WorkspaceTable),
+        ("[[workspace.obstacle]]", ObstacleTable),
         ("[limits]", LimitTable),
         ("[run]", Run),
     ],
@@ -130,6 +132,7 @@ def _kind(kind: MapKind) -> str:
         "needs one of": _names(kind.one_of),
         "takes": _names(kind.takes),
         "quantities": ", ".join(f"**`{name}`**" if name in kind.stored else f"`{name}`" for name in kind.quantities),
+        "stored besides": "; ".join(f"with `{key}`: {_names(names)}" for key, names in kind.stored_with),
     }
     lines = [textwrap.fill(f"- {words}: {text}", 120, subsequent_indent="  ") for words, text in asked.items() if text]
     return f"`{kind.name}`: {kind.description}\n\n" + "".join(f"{line}\n" for line in lines)

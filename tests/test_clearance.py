@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from oracles import clearance as oracle
 from pydantic import Field
 from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.config.obstacles import Obstacles, PlatformShapeKeys
@@ -116,7 +117,9 @@ def test_depths_in_boxes_are_least_translations():
 
 
 def tables(solid):
-    return clearance_lanes.Polyhedron(*map(jnp.asarray, (solid.normals, solid.offsets, solid.triangles, solid.edges)))
+    return clearance_lanes.Polyhedron(
+        *map(jnp.asarray, (solid.normals, solid.offsets, solid.triangles, solid.edges, solid.sides))
+    )
 
 
 def test_hulls(count=2_000):
@@ -313,6 +316,27 @@ def test_boxes_that_meet():
     assert kind == "platform-obstacle"
     np.testing.assert_allclose(np.asarray(term(poses)).real, [0.3, 0.0, -0.2, 0.1], atol=1e-12)
     assert (found.clearance <= np.array([0.3, 0.0, -0.2, 0.1]) + 1e-12).all()
+
+
+def test_hulls_and_boxes_that_meet(count=240):
+    """Against the facets of the convex hull of all differences of corners; turned, along the axes, nearly so."""
+    rng = np.random.default_rng(8)
+    odd = shapes.hull(rng.normal(size=(9, 3)))
+    block = shapes.hull(oracle.corners(np.array([[0.4, 0.9, 0.6]]))[0])
+    half, centre = np.array([0.3, 0.5, 0.8]), rng.uniform(-1.9, 1.9, (count, 3))
+    angle = np.where(np.arange(count) % 3 == 0, 1.0, np.where(np.arange(count) % 3 == 1, 0.0, 1e-7))
+    turns = Rotation.from_rotvec(angle[:, None] * rng.normal(size=(count, 3))).as_matrix()
+    for solid in (odd, block):
+        found = lanes(
+            lambda c, x, y, z, s=solid: clearance_lanes.hull_box(
+                tables(s), c, [x, y, z], [jnp.asarray(h) for h in half]
+            )
+        )(centre, *(turns[:, :, k] for k in range(3)))
+        corners = np.einsum("nij,kj->nki", turns, oracle.corners(half[None])[0]) + centre[:, None]
+        own = np.unique(solid.triangles.reshape(-1, 3), axis=0)
+        wanted = [ConvexHull((x[:, None] - own[None]).reshape(-1, 3)).equations[:, 3].max() for x in corners]
+        np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9)
+        assert min((found > 0.05).sum(), (found < -0.05).sum()) > 30
 
 
 def test_what_has_nothing_to_meet():

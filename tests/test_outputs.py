@@ -399,7 +399,7 @@ def test_all_quantities_of_a_file_are_cut_at_the_same_slices(tmp_path, figures):
     """Where only some orientations are accessible, what is drawn of one is drawn of the others."""
     axes = {"torsion": 9, "tilt_azimuth": 4, "tilt": 3}
     points = {name: np.linspace(0.0, 1.0, count) for name, count in axes.items()}
-    verdict = np.full(tuple(axes.values()), cspr_jax.Verdict.NOT_ACCESSIBLE.value, np.uint16)
+    verdict = np.full(tuple(axes.values()), cspr_jax.Verdict.NOT_ACCESSIBLE.value, np.uint32)
     verdict[1:8] = cspr_jax.Verdict.SLACK_CABLE.value
     arcs = np.zeros(verdict.shape, np.int16)
     arcs[4, :, :2], verdict[4, :, :2] = 3, 0

@@ -194,7 +194,7 @@ def test_an_orientation_plane_has_no_label_on_its_head(capsys, tmp_path, figures
         "tilt_azimuth": azimuth,
         "tilt": np.arange(1, 5) * 0.3,
     }
-    verdict = np.zeros((1, 1, 1, 1, 8, 4), np.uint16)
+    verdict = np.zeros((1, 1, 1, 1, 8, 4), np.uint32)
     path = made(tmp_path / "map.h5", axes, {"verdict": verdict}, kind="orientations", trajectory={})
     cspr(capsys, "plot", path)
     (panel,) = panels(figures[0])
@@ -206,7 +206,7 @@ def test_an_orientation_plane_has_no_label_on_its_head(capsys, tmp_path, figures
     three = made(
         tmp_path / "three.h5",
         axes | {"torsion": np.arange(-2, 3) * 0.3},
-        {"verdict": np.zeros((1, 1, 1, 5, 8, 4), np.uint16)},
+        {"verdict": np.zeros((1, 1, 1, 5, 8, 4), np.uint32)},
         kind="orientations",
         trajectory={},
     )

@@ -1,5 +1,6 @@
 """Sweeps from file to HDF5: what is stored, where, under which name, and what a failure leaves behind."""
 
+import dataclasses
 import itertools
 import json
 from pathlib import Path
@@ -275,6 +276,9 @@ def test_the_reference_data_set_is_what_the_program_computes():
     path = ROOT / "results" / "reference" / "minimum_arcs.h5"
     assert path.stat().st_size < 2_000_000
     result = cspr_jax.open_result(path)
+    with h5py.File(path) as file:
+        for name, stored in result.data.items():
+            np.testing.assert_array_equal(file[name][...], stored)
     sweep = read_sweep(ROOT / "sweeps" / "reference" / "minimum_arcs.toml")
     assert result.attributes["identity"] == sweep.identity
     assert list(result.axes) == list(sweep.grid.axes)
@@ -288,6 +292,31 @@ def test_the_reference_data_set_is_what_the_program_computes():
     for name, stored in result.data.items():
         rtol = 1e-6 if name in FLOATS else 0.0
         np.testing.assert_allclose(stored[index], answers[name], rtol=rtol, atol=rtol, err_msg=name)
+
+
+def test_runs_of_versions_with_narrower_verdicts_go_on(tiny, tmp_path, monkeypatch):
+    """Earlier versions stored flags as uint16: their shards and results are read, finished, and give the same."""
+    narrow = dataclasses.replace(EVERY["verdict"], kind="uint16")
+    with monkeypatch.context() as before:
+        before.setitem(EVERY, "verdict", narrow)
+        code, out, _ = cspr("run", sweep_file(tmp_path, run="tile = [1, 4, 5, 3]"), "-o", tmp_path / "run")
+    path = Path(out.splitlines()[-1])
+    old, shards = path.read_bytes(), sorted((tmp_path / "run" / "shards").iterdir())
+    with h5py.File(path) as file:
+        assert file["verdict"].dtype == np.uint16
+    data = cspr_jax.open_result(path).data
+    assert data["verdict"].dtype == np.uint32 and cspr("verify", tmp_path / "run")[0] == 0
+    kept = shards[0].read_bytes()
+    path.unlink(), shards[1].unlink()
+    code, out, _ = cspr("run", tmp_path / "tiny.toml", "-o", tmp_path / "run")
+    assert code == 0 and shards[0].read_bytes() == kept and not list(tmp_path.glob("run/quarantine/*"))
+    assert path.read_bytes() != old and cspr("verify", path)[0] == 0
+    again = cspr_jax.open_result(path)
+    with h5py.File(path) as file:
+        assert file["verdict"].dtype == file["verdict"].attrs["flag_masks"].dtype == np.uint32
+    for name, stored in again.data.items():
+        np.testing.assert_array_equal(stored, data[name])
+        np.testing.assert_array_equal(stored, tiny[2][name])
 
 
 def test_hints_come_with_what_is_computed_and_with_nothing_refused(tmp_path):

@@ -10,6 +10,7 @@ from support import cable_robots
 from support.workspaces import ROUND, made
 
 import cspr_jax
+from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.reasons import REASONS
 from cspr_jax.problem import centred
@@ -18,7 +19,7 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.pulleys import exits
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
-from cspr_jax.search.workspace_clearances import apart
+from cspr_jax.search.workspace_clearances import at_rest, surroundings
 from cspr_jax.search.workspace_questions import question
 from cspr_jax.search.workspaces import Poses, WorkspaceSearch
 
@@ -139,12 +140,17 @@ def test_cables_that_leave_pulleys_are_kept_apart_from_there():
     plain = platform_robot(base, platform, mass=1.0, inertia=ROUND, pattern="1R2T", z_axis="down", gravity=G)
     wound = with_cables(plain, pulley_radius=0.1)
     places, turns = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.3]]), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))
-    found = apart(centred(wound)[0], places - base.mean(0), turns)[0]
+
+    def apart(robot, positions, quaternions):
+        here = surroundings(robot, frame_of(np.zeros((1, 3)), "down"))
+        return at_rest(robot, here, positions, quaternions).clearance
+
+    found = apart(centred(wound)[0], places - base.mean(0), turns)
     for place, value in zip(places, found, strict=True):
         ends = np.asarray(exits(base, wound.pulleys.axes, wound.pulleys.radius, place + platform).point)
         moved = dataclasses.replace(plain, base_points=ends)
-        assert value == pytest.approx(apart(moved, place[None], turns[:1])[0][0], abs=1e-9)
-        assert value != pytest.approx(apart(plain, place[None], turns[:1])[0][0], abs=1e-3)
+        assert value == pytest.approx(apart(moved, place[None], turns[:1])[0], abs=1e-9)
+        assert value != pytest.approx(apart(plain, place[None], turns[:1])[0], abs=1e-3)
 
 
 def test_cogiro():

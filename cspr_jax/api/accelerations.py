@@ -12,6 +12,7 @@ from cspr_jax.problem import limits_over, prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.wrench_sets import Faces, spanning
+from cspr_jax.schema.verdicts import FLAGS
 from cspr_jax.search import accelerations as search
 
 
@@ -65,7 +66,7 @@ class AvailableAccelerations:
         Raises:
             InputError: another shape, or not finite.
         """
-        return self._judged(accelerations)[1].astype(np.uint16)
+        return self._judged(accelerations)[1].astype(FLAGS)
 
     def _judged(self, accelerations) -> tuple[np.ndarray, np.ndarray]:
         given = np.asarray(accelerations, float)

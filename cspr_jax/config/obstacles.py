@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from cspr_jax.config.limits import Coordinate, Point
 from cspr_jax.config.reading import Table
@@ -21,6 +21,10 @@ Component = Annotated[float, Field(ge=-1.1, le=1.1)]
 Quaternion = Annotated[list[Component], Field(min_length=4, max_length=4)]
 Corners = Annotated[list[Point], Field(min_length=2, max_length=2)]
 Points = Annotated[list[Point], Field(min_length=4, max_length=MOST_CORNERS)]
+HullOf = Annotated[
+    Annotated[bool, Tag("~true")] | Annotated[Points, Tag("~points")],
+    Discriminator(lambda value: "~points" if isinstance(value, list) else "~true"),
+]
 
 # Keys of each kind: those that it needs, and those that it may have.
 _KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -99,12 +103,14 @@ class PlatformShapeKeys(Table):
     """The platform's own shape, which its cables are kept clear of."""
 
     platform_box: Corners | None = Field(
-        None, description="rigid platform: its box, [[x, y, z], [x, y, z]], least and largest, platform axes, m"
-    )
-    platform_hull: Points | None = Field(
         None,
-        description="rigid platform: points whose convex hull is its shape, platform axes, m, in place of "
-        "platform_box; absent: the hull of platform_points, if these do not lie in a plane",
+        description="interference-free: the platform's box, [[x, y, z], [x, y, z]], least and largest, platform axes, "
+        "m; cables keep clear of it, and it of obstacles; absent, without platform_hull: its shape is not looked at",
+    )
+    platform_hull: HullOf | None = Field(
+        None,
+        description="in place of platform_box: points whose convex hull is the platform's shape, platform axes, m; "
+        "true: those where the cables are attached",
     )
 
     @model_validator(mode="after")
@@ -113,27 +119,38 @@ class PlatformShapeKeys(Table):
             raise fault("platform_hull", self.platform_hull, "absent beside platform_box")
         if self.platform_box is not None:
             _check_corners("platform_box", self.platform_box)
-        if self.platform_hull is not None:
+        if self.platform_hull is False:
+            raise fault("platform_hull", False, "true, a list of points, or absent")
+        if isinstance(self.platform_hull, list):
             try:
                 shapes.hull(self.platform_hull)
             except InputError as error:
                 raise fault("platform_hull", self.platform_hull, "four points or more, not all in a plane") from error
         return self
 
-    def body(self, centre_of_mass: Sequence[Coordinate] = (0.0, 0.0, 0.0)) -> shapes.Body | None:
+    def body(
+        self,
+        centre_of_mass: Sequence[Coordinate] = (0.0, 0.0, 0.0),
+        platform_points: Sequence[Sequence[Coordinate]] = (),
+    ) -> shapes.Body | None:
         """The shape.
 
         Args:
             centre_of_mass: (3,) of the robot file, platform axes, m.
+            platform_points: (n_cables, 3) of the robot file, platform axes, m.
 
         Returns:
             the shape in platform axes, from the mass centre; None: not given.
+
+        Raises:
+            InputError: the shape is the hull of `platform_points`, which lie in a plane.
         """
         if self.platform_box is not None:
             low, high = ([x - c for x, c in zip(corner, centre_of_mass, strict=True)] for corner in self.platform_box)
             return shapes.box_between(low, high, name="platform")
         if self.platform_hull is not None:
-            points = [[x - c for x, c in zip(point, centre_of_mass, strict=True)] for point in self.platform_hull]
+            given = self.platform_hull if isinstance(self.platform_hull, list) else platform_points
+            points = [[x - c for x, c in zip(point, centre_of_mass, strict=True)] for point in given]
             return shapes.hull(points, name="platform")
         return None
 

@@ -5,23 +5,25 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from cspr_jax.config.obstacles import Obstacles, PlatformShapeKeys
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Quaternion
 from cspr_jax.config.wording import fault
 
 Condition = Literal["static", "wrench-feasible", "wrench-closure", "interference-free"]
 Component = Annotated[float, Field(ge=-1e12, le=1e12)]
+Speed = Annotated[float, Field(gt=0.0, le=1e6)]
 Sizes = Annotated[list[Annotated[float, Field(ge=0.0, le=1e12)]], Field(min_length=1, max_length=6)]
 
 
-class WorkspaceTable(Table):
-    """Conditions of the workspace; a pose meets all of them."""
+class PoseConditions(Table):
+    """Conditions of poses, and of sets of orientations."""
 
     conditions: Annotated[list[Condition], Field(min_length=1, max_length=4)] = Field(
         ["wrench-feasible"],
         description='"static": taut cables hold the weight; "wrench-feasible": tensions within their limits supply '
         'all wrenches; "wrench-closure": cables that are pulled hard enough resist every wrench; "interference-free": '
-        "no two cables meet",
+        "no two cables meet, nor a cable or the platform what obstacle, platform_box and platform_hull say",
     )
     orientation: Quaternion | None = Field(
         None, description="orientation of a platform, a unit quaternion, scalar first; absent: that of its file"
@@ -76,11 +78,13 @@ class WorkspaceTable(Table):
         return names
 
     @model_validator(mode="after")
-    def _one_set(self) -> "WorkspaceTable":
+    def _one_set(self) -> "PoseConditions":
         is_of_some = self.orientations in ("inclusion", "total")
         for name in ("tilt_max", "quaternions"):
             if getattr(self, name) is not None and not is_of_some:
-                raise fault(name, None, 'absent: workspace.orientations is neither "inclusion" nor "total"')
+                raise fault(
+                    name, getattr(self, name), 'absent: workspace.orientations is neither "inclusion" nor "total"'
+                )
         if is_of_some and (self.tilt_max is None) == (self.quaternions is None):
             raise fault("tilt_max", self.tilt_max, f'given, or quaternions, one of them, with "{self.orientations}"')
         if self.prove and self.orientations is not None:
@@ -92,8 +96,34 @@ class WorkspaceTable(Table):
         return self
 
     @model_validator(mode="after")
-    def _somebody_asks(self) -> "WorkspaceTable":
+    def _somebody_asks(self) -> "PoseConditions":
         for name in ("wrenches", "wrench_box", "wrench_ellipsoid", "acceleration"):
             if getattr(self, name) is not None and "wrench-feasible" not in self.conditions:
-                raise fault(name, None, 'absent: "wrench-feasible" is not among the conditions')
+                raise fault(name, getattr(self, name), 'absent: "wrench-feasible" is not among the conditions')
+        return self
+
+
+class WorkspaceTable(PlatformShapeKeys, PoseConditions):
+    """Conditions of the workspace; a pose meets all of them."""
+
+    obstacle: Obstacles | None = Field(
+        None, description="interference-free: [[workspace.obstacle]], bodies fixed in space that nothing may meet"
+    )
+    speed: Speed | None = Field(
+        None,
+        description="with cable_speed_max: speed that the origin of the platform frame, or the point mass, must be "
+        "able to have in every direction in which it can move, m/s",
+    )
+    angular_speed: Speed | None = Field(
+        None,
+        description="with cable_speed_max: angular speed that the platform must be able to have about every axis about "
+        "which it can turn, together with speed, rad/s",
+    )
+
+    @model_validator(mode="after")
+    def _interference_asks(self) -> "WorkspaceTable":
+        for name in ("obstacle", "platform_box", "platform_hull"):
+            if getattr(self, name) is not None and "interference-free" not in self.conditions:
+                given = self.model_dump(include={name}, exclude_none=True)[name]
+                raise fault(name, given, 'absent: "interference-free" is not among the conditions')
         return self

@@ -8,6 +8,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.accelerations import TOLERANCE
 from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.schema.tiles import Grid
+from cspr_jax.schema.verdicts import FLAGS
 from cspr_jax.search.accelerations import reach_of
 
 MOST_CABLES = 20
@@ -28,7 +29,7 @@ class FeasibleAccelerationMap(PointMassMap):
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         answers = reach_of(self._problem.robot, self._problem.limits, self._targets(cells))._asdict()
-        return answers | {"verdict": answers["verdict"].astype(np.uint16)}
+        return answers | {"verdict": answers["verdict"].astype(FLAGS)}
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""

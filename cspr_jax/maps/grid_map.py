@@ -14,7 +14,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.problem import build_problem
 from cspr_jax.robots.point_mass import is_planar, plane_normal, rest_point
 from cspr_jax.schema.tiles import Grid
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
@@ -157,7 +157,7 @@ class PointMassMap(GridMap):
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         feasible, margin, verdict = answers["arcs"] > 0, answers["margin"], answers["verdict"]
-        unsure = np.uint16(Verdict.FEWER_ARCS_UNDECIDED.value)
+        unsure = FLAGS(Verdict.FEWER_ARCS_UNDECIDED.value)
         lasts = np.isfinite(answers["duration"]) & (answers["duration"] > 0.0)
         return {
             "a feasible cell with a margin below zero": feasible & ~(margin > -ROUNDING),

@@ -9,7 +9,7 @@ from cspr_jax.maps.places import DIGITS, AttainabilityMap
 from cspr_jax.maps.poses import TILT_TORSION
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.accessible import accessible
 
 # What has no value where nothing is accessible.
@@ -27,7 +27,7 @@ class OrientationsMap(AttainabilityMap):
         some, count = np.flatnonzero(self._accessible(places, angles) & (z0 > 0.0)), len(z0)
         every = {name: np.full(count, np.nan) for name in FLOATS}
         every |= {"arcs": np.zeros(count, int), "tried_arcs": np.zeros(count, int)}
-        every["verdict"] = np.full(count, Verdict.NOT_ACCESSIBLE.value, np.uint16)
+        every["verdict"] = np.full(count, Verdict.NOT_ACCESSIBLE.value, FLAGS)
         if len(some):
             answers = self._attainable(places[some], angles[some], z0[some])
             columns = vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}

@@ -11,7 +11,7 @@ from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.problem import motion_kind
 from cspr_jax.robots.symmetries import NONE, folded, symmetries
 from cspr_jax.schema.quantities import REFUSALS
-from cspr_jax.schema.verdicts import NO_REASON, SENTENCES, Verdict
+from cspr_jax.schema.verdicts import FLAGS, NO_REASON, SENTENCES, Verdict
 from cspr_jax.search.accessible import Accessible, accessible
 from cspr_jax.search.attainable import VALUES, attainable
 from cspr_jax.search.platform_answers import PoseAnswers
@@ -92,7 +92,7 @@ class AttainabilityMap(OrientationWorkspaceMap):
         pieces = zip(every, np.split(arcs, stops), np.split(verdicts, stops), strict=True)
         rows = [_of_attained(*piece) for piece in pieces]
         columns = {name: np.array([row[name] for row in rows[: len(places)]]) for name in rows[0]}
-        columns["main_reason"] = columns["main_reason"].astype(np.uint16)
+        columns["main_reason"] = columns["main_reason"].astype(FLAGS)
         rough = np.array([row["attainable_fraction"] for row in rows[len(places) :]])
         error = np.abs(columns["attainable_fraction"] - rough)
         return _of_sets(fine, coarse) | columns | {"attainable_error": error}

@@ -14,18 +14,22 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.maps.poses import TILT_TORSION
 from cspr_jax.problem import build_limits, build_robot, centred, given_quaternion
+from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.orientation_grids import cone_grid, equal_volume_grid, turn_grid
 from cspr_jax.search.rest_poses import MARGINS, OrientationSet, RestPoses, over_orientations
+from cspr_jax.search.workspace_clearances import surroundings
 from cspr_jax.search.workspace_questions import FEASIBLE, check_cables, question, required_wrenches
+from cspr_jax.search.workspace_speeds import CableSpeeds, cable_speeds
 from cspr_jax.search.workspaces import WorkspaceSearch
 
 INTERFERENCE = "interference-free"
 # Limits of poses at rest: others belong to motions.
 TENSIONS = ("tension_min", "tension_max")
-HELD = (*TENSIONS, "floor", "cable_length_max")
+SPEED = "cable_speed_max"
+HELD = (*TENSIONS, "floor", "cable_length_max", SPEED)
 # Of pi, of sets of orientations where the file does not say.
 DIVISIONS = 12
 
@@ -57,7 +61,7 @@ class WorkspaceMap(GridMap):
             searches = {name: self._search(name) for name in names}
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
-        self._poses = RestPoses(self._robot, searches, INTERFERENCE in self._asked.conditions, self._limits)
+        self._poses = RestPoses(self._robot, searches, self._surroundings(spec), self._limits, self._speeds(spec))
 
     def _refuse_unused(self) -> None:
         for limit in LIMITS:
@@ -70,6 +74,39 @@ class WorkspaceMap(GridMap):
             if limit.name in TENSIONS and FEASIBLE not in self._asked.conditions:
                 allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
                 raise ConfigError(self._file, f"limits.{limit.name}: {allowed}")
+
+    def _surroundings(self, spec: RobotFile) -> Scene | None:
+        asked, row = self._asked, self._row
+        if INTERFERENCE not in asked.conditions:
+            return None
+        for name in ("platform_box", "platform_hull"):
+            if getattr(asked, name) is not None and not row.is_body:
+                raise ConfigError(self._file, f"workspace.{name}: must be absent: {spec.kind} has no shape")
+        # Shapes are from where the arms of the kernels are: the mass centre, or a joint.
+        centre = None if row.is_jointed else spec.centre_of_mass
+        try:
+            body = asked.body(centre or (0.0, 0.0, 0.0), spec.platform_points or ())
+        except InputError as error:
+            allowed = "must be points: those where the cables are attached lie in a plane"
+            raise ConfigError(self._file, f"workspace.platform_hull = true: {allowed}") from error
+        return surroundings(self._robot, self._frame, [table.shape() for table in asked.obstacle or ()], body)
+
+    def _speeds(self, spec: RobotFile) -> CableSpeeds | None:
+        asked, most = self._asked, self._limits.cable_speed_max
+        given = [name for name in ("speed", "angular_speed") if getattr(asked, name) is not None]
+        if not given:
+            if getattr(self._keys.limits, SPEED) is not None:
+                allowed = "must be absent without workspace.speed and workspace.angular_speed: cells are at rest"
+                raise ConfigError(self._file, f"limits.cable_speed_max: {allowed}")
+            return None
+        for name, has in (("speed", not self._row.is_jointed), ("angular_speed", self._row.is_body)):
+            if name in given and not has:
+                why = "turns about its joint alone" if self._row.is_jointed else "does not turn"
+                raise ConfigError(self._file, f"workspace.{name}: must be absent: {spec.kind} {why}")
+        if most is None:
+            raise ConfigError(self._file, f"workspace.{given[0]}: must be absent without limits.cable_speed_max")
+        values = {"speed": asked.speed or 0.0, "angular_speed": asked.angular_speed or 0.0}
+        return cable_speeds(self._robot, np.asarray(most), **values)
 
     def _given_turns(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
         # (k, 4) in the kernels' axes.

@@ -18,7 +18,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.robots import clearance_kernels as kernels
 from cspr_jax.robots.platform import PlatformRobot, pairs_apart
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, box_between, hull, is_flat
+from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, hull, is_flat
 
 # Poses of a batch on a CPU: of 16384 to 131072 about the same.
 BATCH = 65_536
@@ -291,12 +291,10 @@ def _terms(scene: Scene, origin: np.ndarray, dtype: np.dtype):
     body, leave = _cast(_solid(scene.body, np.zeros(3)), dtype), _cast(np.asarray(scene.leave), dtype)
     yield "platform", first, lambda poses: kernels.of_platform(points, poses, body, leave)
     first += count
-    around = _cast(_solid(_around(scene.body), np.zeros(3)), dtype)
+    of_brick = kernels.of_boxes if isinstance(body, kernels.Brick) else kernels.of_hull_box
     for solid in solids:
-        if isinstance(solid, kernels.Brick):
-            yield "platform-obstacle", first, lambda poses, solid=solid: kernels.of_boxes(poses, around, solid)
-        else:
-            yield "platform-obstacle", first, lambda poses, solid=solid: kernels.of_body(poses, body, solid)
+        of_both = of_brick if isinstance(solid, kernels.Brick) else kernels.of_body
+        yield "platform-obstacle", first, lambda poses, solid=solid, of_both=of_both: of_both(poses, body, solid)
         first += 1
 
 
@@ -311,7 +309,7 @@ def _solid(shape: Obstacle | Hull, origin: np.ndarray):
         return kernels.Rod(*map(leaf, (shape.start - origin, shape.end - shape.start, shape.radius)))
     if isinstance(shape, Box):
         return kernels.Brick(*map(leaf, (shape.centre - origin, shape.half, shape.turn)))
-    return kernels.Polyhedron(*map(leaf, (shape.normals, shape.offsets, shape.triangles, shape.edges)))
+    return kernels.Polyhedron(*map(leaf, (shape.normals, shape.offsets, shape.triangles, shape.edges, shape.sides)))
 
 
 def _corners(shape: Body) -> np.ndarray:
@@ -319,11 +317,6 @@ def _corners(shape: Body) -> np.ndarray:
         return shape.triangles.reshape(-1, 3)
     signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(-1, 3)
     return shape.centre + (signs * shape.half) @ shape.turn.T
-
-
-def _around(shape: Body) -> Box:
-    corners = _corners(shape)
-    return shape if isinstance(shape, Box) else box_between(corners.min(0), corners.max(0))
 
 
 def _reach(shape: Obstacle, origin: np.ndarray) -> float:

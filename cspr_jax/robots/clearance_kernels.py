@@ -16,6 +16,7 @@ from cspr_jax.arithmetic.lanes import Matrix, Vector
 from cspr_jax.robots.clearance_lanes import (
     Polyhedron,
     boxes,
+    hull_box,
     nearest,
     point_segment,
     segment_box,
@@ -233,11 +234,11 @@ def of_body(poses: Poses, own: Own, solid: Ball | Rod) -> Array:
 
 @jax.jit
 def of_boxes(poses: Poses, own: Brick, solid: Brick) -> Array:
-    """The platform and a box, the nearest that both can be: the largest gap between their shadows on a line.
+    """The platform, a box, and another box: the largest gap between their shadows on a line.
 
     Args:
         poses: lanes (n,).
-        own: a box around the platform, in its axes.
+        own: shape of the platform in its axes.
         solid: the obstacle.
 
     Returns:
@@ -249,6 +250,24 @@ def of_boxes(poses: Poses, own: Brick, solid: Brick) -> Array:
     away = _inward(turn, _less(_three(solid.centre), poses.position))
     centre, _ = _in_brick(own, away, [zero, zero, zero])
     return nearest([boxes(_three(own.half), centre, [tuple(zero + x for x in e) for e in edges], _three(solid.half))])
+
+
+@jax.jit
+def of_hull_box(poses: Poses, own: Polyhedron, solid: Brick) -> Array:
+    """The platform, a convex polyhedron, and a box: the largest gap between their shadows on a line.
+
+    Args:
+        poses: lanes (n,).
+        own: shape of the platform in its axes.
+        solid: the obstacle.
+
+    Returns:
+        (n,) complex: no larger than the signed distance, with its sign, m, and 0.
+    """
+    zero, turn = jnp.zeros_like(poses.position[0]), _rotation(poses)
+    edges = [tuple(zero + x for x in _inward(turn, _three(column))) for column in solid.turn.T]
+    centre = _inward(turn, _less(_three(solid.centre), poses.position))
+    return nearest([hull_box(own, centre, edges, _three(solid.half))])
 
 
 def _inward(turn: Matrix | None, vector: Vector) -> Vector:

@@ -180,12 +180,14 @@ class Polyhedron(NamedTuple):
         offsets: (n_faces,) m.
         triangles: (n_faces, 3, 3) m.
         edges: (n_edges, 2, 3) m.
+        sides: (n_edges, 2, 3).
     """
 
     normals: Array
     offsets: Array
     triangles: Array
     edges: Array
+    sides: Array
 
 
 def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
@@ -287,3 +289,66 @@ def boxes(own: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -
             # Parallel edges have no such line.
             gap = jnp.where((square > tiny) & (across > gap), across, gap)
     return gap
+
+
+def hull_box(hull: Polyhedron, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Array:
+    """Largest gap between the shadows of a convex polyhedron and a box on a line, in the axes of the polyhedron.
+
+    The lines are the normals to the faces of both, and to an edge of each where the edge of the polyhedron is the
+    farthest that it reaches along the line: those to the faces of the sum of both shapes.
+
+    Args:
+        hull: the polyhedron.
+        centre: of the box, m.
+        axes: three unit vectors of the box.
+        half: three halves of the lengths of its edges, m.
+
+    Returns:
+        (...) m: no larger than the distance, positive exactly where they are apart; else minus the least translation
+        that parts them.
+    """
+
+    def gap(line, reached):
+        return dot(centre, line) - reached - sum(h * jnp.abs(dot(e, line)) for h, e in zip(half, axes, strict=True))
+
+    def of_face(face, largest):
+        return _greater(gap([hull.normals[face, k] for k in range(3)], hull.offsets[face]), largest)
+
+    largest = lax.fori_loop(0, len(hull.offsets), of_face, jnp.full_like(centre[0] + axes[0][0], -jnp.inf))
+    corners = hull.triangles.reshape(-1, 3)
+    for axis in axes:
+
+        def of_corner(corner, ends, axis=axis):
+            height = dot([corners[corner, k] for k in range(3)], axis)
+            return lesser(height, ends[0]), _greater(height, ends[1])
+
+        far = jnp.full_like(largest, jnp.inf)
+        low, high = lax.fori_loop(0, len(corners), of_corner, (far, -far))
+        largest = _greater(_greater(gap(axis, high), gap([-x for x in axis], -low)), largest)
+    return lax.fori_loop(0, len(hull.edges), lambda edge, found: _of_edge(hull, edge, axes, gap, found), largest)
+
+
+def _of_edge(hull: Polyhedron, edge: Array, axes: Sequence[Vector], gap, largest: Array) -> Array:
+    # Of the lines across an edge of a polyhedron and those of a box.
+    start, (a, b) = (
+        [hull.edges[edge, 0, k] for k in range(3)],
+        [[hull.sides[edge, i, k] for k in range(3)] for i in (0, 1)],
+    )
+    along, turn = [hull.edges[edge, 1, k] - start[k] for k in range(3)], cross(a, b)
+    for axis in axes:
+        line = cross(along, axis)
+        # Of nearly parallel edges rounding has left a part along the edge.
+        part = dot(line, along) / dot(along, along)
+        line = tuple(x - part * y for x, y in zip(line, along, strict=True))
+        square = dot(line, line)
+        from_a, to_b = dot(cross(a, line), turn), dot(cross(line, b), turn)
+        # Between the normals of both faces, one way or the other: there the edge reaches farthest.
+        one = jnp.ones_like(square)
+        sign = jnp.where(
+            (from_a >= 0.0) & (to_b >= 0.0), one, jnp.where((from_a <= 0.0) & (to_b <= 0.0), -one, 0.0 * one)
+        )
+        scale = sign / jnp.sqrt(_greater(square, _tiny(square)))
+        line = tuple(scale * x for x in line)
+        found = gap(line, dot(start, line))
+        largest = jnp.where((square > _tiny(square)) & (sign != 0.0) & (found > largest), found, largest)
+    return largest

@@ -14,6 +14,8 @@ LARGEST_LENGTH = 1e6
 UNIT_TOLERANCE = 1e-6
 # Points nearer to a plane than this part of their extent lie in it.
 FLAT = 1e-9
+# Rounding of coordinates of some metres, m.
+WITHIN = 1e-10
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,6 +76,7 @@ class Hull:
         offsets: (n_faces,) their products with points of the triangle, m.
         triangles: (n_faces, 3, 3) corners, m.
         edges: (n_edges, 2, 3) ends of the edges, those within a flat face left out, m.
+        sides: (n_edges, 2, 3) outward normals of the two faces beside each edge.
         name: for people.
     """
 
@@ -81,6 +84,7 @@ class Hull:
     offsets: np.ndarray
     triangles: np.ndarray
     edges: np.ndarray
+    sides: np.ndarray
     name: str = "hull"
 
 
@@ -190,12 +194,13 @@ def hull(points, *, name: str = "hull") -> Hull:
     corners, normals = found.simplices, found.equations[:, :3]
     # Once more in the corners, whose coordinates it has to fit.
     offsets = np.einsum("fi,fi->f", normals, given[corners].mean(1))
-    edges = []
+    edges, sides = [], []
     for face, (simplex, others) in enumerate(zip(corners, found.neighbors, strict=True)):
         for k, other in enumerate(others):
             if face < other and normals[face] @ normals[other] < 1.0 - FLAT:
                 edges.append(given[np.delete(simplex, k)])
-    return Hull(normals, offsets, given[corners], np.array(edges), name)
+                sides.append(normals[[face, other]])
+    return Hull(normals, offsets, given[corners], np.array(edges), np.array(sides), name)
 
 
 def is_flat(points: np.ndarray) -> bool:
@@ -211,6 +216,23 @@ def is_flat(points: np.ndarray) -> bool:
         return True
     spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
     return bool(spread[2] <= FLAT * spread[0])
+
+
+def is_within(shape: Body, points: np.ndarray) -> np.ndarray:
+    """Whether points belong to a shape, its surface included.
+
+    Args:
+        shape: the shape.
+        points: (n, 3) m.
+
+    Returns:
+        (n,) whether none is outside by more than `WITHIN`.
+    """
+    if isinstance(shape, Box):
+        out = (np.abs((points - shape.centre) @ shape.turn) - shape.half).max(1)
+    else:
+        out = (points @ shape.normals.T - shape.offsets).max(1)
+    return out <= WITHIN
 
 
 def inward(shape: Obstacle, frame: Frame) -> Obstacle:
@@ -242,8 +264,8 @@ def turned(shape: Body, frame: Frame) -> Body:
     """
     if isinstance(shape, Box):
         return dataclasses.replace(shape, centre=frame.turned(shape.centre), turn=frame.turned(shape.turn.T).T)
-    normals, triangles, edges = map(frame.turned, (shape.normals, shape.triangles, shape.edges))
-    return dataclasses.replace(shape, normals=normals, triangles=triangles, edges=edges)
+    normals, triangles, edges, sides = map(frame.turned, (shape.normals, shape.triangles, shape.edges, shape.sides))
+    return dataclasses.replace(shape, normals=normals, triangles=triangles, edges=edges, sides=sides)
 
 
 def _point(key: str, given) -> np.ndarray:

@@ -30,6 +30,8 @@ class MapKind:
         implementation: "module:Class" of its `maps.grid_map.GridMap`.
         quantities: what it gives, all rows of `schema.quantities.QUANTITIES`.
         stored: those that are stored where the sweep file does not say.
+        stored_with: by key, those that are stored besides where that key is given. A key that came later than its map
+            leaves what is stored without it, and so the identities of older sweeps, as they were.
         pictured: those of which a picture shows the first that there is, where nobody says which.
         motionless: those that belong to a place or an instant, not to a motion.
         families: trajectory families that it takes; none: its cells are places, and it knows no motion.
@@ -63,6 +65,7 @@ class MapKind:
     is_over_orientations: bool = False
     cells: int = LARGEST_TILE
     patterns: tuple[str, ...] = ()
+    stored_with: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -106,6 +109,8 @@ _OF_LAUNCHES = (
 )
 _OF_LENGTHS = ("sigma_p", "sigma_r")
 _OF_WORKSPACES = ("verdict", "wrench_margin", "closure_margin", "clearance", "orientation_fraction", "cell_side")
+_AMONG_OBSTACLES = ("nearest_bodies", "clearance_cables", "clearance_obstacles")
+_OF_SHAPES = ("nearest_bodies", "clearance_cables", "clearance_platform")
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 
@@ -272,10 +277,17 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Workspace",
             description="poses that a robot of any pattern can hold, or places at which it can hold sets of them",
             implementation="cspr_jax.maps.workspace:WorkspaceMap",
-            quantities=_OF_WORKSPACES,
+            quantities=(*_OF_WORKSPACES, *_AMONG_OBSTACLES, "clearance_platform", "length_margin", "speed_margin"),
             stored=_OF_WORKSPACES,
+            stored_with=(
+                ("workspace.obstacle", _AMONG_OBSTACLES),
+                ("workspace.platform_box", _OF_SHAPES),
+                ("workspace.platform_hull", _OF_SHAPES),
+                ("workspace.speed", ("speed_margin",)),
+                ("workspace.angular_speed", ("speed_margin",)),
+            ),
             pictured=("wrench_margin", "closure_margin", "clearance"),
-            motionless=_OF_WORKSPACES,
+            motionless=(*_OF_WORKSPACES, *_AMONG_OBSTACLES, "clearance_platform", "length_margin", "speed_margin"),
             families=(),
             takes=("workspace", "limits", "axes.tilt_azimuth", "axes.tilt", "axes.torsion"),
         ),
@@ -299,7 +311,8 @@ def register(kind: MapKind, *own: Quantity) -> None:
     for name in kind.quantities:
         if name not in QUANTITIES and name not in [quantity.name for quantity in own]:
             raise InputError("quantities", name, "a row of schema.quantities.QUANTITIES")
-    for key, names in (("stored", kind.stored), ("pictured", kind.pictured), ("motionless", kind.motionless)):
+    rows = [("stored", kind.stored), ("pictured", kind.pictured), ("motionless", kind.motionless)]
+    for key, names in [*rows, *(("stored_with", names) for _, names in kind.stored_with)]:
         for name in names:
             if name not in kind.quantities:
                 raise InputError(key, name, "one of the quantities of the map")

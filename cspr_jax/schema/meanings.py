@@ -43,12 +43,28 @@ def cell_sides(_: Mapping[str, Any]) -> tuple[str, ...]:
     return CELL_SIDES
 
 
+NEAREST_BODIES = ("none", "two cables", "cable and obstacle", "cable and platform", "platform and obstacle")
+
+
+def nearest_bodies(_: Mapping[str, Any]) -> tuple[str, ...]:
+    """Two bodies whose distance is the least of all, in the order of `robots.clearance.Kind` from 1 on.
+
+    Args:
+        _: settings of a sweep; the words are the same for all.
+
+    Returns:
+        the words of 0 to 4.
+    """
+    return NEAREST_BODIES
+
+
 # More words than these nobody reads, nor can HDF5 keep them beside a dataset.
 MOST = 1000
 # By the name that a quantity's row gives: words of 0, 1, 2, ... for the settings of a sweep.
 MEANINGS: dict[str, Callable[[Mapping[str, Any]], tuple[str, ...]]] = {
     "line-bounds": line_bounds,
     "cell-sides": cell_sides,
+    "nearest-bodies": nearest_bodies,
 }
 
 

@@ -78,7 +78,7 @@ SEGMENTS = {
             "Equal to `segment_arcs` where it is positive, else that of the best candidate.",
             "int16",
         ),
-        Quantity("segment_verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint16"),
+        Quantity("segment_verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint32"),
         Quantity("segment_margin", "1", "margin", MARGIN),
     )
 }

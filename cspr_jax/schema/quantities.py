@@ -6,8 +6,9 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.schema.motion_quantities import FLIGHT, HOW, MARGIN, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.pose_quantities import POSES
 from cspr_jax.schema.quantity import Quantity
-from cspr_jax.schema.verdicts import SENTENCES, Verdict
+from cspr_jax.schema.verdicts import FLAGS, SENTENCES, Verdict
 
 AXES = {
     q.name: q
@@ -55,7 +56,7 @@ QUANTITIES = {
     q.name: q
     for q in (
         Quantity("arcs", "1", "smallest number of arcs", f"Smallest number of feasible arcs{HOW}; 0: none.", "int16"),
-        Quantity("verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint16", unflagged="feasible"),
+        Quantity("verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint32", unflagged="feasible"),
         Quantity(
             "duration",
             "s",
@@ -188,7 +189,7 @@ QUANTITIES = {
             "1",
             "main reason",
             "Why most of the accessible orientations that are not attained are not: a verdict's flag; 0: all are.",
-            "uint16",
+            "uint32",
             unflagged="all attained",
         ),
         *(
@@ -220,36 +221,7 @@ QUANTITIES = {
             "not even span the space. Never positive of suspended robots.",
             signed=True,
         ),
-        Quantity(
-            "wrench_margin",
-            "N",
-            "margin of the tensions",
-            "Largest distance that tensions which supply all wrenches can keep from their finite limits; negative "
-            "outside of the workspace, infinite where nothing bounds it.",
-            signed=True,
-        ),
-        Quantity(
-            "clearance",
-            "m",
-            "clearance of the cables",
-            "Smallest distance between cables without a common point, less their diameter.",
-            signed=True,
-        ),
-        Quantity(
-            "cell_side",
-            "1",
-            "side of the whole cell",
-            "1: every position of the cell, the box half-way to the next points, is proved inside; 2: every one is "
-            "proved outside; 0: not decided, or nobody asks.",
-            "int16",
-            meanings="cell-sides",
-        ),
-        Quantity(
-            "orientation_fraction",
-            "1",
-            "part of the orientations",
-            "Part of a set of orientations, by volume, that is inside the workspace at a place; of one pose 0 or 1.",
-        ),
+        *POSES,
         Quantity(
             "level_acceleration",
             "m s-2",
@@ -384,5 +356,5 @@ def flag_attributes() -> dict[str, object]:
     Returns:
         flag_masks and flag_meanings.
     """
-    masks = np.array([flag.value for flag in SENTENCES], np.uint16)
+    masks = np.array([flag.value for flag in SENTENCES], FLAGS)
     return {"flag_masks": masks, "flag_meanings": " ".join(flag.text for flag in SENTENCES)}

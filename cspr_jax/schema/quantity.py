@@ -3,6 +3,9 @@
 import dataclasses
 from typing import Literal
 
+# By type, narrower ones in which earlier versions stored the same numbers.
+EARLIER = {"uint32": ("uint16",)}
+
 
 @dataclasses.dataclass(frozen=True)
 class Quantity:
@@ -24,8 +27,13 @@ class Quantity:
     units: str
     long_name: str
     description: str
-    kind: Literal["float", "uint16", "int16"] = "float"
+    kind: Literal["float", "uint32", "uint16", "int16"] = "float"
     unflagged: str = ""
     signed: bool = False
     meanings: str = ""
     contoured: bool = False
+
+    @property
+    def readable(self) -> tuple[str, ...]:
+        """NumPy names of the types that files have it in, its own first."""
+        return ("float64", "float32") if self.kind == "float" else (self.kind, *EARLIER.get(self.kind, ()))

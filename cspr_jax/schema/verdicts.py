@@ -2,6 +2,11 @@
 
 import enum
 
+import numpy as np
+
+# Of arrays of flags, in memory and in files.
+FLAGS = np.uint32
+
 
 class Verdict(enum.IntFlag):
     """Flags of the reasons why a trajectory is not, or not certainly, feasible; 0 is feasible."""
@@ -23,6 +28,7 @@ class Verdict(enum.IntFlag):
     FEWER_ARCS_UNDECIDED = 8192
     NOT_ACCESSIBLE = 16384
     WRENCH_INFEASIBLE = 32768
+    OBSTACLE = 65536
 
     @property
     def text(self) -> str:
@@ -49,4 +55,5 @@ SENTENCES = {
     Verdict.FEWER_ARCS_UNDECIDED: "Feasible as stated, but a smaller number of arcs could not be refuted.",
     Verdict.NOT_ACCESSIBLE: "No way leads there from the reference orientation without interference or singularity.",
     Verdict.WRENCH_INFEASIBLE: "Within their limits of tension the cables cannot supply a wrench that they must.",
+    Verdict.OBSTACLE: "A cable or the platform touches an obstacle.",
 }

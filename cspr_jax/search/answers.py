@@ -19,7 +19,7 @@ from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, prove
 from cspr_jax.feasibility.point_mass.margins import margins
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.schema.labelled import Columns
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -249,10 +249,10 @@ def _best(
 
 
 def _verdicts(problem: Problem, smallest: np.ndarray, doubtful: np.ndarray, slack: np.ndarray) -> np.ndarray:
-    broken = np.zeros(len(smallest), np.uint16)
+    broken = np.zeros(len(smallest), FLAGS)
     for flag, column in zip(criteria.flags(problem.limits), slack.T, strict=True):
-        broken |= np.where(column <= 0.0, flag.value, 0).astype(np.uint16)
-    broken |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(np.uint16)
+        broken |= np.where(column <= 0.0, flag.value, 0).astype(FLAGS)
+    broken |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(FLAGS)
     none = np.where(doubtful, Verdict.UNDECIDED.value, Verdict.NO_ARCS.value | broken)
     some = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
-    return np.where(smallest > 0, some, none).astype(np.uint16)
+    return np.where(smallest > 0, some, none).astype(FLAGS)

@@ -12,7 +12,7 @@ from cspr_jax.feasibility.point_mass.bezier_margins import cubics, smallest_marg
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.force_balance import pseudotensions
 from cspr_jax.robots.point_mass import rest_point
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.proved_verdicts import Verdicts, plain_slack
 from cspr_jax.trajectories.bezier import Bezier
 
@@ -67,5 +67,5 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
         shown = [plain_slack(row.name, x) for row, x in zip(rows, proved.attained.T, strict=True)]
         room = np.min(shown, axis=0)
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0))
-    verdict = np.where(finite, verdict, Verdict.NOT_FINITE.value).astype(np.uint16)
+    verdict = np.where(finite, verdict, Verdict.NOT_FINITE.value).astype(FLAGS)
     return Verdicts(verdict, slack.min(1), bound.min(1), room)

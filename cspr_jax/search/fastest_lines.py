@@ -11,7 +11,7 @@ from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
 from cspr_jax.feasibility.point_mass.line_search import LONGER
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.line_durations import Durations, Rule, by_cells, by_formula, by_search, moving
 from cspr_jax.search.line_verdicts import TOLERANCE, limits_at_rest, verdicts
 from cspr_jax.search.proved_verdicts import Verdicts
@@ -131,7 +131,7 @@ def _at_rest(
     # With limits on places alone the motion of the formulas is shown all the same.
     no_motion = NO_MOTION if in_one_plane(problem.robot) else ~0
     may_move = ~above & (found.rest > doubt) & ~is_same & found.is_bounded & ((flags & no_motion) == 0)
-    verdict = np.where(may_move | (rests & is_same), 0, np.where(flags > 0, flags, open_ended)).astype(np.uint16)
+    verdict = np.where(may_move | (rests & is_same), 0, np.where(flags > 0, flags, open_ended)).astype(FLAGS)
     nothing = np.full(len(starts), np.nan)
     margin = np.minimum(np.where(above, np.nan, found.rest), 0.0)
     return Verdicts(verdict, margin, nothing.copy(), np.full(len(starts), np.inf)), may_move, flags == 0
@@ -151,7 +151,7 @@ def _proved(
 ) -> tuple[Durations, Verdicts]:
     # What a search found is made longer until it is proved; without a motion, the flags of the one by formulas stand.
     nothing = np.full(len(starts), np.nan)
-    flags = np.where(before > 0, before, Verdict.UNDECIDED.value).astype(np.uint16)
+    flags = np.where(before > 0, before, Verdict.UNDECIDED.value).astype(FLAGS)
     own = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))
     durations = found.part(np.arange(len(starts)))
     durations.duration[~np.isfinite(found.duration)] = np.nan

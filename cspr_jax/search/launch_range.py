@@ -19,6 +19,7 @@ from cspr_jax.feasibility.point_mass.bezier_margins import depths_of
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.verdicts import FLAGS
 from cspr_jax.search.bezier_sequences import margins_of
 from cspr_jax.search.bezier_verdicts import BATCH, verdicts
 from cspr_jax.search.evolution import evolved
@@ -173,7 +174,7 @@ def _answers(known: tuple[Problem, Bounds], cases: tuple[Question, np.ndarray]) 
         return np.where(is_found, values.reshape(count, tracks)[each, slowest], np.nan)
 
     return LaunchRange(
-        np.where(is_found, np.uint16(0), verdict[each, largest]),
+        np.where(is_found, FLAGS(0), verdict[each, largest]),
         margin[each, largest],
         shown(speed),
         shown(shots.motion.time),

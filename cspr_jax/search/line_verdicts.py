@@ -17,7 +17,7 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.line_durations import BATCH, Durations, lines_of
 from cspr_jax.search.proved_verdicts import Verdicts, plain_slack
 from cspr_jax.trajectories.amplitudes import Amplitude
@@ -76,7 +76,7 @@ def verdicts(
         room = np.minimum(room, plain_slack(name, values / gravity if name.startswith("tension") else values))
     broken |= np.bitwise_or.reduce(flags, axis=1)
     is_open = ~(proved.bound > doubt).all(1) | doubtful
-    verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(np.uint16)
+    verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(FLAGS)
     return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.feasibility.platform.motion_checker import MotionChecker
 from cspr_jax.feasibility.platform.samples import rows
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.platform_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
 from cspr_jax.trajectories.platform_segment import PoseSegment
@@ -83,7 +83,7 @@ def settled(
     answers = PoseAnswers(
         arcs=smallest.arcs,
         tried_arcs=tried,
-        verdict=np.where(smallest.arcs > 0, less, refused).astype(np.uint16),
+        verdict=np.where(smallest.arcs > 0, less, refused).astype(FLAGS),
         duration=duration,
         margin=np.minimum(checks.slack[:, 0], checks.slack[:, 2]),
         margin_bound=nothing,

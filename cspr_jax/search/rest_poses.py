@@ -1,7 +1,7 @@
 """Poses at rest against all conditions of a workspace, and sets of orientations at places. Arrays in, answers out."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -9,14 +9,19 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.workspace import geometry
 from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.limits import Limits
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.workspace_cells import WorkspaceCells
-from cspr_jax.search.workspace_clearances import apart
+from cspr_jax.search.workspace_clearances import at_rest, flags, nearest_bodies
 from cspr_jax.search.workspace_questions import CLOSURE
+from cspr_jax.search.workspace_shifts import shifts
+from cspr_jax.search.workspace_speeds import CableSpeeds
 from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
 
-MARGINS = ("wrench_margin", "closure_margin", "clearance")
+CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
+MARGINS = ("wrench_margin", "closure_margin", "clearance", *CLEARANCES, "length_margin", "speed_margin")
+NEAREST = "nearest_bodies"
 BATCH = 4096
 # Rounding of distances, m: far above what coordinates below 1e6 m have, far below what anybody measures.
 CLOSE = 1e-9
@@ -34,14 +39,16 @@ class RestPoses:
     Fields:
         robot: centred, z down.
         searches: by condition, what is asked of the cables.
-        is_apart: whether no two cables may meet.
+        around: what the cables may not meet, each other included; None: nobody asks.
         limits: floor and largest cable lengths, kernels' axes; tensions are those of the searches.
+        speeds: velocities that the robot must be able to have; None: nobody asks.
     """
 
     robot: AnyRobot
     searches: Mapping[Any, WorkspaceSearch]
-    is_apart: bool
+    around: Scene | None
     limits: Limits
+    speeds: CableSpeeds | None = None
 
     def __call__(self, origins: np.ndarray, quaternions: np.ndarray) -> Answers:
         """Whether poses meet all conditions.
@@ -51,26 +58,33 @@ class RestPoses:
             quaternions: (n, 4) unit quaternions, scalar first.
 
         Returns:
-            (n,) verdict, and each of `MARGINS`, NaN where nobody asks.
+            (n,) verdict, each of `MARGINS`, NaN where nobody asks, and `NEAREST`.
         """
         places, count = mass_centres(self.robot, origins, quaternions), len(origins)
         found: Answers = {name: np.full(count, np.nan) for name in MARGINS}
-        verdict = np.zeros(count, np.uint16)
+        verdict = np.zeros(count, FLAGS)
         for condition, asked in self.searches.items():
             answers = asked(places, quaternions)
             verdict |= answers.verdict
             name = "closure_margin" if condition == CLOSURE else "wrench_margin"
             found[name] = np.fmin(found[name], answers.margin)
-        if self.is_apart:
-            found["clearance"], flags = apart(self.robot, places, quaternions)
-            verdict |= flags
-        return {"verdict": verdict | self._limited(places, quaternions), **found}
+        found[NEAREST] = np.zeros(count, np.int16)
+        if self.around is not None:
+            every = at_rest(self.robot, self.around, places, quaternions)
+            found |= {"clearance": every.clearance, NEAREST: nearest_bodies(self.around, every)}
+            found |= {name: getattr(every, of) for name, of in CLEARANCES.items()}
+            verdict |= flags(every)
+        for name, flag, slack in self._limited(origins, quaternions):
+            verdict |= np.where((slack < 0.0).any(1), flag, 0).astype(FLAGS)
+            if name:
+                found[name] = slack.min(1)
+        return {"verdict": verdict, **found}
 
     def sides(self, origins: np.ndarray, half: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
         """Which cells, at one orientation, are proved to lie wholly on one side of the workspace.
 
-        While a robot moves by a distance without a turn, its heights, the lengths of its cables and the distances
-        between them change by no more than that.
+        While a robot moves by a distance without a turn, its heights and the lengths of its cables change by no more
+        than that; distances and speeds of cables change as `search.workspace_shifts` says.
 
         Args:
             origins: (n, 3) of the platform frame at the centres of the cells, kernels' coordinates, m.
@@ -86,29 +100,37 @@ class RestPoses:
         for asked in self.searches.values():
             kept, lost = WorkspaceCells(self.robot, asked.asked)(places, half, quaternion, asked(places, turns))
             inside, outside = inside & kept, outside | lost
-        slacks = list[np.ndarray]()
-        if self.is_apart:
-            slacks.append(apart(self.robot, places, turns)[0])
-        if self.limits.floor is not None:
-            slacks.append(float(self.limits.floor) - places[:, 2])
-        if self.limits.cable_length_max is not None:
-            slacks.append((np.asarray(self.limits.cable_length_max) - self._lengths(places, turns)).min(1))
-        for slack in slacks:
-            inside, outside = inside & (slack > reach + CLOSE), outside | (slack < -reach - CLOSE)
+        moved = shifts(self.robot, places, turns, reach)
+        if self.robot.pulleys is not None:
+            # A platform within a pulley has no cable there.
+            inside &= (moved.free > 0.0).all(1)
+        slacks = list[tuple[np.ndarray, np.ndarray]]()
+        if self.around is not None:
+            every = at_rest(self.robot, self.around, places, turns)
+            slacks += [(getattr(every, of)[:, None], getattr(moved, of)[:, None]) for of in ("cables", "obstacles")]
+            inside &= (every.platform > moved.near_platform(self.around) + CLOSE) & ~every.is_open
+            outside |= every.platform < -moved.platform - CLOSE
+        changes = {} if self.speeds is None else {"speed_margin": self.speeds.changes(moved)}
+        slacks += [(slack, changes.get(name, reach[:, None])) for name, _, slack in self._limited(origins, turns)]
+        for slack, change in slacks:
+            inside &= (slack > change + CLOSE).all(1)
+            outside |= (slack < -change - CLOSE).any(1)
         return np.where(inside, 1, np.where(outside, 2, 0)).astype(np.int16)
 
     def _lengths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         poses = places, quaternions
         return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
 
-    def _limited(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        verdict = np.zeros(len(places), np.uint16)
+    def _limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
+        # Of each limit its quantity, or "", its flag, and (n, k) what is left of it.
+        places = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
-            verdict |= np.where(places[:, 2] > float(self.limits.floor), Verdict.BELOW_FLOOR, 0).astype(np.uint16)
+            yield "", Verdict.BELOW_FLOOR, float(self.limits.floor) - places[:, 2:]
         if self.limits.cable_length_max is not None:
-            is_long = (self._lengths(places, quaternions) > np.asarray(self.limits.cable_length_max)).any(1)
-            verdict |= np.where(is_long, Verdict.CABLE_TOO_LONG, 0).astype(np.uint16)
-        return verdict
+            slack = np.asarray(self.limits.cable_length_max) - self._lengths(places, quaternions)
+            yield "length_margin", Verdict.CABLE_TOO_LONG, slack
+        if self.speeds is not None:
+            yield "speed_margin", Verdict.CABLE_TOO_FAST, self.speeds.margins(origins, quaternions)
 
 
 def over_orientations(
@@ -129,7 +151,7 @@ def over_orientations(
 
     Returns:
         (n,) verdict: where it is not 0, the flags of the most orientations that stand in the way; margins of the best
-        orientation, or of the worst; and orientation_fraction, the part of the set that is inside.
+        orientation, or of the worst, and what is nearest there; orientation_fraction, the part of the set inside.
     """
     parts, count = list[Answers](), len(orientations)
     step = max(1, AT_ONCE // count)
@@ -150,14 +172,16 @@ def _of_places(every: Answers, volume: np.ndarray, kind: OrientationSet) -> Answ
     else:
         best, is_met = np.fmin.reduce, inside.all(1)
         may_be = ~is_met & (inside | is_open).all(1)
-    flags = np.where(is_met, 0, np.where(may_be, Verdict.UNDECIDED.value, _most_frequent(verdict)))
+    reasons = np.where(is_met, 0, np.where(may_be, Verdict.UNDECIDED.value, _most_frequent(verdict)))
     found = {name: best(every[name], axis=1) for name in MARGINS}
-    return {"verdict": flags.astype(np.uint16), **found, "orientation_fraction": inside @ volume}
+    at = (every["clearance"] == found["clearance"][:, None]).argmax(1)
+    found[NEAREST] = every[NEAREST][np.arange(len(at)), at]
+    return {"verdict": reasons.astype(FLAGS), **found, "orientation_fraction": inside @ volume}
 
 
 def _most_frequent(verdict: np.ndarray) -> np.ndarray:
     # Of each row the flags that most of those have that are not inside.
     values = np.unique(verdict[verdict != 0])
     if len(values) == 0:
-        return np.zeros(len(verdict), np.uint16)
+        return np.zeros(len(verdict), FLAGS)
     return values[np.argmax([(verdict == value).sum(1) for value in values], axis=0)]

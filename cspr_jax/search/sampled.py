@@ -9,7 +9,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.slacks import flags, slacks
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.answers import Answers
 from cspr_jax.trajectories.motion import Motion
 
@@ -53,7 +53,7 @@ def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400)
     return Answers(
         arcs=none,
         tried_arcs=none,
-        verdict=verdict.astype(np.uint16),
+        verdict=verdict.astype(FLAGS),
         duration=np.array(duration),
         margin=slack[:, ~is_limit].min(1),
         margin_bound=np.full(len(motions), np.nan),

@@ -21,7 +21,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.schema.labelled import Columns
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.workspace_questions import CLOSURE, UNTURNED, Question
 
 # Of the largest limit of the tensions, or of the wrench: a margin nearer to zero is that of the boundary.
@@ -134,7 +134,7 @@ class WorkspaceSearch:
             the answers.
         """
         if len(positions) == 0:
-            return WorkspaceAnswers(np.zeros(0, np.uint16), np.zeros(0), np.zeros(0, bool))
+            return WorkspaceAnswers(np.zeros(0, FLAGS), np.zeros(0), np.zeros(0, bool))
         turns = np.repeat(UNTURNED, len(positions), 0) if quaternions is None else quaternions
         loads = self._weights(positions, turns) if wrenches is None else wrenches / self.unit
         poses = Poses(positions, turns, loads)
@@ -144,7 +144,7 @@ class WorkspaceSearch:
         verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
         verdict = np.where(is_outside, Verdict.SINGULAR, verdict)
         verdict = np.where(np.isnan(margin), Verdict.NOT_FINITE, verdict)
-        return WorkspaceAnswers(verdict.astype(np.uint16), margin, is_exact)
+        return WorkspaceAnswers(verdict.astype(FLAGS), margin, is_exact)
 
     def _trials(self) -> np.ndarray:
         # Wrench matrices of poses among the spools.

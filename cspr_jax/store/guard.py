@@ -36,6 +36,7 @@ _TYPES = {
     "float32": (h5t.IEEE_F32LE, h5t.IEEE_F32BE),
     "int64": (h5t.STD_I64LE, h5t.STD_I64BE),
     "int16": (h5t.STD_I16LE, h5t.STD_I16BE),
+    "uint32": (h5t.STD_U32LE, h5t.STD_U32BE),
     "uint16": (h5t.STD_U16LE, h5t.STD_U16BE),
 }
 

@@ -160,10 +160,10 @@ def _map(
         _check_numbers(name, points, LARGEST_LENGTH)
     shape = tuple(points.size for points in axes.values())
     for name, array in data.items():
-        kind = QUANTITIES[name].kind
-        if array.shape != shape or array.dtype.name not in (("float64", "float32") if kind == "float" else (kind,)):
+        if array.shape != shape or array.dtype.name not in QUANTITIES[name].readable:
             raise DamagedError(f"{name} has not the shape of its axes, or another type")
         _check_numbers(name, array, LARGEST_NUMBER, finite=False)
+        data[name] = _as_now(name, array)
     return axes, data
 
 
@@ -202,14 +202,20 @@ def _motion(
             wanted = (arrays[first].size if first in arrays else -1, *(len(PARTS[part]) for part in rest))
         elif name in segments:
             wanted = (segments["segment"].size if "segment" in segments else -1,)
-        kind = EVERY[name].kind
-        if array.shape != wanted or array.dtype != (np.float64 if kind == "float" else kind):
+        kinds = EVERY[name].readable
+        if array.shape != wanted or array.dtype.name not in (kinds[:1] if kinds[0] == "float64" else kinds):
             raise DamagedError(f"{name} has another shape or type than in a motion")
         # The best candidate of a motion that is not feasible may pass a singularity.
         _check_numbers(name, array, LARGEST_NUMBER, finite=name not in _OPEN)
     if (np.diff(time) < 0.0).any():
         raise DamagedError("its time runs backwards")
-    return {"t": time}, {name: array for name, array in arrays.items() if name != "t"}
+    return {"t": time}, {name: _as_now(name, array) for name, array in arrays.items() if name != "t"}
+
+
+def _as_now(name: str, array: np.ndarray) -> np.ndarray:
+    # In the type that this version stores; no number changes.
+    kind = EVERY[name].kind
+    return array if kind == "float" else array.astype(kind, copy=False)
 
 
 def _check_numbers(name: str, array: np.ndarray, most: float, *, finite: bool = True) -> None:

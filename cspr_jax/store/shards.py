@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from cspr_jax.schema.identity import canonical_json
+from cspr_jax.schema.quantity import EARLIER
 from cspr_jax.store import guard
 from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, file_size, new_dataset, reason
 from cspr_jax.store.seal import DamagedError, sealed, unreadable, unsealed
@@ -123,7 +124,8 @@ def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -
             if set(file) != set(layout.store):
                 raise DamagedError("it holds other quantities")
             datasets = guard.datasets(file, layout.store)
-            if any(one.dtype != dtype_of(name, layout.dtype) for name, one in datasets.items()):
+            kinds = {name: dtype_of(name, layout.dtype) for name in layout.store}
+            if any(one.dtype not in (kinds[name], *EARLIER.get(kinds[name], ())) for name, one in datasets.items()):
                 raise DamagedError("it holds other types")
             if any(one.shape != shape for one in datasets.values()):
                 raise DamagedError("it holds a tile of another shape")
@@ -131,10 +133,11 @@ def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -
             written = file.attrs["content_sha256"]
         except UNREADABLE as error:
             raise DamagedError(f"HDF5 cannot read it: {reason(error)}") from error
-    shard = Shard(index, str(header["environment"]), int(header["near_zero"]), values)
-    if shard.digest != written:
+    # Of the types in which it was written.
+    if digest_of(values) != written:
         raise DamagedError("its content has changed")
-    return shard
+    values = {name: array.astype(kinds[name], copy=False) for name, array in values.items()}
+    return Shard(index, str(header["environment"]), int(header["near_zero"]), values)
 
 
 def owners(paths: Iterable[Path]) -> set[tuple[str, str]]:

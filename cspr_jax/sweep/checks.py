@@ -81,6 +81,19 @@ def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
             raise ConfigError(path, f"axes.{name} = {shown(float(wrong[0]))}: must be {allowed}")
 
 
+def is_given(keys: SweepFile, name: str) -> bool:
+    """Whether a sweep has a key.
+
+    Args:
+        keys: the sweep.
+        name: dotted.
+
+    Returns:
+        whether it is there.
+    """
+    return _missing(keys, name) is None
+
+
 def _missing(keys: SweepFile, name: str) -> str | None:
     # What to say of a dotted key that is not given; None: it is.
     table: Table = keys

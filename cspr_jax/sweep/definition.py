@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import itertools
 import math
 import os
 import shutil
@@ -20,9 +21,9 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
 from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
-from cspr_jax.store.netcdf import bytes_needed
+from cspr_jax.store.netcdf import bytes_needed, dtype_of
 from cspr_jax.store.shards import Layout
-from cspr_jax.sweep.checks import check_map, check_points
+from cspr_jax.sweep.checks import check_map, check_points, is_given
 
 # Each tile is a file.
 LARGEST_TILES = 100_000
@@ -43,6 +44,7 @@ class Sweep:
         store: quantities to keep.
         settings: everything that decides the result's numbers.
         text: of the file, as it was read.
+        types: NumPy's name of each stored quantity's type, which processes need that know no rows from outside.
     """
 
     file: Path
@@ -53,6 +55,7 @@ class Sweep:
     store: list[str]
     settings: dict[str, Any]
     text: str
+    types: dict[str, str]
 
     @functools.cached_property
     def identity(self) -> str:
@@ -111,7 +114,8 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     own = _orientation_axes(keys) if kind.is_over_orientations else {}
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
     counts |= {name: len(points) for name, points in own.items()}
-    store = list(keys.run.store or kind.stored)
+    more = [names for key, names in kind.stored_with if is_given(keys, key)]
+    store = list(keys.run.store or dict.fromkeys((*kind.stored, *itertools.chain(*more))))
     for name in store:
         if name not in kind.quantities:
             raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(kind.quantities)} in this map")
@@ -126,7 +130,8 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     settings = keys.model_dump(mode="json", by_alias=True, exclude_none=True)
     settings |= {"robot": robot.settings, "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
-    return Sweep(path, kind, keys, robot, Grid(axes, tile), store, settings, text)
+    types = {name: dtype_of(name, keys.run.dtype) for name in store}
+    return Sweep(path, kind, keys, robot, Grid(axes, tile), store, settings, text, types)
 
 
 def _count(axis: AxisRange | list[float]) -> int:

@@ -61,17 +61,10 @@ class TileMap:
                 ) from error
             raise
         _refuse(index, self._cells.contradictions(answers))
-        dtype = self._sweep.keys.run.dtype
-        values = {name: _stored(answers[name], dtype).reshape(tiling.extent(index)) for name in self._sweep.store}
+        # Counts and flags fit their small types: max_arcs is at most 1000.
+        values = {n: answers[n].astype(kind).reshape(tiling.extent(index)) for n, kind in self._sweep.types.items()}
         now = environment()
         return Computed(Shard(index, digest(now), _near_zero(answers), values), now)
-
-
-def _stored(values: np.ndarray, dtype: str) -> np.ndarray:
-    # Counts and flags fit their small types: max_arcs is at most 1000, verdicts are uint16.
-    if values.dtype.kind == "f":
-        return values.astype(dtype)
-    return values.astype(np.int16 if values.dtype.kind == "i" else np.uint16)
 
 
 def _near_zero(answers: dict[str, np.ndarray]) -> int:

@@ -54,7 +54,7 @@ def values_of(sweep: Sweep, index: int) -> dict[str, np.ndarray]:
     kind = sweep.keys.run.dtype
     found = {
         "arcs": rng.integers(0, 30, shape).astype(np.int16),
-        "verdict": rng.integers(0, 500, shape).astype(np.uint16),
+        "verdict": rng.integers(0, 500, shape).astype(np.uint32),
         "margin": rng.normal(size=shape).astype(kind),
         "duration": rng.uniform(1.0, 9.0, shape).astype(kind),
     }

@@ -409,3 +409,21 @@ def test_the_limits_hold(tmp_path, monkeypatch):
             patch.setattr(isolated, "_CODE", isolated._CODE.replace("serve()", body + "serve()"))
             with pytest.raises(StoreError, match=words):
                 cspr_jax.open_result(path)
+
+
+def test_motions_of_versions_with_narrower_verdicts(tmp_path):
+    """Earlier versions stored flags as uint16; other types than these two are refused."""
+
+    def with_segments(dtype):
+        def fill(file):
+            a_motion(file)
+            file["segment"] = np.array([1, 2], np.int16)
+            file["segment_verdict"] = np.array([0, 32768], dtype)
+
+        return fill
+
+    for dtype in (np.uint16, np.uint32):
+        found = cspr_jax.open_result(forged(tmp_path / "m.h5", with_segments(dtype))).data["segment_verdict"]
+        assert found.dtype == np.uint32 and found.tolist() == [0, 32768]
+    with pytest.raises(StoreError, match="segment_verdict"):
+        cspr_jax.open_result(forged(tmp_path / "m.h5", with_segments(np.int64)))

@@ -171,7 +171,7 @@ def exit_points(robot: AnyRobot, pulleys: Pulleys, positions: Array, quaternions
     Returns:
         (n, n_cables, 3) m.
     """
-    targets = _attachments(robot, positions, quaternions)
+    targets = attachments(robot, positions, quaternions)
     return jax.vmap(lambda x: jnp.asarray(exits(robot.base_points, pulleys.axes, pulleys.radius, x).point))(targets)
 
 
@@ -187,15 +187,25 @@ def cable_lengths(robot: AnyRobot, positions: Array, quaternions: Array) -> Arra
     Returns:
         (n, n_cables) m.
     """
-    targets, pulleys = _attachments(robot, positions, quaternions), robot.pulleys
+    targets, pulleys = attachments(robot, positions, quaternions), robot.pulleys
     if pulleys is None:
         return jnp.linalg.norm(robot.base_points[None] - targets, axis=2)
     way = jax.vmap(lambda x: exits(robot.base_points, pulleys.axes, pulleys.radius, x))(targets)
     return way.wrapped + way.free
 
 
-def _attachments(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
-    # (n, n_cables, 3) of all cables.
+@jax.jit
+def attachments(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
+    """Where the cables are attached.
+
+    Args:
+        robot: z down.
+        positions: (n, 3) m.
+        quaternions: (n, 4).
+
+    Returns:
+        (n, n_cables, 3) m.
+    """
     arms = jnp.zeros((len(positions), *robot.base_points.shape), positions.dtype)
     if isinstance(robot, PlatformRobot):
         points = robot.platform_points

@@ -15,6 +15,7 @@ REASONS = {
     Verdict.SINGULAR: ("singular", "#D55E00"),
     Verdict.CABLE_CABLE: ("cables touch", "#CC79A7"),
     Verdict.CABLE_PLATFORM: ("cable touches platform", "#E69F00"),
+    Verdict.OBSTACLE: ("obstacle touched", "#A6761D"),
     Verdict.WRENCH_INFEASIBLE: ("wrench infeasible", "#882255"),
     Verdict.SLACK_CABLE: ("slack cable", "#56B4E9"),
     Verdict.OVER_TENSION: ("too much tension", "#0072B2"),
