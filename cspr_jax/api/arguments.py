@@ -5,6 +5,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from cspr_jax.arithmetic.elementary import numbers
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
 from cspr_jax.errors import InputError
@@ -155,9 +156,10 @@ def points_of(key: str, given) -> np.ndarray:
     Raises:
         InputError: another shape, not finite, or beyond 1e6 m.
     """
-    points = np.asarray(given, float)
+    allowed = "finite numbers of shape (n, 3), n >= 1"
+    points = numbers(key, given, allowed)
     if points.ndim != 2 or points.shape[1] != 3 or not len(points):
-        raise InputError(key, f"shape {points.shape}", "finite numbers of shape (n, 3), n >= 1")
+        raise InputError(key, None, f"must be {allowed}", fault=f"an array of shape {points.shape}")
     fits = (np.abs(points) <= LARGEST_LENGTH).all(1)
     if not fits.all():
         raise InputError(key, points[~fits][0].tolist(), "finite numbers, at most 1e6 m")

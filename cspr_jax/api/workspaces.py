@@ -3,7 +3,7 @@
 import numpy as np
 
 from cspr_jax.api.arguments import points_of, quaternions
-from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.arithmetic.elementary import double_precision, numbers
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
 from cspr_jax.problem import centred, limits_over
@@ -40,7 +40,7 @@ def workspace(  # noqa: PLR0913
     Args:
         robot: a point mass or a body on as many cables as degrees of freedom, or more; pulleys count.
         positions: (n, 3) of the origin of the platform frame, of a robot on a joint of the joint, in the robot's axes,
-            m.
+            m; n >= 1.
         orientations: (n, 4) unit quaternions, scalar first, from the orientation of the file; None: that one.
         condition: "static": taut cables of any tension hold the weight; "wrench-feasible": tensions within limits
             supply all wrenches; "wrench-closure": cables that are pulled hard enough resist every wrench.
@@ -78,8 +78,10 @@ def workspace(  # noqa: PLR0913
     for key, value in (*asked.items(), ("capacity_length", capacity_length)):
         if value is not None and condition != FEASIBLE:
             raise InputError(key, value, f'None with condition "{condition}"')
-    if capacity_length is not None and not 0.0 < capacity_length < np.inf:
-        raise InputError("capacity_length", capacity_length, "a number > 0, in m")
+    if capacity_length is not None:
+        length = numbers("capacity_length", capacity_length, "a number > 0, in m")
+        if length.ndim or not 0.0 < length < np.inf:
+            raise InputError("capacity_length", capacity_length, "a number > 0, in m")
     places = _places(robot, positions)
     with double_precision():
         own, frame = centred(robot)
@@ -102,7 +104,8 @@ def _places(robot, positions) -> np.ndarray:
 
 def _limits(robot, tension_min, tension_max) -> Limits:
     if tension_max is not None and np.ndim(tension_max) == 0:  # of an infinite one each cable has its own
-        tension_max = np.full(robot.n_cables, tension_max)
+        allowed = f"a number > 0, or {robot.n_cables}: one a cable"
+        tension_max = np.full(robot.n_cables, numbers("tension_max", tension_max, allowed))
     return limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max), any_tensions=True)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.elementary import leaf, numbers
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.errors import InputError
 from cspr_jax.robots.limits import Limits
@@ -64,10 +64,11 @@ def check_bounded(limits: Limits) -> None:
 
 
 def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
-    numbers = np.asarray(value, float)
+    allowed = row.allowed + f", or {n_cables}: one a cable" * row.per_cable
+    values = numbers(f"{at}{row.name}", value, allowed)
     least = -np.inf if not row.per_cable else 0.0 if row.from_zero else np.nextafter(0.0, 1.0)
     shapes = [(), (n_cables,)] if row.per_cable else [()]
-    allowed = np.isfinite(numbers) | ((numbers == np.inf) & (row.name == "tension_max") & (numbers.ndim > 0))
-    if numbers.shape not in shapes or not ((numbers >= least) & allowed).all():
-        raise InputError(f"{at}{row.name}", value, row.allowed + f", or {n_cables}: one a cable" * row.per_cable)
-    return leaf(np.broadcast_to(numbers, (n_cables,) if row.per_cable else ()))
+    is_number = np.isfinite(values) | ((values == np.inf) & (row.name == "tension_max") & (values.ndim > 0))
+    if values.shape not in shapes or not ((values >= least) & is_number).all():
+        raise InputError(f"{at}{row.name}", value, allowed)
+    return leaf(np.broadcast_to(values, (n_cables,) if row.per_cable else ()))

@@ -19,7 +19,10 @@ AXES = {
         Quantity("azimuth", "rad", "azimuth", "Direction of the target from the central vertical, from x to y."),
         Quantity("z", "m", "z of the target", "Vertical coordinate of the target; see z_axis."),
         Quantity(
-            "tilt_azimuth", "rad", "azimuth phi of the tilt", "From the direction of the target; tilt and torsion."
+            "tilt_azimuth",
+            "rad",
+            "azimuth phi of the tilt",
+            "From the direction of the target, in workspaces from x; tilt and torsion.",
         ),
         Quantity("tilt", "rad", "tilt theta", "Angle between the platform's normal and the vertical."),
         Quantity("torsion", "rad", "torsion sigma", "Of tilt and torsion, Z_phi X_theta Z_(sigma - phi)."),

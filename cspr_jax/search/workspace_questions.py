@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.arithmetic.elementary import numbers
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.workspace import geometry
@@ -127,25 +128,27 @@ def required_wrenches(
     if acceleration is not None:
         if row.is_jointed:
             raise InputError("acceleration", acceleration, "must be absent", fault="of a robot on a joint")
-        radius = float(robot.mass) * float(_not_negative("acceleration", np.asarray(acceleration, float)))
+        radius = numbers("acceleration", acceleration, "a number >= 0, in m/s^2")
+        if radius.ndim or not 0.0 <= radius < np.inf:
+            raise InputError("acceleration", acceleration, "a number >= 0, in m/s^2")
+        radius = float(robot.mass) * radius
         ellipsoids.append(np.where(geometry.scales(robot), 0.0, radius))
     return dataclasses.replace(asked, box=half, ellipsoids=tuple(ellipsoids))
 
 
 def _finite(robot: AnyRobot, key: str, given: Any, ndim: int) -> np.ndarray:
-    try:
-        values = np.asarray(given, float)
-    except ValueError:
-        values = np.full(0, np.nan)
-    if values.ndim != ndim or not values.size or values.shape[-1] != robot.dof or not np.isfinite(values).all():
-        shape = f"({robot.dof},)" if ndim == 1 else f"(k, {robot.dof})"
-        raise InputError(key, f"shape {values.shape}", f"finite numbers of shape {shape}")
+    allowed = "finite numbers of shape " + (f"({robot.dof},)" if ndim == 1 else f"(k, {robot.dof}), k >= 1")
+    values = numbers(key, given, allowed)
+    if values.ndim != ndim or not values.size or values.shape[-1] != robot.dof:
+        raise InputError(key, None, f"must be {allowed}", fault=f"an array of shape {values.shape}")
+    if not np.isfinite(values).all():
+        raise InputError(key, values.tolist(), allowed)
     if PATTERNS[robot.pattern].along_line and values[..., 3:].any():
         raise InputError(key, "moments of a rod", "0 there: their two axes turn with it")
     return values
 
 
 def _not_negative(key: str, values: np.ndarray) -> np.ndarray:
-    if not (values >= 0.0).all() or not np.isfinite(values).all():
+    if not (values >= 0.0).all():
         raise InputError(key, values.tolist(), "not negative")
     return values
