@@ -5,7 +5,6 @@ from typing import Any
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.elementary import numbers
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
 from cspr_jax.errors import InputError
@@ -14,6 +13,7 @@ from cspr_jax.problem import limits_over, prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot
 from cspr_jax.robots.robot import check_determined
+from cspr_jax.schema.given_numbers import numbers
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.pose_targets import REFERENCE
 from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors, named

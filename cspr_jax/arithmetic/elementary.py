@@ -3,14 +3,12 @@
 import contextlib
 import math
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import cast
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
-
-from cspr_jax.errors import InputError
 
 # Terms that keep the truncation below half a unit in the last place on |x| <= pi / 2.
 _SINE_TERMS = {"float64": 11, "float32": 7}
@@ -116,26 +114,6 @@ def leaf(value) -> Array:
         the array.
     """
     return value if isinstance(value, jax.core.Tracer) else cast(Array, np.asarray(value, float))
-
-
-def numbers(key: str, given: Any, allowed: str) -> np.ndarray:
-    """Numbers that somebody gave.
-
-    Args:
-        key: named in errors.
-        given: number or nested sequence.
-        allowed: what is allowed, for errors.
-
-    Returns:
-        float64 array.
-
-    Raises:
-        InputError: no numbers, or rows of several lengths.
-    """
-    try:
-        return np.asarray(given, float)
-    except (TypeError, ValueError) as error:
-        raise InputError(key, given, allowed) from error
 
 
 def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.elementary import leaf, numbers
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.errors import InputError
 from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.given_numbers import numbers
 from cspr_jax.schema.limits import LIMITS, Limit
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.arithmetic.elementary import numbers
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.workspace import geometry
@@ -15,6 +14,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.schema.given_numbers import numbers
 
 STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
 CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
