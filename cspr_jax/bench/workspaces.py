@@ -88,7 +88,8 @@ def margin_rate(
     own = centred(robot)[0]
     start = time.perf_counter()
     search = WorkspaceSearch(own, question(own, condition, robot.limits))
-    kernel, size = search.kernel(np.dtype(dtype).type, by_null_space=by_null_space), room(search.batch)
+    numbers = np.dtype(dtype).type
+    kernel, size = search.kernel(numbers, by_null_space=by_null_space), room(search.batch(numbers))
     every = _poses(own, batches * size, dtype)
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::batches], every)) for i in range(batches)]
 

@@ -32,8 +32,8 @@ PART = 1 << 18
 # Poses of a batch where few are asked about, and of what is only prepared here.
 BATCH = 1024
 MOST_SHORT = 8  # short batches
-# Of the wrench matrices of a batch where many are: what starts a call is then short beside it.
-NUMBERS = 1_600_000
+# Of the wrench matrices of a batch where many are: what starts a call is then short beside it, and caches hold most.
+BYTES = 6_400_000
 # Poses by which the base block is chosen, and those by which cocircuits that are none are left out.
 TRIALS, FEW_TRIALS = 200, 8
 # So many open poses go to singular values at once: to compile for them would take longer.
@@ -203,11 +203,17 @@ class WorkspaceSearch:
             yield self._stage(np.float64, True), is_known
         yield self._stage(np.float64, False), is_known
 
-    @property
-    def batch(self) -> int:
-        """Length of a batch on a CPU where many poses are asked about."""
+    def batch(self, dtype: type) -> int:
+        """Length of a batch on a CPU where many poses are asked about.
+
+        Args:
+            dtype: of the numbers.
+
+        Returns:
+            a power of two.
+        """
         rows = self._robot.dof * self._robot.n_cables
-        return 1 << int(np.log2(NUMBERS / rows))
+        return 1 << int(np.log2(BYTES / (rows * np.dtype(dtype).itemsize)))
 
     def kernel(self, dtype: type, *, by_null_space: bool = False) -> Callable[..., Array]:
         """Compiled margins of a batch of poses.
@@ -253,7 +259,7 @@ class WorkspaceSearch:
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
             batch = lanes(poses.positions), turns, loads
             # Two lengths, since each is compiled.
-            size = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch
+            size = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch(dtype)
             return in_batches(lambda x: compiled(*x), batch, size=size)
 
         return stage

@@ -70,7 +70,6 @@ def _down(points: Array, shape: tuple[int, int]) -> Vector:
     return tuple(jnp.broadcast_to(points[:, i, None], shape) for i in range(3))
 
 
-@jax.jit
 def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> tuple[Vector, Array]:
     """Unit vectors of the cables, from the effector on; with pulleys those of the free cables.
 
@@ -82,21 +81,37 @@ def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> tupl
     Returns:
         three arrays (n_cables, n); (n,) coordinates over the length of the shortest cable, or 1 if that is more.
     """
+    return _units(robot, position, arms, _inverse_lengths(robot, position, arms))
+
+
+def _rays(robot: AnyRobot, position: Vector, arms: Vector | None) -> tuple[Vector, Vector]:
+    # Where cables are attached, and from there to the base points.
     shape = robot.n_cables, len(position[0])
     if arms is None and isinstance(robot, PlatformRobot):
         arms = _down(robot.platform_points, shape)
     target, base = [_along(x, shape) for x in position], _down(robot.base_points, shape)
     if arms is not None:
         target = [x + arm for x, arm in zip(target, arms, strict=True)]
-    ray = tuple(base[i] - target[i] for i in range(3))
-    inverse = 1.0 / jnp.sqrt(lanes.dot(ray, ray))
+    return target, tuple(base[i] - target[i] for i in range(3))
+
+
+@jax.jit
+def _inverse_lengths(robot: AnyRobot, position: Vector, arms: Vector | None) -> Array:
+    _, ray = _rays(robot, position, arms)
+    return 1.0 / jnp.sqrt(lanes.dot(ray, ray))
+
+
+@jax.jit
+def _units(robot: AnyRobot, position: Vector, arms: Vector | None, inverse: Array) -> tuple[Vector, Array]:
+    target, ray = _rays(robot, position, arms)
     far = jnp.max(jnp.abs(robot.base_points)) + lanes.largest([jnp.abs(x) for x in position])
     loss = jnp.maximum(1.0, far * jnp.max(inverse, axis=0))
-    if robot.pulleys is not None:
-        radius = jnp.broadcast_to(robot.pulleys.radius[:, None], shape)
-        way = exit_lanes(base, _down(robot.pulleys.axes, shape), radius, target).direction
-        return tuple(-x for x in way), loss
-    return tuple(x * inverse for x in ray), loss
+    if robot.pulleys is None:
+        return tuple(x * inverse for x in ray), loss
+    shape = inverse.shape[0], inverse.shape[1]
+    base, axes = _down(robot.base_points, shape), _down(robot.pulleys.axes, shape)
+    way = exit_lanes(base, axes, jnp.broadcast_to(robot.pulleys.radius[:, None], shape), target).direction
+    return tuple(-x for x in way), loss
 
 
 @jax.jit

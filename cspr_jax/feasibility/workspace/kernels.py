@@ -162,35 +162,38 @@ def null_space(every: Sequence[Array], loss: Array, wrench: Column, *, order: tu
     Returns:
         the tensions.
     """
-    rows, held, *others = _by_block(every, loss, wrench, order=order)
-    *stacked, tensions = _stacked([*rows, held])
-    return NullSpace(stacked, tensions, *others)
-
-
-@jax.jit
-def _stacked(lanes: Sequence[Sequence[Array]]) -> list[Array]:
-    return [jnp.stack(row) for row in lanes]
+    return _joined(_by_block(every, wrench, order=order), wrench, loss)
 
 
 @partial(jax.jit, static_argnames=("order",))
-def _by_block(every: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]):
-    # What `NullSpace` has, cable by cable.
-    others, like = order[CABLES:], every[0][0]
+def _by_block(every: Sequence[Array], wrench: Column, *, order: tuple[int, ...]) -> tuple[list[list[Array]], Array]:
+    # Tensions of the six for each cable beyond them and for the wrench, two by two as complex numbers, which halves
+    # what XLA computes again for each result; and what they are multiplied by, with the scale of their last digits.
+    like = every[0][0]
     cables = [[component[k] for component in every] for k in order]
     given = [jnp.broadcast_to(x, like.shape) for x in wrench]
     found = block(cables[:CABLES], [*cables[CABLES:], given])
-    zero, tensions = jnp.zeros_like(like), found.tensions
-    beyond = [[-found.common if i == j else zero for i in range(len(others))] for j in range(len(others))]
-    rows = [[*tensions[j], *beyond[j]] for j in range(len(others))]
-    inverse = 1.0 / found.common
-    held = [*(x * inverse for x in tensions[-1]), *[zero] * len(others)]
-    rounding = jnp.asarray(BLOCK_ROUNDING * jnp.finfo(like.dtype).eps, like.dtype) * loss * found.scale
+    pairs = [[lax.complex(six[i], six[i + 1]) for i in range(0, CABLES, 2)] for six in found.tensions]
+    return pairs, lax.complex(found.common, found.scale)
+
+
+@jax.jit
+def _joined(found: tuple[list[list[Array]], Array], wrench: Column, loss: Array) -> NullSpace:
+    *others, last = [[part for pair in six for part in (jnp.real(pair), jnp.imag(pair))] for six in found[0]]
+    common, scale = jnp.real(found[1]), jnp.imag(found[1])
+    zero, count = jnp.zeros_like(common), len(others)
+    rows = [[*others[j], *(-common if i == j else zero for i in range(count))] for j in range(count)]
+    inverse = 1.0 / common
+    held = [x * inverse for x in last]
+    rounding = jnp.asarray(BLOCK_ROUNDING * jnp.finfo(common.dtype).eps, common.dtype) * loss * scale
     most_held = largest([jnp.abs(x) for x in held])
-    uncertain = rounding * (one_norm(given) + most_held) * jnp.abs(inverse)
-    noise = zero if not others else rounding
-    if len(others) == MOST_OTHERS:
+    size = sum((jnp.abs(x) for x in wrench), zero)
+    uncertain = rounding * (size + most_held) * jnp.abs(inverse)
+    noise = rounding if count else zero
+    if count == MOST_OTHERS:
         noise = 4.0 * noise * largest([jnp.abs(x) for row in rows for x in row])
-    return rows, held, noise, uncertain, most_held
+    stacked = [jnp.stack(row) for row in rows]
+    return NullSpace(stacked, jnp.stack([*held, *[zero] * count]), noise, uncertain, most_held)
 
 
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
