@@ -212,6 +212,17 @@ def test_what_cannot_be_proved(tmp_path, more, words):
     assert (code, out) == (2, "") and words in error and len(error.splitlines()) == 1
 
 
+def test_capacity_margins_beside_the_others(tmp_path):
+    """Stored where their length is given; what Python says, and on the same side as the margin of the tensions."""
+    out = swept(tmp_path, conditions='["wrench-feasible"]', more="capacity_length = 0.3")[1]
+    found = cspr_jax.workspace(cspr_jax.load_robot("kntu-planar"), grid(*KNTU), capacity_length=0.3)
+    with h5py.File(out.strip()) as file:
+        margin, capacity = file["wrench_margin"][...].ravel(), file["capacity_margin"][...].ravel()
+    np.testing.assert_allclose(capacity, found.margin, atol=1e-9)
+    assert ((capacity > 0.0) == (margin > 0.0)).all() and 0 < (margin > 0.0).sum() < len(margin)
+    assert swept(tmp_path, conditions='["static"]', more="capacity_length = 0.3")[0] == 2
+
+
 def test_cables_that_are_too_long(tmp_path):
     """A cell is outside where one of them exceeds its largest length."""
     robot, places = cspr_jax.load_robot("kntu-planar"), grid(*KNTU)

@@ -70,6 +70,11 @@ class PoseConditions(Table):
         "beside, m/s^2",
     )
 
+    capacity_length: Annotated[float, Field(gt=0.0, le=1e6)] | None = Field(
+        None,
+        description="wrench-feasible: store capacity margins, too, moments over this length, m (of a point mass any)",
+    )
+
     @field_validator("conditions")
     @classmethod
     def _once(cls, names: list[str]) -> list[str]:
@@ -97,7 +102,7 @@ class PoseConditions(Table):
 
     @model_validator(mode="after")
     def _somebody_asks(self) -> "PoseConditions":
-        for name in ("wrenches", "wrench_box", "wrench_ellipsoid", "acceleration"):
+        for name in ("wrenches", "wrench_box", "wrench_ellipsoid", "acceleration", "capacity_length"):
             if getattr(self, name) is not None and "wrench-feasible" not in self.conditions:
                 raise fault(name, getattr(self, name), 'absent: "wrench-feasible" is not among the conditions')
         return self

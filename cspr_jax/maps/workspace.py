@@ -59,9 +59,12 @@ class WorkspaceMap(GridMap):
         try:
             names = [name for name in self._asked.conditions if name != INTERFERENCE]
             searches = {name: self._search(name) for name in names}
+            length = self._asked.capacity_length
+            capacity = None if length is None else self._search(FEASIBLE, length)
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
-        self._poses = RestPoses(self._robot, searches, self._surroundings(spec), self._limits, self._speeds(spec))
+        around, speeds = self._surroundings(spec), self._speeds(spec)
+        self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity)
 
     def _refuse_unused(self) -> None:
         for limit in LIMITS:
@@ -136,13 +139,13 @@ class WorkspaceMap(GridMap):
             angles, volume = cone_grid(divisions, tilt, asked.torsion_max or 0.0)
         return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._turn), volume
 
-    def _search(self, name: str) -> WorkspaceSearch:
+    def _search(self, name: str, capacity_length: float | None = None) -> WorkspaceSearch:
         loads = None
         if name == FEASIBLE:
             asked = self._asked
             given = {"points": asked.wrenches, "box": asked.wrench_box, "ellipsoid": asked.wrench_ellipsoid}
             loads = required_wrenches(self._robot, self._frame, **given, acceleration=asked.acceleration)
-        return WorkspaceSearch(self._robot, question(self._robot, name, self._limits, loads))
+        return WorkspaceSearch(self._robot, question(self._robot, name, self._limits, loads, capacity_length))
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

@@ -110,6 +110,10 @@ _OF_LAUNCHES = (
 _OF_LENGTHS = ("sigma_p", "sigma_r")
 _OF_WORKSPACES = ("verdict", "wrench_margin", "closure_margin", "clearance", "orientation_fraction", "cell_side")
 _AMONG_OBSTACLES = ("nearest_bodies", "clearance_cables", "clearance_obstacles")
+_MORE_OF_WORKSPACES = (
+    *_AMONG_OBSTACLES,
+    *("clearance_platform", "length_margin", "speed_margin", "capacity_margin"),
+)
 _OF_SHAPES = ("nearest_bodies", "clearance_cables", "clearance_platform")
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
@@ -277,17 +281,18 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Workspace",
             description="poses that a robot of any pattern can hold, or places at which it can hold sets of them",
             implementation="cspr_jax.maps.workspace:WorkspaceMap",
-            quantities=(*_OF_WORKSPACES, *_AMONG_OBSTACLES, "clearance_platform", "length_margin", "speed_margin"),
+            quantities=(*_OF_WORKSPACES, *_MORE_OF_WORKSPACES),
             stored=_OF_WORKSPACES,
             stored_with=(
                 ("workspace.obstacle", _AMONG_OBSTACLES),
                 ("workspace.platform_box", _OF_SHAPES),
                 ("workspace.platform_hull", _OF_SHAPES),
                 ("workspace.speed", ("speed_margin",)),
+                ("workspace.capacity_length", ("capacity_margin",)),
                 ("workspace.angular_speed", ("speed_margin",)),
             ),
             pictured=("wrench_margin", "closure_margin", "clearance"),
-            motionless=(*_OF_WORKSPACES, *_AMONG_OBSTACLES, "clearance_platform", "length_margin", "speed_margin"),
+            motionless=(*_OF_WORKSPACES, *_MORE_OF_WORKSPACES),
             families=(),
             takes=("workspace", "limits", "axes.tilt_azimuth", "axes.tilt", "axes.torsion"),
         ),

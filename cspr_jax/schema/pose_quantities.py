@@ -12,6 +12,14 @@ POSES = (
         signed=True,
     ),
     Quantity(
+        "capacity_margin",
+        "N",
+        "capacity margin",
+        "Distance of the wrenches that must be supplied from the faces of all that the cables can supply, moments over "
+        "`workspace.capacity_length`; negative outside of the workspace.",
+        signed=True,
+    ),
+    Quantity(
         "clearance",
         "m",
         "clearance",

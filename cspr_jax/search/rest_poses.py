@@ -20,7 +20,10 @@ from cspr_jax.search.workspace_speeds import CableSpeeds
 from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
 
 CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
-MARGINS = ("wrench_margin", "closure_margin", "clearance", *CLEARANCES, "length_margin", "speed_margin")
+MARGINS = (
+    *("wrench_margin", "closure_margin", "capacity_margin"),
+    *("clearance", *CLEARANCES, "length_margin", "speed_margin"),
+)
 NEAREST = "nearest_bodies"
 BATCH = 4096
 # Rounding of distances, m: far above what coordinates below 1e6 m have, far below what anybody measures.
@@ -42,6 +45,7 @@ class RestPoses:
         around: what the cables may not meet, each other included; None: nobody asks.
         limits: floor and largest cable lengths, kernels' axes; tensions are those of the searches.
         speeds: velocities that the robot must be able to have; None: nobody asks.
+        capacity: for the capacity margin, which decides nothing; None: nobody asks.
     """
 
     robot: AnyRobot
@@ -49,6 +53,7 @@ class RestPoses:
     around: Scene | None
     limits: Limits
     speeds: CableSpeeds | None = None
+    capacity: WorkspaceSearch | None = None
 
     def __call__(self, origins: np.ndarray, quaternions: np.ndarray) -> Answers:
         """Whether poses meet all conditions.
@@ -68,6 +73,8 @@ class RestPoses:
             verdict |= answers.verdict
             name = "closure_margin" if condition == CLOSURE else "wrench_margin"
             found[name] = np.fmin(found[name], answers.margin)
+        if self.capacity is not None:
+            found["capacity_margin"] = self.capacity(places, quaternions).margin
         found[NEAREST] = np.zeros(count, np.int16)
         if self.around is not None:
             every = at_rest(self.robot, self.around, places, quaternions)
