@@ -116,13 +116,13 @@ def clearance_rate(dtype: str) -> float:
     among = scene(robot, diameter=0.01)
     of_robot = clearance_kernels.Points(*map(leaf, (among.base_points, among.platform_points, among.diameters)))
     points = jax.tree.map(lambda x: np.asarray(x, dtype), of_robot)
-    size = room(PAIRS_BATCH)
+    size, pairs = room(PAIRS_BATCH), np.array(among.pairs, np.int32)
     every = _poses(robot, 4 * size, dtype)
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::4], every)) for i in range(4)]
 
     def one(poses):
         given = clearance_kernels.Poses(poses.place, poses.turn, None)
-        return jax.block_until_ready(clearance_kernels.of_cables(points, given, among.pairs))
+        return jax.block_until_ready(clearance_kernels.of_cables(points, given, pairs))
 
     return 4 * size / best(partial(in_threads, one, parts))
 

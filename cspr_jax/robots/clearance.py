@@ -22,8 +22,6 @@ from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, 
 
 # Poses of a batch on a CPU: of 16384 to 131072 about the same.
 BATCH = 65_536
-# Pairs of cables of one compiled loop; XLA takes a longer one apart.
-PAIRS = 28
 # Of the diameter, and of the platform's shape: what of a cable next to its attachment point is not held against it.
 LEAVE_DIAMETERS, LEAVE_SIZE = 10.0, 0.01
 # Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; 2.2 was met.
@@ -278,10 +276,10 @@ def _terms(scene: Scene, origin: np.ndarray, dtype: np.dtype):
     points = _cast(
         kernels.Points(*map(leaf, (scene.base_points - origin, scene.platform_points, scene.diameters))), dtype
     )
-    for start in range(0, len(scene.pairs), PAIRS):
-        group = scene.pairs[start : start + PAIRS]
-        yield "cables", first, lambda poses, group=group: kernels.of_cables(points, poses, group)
-        first += len(group)
+    if scene.pairs:
+        pairs = np.array(scene.pairs, np.int32)
+        yield "cables", first, lambda poses: kernels.of_cables(points, poses, pairs)
+        first += len(pairs)
     solids = [_cast(_solid(shape, origin), dtype) for shape in scene.obstacles]
     for solid in solids:
         yield "obstacle", first, lambda poses, solid=solid: kernels.of_obstacle(points, poses, solid)

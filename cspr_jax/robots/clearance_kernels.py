@@ -4,12 +4,12 @@ Each gives one complex number a pose, of `clearance_lanes.nearest`: the clearanc
 """
 
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
-from jax import Array
+import numpy as np
+from jax import Array, lax
 
 from cspr_jax.arithmetic import lanes
 from cspr_jax.arithmetic.lanes import Matrix, Vector
@@ -132,22 +132,56 @@ def _cables(points: Points, poses: Poses) -> tuple[Sequence[Vector], Sequence[Ve
     return ends, [tuple(poses.position[i] + arms[k][i] - ends[k][i] for i in range(3)) for k in range(count)]
 
 
-@partial(jax.jit, static_argnames="pairs")
-def of_cables(points: Points, poses: Poses, pairs: tuple[tuple[int, int], ...]) -> Array:
+def of_cables(points: Points, poses: Poses, pairs: np.ndarray) -> Array:
     """The nearest two cables.
 
     Args:
         points: of the robot.
         poses: lanes (n,).
-        pairs: cables that can meet; known when this is compiled.
+        pairs: (n_pairs, 2) cables that can meet.
 
     Returns:
         (n,) complex: distance less the mean of both diameters, m, and place among the pairs.
     """
-    ends, rays = _cables(points, poses)
-    thick = [0.5 * (points.diameters[i] + points.diameters[j]) for i, j in pairs]
-    found = [segments(ends[i], rays[i], ends[j], rays[j]) for i, j in pairs]
-    return nearest([x - y for x, y in zip(found, thick, strict=True)])
+    return _nearest_pair(points, *_lines(points, poses), pairs)
+
+
+@jax.jit
+def _lines(points: Points, poses: Poses) -> tuple[list[Array] | None, list[Array]]:
+    # Components of where cables leave their spools, if that moves, and from there to the platform, (n_cables, n) each:
+    # a loop over what its own call has stored would be slow.
+    if poses.ends is not None:
+        ends, rays = _cables(points, poses)
+        return [jnp.stack([end[i] for end in ends]) for i in range(3)], [
+            jnp.stack([ray[i] for ray in rays]) for i in range(3)
+        ]
+    shape = points.base.shape[0], len(poses.position[0])
+    arms = [jnp.broadcast_to(points.platform[:, i, None], shape) for i in range(3)]
+    turn = _rotation(poses)
+    if turn is not None:
+        arms = list(lanes.turned([[jnp.broadcast_to(x[None], shape) for x in row] for row in turn], arms))
+    return None, [poses.position[i][None] + arms[i] - points.base[:, i, None] for i in range(3)]
+
+
+@jax.jit
+def _nearest_pair(points: Points, starts: list[Array] | None, rays: list[Array], pairs: Array) -> Array:
+    like = rays[0][0]
+
+    def line(k):
+        ends = [jnp.broadcast_to(points.base[k, i], like.shape) for i in range(3)]
+        return ends if starts is None else [x[k] for x in starts], [x[k] for x in rays]
+
+    def step(found, pair):
+        (i, j), place = pair
+        thick = 0.5 * (points.diameters[i] + points.diameters[j])
+        distance = segments(*line(i), *line(j)) - thick
+        # As `clearance_lanes.nearest` does: the first of equal ones, and NaN stays.
+        is_kept = jnp.isnan(jnp.real(found)) | (distance >= jnp.real(found))
+        return jnp.where(is_kept, found, lax.complex(distance, jnp.full_like(distance, place))), None
+
+    far = jnp.full_like(like, jnp.inf)
+    start = lax.complex(far, jnp.zeros_like(far))
+    return lax.scan(step, start, (pairs, jnp.arange(len(pairs), dtype=like.dtype)))[0]
 
 
 @jax.jit
