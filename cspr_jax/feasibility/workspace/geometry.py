@@ -105,7 +105,7 @@ def _inverse_lengths(robot: AnyRobot, position: Vector, arms: Vector | None) -> 
 def _units(robot: AnyRobot, position: Vector, arms: Vector | None, inverse: Array) -> tuple[Vector, Array]:
     target, ray = _rays(robot, position, arms)
     far = jnp.max(jnp.abs(robot.base_points)) + lanes.largest([jnp.abs(x) for x in position])
-    loss = jnp.maximum(1.0, far * jnp.max(inverse, axis=0))
+    loss = jnp.maximum(1.0, far * lanes.largest(list(inverse)))
     if robot.pulleys is None:
         return tuple(x * inverse for x in ray), loss
     shape = inverse.shape[0], inverse.shape[1]
