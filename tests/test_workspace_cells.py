@@ -12,6 +12,7 @@ from support.workspaces import made
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.feasibility.workspace import geometry
+from cspr_jax.feasibility.workspace.geometry import mass_centres
 from cspr_jax.feasibility.workspace.required import RequiredWrenches
 from cspr_jax.problem import centred
 from cspr_jax.robots.cables import with_cables
@@ -20,7 +21,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.cell_proofs import CellProofs
 from cspr_jax.search.workspace_cells import WorkspaceCells
 from cspr_jax.search.workspace_questions import CONDITIONS, question
-from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
+from cspr_jax.search.workspaces import WorkspaceSearch
 
 NONE = np.array([1.0, 0.0, 0.0, 0.0])
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])

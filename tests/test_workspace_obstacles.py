@@ -13,6 +13,7 @@ from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.feasibility.workspace import geometry
+from cspr_jax.feasibility.workspace.geometry import mass_centres
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.point_mass import guided_robot, point_mass_robot
@@ -21,7 +22,6 @@ from cspr_jax.schema.meanings import NEAREST_BODIES
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.workspace_shifts import shifts
 from cspr_jax.search.workspace_speeds import cable_speeds
-from cspr_jax.search.workspaces import mass_centres
 from cspr_jax.sweep.definition import read_sweep
 
 ROOT = Path(__file__).parent.parent

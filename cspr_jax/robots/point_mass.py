@@ -254,7 +254,8 @@ def pulls(robot: Robot, targets: Array) -> Array:
     """
     if robot.pulleys is not None:
         targets = jnp.broadcast_to(targets, robot.base_points.shape)
-        return -exits(robot.base_points, robot.pulleys.axes, robot.pulleys.radius, targets).direction  # type: ignore[operator]
+        way = exits(robot.base_points, robot.pulleys.axes, robot.pulleys.radius, targets)
+        return -jnp.asarray(way.direction)
     rays = robot.base_points - targets
     return rays / jnp.linalg.norm(rays, axis=1, keepdims=True)
 

@@ -9,6 +9,7 @@ Krut 2010). A candidate bounds nothing where a cable without a largest tension p
 import dataclasses
 import functools
 import itertools
+import math
 
 import jax
 import jax.numpy as jnp
@@ -99,7 +100,7 @@ class Faces:
 
 @functools.cache
 def _subsets(count: int, size: int) -> np.ndarray:
-    return np.array(list(itertools.combinations(range(count), size))).reshape(-1, size)
+    return np.array(list(itertools.combinations(range(count), size)), int).reshape(math.comb(count, size), size)
 
 
 @functools.cache

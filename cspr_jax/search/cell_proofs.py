@@ -7,11 +7,12 @@ from cspr_jax.arithmetic.batches import in_batches, in_parts
 from cspr_jax.feasibility.workspace.cells import Cells, cells_about
 from cspr_jax.feasibility.workspace.inside_cells import least_margins
 from cspr_jax.feasibility.workspace.outside_cells import are_beyond, are_one_sided
-from cspr_jax.feasibility.workspace.worst_cocircuits import subsets, worst_cocircuits
+from cspr_jax.feasibility.workspace.worst_cocircuits import worst_cocircuits
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot, across_line
 from cspr_jax.robots.tension_rules import distributions
+from cspr_jax.robots.wrench_sets import spanning
 from cspr_jax.search.workspace_questions import CLOSURE, Question
 from cspr_jax.search.workspaces import WorkspaceSearch
 
@@ -33,7 +34,7 @@ class CellProofs:
         # The same at every place, for the robot does not turn.
         required = search.required(np.zeros(3), quaternion)
         self._wrenches, self._is_finite = required.corners, not required.ellipsoids
-        self._subsets = subsets(robot.n_cables, robot.dof)
+        self._subsets = spanning(robot.n_cables, robot.dof)
 
     def matrices(self, positions: np.ndarray) -> np.ndarray:
         """Wrench matrices.

@@ -8,6 +8,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.workspace import geometry
+from cspr_jax.feasibility.workspace.geometry import mass_centres
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.limits import Limits
@@ -17,7 +18,7 @@ from cspr_jax.search.workspace_clearances import at_rest, flags, nearest_bodies
 from cspr_jax.search.workspace_questions import CLOSURE
 from cspr_jax.search.workspace_shifts import shifts
 from cspr_jax.search.workspace_speeds import CableSpeeds
-from cspr_jax.search.workspaces import WorkspaceSearch, mass_centres
+from cspr_jax.search.workspaces import WorkspaceSearch
 
 CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
 MARGINS = (

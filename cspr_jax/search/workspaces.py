@@ -113,7 +113,7 @@ class WorkspaceSearch:
             sizes = asked.wrenches.size, float(robot.mass * robot.gravity)
             self._boundary *= np.abs([*asked.low, *asked.high[np.isfinite(asked.high)], *sizes]).max()
         matrices = self._trials()
-        self._choices = cocircuits.spanning(matrices[:FEW_TRIALS])
+        self._choices = cocircuits.choices_of(matrices[:FEW_TRIALS])
         self._order = tuple[int, ...]()
         is_few = 0 <= robot.n_cables - cocircuits.CABLES <= cocircuits.MOST_OTHERS
         if robot.dof == cocircuits.CABLES and is_few and self._wrenches.is_one and self._measure != "capacity":
@@ -323,25 +323,3 @@ def _length(robot: AnyRobot) -> float:
         return 1.0
     points = np.asarray(robot.platform_points)
     return float(np.sqrt((points**2).sum(1).mean())) or 1.0
-
-
-def mass_centres(robot: AnyRobot, origins: np.ndarray, quaternions: np.ndarray | None) -> np.ndarray:
-    """Positions of the mass centre, as the kernels take them; of a robot on a joint those of the joint.
-
-    Args:
-        robot: centred, z down.
-        origins: (n, 3) of the platform frame, m.
-        quaternions: (n, 4) unit quaternions, scalar first, or (1, 4) one for all; None: no rotation.
-
-    Returns:
-        (n, 3) m.
-    """
-    row = PATTERNS[robot.pattern]
-    if not isinstance(robot, PlatformRobot) or row.is_jointed or robot.centre_of_mass is None:
-        return origins
-    arm = np.asarray(robot.centre_of_mass)
-    if quaternions is None:
-        return origins + arm
-    scalar, axis = quaternions[:, :1], quaternions[:, 1:]
-    twice = 2.0 * np.cross(axis, np.broadcast_to(arm, axis.shape))
-    return origins + arm + scalar * twice + np.cross(axis, twice)

@@ -9,7 +9,6 @@ There are two ways to all of them: y = c . W, with c normal to dof - 1 columns; 
 cables more, the relations among the rows of the null space. One lane a pose: all numbers are arrays (...) of one shape.
 """
 
-import functools
 import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -19,6 +18,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import cross, dot, largest
+from cspr_jax.robots.wrench_sets import spanning
 
 CABLES = 6  # of a base block, in two groups of three
 # Further cables beside a base block.
@@ -27,22 +27,6 @@ MOST_OTHERS = 2
 NOTHING = 1e-12
 
 Column = Sequence[Array]
-
-
-@functools.cache
-def subsets(count: int, dof: int) -> np.ndarray:
-    """Choices of dof - 1 cables, the others behind them.
-
-    Args:
-        count: number of cables.
-        dof: number of components.
-
-    Returns:
-        (n_choices, count) numbers of cables from 0 on.
-    """
-    chosen = itertools.combinations(range(count), dof - 1)
-    rows = [(*some, *(k for k in range(count) if k not in some)) for some in chosen]
-    return np.array(rows, np.int32).reshape(-1, count)
 
 
 class Choices(NamedTuple):
@@ -58,8 +42,8 @@ class Choices(NamedTuple):
     counts: np.ndarray | None
 
 
-def spanning(matrices: np.ndarray) -> Choices:
-    """Choices of `subsets` that are one at some pose: four cables at one point are none, wherever they are.
+def choices_of(matrices: np.ndarray) -> Choices:
+    """Choices of dof - 1 cables that are one at some pose: four cables at one point are none, wherever they are.
 
     Args:
         matrices: (n, dof, n_cables) wrench matrices of some poses, of unit columns.
@@ -68,12 +52,14 @@ def spanning(matrices: np.ndarray) -> Choices:
         the choices.
     """
     dof, count = matrices.shape[1:]
-    table = subsets(count, dof)
+    chosen = spanning(count, dof)
+    others = [np.setdiff1d(np.arange(count), row) for row in chosen]
+    table = np.concatenate([chosen, np.array(others, int).reshape(len(chosen), -1)], axis=1).astype(np.int32)
     rows = [np.delete(np.arange(dof), k) for k in range(dof)]
     sizes = np.zeros((len(table), count - dof + 1))
     for matrix in matrices:
-        chosen = matrix[:, table[:, : dof - 1]].transpose(1, 0, 2)  # (n_choices, dof, dof - 1)
-        normals = np.stack([(-1.0) ** k * np.linalg.det(chosen[:, row]) for k, row in enumerate(rows)], -1)
+        columns = matrix[:, chosen].transpose(1, 0, 2)  # (n_choices, dof, dof - 1)
+        normals = np.stack([(-1.0) ** k * np.linalg.det(columns[:, row]) for k, row in enumerate(rows)], -1)
         rest = matrix[:, table[:, dof - 1 :]]
         np.maximum(sizes, np.abs(np.einsum("sk,ksj->sj", normals, rest)), out=sizes)
     is_one = (sizes > NOTHING).any(1)

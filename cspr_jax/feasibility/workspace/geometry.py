@@ -241,3 +241,25 @@ def weights(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
         (n, dof) N and N m.
     """
     return jax.vmap(lambda p, q: robot.inertial_wrench(at_rest(p, q)))(positions, quaternions)
+
+
+def mass_centres(robot: AnyRobot, origins: np.ndarray, quaternions: np.ndarray | None) -> np.ndarray:
+    """Positions of the mass centre, as the kernels take them; of a robot on a joint those of the joint.
+
+    Args:
+        robot: centred, z down.
+        origins: (n, 3) of the platform frame, m.
+        quaternions: (n, 4) unit quaternions, scalar first, or (1, 4) one for all; None: no rotation.
+
+    Returns:
+        (n, 3) m.
+    """
+    row = PATTERNS[robot.pattern]
+    if not isinstance(robot, PlatformRobot) or row.is_jointed or robot.centre_of_mass is None:
+        return origins
+    arm = np.asarray(robot.centre_of_mass)
+    if quaternions is None:
+        return origins + arm
+    scalar, axis = quaternions[:, :1], quaternions[:, 1:]
+    twice = 2.0 * np.cross(axis, np.broadcast_to(arm, axis.shape))
+    return origins + arm + scalar * twice + np.cross(axis, twice)

@@ -63,7 +63,7 @@ def by_normals(
         loss: (n,) their errors over rounding, likewise.
         wrenches: what the cables must supply.
         asked: limits.
-        choices: of `cocircuits.spanning`.
+        choices: of `cocircuits.choices_of`.
         measure: "tensions", "capacity" or "closure"; known when this is compiled, as what follows.
         is_bounded: whether all largest tensions are finite.
 

@@ -1,7 +1,6 @@
 """Verdicts of poses by linear programs and by least squares: slow and general, to compare with; no jax."""
 
 import numpy as np
-from scipy.optimize import linprog, nnls
 
 # Of what is wanted: what a residual may be off.
 CLOSE = 1e-6
@@ -20,6 +19,8 @@ def by_program(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
     Returns:
         whether the largest s is positive.
     """
+    from scipy.optimize import linprog  # takes long to import, and few ask
+
     dof, count = matrix.shape
     if low is None or high is None:
         low, high, wrench = np.zeros(count), np.ones(count), np.zeros(dof)
@@ -51,6 +52,8 @@ def by_squares(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
     Returns:
         whether the residual is below 1e-6 of what is wanted.
     """
+    from scipy.optimize import nnls
+
     dof, count = matrix.shape
     if low is None or high is None:
         low, high, wrench = np.ones(count), np.full(count, np.inf), np.zeros(dof)

@@ -22,7 +22,7 @@ class Worst(NamedTuple):
 
     Fields:
         normal: (n, dof) c.
-        subset: (n,) row of `subsets`: the cables that it is normal to.
+        subset: (n,) row of `wrench_sets.spanning`: the cables that it is normal to.
         load: (n,) the wrench that asks for the most along it.
         inner: (n, dof) sum of all normals that do not void, and that prove the same of the same wrench, each by how
             much: since what tensions give along c is a convex function of c, it proves so too, and has no cable normal
@@ -33,19 +33,6 @@ class Worst(NamedTuple):
     subset: Array
     load: Array
     inner: Array
-
-
-def subsets(count: int, dof: int) -> np.ndarray:
-    """Choices of dof - 1 cables.
-
-    Args:
-        count: number of cables.
-        dof: number of components.
-
-    Returns:
-        (n_choices, dof - 1).
-    """
-    return spanning(count, dof) if dof > 1 else np.zeros((1, 0), int)
 
 
 @partial(jax.jit, static_argnames=("condition", "unbounded"))
@@ -76,7 +63,7 @@ def worst_cocircuits(
         the cocircuits.
     """
     dof, count = matrices.shape[1:]
-    chosen = subsets(count, dof)
+    chosen = spanning(count, dof)
     own = np.zeros((len(chosen), count), bool)
     np.put_along_axis(own, chosen, True, axis=1)
     free = np.array(unbounded)
