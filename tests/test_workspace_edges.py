@@ -13,7 +13,7 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.workspace_questions import question, required_wrenches
-from cspr_jax.search.workspaces import WorkspaceSearch
+from cspr_jax.search.workspaces import Poses, WorkspaceSearch
 
 G = cable_robots.GRAVITY
 CORNERS = np.array([[x, y, z] for x in (-2.0, 2.0) for y in (-1.5, 1.5) for z in (0.5, 3.0)])
@@ -115,15 +115,20 @@ def test_any_length_may_be_the_unit_of_moments(precision):
 
 
 def test_poses_beside_a_spool():
-    """Differences of coordinates lose digits there; float32 says so, and float64 answers in its place."""
+    """Differences of coordinates lose digits there: the bounds of float32 grow, and float64 answers in its place."""
     spools = np.array([[-2.0, -1.0, 3.0], [2.0, -1.0, 3.0], [2.0, 1.0, 3.0], [-2.0, 1.0, 3.0]])
     robot = cspr_jax.point_mass(spools, mass=2.0, z_axis="up")
+    own, frame = centred(robot)
+    search = WorkspaceSearch(own, question(own, "static", Limits()), precision="float32")
+    (look, _), *_ = search._stages()
     rng = np.random.default_rng(5)
     for distance in (1e-2, 1e-4, 1e-5):
         beside = spools[rng.integers(0, 4, 400)] + distance * rng.normal(size=(400, 3))
         slow = cspr_jax.workspace(robot, beside, condition="static")
         fast = cspr_jax.workspace(robot, beside, condition="static", precision="float32")
         assert (slow.verdict == fast.verdict).all() and {0, Verdict.WRENCH_INFEASIBLE} <= set(slow.verdict.tolist())
+        found = look(Poses(np.asarray(frame.inward(beside)), np.repeat([[1.0, 0.0, 0.0, 0.0]], 400, 0), None))
+        assert (found.real <= slow.margin).all() and (slow.margin <= found.imag).all()
 
 
 def test_cables_at_one_point_are_never_closed():
