@@ -15,7 +15,7 @@ def main() -> None:
     import numpy as np
 
     jax.config.update("jax_enable_x64", True)
-    from cspr_jax.feasibility.platform.samples import SAMPLES
+    from cspr_jax.feasibility.platform.motions import SAMPLES
     from cspr_jax.published import chapter_3 as tables
     from cspr_jax.search.accessible import accessible
     from cspr_jax.search.attainable import VALUES

@@ -27,13 +27,15 @@ from support.platforms import (
     states,
 )
 
-from cspr_jax.feasibility.platform.kernels import cable_vectors, moving_along, still_along
+from cspr_jax.feasibility.platform.kernels import slacks_at
+from cspr_jax.feasibility.platform.place_certificate import wires_beside
 from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.feasibility.platform.slacks import pose_slacks
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans import choices, planning
 from cspr_jax.robots import contact_lanes, interference
 from cspr_jax.robots.limits import NO_LIMITS
+from cspr_jax.robots.platform import rays as rays_of
 from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.store.result import open_result
@@ -122,48 +124,47 @@ directions_of = jax.jit(interference.cable_directions)
 
 
 def test_lanes_are_the_readable_slacks():
-    """Every criterion with every limit, and distances between cables, along arcs of random motions from rest."""
+    """Every criterion with every limit, and distances between cables, at instants of random motions from rest."""
     package, rng, p = ours(MSSM), np.random.default_rng(3), 5
-    limits = limits_of(**TIGHT)
-    problem, near, places = Problem(package, limits, EFFECTIVE), interference.contacts(package), np.linspace(0, 1, 65)
+    limits, tau = limits_of(**TIGHT), rng.uniform(0.0, 1.0, 2 * INSTANTS)
+    problem, near = Problem(package, limits, EFFECTIVE), interference.contacts(package)
     motions = [
         made(package, random_pose(rng, rest=True), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p)
         for _ in range(12)
     ]
-    which = np.arange(INSTANTS) % len(motions)
-    arcs = stacked([motions[i] for i in which]), np.full(INSTANTS, float(p)), (which % p).astype(float)
+    which = np.arange(len(tau)) % len(motions)
+    items = stacked([motions[i] for i in which]), np.full(len(tau), float(p)), tau
     pairs = tuple((int(i), int(j)) for i, j in near.pairs)
-    moving = np.asarray(moving_along(problem, places, arcs, kind=FROM_REST))
-    still = still_along(problem, places, arcs, platform=(near.sides, near.normal), pairs=pairs, kind=FROM_REST).values
-    *still, nearest = np.moveaxis(np.asarray(still), 1, 0)
-    found, seen = np.concatenate([np.moveaxis(moving, 1, 0), still])[order(limits)], 0
+    *found, nearest = (np.asarray(x) for x in slacks_at(problem, items, pairs=pairs, kind=FROM_REST))
+    seen = 0
     for i, segment in enumerate(motions):
-        some = np.sort(rng.choice(len(places), 9, replace=False))
-        at = states(segment, EFFECTIVE, p, (i % p + places[some]) / p)
+        some = np.flatnonzero(which == i)
+        at = states(segment, EFFECTIVE, p, tau[some])
         for place, *leaves in zip(some, *at[:6], strict=True):
             pose = State(*leaves)
             wanted = np.asarray(slacks_of(problem, pose, np.asarray(Z0), segment.regular))
             if abs(wanted[1]) > 1e-3:
-                np.testing.assert_allclose(found[:, place, i], wanted, rtol=1e-7, atol=1e-8)
+                np.testing.assert_allclose([x[place] for x in found], wanted, rtol=1e-7, atol=1e-8)
                 seen += 1
             gaps = np.asarray(gaps_of(package, near.pairs, pose.position, pose.rotation))
-            assert nearest[place, i] == pytest.approx(np.linalg.norm(gaps, axis=1).min(), abs=1e-9)
+            assert nearest[place] == pytest.approx(np.linalg.norm(gaps, axis=1).min(), abs=1e-9)
     assert seen > 40
 
 
-def test_vectors_of_lanes():
-    """Between cables, and along them, between poses: as the readable functions give them."""
+def test_cables_beside_the_middles_of_blocks():
+    """As vectors in fixed axes and as the platform sees them, between poses: as the readable functions give them."""
     package, rng, p = ours(MSSM), np.random.default_rng(8), 5
-    near, tau = interference.contacts(package), rng.uniform(0.0, 1.0, INSTANTS)
-    some = [made(package, random_pose(rng), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p) for _ in tau]
-    pairs = tuple((int(i), int(j)) for i, j in near.pairs)
-    items = stacked(some), np.full(INSTANTS, float(p)), tau
-    gaps, directions = cable_vectors(Problem(package, NO_LIMITS, EFFECTIVE), items, pairs=pairs, kind=USUAL)
-    own = directions / np.linalg.norm(directions, axis=2, keepdims=True)
-    for segment, t, found, along in zip(some, tau, np.asarray(gaps), own, strict=True):
+    middle, off = rng.uniform(0.2, 0.8, INSTANTS), rng.uniform(-0.05, 0.05, INSTANTS)
+    # Beside a knot the polynomial of the middle goes on.
+    off = np.where((middle + off < 0.1) | (middle + off > 0.9), 0.0, off)
+    some = [made(package, random_pose(rng), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p) for _ in middle]
+    items = stacked(some), np.full(INSTANTS, float(p)), middle, off
+    rays, seen = wires_beside(Problem(package, NO_LIMITS, EFFECTIVE), items, kind=USUAL)
+    own = np.asarray(seen) / np.linalg.norm(seen, axis=2, keepdims=True)
+    for segment, t, found, along in zip(some, middle + off, np.asarray(rays), own, strict=True):
         pose = states(segment, EFFECTIVE, p, [t])
         where = pose.position[0], pose.rotation[0]
-        np.testing.assert_allclose(found, gaps_of(package, near.pairs, *where), atol=1e-9)
+        np.testing.assert_allclose(found, rays_of(package, *where)[0], atol=1e-9)
         np.testing.assert_allclose(along, directions_of(package, *where), atol=1e-9)
 
 

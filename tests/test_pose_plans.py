@@ -28,6 +28,7 @@ from support.platforms import (
 )
 
 import cspr_jax
+from cspr_jax.feasibility.platform import place_certificate
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.slacks import pose_slacks
 from cspr_jax.published import table_3_2
@@ -105,7 +106,7 @@ def check_verdicts(checker, count):
 def test_verdicts_do_not_change_with_more_samples(checker, monkeypatch):
     cases = random_cases(12, 40, lowest=-5.0, highest=0.0, arcs=(3, 9))
     before = checked(checker, cases)
-    monkeypatch.setattr("cspr_jax.feasibility.platform.samples.SAMPLES", 201)
+    monkeypatch.setattr("cspr_jax.feasibility.platform.motions.SAMPLES", 201)
     after = checked(checker, cases)
     np.testing.assert_array_equal(after.verdict, before.verdict)
     regular = after.slack[:, 1] > 0.0
@@ -151,12 +152,12 @@ def test_verdicts_against_dense_samples(checker):
     assert ((verdicts & Verdict.UNDECIDED) != 0).sum() < 5 and good > 500, good
 
 
-def test_steps_are_halved_where_cables_turn(checker, monkeypatch):
-    """With four samples an arc interference is still what it is with many."""
+def test_blocks_are_halved_where_cables_turn(checker, monkeypatch):
+    """With one block an arc interference is still what it is with four."""
     cases = random_cases(17, 60, lowest=-8.0, highest=1.0, arcs=(2, 6))
     flags = Verdict.CABLE_CABLE.value | Verdict.CABLE_PLATFORM.value
     before = checked(checker, cases).verdict & flags
-    monkeypatch.setattr("cspr_jax.feasibility.platform.samples.SAMPLES", 4)
+    monkeypatch.setattr(place_certificate, "PARTS", 1)
     np.testing.assert_array_equal(checked(checker, cases).verdict & flags, before)
     assert (before > 0).sum() > 3
 

@@ -70,11 +70,22 @@ def gaps(robot: PlatformRobot, pairs: Array, position: Array, rotation: Array) -
     """
     cables, _ = rays(robot, position, rotation)
     i, j = pairs[:, 0], pairs[:, 1]
-    return _between(robot.base_points[i], cables[i], robot.base_points[j], cables[j])
+    return between(robot.base_points[i], cables[i], robot.base_points[j], cables[j])
 
 
-def _between(a: Array, u: Array, b: Array, v: Array) -> Array:
-    # From the segment a + s u to b + t v, s and t in [0, 1]: the nearest points of the lines, then of the ends.
+def between(a: Array, u: Array, b: Array, v: Array) -> Array:
+    """The shortest vectors between segments a + s u and b + t v, s and t in [0, 1].
+
+    Args:
+        a: (..., 3) where the first ones start, m.
+        u: (..., 3) along them, m.
+        b: (..., 3) likewise of the second ones.
+        v: (..., 3).
+
+    Returns:
+        (..., 3) from the first to the second, m.
+    """
+    # The nearest points of the lines, then of the ends.
     apart = b - a
     uu, uv, vv = (jnp.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v)))
     au, av = jnp.sum(apart * u, axis=-1), jnp.sum(apart * v, axis=-1)

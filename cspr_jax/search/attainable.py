@@ -91,7 +91,7 @@ def attained(
             size = max(CANDIDATES // max(options.shape[1], 1), 1)
             for piece in (left[k : k + size] for k in range(0, len(left), size)):
                 cell, trial = trials(motions.motions(piece), options[piece])
-                arcs = smallest_arcs(checker, trial, max_arcs=max_arcs).arcs
+                arcs = smallest_arcs(checker, trial, max_arcs=max_arcs, margins=False).arcs
                 is_attained[piece[cell[arcs > 0]]] = True
         return is_attained
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.feasibility.platform.motion_checker import MotionChecker
-from cspr_jax.feasibility.platform.samples import rows
+from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.platform_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
@@ -62,8 +62,7 @@ def settled(
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
 
     Returns:
-        the answers, found at refined samples; nothing is proved, and (2.55) does not apply: NaN. The
-        segments that they belong to.
+        the answers; (2.55) does not apply: NaN. The segments that they belong to.
     """
     tried = smallest.arcs if fixed is None else np.where(smallest.arcs > 0, smallest.arcs, fixed)
     none = np.flatnonzero(tried == 0)
@@ -86,7 +85,7 @@ def settled(
         verdict=np.where(smallest.arcs > 0, less, refused).astype(FLAGS),
         duration=duration,
         margin=np.minimum(checks.slack[:, 0], checks.slack[:, 2]),
-        margin_bound=nothing,
+        margin_bound=checks.bound,
         limit_margin=checks.slack[:, 3:].min(1, initial=np.inf),
         feasible_at_infinity=nothing,
         beta_hat=beta_hats,

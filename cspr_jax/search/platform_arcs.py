@@ -10,7 +10,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.platform.motion_checker import MotionChecker, PoseChecks
-from cspr_jax.feasibility.platform.samples import rows
+from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
@@ -94,7 +94,13 @@ class _Segments:
 
 
 def smallest_arcs(
-    checker: MotionChecker, candidates: Candidates, *, max_arcs: int, fixed: np.ndarray | None = None, beyond: int = -1
+    checker: MotionChecker,
+    candidates: Candidates,
+    *,
+    max_arcs: int,
+    fixed: np.ndarray | None = None,
+    beyond: int = -1,
+    margins: bool = True,
 ) -> Found:
     """The smallest number of arcs that passes all tests.
 
@@ -107,6 +113,7 @@ def smallest_arcs(
         fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
         beyond: how many arcs beyond the smallest one of a motion are tried for its other candidates; -1: the first
             one that passes is enough.
+        margins: whether the checks are to have more than verdicts.
 
     Returns:
         what was found.
@@ -132,7 +139,7 @@ def smallest_arcs(
             turn = _sieved(checker, segments, arcs, turn, np.linspace(1.0, 0.0, COARSE * arcs + 1))
             if not len(turn):
                 continue
-            got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False)
+            got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False, margins=margins)
             checks.put(turn, got)
             passed, unsure = (turn[got.verdict == verdict] for verdict in (0, Verdict.UNDECIDED))
             smallest[passed] = arcs

@@ -18,8 +18,8 @@ from cspr_jax.feasibility.platform.checker import BESIDE_KNOT, TOUCH
 from cspr_jax.feasibility.platform.crossings import CableVectors, passed_over
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.feasibility.platform.motion_checker import FEW, TOLERANCE, MotionChecker, PoseChecks
+from cspr_jax.feasibility.platform.motions import Motions, rows
 from cspr_jax.feasibility.platform.redundant_kernels import cable_vectors, end_wrenches, instants, other_limits
-from cspr_jax.feasibility.platform.samples import SAMPLES, Motions, rows
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.workspace import exact
 from cspr_jax.robots.platform import pairs_apart
@@ -31,6 +31,7 @@ from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
 
 # So many samples are held at a time, instants of the first look computed at a time.
 ROOM, CHUNK = 200_000, 8
+SAMPLES = 64  # an arc
 # Halvings of an interval of beta-hat: to rounding. Slopes below this, over the margins, are none.
 HALVINGS, FLAT = 60, 1e-12
 # An interval of no values.
@@ -138,8 +139,8 @@ class RedundantChecker(MotionChecker):
         lowest, highest = zero[slope > 0.0].max(initial=-np.inf), zero[slope < 0.0].min(initial=np.inf)
         return 0.5 * (low + high), *((lowest, highest) if is_held else NONE)
 
-    def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True) -> PoseChecks:
-        """Check motions in full; see `MotionChecker.check`."""
+    def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True, margins: bool = True) -> PoseChecks:
+        """Check motions in full, by samples: nothing is proved; see `MotionChecker.check`."""
         checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         for count in np.unique(arcs).tolist():
             # Those of one number of samples together.
@@ -203,4 +204,6 @@ class RedundantChecker(MotionChecker):
             np.where(is_finite, verdict, Verdict.NOT_FINITE.value),
             np.where(is_finite[:, None], slacks, np.nan),
             np.where(is_finite, nearest, np.nan),
+            np.full(len(margin), np.nan),
+            np.full(len(margin), np.nan),
         )

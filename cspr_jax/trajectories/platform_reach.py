@@ -2,12 +2,12 @@
 
 A motion is analytic between the knots of its amplitude function. Around the middle m of a block, on the ellipse with
 the semi-axes a (along time) and b, every quantity of the motion is bounded in the Hermitian norm: polynomials by their
-terms, sines and cosines by those of the middle, and turns by the imaginary part of their rotation vector v, since for
-a complex v
+terms, sines and cosines by those of the middle, and turns by the imaginary part of half their rotation vector, v =
+beta u: for a complex v
 
-    |exp(2 [v])| <= exp(2 |Im v|) = G,    |omega| <= 2 G |v'|,    |omega'| <= 2 G (|v''| + |v'|^2)
+    |exp(2 [v])| <= exp(2 |Im v|) = G,    omega = 2 beta' u + 2 beta (integral over s from 0 to 1 of exp(2 s [v]) u')
 
-With b = 0 these are bounds on an interval of real time. docs/theory.md derives them.
+since a turn leaves its own axis alone. With b = 0 these are bounds on an interval of real time: docs/theory.md.
 """
 
 import math
@@ -104,32 +104,31 @@ def reach(segment: PoseSegment, arcs: Array, middle: Middle, axes: tuple[Array, 
     """
     along, aside = axes
     sizes = _polynomial_sizes(middle.terms, along)
+    phase = math.pi * arcs * along, jnp.exp(math.pi * arcs * aside)
     sine, cosine = sincospi(arcs * middle.tau)
-    growth = jnp.exp(math.pi * arcs * aside)
-    first = _trigonometric((jnp.abs(sine), jnp.abs(cosine)), math.pi * arcs * along, growth)
+    first = _trigonometric((jnp.abs(sine), jnp.abs(cosine)), *phase)
     speed, bend = _swing(segment, arcs, middle, (along, aside), sizes, first, kind)
     if kind.plain:
         omega = math.pi * arcs
-        beats = (first[1], omega * first[0], omega * omega * first[1])
+        beats = _Beats(first.cosine, omega * first.sine, omega * omega * first.cosine, first.aside)
     else:
         sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
-        third = _trigonometric(
-            (jnp.abs(sine3), jnp.abs(cosine3)), 3.0 * math.pi * arcs * along, growth * growth * growth
-        )
-        beats = _beat(segment, arcs, middle, along, first, third)
+        third = _trigonometric((jnp.abs(sine3), jnp.abs(cosine3)), 3.0 * phase[0], phase[1] * phase[1] * phase[1])
+        beats = _beat(segment, arcs, middle, (along, aside), first, third)
     angle = jnp.abs(segment.turn.angle)
     if kind.from_rest:
-        halves = tuple(angle * size for size in sizes[:3])
+        u, u1, u2 = (angle * size for size in sizes[:3])
     else:
-        halves = _half_vector(segment, middle, (along, aside), sizes, angle)
-    u, u1, u2 = halves
-    beta, beta1, beta2 = beats
-    v, v1 = beta * u, beta1 * u + beta * u1
-    v2 = beta2 * u + 2.0 * beta1 * u1 + beta * u2
-    grown = jnp.exp(2.0 * jnp.minimum(aside * v1, v))
-    if kind.from_rest:  # about one axis
-        return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * v1, 2.0 * v2)
-    return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * grown * v1, 2.0 * grown * (v2 + v1 * v1))
+        u, u1, u2 = _half_vector(segment, middle, (along, aside), sizes, angle)
+    beta, beta1, beta2, beta_aside = beats
+    v1 = beta1 * u + beta * u1
+    grown = jnp.exp(2.0 * jnp.minimum(beta_aside * u + beta * aside * u1, beta * u))
+    beside = 1.0 if kind.from_rest else grown  # then all is about one axis
+    omega = beta1 * u + beside * beta * u1
+    spin = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
+    if not kind.from_rest:
+        spin = spin + grown * beta * u1 * v1
+    return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * spin)
 
 
 def _polynomial_sizes(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
@@ -138,20 +137,39 @@ def _polynomial_sizes(terms: Sequence[Array], along: Array) -> tuple[Array, ...]
     return tuple(polynomial([math.perm(i, j) * sizes[i] for i in range(j, len(sizes))], along) for j in range(4))
 
 
-def _trigonometric(middle: tuple[Array, Array], along: Array, growth: Array) -> tuple[Array, Array]:
-    # Of |sin| and |cos| within `along` of an angle whose |sin| and |cos| are `middle`; growth is exp of the largest
-    # imaginary part.
+class _Trigonometric(NamedTuple):
+    # Of |sin|, |cos|, and the imaginary part of the cosine.
+    sine: Array
+    cosine: Array
+    aside: Array
+
+
+class _Beats(NamedTuple):
+    # Of |beta|, |beta'|, |beta''|, and the imaginary part of beta.
+    value: Array
+    rate: Array
+    bend: Array
+    aside: Array
+
+
+def _trigonometric(middle: tuple[Array, Array], along: Array, growth: Array) -> _Trigonometric:
+    # Within `along` of an angle whose |sin| and |cos| are `middle`; growth is exp of the largest imaginary part.
     shrunk = 1.0 / growth
     cosh, sinh = 0.5 * (growth + shrunk), 0.5 * (growth - shrunk)
-    off = jnp.sqrt(jnp.minimum(along, 1.0) ** 2 + sinh * sinh)
+    near = jnp.minimum(along, 1.0)
+    off = jnp.sqrt(near * near + sinh * sinh)
     sine, cosine = middle
-    return jnp.minimum(cosh, sine * cosh + cosine * off), jnp.minimum(cosh, cosine * cosh + sine * off)
+    return _Trigonometric(
+        jnp.minimum(cosh, sine * cosh + cosine * off),
+        jnp.minimum(cosh, cosine * cosh + sine * off),
+        jnp.minimum(1.0, sine + cosine * near) * sinh,
+    )
 
 
 def _swing(segment: PoseSegment, arcs: Array, middle: Middle, axes, sizes, first, kind: Kind) -> tuple[Array, Array]:
     # Of |p'| and |p''|: the terms of `platform_lanes`, and the growth of the frame that turns with the ellipse.
     omega = math.pi * arcs
-    sine, cosine = first
+    sine, cosine, _ = first
     if kind.from_rest:
         r, r1, r2, r3 = (jnp.abs(segment.end_radius) * size for size in sizes)
         nu, steady, frame = 0.0 * r, omega * omega, jnp.ones_like(r)
@@ -179,18 +197,19 @@ def _hypotenuse(a: Array, b: Array) -> Array:
     return jnp.sqrt(a * a + b * b)
 
 
-def _beat(segment: PoseSegment, arcs: Array, middle: Middle, along: Array, first, third) -> tuple[Array, ...]:
-    # Of |beta|, |beta'|, |beta''| of (3.93), by terms.
+def _beat(segment: PoseSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
+    # Of (3.93), by terms.
     how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
     slope = (how.end_beta_hat - how.start_beta_hat) * share
     h, steep = how.start_beta_hat * share + slope * middle.tau, jnp.abs(slope)
-    nine, one = jnp.abs(9.0 + h) + steep * along, jnp.abs(1.0 + h) + steep * along
-    (sine, cosine), (sine3, cosine3) = first, third
-    value = nine * cosine + one * cosine3
-    rate = steep * (cosine + cosine3) + omega * (3.0 * one * sine3 + nine * sine)
-    bend = 2.0 * steep * omega * (3.0 * sine3 + sine) + omega * omega * (9.0 * one * cosine3 + nine * cosine)
-    return value * 0.125, rate * 0.125, bend * 0.125
+    nine, one = jnp.abs(9.0 + h) + steep * axes[0], jnp.abs(1.0 + h) + steep * axes[0]
+    value = nine * first.cosine + one * third.cosine
+    rate = steep * (first.cosine + third.cosine) + omega * (3.0 * one * third.sine + nine * first.sine)
+    bend = 2.0 * steep * omega * (3.0 * third.sine + first.sine)
+    bend = bend + omega * omega * (9.0 * one * third.cosine + nine * first.cosine)
+    aside = nine * first.aside + one * third.aside + steep * axes[1] * (first.cosine + third.cosine)
+    return _Beats(value * 0.125, rate * 0.125, bend * 0.125, aside * 0.125)
 
 
 def _half_vector(segment: PoseSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:

@@ -1,11 +1,11 @@
-"""Blocks of a platform's motions: quarters of arcs, cut at the knots of the amplitude function, and halved where open."""
+"""Blocks of a platform's motions: parts of arcs, cut at the knots of the amplitude function, and halved where open."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-# Of an arc; so many times a block is halved at most.
-QUARTERS, HALVINGS = 4, 20
+# So many times a block is halved at most, and so many of an arc may be open.
+HALVINGS, OPEN = 20, 64
 
 
 class Blocks(NamedTuple):
@@ -35,18 +35,19 @@ class Blocks(NamedTuple):
         )
 
 
-def quarters(arcs: np.ndarray, knots: np.ndarray) -> Blocks:
-    """Quarters of all arcs of motions.
+def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: int) -> Blocks:
+    """Equal parts of all arcs of motions.
 
     Args:
         arcs: (n,) number of arcs of each motion, 1 or more.
         knots: of the amplitude function, inside ]0, 1[.
+        parts: how many an arc.
 
     Returns:
         the blocks, those of a motion side by side, in time.
     """
     edges = {
-        int(p): np.unique(np.concatenate([np.arange(QUARTERS * p + 1) / (QUARTERS * p), knots])) for p in np.unique(arcs)
+        int(p): np.unique(np.concatenate([np.arange(parts * p + 1) / (parts * p), knots])) for p in np.unique(arcs)
     }
     each = [edges[int(p)] for p in arcs]
     row = np.repeat(np.arange(len(arcs)), [len(x) - 1 for x in each])

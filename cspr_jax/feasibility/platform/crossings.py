@@ -4,10 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cspr_jax.feasibility.platform.kernels import LEAST_COSINE
 from cspr_jax.robots.interference import cables_cross, platform_hit
 
 HALVINGS = 12
+# Steps between which a gap or a cable turns by more than this angle are to be halved.
+LEAST_COSINE = 0.8
 
 CableVectors = tuple[np.ndarray, np.ndarray]  # between cables (k, n_pairs, 3), along cables (k, n_cables, 3)
 

@@ -25,11 +25,16 @@ class PoseChecks:
         verdict: (n,) `Verdict` flags; 0 is feasible.
         slack: (n, n_criteria) smallest of each criterion of `MotionChecker.flags`; NaN where unknown.
         gap: (n,) smallest distance between cables that can meet, m; infinite where none can.
+        bound: (n,) proved lower bound of the slack of taut cables and of the depth below the spools; NaN where nothing
+            is proved.
+        instant: (n,) tau at which tensions or limits on them refute the motion; NaN elsewhere.
     """
 
     verdict: np.ndarray
     slack: np.ndarray
     gap: np.ndarray
+    bound: np.ndarray
+    instant: np.ndarray
 
     def put(self, which: np.ndarray, others: "PoseChecks") -> None:
         """Write others into it.
@@ -38,7 +43,8 @@ class PoseChecks:
             which: (m,) their places.
             others: of m motions.
         """
-        self.verdict[which], self.slack[which], self.gap[which] = others.verdict, others.slack, others.gap
+        for mine, theirs in zip(vars(self).values(), vars(others).values(), strict=True):
+            mine[which] = theirs
 
     def rows(self, which: np.ndarray) -> "PoseChecks":
         """Checks of some of the motions.
@@ -49,7 +55,7 @@ class PoseChecks:
         Returns:
             those of m motions.
         """
-        return PoseChecks(self.verdict[which], self.slack[which], self.gap[which])
+        return PoseChecks(**{name: values[which] for name, values in vars(self).items()})
 
 
 class FirstLook(Protocol):
@@ -129,16 +135,18 @@ class MotionChecker(abc.ABC):
         Returns:
             verdicts 0, the rest NaN.
         """
-        return PoseChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), np.full(count, np.nan))
+        numbers = [np.full(count, np.nan) for _ in ("gap", "bound", "instant")]
+        return PoseChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
 
     @abc.abstractmethod
-    def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True) -> PoseChecks:
+    def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True, margins: bool = True) -> PoseChecks:
         """Check motions in full.
 
         Args:
             segments: leaves (n, ...), of the parity of `arcs`.
             arcs: (n,).
             whole: whether to go on where the motion itself is infeasible; else the rest is NaN there.
+            margins: whether more than the verdict is wanted; else slacks and gaps are ignored.
 
         Returns:
             the checks.

@@ -16,7 +16,7 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.batches import in_batches, room
 from cspr_jax.arithmetic.lanes import cross, dot
-from cspr_jax.feasibility.platform.samples import rows
+from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.feasibility.platform.slack_lanes import certain_tension, lowest_tension
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import balance, cables

@@ -1,0 +1,102 @@
+"""Margins of a platform's motions: smallest values that are attained, narrowed down from samples by parabolas."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+# Parabolas one after the other, each through points so much nearer; a value that spreads less is not narrowed.
+ROUNDS, NEARER, LEVEL = 5, 3.0, 1e-9
+
+
+class Samples(NamedTuple):
+    """Samples of criteria along motions.
+
+    Fields:
+        which: (n_values,) criteria.
+        row: (k,) whose block it is.
+        tau: (m, k) instants, increasing.
+        values: (m, n_values, k).
+    """
+
+    which: np.ndarray
+    row: np.ndarray
+    tau: np.ndarray
+    values: np.ndarray
+
+
+def narrowed(
+    values_at: Callable[[np.ndarray, np.ndarray], np.ndarray], least: np.ndarray, samples: Samples, wanted: np.ndarray
+) -> None:
+    """Put smallest values around samples into what is known.
+
+    Args:
+        values_at: of motions (j,) at instants (j,), (n_criteria, j).
+        least: (n_criteria, n) smallest values so far; written into.
+        samples: of n motions.
+        wanted: (n,) motions that are asked about.
+    """
+    place, value, item = low_points(samples, wanted)
+    if not len(place):
+        return
+    row, which, tau = samples.row[item], samples.which[value], samples.tau[place, item]
+    last = len(samples.tau) - 1
+    beside = [np.abs(samples.tau[np.clip(place + k, 0, last), item] - tau) for k in (-1, 1)]
+    width = np.maximum(*beside)
+    for _ in range(ROUNDS):
+        points = np.clip(tau[:, None] + width[:, None] * np.array([-1.0, 0.0, 1.0]), 0.0, 1.0)
+        found = _values(values_at, least, row, points, which)
+        tau = _vertex(points, found)
+        width = width / NEARER
+    _values(values_at, least, row, tau[:, None], which)
+
+
+def low_points(samples: Samples, wanted: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Samples no larger than their neighbours, where a parabola of twice the bend could reach the smallest value.
+
+    Args:
+        samples: of n motions.
+        wanted: (n,) motions that are asked about.
+
+    Returns:
+        which of the m, of the n_values and of the k, (j,) each.
+    """
+    values, row = samples.values, samples.row
+    smallest = np.full((values.shape[1], len(wanted)), np.inf)
+    own = values.min(0)
+    for kept, found in zip(smallest, own, strict=True):
+        np.minimum.at(kept, row, found)
+    falls = values[1:] < values[:-1]
+    side = np.ones_like(falls[:1])
+    is_low = np.concatenate([side, falls]) & np.concatenate([~falls, side])
+    with np.errstate(invalid="ignore"):  # infinities beside infinities
+        is_low &= (np.ptp(values, axis=0) > LEVEL) & wanted[row]
+    place, value, item = np.nonzero(is_low)
+    here, last = values[place, value, item], len(values) - 1
+    before, after = (values[np.clip(place + k, 0, last), value, item] for k in (-1, 1))
+    with np.errstate(invalid="ignore"):
+        bend = before - 2.0 * here + after
+    reaches = np.isfinite(bend) & (here - 0.25 * bend <= smallest[value, row[item]])
+    return place[reaches], value[reaches], item[reaches]
+
+
+def _values(values_at: Callable, least: np.ndarray, row: np.ndarray, points: np.ndarray, which: np.ndarray):
+    # (j, m) of each candidate's own criterion; all criteria learn from them.
+    count = points.shape[1]
+    rows = np.repeat(row, count)
+    found = values_at(rows, points.ravel())
+    for kept, values in zip(least, found, strict=True):
+        np.fmin.at(kept, rows, values)
+    return found[np.repeat(which, count), np.arange(len(rows))].reshape(points.shape)
+
+
+def _vertex(points: np.ndarray, values: np.ndarray) -> np.ndarray:
+    # Of the parabola through three points, within them; the lowest of them where it has no minimum there.
+    (a, b, c), (x, y, z) = points.T, values.T
+    with np.errstate(invalid="ignore", divide="ignore"):
+        top = (b - a) ** 2 * (y - z) - (b - c) ** 2 * (y - x)
+        bottom = (b - a) * (y - z) - (b - c) * (y - x)
+        vertex = b - 0.5 * top / bottom
+    best = points[np.arange(len(points)), np.nanargmin(np.where(np.isnan(values), np.inf, values), axis=1)]
+    is_inside = np.isfinite(vertex) & (vertex >= a) & (vertex <= c) & (bottom < 0.0)
+    return np.where(is_inside, vertex, best)

@@ -1,0 +1,222 @@
+"""Bounds of what depends on a platform's pose alone on blocks of its motions: contacts, depth, limits on the pose.
+
+Two cables are apart where some unit vector e has e . (x_j - x_i) > 0 for all points x of both: linear in the points, so
+that their ends are enough. A cable is off the platform where its vector v from its corner, in platform axes, has
+e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a whole block; that of its
+middle is taken, the shortest vector between the cables, and the residual of the projection onto the sector (Moreau).
+Between instants h apart a function f with |f''| <= C stays above its smaller end less C h^2 / 8.
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.arithmetic.lanes import Vector, dot, largest, smallest, stored
+from cspr_jax.feasibility.limits import given, scales
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots import contact_lanes
+from cspr_jax.robots.interference import between
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.wrench_lanes import CABLES, Cables, cables
+from cspr_jax.schema.limits import Limit
+from cspr_jax.trajectories.platform_lanes import State, state
+from cspr_jax.trajectories.platform_reach import instant_beside, middle_of, reach
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+
+STEPS = 8
+# Of coordinates of some size: what lengths and heights may be wrong by.
+ROUNDING = 1e-13
+TINY = 1e-30
+
+
+class PlaceBounds(NamedTuple):
+    """What is known of n blocks.
+
+    Fields:
+        clear: (n,) lower bound of the distance between cables that can meet, and of that of the cables from the sectors
+            of their corners, m.
+        slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
+        nodes: (m, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between cables, m.
+        speeds: (2, n) bounds of |p'| and of the norm of the derivative of the rotation matrix.
+    """
+
+    clear: Array
+    slacks: Array
+    nodes: Array
+    speeds: Array
+
+
+class _Bends(NamedTuple):
+    # (n,) what second derivatives take off between two instants, m: of the centre, of a unit arm, of unit vectors seen
+    # from the platform.
+    centre: Array
+    arm: Array
+    seen: Array
+
+
+def of_pose(problem: Problem) -> list[Limit]:
+    """Limits on the pose that are given.
+
+    Args:
+        problem: robot, limits.
+
+    Returns:
+        their rows.
+    """
+    return [row for row in given(problem.limits) if not row.of_motion]
+
+
+@partial(jax.jit, static_argnames=("pairs", "kind", "margins"))
+def place_blocks(
+    problem: Problem, platform, one: Array, items, *, pairs: tuple, kind: Kind, margins: bool
+) -> PlaceBounds:
+    """Bounds on blocks.
+
+    Args:
+        problem: robot, limits, amplitude.
+        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
+        one: () the number 1; see `arithmetic.lanes.stored`.
+        items: segments (leaves (n, ...)), arcs (n,), and where blocks start and stop (n,), with no knot inside.
+        pairs: of cables that can meet.
+        kind: of the motions.
+        margins: whether distances between cables are wanted; else they are infinite.
+
+    Returns:
+        the bounds.
+    """
+    segments, arcs, start, stop = items
+    middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
+
+    def at(off):
+        here = state(segments, arcs, instant_beside(middle, segments.sense, arcs, off * half), kind)
+        return here, cables(problem.robot, here.position, here.turn)
+
+    bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
+    share = (2.0 * half / STEPS) ** 2 / 8.0
+    turning = bounds.spin + bounds.omega**2
+    here, wires = at(0.0)
+    away = [
+        dot(x, x)
+        for x in ([here.position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
+    ]
+    seen = turning * (jnp.sqrt(largest(away)) + half * bounds.speed) + bounds.bend + 2.0 * bounds.omega * bounds.speed
+    bends = stored(_Bends(bounds.bend * share, turning * share, seen * share), one)
+    gaps, residuals = _separators(problem.robot, platform, pairs, stored((wires, here.turn), one))
+
+    def on(place):
+        now, lines = at(place)
+        apart = _apart(problem.robot, pairs, gaps, lines, bends)
+        away = zip(residuals, contact_lanes.cable_directions(lines, now.turn), strict=True)
+        clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
+        values = _slacks(problem, segments, now, lines)
+        if margins and pairs:
+            found = [dot(x, x) for x in contact_lanes.gaps(problem.robot.base_points, pairs, lines)]
+            values.append(jnp.sqrt(smallest(found)))
+        # Two numbers a loop.
+        return lax.complex(clear, values[0]), *values[1:]
+
+    first, *others = lax.map(on, np.linspace(-1.0, 1.0, STEPS + 1))
+    nodes = [jnp.imag(first), *others]
+    if not (margins and pairs):
+        nodes.append(jnp.full_like(nodes[0], jnp.inf))
+    steps = _steps(problem, segments, bends)
+    size = jnp.max(jnp.abs(problem.robot.base_points)) + segments.hub[:, 2]
+    return PlaceBounds(
+        jnp.min(jnp.real(first), axis=0) - ROUNDING * size,
+        jnp.stack([jnp.min(x, axis=0) - step - ROUNDING for x, step in zip(nodes[:-1], steps, strict=True)]),
+        jnp.stack(nodes, axis=1),
+        jnp.stack([bounds.speed, bounds.turn]),
+    )
+
+
+def _separators(robot: PlatformRobot, platform, pairs: tuple, middle) -> tuple[list[Vector], list[Vector]]:
+    # Unit vectors between cables, one a pair, and off the sectors, one a cable. As arrays: once a block, little code.
+    wires, turn = middle
+    rays, seen = contact_lanes.as_arrays(wires.rays, contact_lanes.cable_directions(wires, turn))
+    residuals = _lanes(_residuals(platform, seen))
+    if not pairs:
+        return [], residuals
+    i, j = (np.array([pair[k] for pair in pairs]) for k in range(2))
+    base = robot.base_points
+    return _lanes(between(base[i][None], rays[:, i], base[j][None], rays[:, j])), residuals
+
+
+def _lanes(vectors: Array) -> list[Vector]:
+    # Unit vectors (n, m, 3) as m of (n,) numbers each.
+    scale = 1.0 / jnp.sqrt(jnp.maximum(jnp.sum(vectors * vectors, axis=2, keepdims=True), TINY))
+    columns = jnp.moveaxis(vectors * scale, 0, 2)
+    return [tuple(columns[k, i] for i in range(3)) for k in range(columns.shape[0])]
+
+
+def _residuals(platform, seen: Array) -> Array:
+    # What is left of vectors (n, n_cables, 3) after their projection onto the sectors of their corners.
+    sides, normal = platform
+    height = jnp.sum(seen * normal[None, None], axis=2, keepdims=True)
+    up = height * normal[None, None]
+    flat, one, two = seen - up, sides[None, :, 0], sides[None, :, 1]
+
+    def area(a, b):
+        return jnp.sum(jnp.cross(a, b) * normal[None, None], axis=2, keepdims=True)
+
+    across = area(one, two)
+    inside = (area(flat, two) * across >= 0.0) & (area(one, flat) * across >= 0.0)
+    left = []
+    for side in (one, two):
+        share = jnp.sum(seen * side, axis=2, keepdims=True) / jnp.sum(side * side, axis=2, keepdims=True)
+        left.append(seen - jnp.maximum(share, 0.0) * side)
+    squares = [jnp.sum(x * x, axis=2, keepdims=True) for x in left]
+    return jnp.where(inside, up, jnp.where(squares[0] <= squares[1], *left))
+
+
+def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: Cables, bends: _Bends) -> Array:
+    # The least over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed between instants.
+    if not pairs:
+        return jnp.full_like(bends.centre, jnp.inf)
+    sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
+    values = []
+    for (i, j), e in zip(pairs, gaps, strict=True):
+        first, last = dot(e, wires.rays[i]), dot(e, wires.rays[j])
+        spools = sum(e[k] * (robot.base_points[j, k] - robot.base_points[i, k]) for k in range(3))
+        between = jnp.sqrt(jnp.sum((robot.platform_points[i] - robot.platform_points[j]) ** 2))
+        values += [
+            spools,
+            spools + last - bends.centre - sizes[j] * bends.arm,
+            spools - first - bends.centre - sizes[i] * bends.arm,
+            spools + last - first - between * bends.arm,
+        ]
+    return smallest(values)
+
+
+def _slacks(problem: Problem, segments: PoseSegment, here: State, wires: Cables) -> list[Array]:
+    # Of the depth below the spools, and of limits on the pose.
+    robot, z0 = problem.robot, problem.robot.gravity / segments.rate
+    normal = plane_normal(robot)
+    values = [dot([normal[i] for i in range(3)], here.position) / z0]
+    factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
+    for row in of_pose(problem):
+        limit = getattr(problem.limits, row.name)
+        if row.quantity == "depth":
+            values.append((limit - here.position[2]) * factor / size)
+        else:
+            values.append(smallest([1.0 - jnp.sqrt(dot(ray, ray)) / limit[k] for k, ray in enumerate(wires.rays)]))
+    return values
+
+
+def _steps(problem: Problem, segments: PoseSegment, bends: _Bends) -> list[Array]:
+    # What these may fall below their values at two instants; a length is convex along the chord of its ray.
+    robot, z0 = problem.robot, problem.robot.gravity / segments.rate
+    steps = [bends.centre / z0]
+    factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
+    arms = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
+    for row in of_pose(problem):
+        limit = getattr(problem.limits, row.name)
+        if row.quantity == "depth":
+            steps.append(bends.centre * factor / size)
+        else:
+            steps.append(largest([(bends.centre + arms[k] * bends.arm) / limit[k] for k in range(CABLES)]))
+    return steps

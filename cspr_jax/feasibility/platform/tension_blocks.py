@@ -1,0 +1,235 @@
+"""Bounds of tensions and of the determinant on blocks of a platform's motions, one lane a block.
+
+With N_k and det J the determinants of Cramer's rule for the tension of cable k,
+
+    kappa_k = 6 z0 N_k / (g det J(P0)),    D = det J / det J(P0),    slack of a taut cable = kappa_k / D
+
+are analytic on a block. They are taken at Chebyshev's nodes; what the polynomials through these leave out is bounded
+on ellipses of complex time, by Hadamard's inequality. With Bernstein coefficients k_i of kappa and d_i of D, and
+remainders r and q, no slack is below the smallest (k_i - r) / (d_i + q). Likewise for limits on tensions, speeds and
+accelerations of cables, `limit_blocks`: docs/theory.md.
+"""
+
+import math
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.arithmetic import chebyshev
+from cspr_jax.arithmetic.lanes import dot, stored
+from cspr_jax.feasibility.limits import given, scales
+from cspr_jax.feasibility.platform.limit_blocks import (
+    QUANTITIES,
+    STRAIGHT,
+    Enclosed,
+    Here,
+    Pair,
+    Sizes,
+    quotient,
+    ratio,
+)
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.wrench_lanes import CABLES, balance, cables, inertial_wrench
+from cspr_jax.schema.limits import Limit
+from cspr_jax.trajectories.platform_lanes import State, squared_duration, state
+from cspr_jax.trajectories.platform_reach import Reach, instant_beside, middle_of, reach
+from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+
+# Part of a bound on real time by which a value at a node may be wrong (tests: by a tenth of that), and by which the
+# polynomial through such values may be. What computing its Bernstein coefficients adds is a part of the values.
+ROUNDING = 1e-13 * chebyshev.LEBESGUE
+COEFFICIENTS = 2.0 * np.finfo(float).eps * (chebyshev.DEGREE + 1) * float(np.abs(chebyshev.bernstein()).sum(1).max())
+REGULAR = CABLES  # the place of D among the values
+
+
+class BlockBounds(NamedTuple):
+    """Slacks on n blocks: of taut cables, of the determinant (D), of the limits on the motion that are given.
+
+    Fields:
+        nodes: (m, n_criteria, n) smallest ones at the nodes; of the determinant that of
+            `wrench_lanes.normalised_determinant` over its value at rest in P0, where margins are asked for.
+        bound: (n_criteria, n) proved lower bounds.
+        rounding: (n,) largest allowance for rounding in those of taut cables, before these are divided by D.
+    """
+
+    nodes: Array
+    bound: Array
+    rounding: Array
+
+
+class _Block(NamedTuple):
+    # Of n blocks.
+    segments: PoseSegment
+    squared: Array  # T^2, s^2
+    regular: Array  # det J(P0), m^9
+    z0: Array
+
+
+def of_motion(problem: Problem) -> list[Limit]:
+    """Limits on the motion that are given.
+
+    Args:
+        problem: robot, limits.
+
+    Returns:
+        their rows.
+    """
+    return [row for row in given(problem.limits) if row.of_motion]
+
+
+@partial(jax.jit, static_argnames=("kind", "margins"))
+def tension_blocks(problem: Problem, one: Array, items, *, kind: Kind, margins: bool) -> BlockBounds:
+    """Bounds of slacks on blocks.
+
+    Args:
+        problem: robot, limits, amplitude.
+        one: () the number 1; see `arithmetic.lanes.stored`.
+        items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start and stop (n,), with no knot
+            inside.
+        kind: of the motions.
+        margins: whether the normalised determinant is wanted.
+
+    Returns:
+        the bounds.
+    """
+    segments, arcs, regular, start, stop = items
+    middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
+    block = _Block(segments, squared_duration(segments, arcs), regular, problem.robot.gravity / segments.rate)
+
+    def at(off, kept):
+        now = instant_beside(middle, segments.sense, arcs, off * half)
+        return state(segments, arcs, stored(now, kept), kind)
+
+    def pairs_at(node):
+        return tuple(lax.complex(*pair) for pair in _values(problem, block, at(node, one), margins=margins))
+
+    pairs = lax.map(pairs_at, chebyshev.nodes())
+    values = jnp.stack([part(x) for x in pairs for part in (jnp.real, jnp.imag)], axis=1)
+    lengths = _lengths(problem.robot, at(0.0, None))
+
+    def on(ellipse):
+        (along, aside), factor = ellipse
+        bounds = reach(segments, arcs, middle, (along * half, aside * half), kind)
+        found = _sizes(problem, block, bounds, along * half, lengths)
+        return tuple(jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in found)
+
+    radii = np.array(chebyshev.RADII)
+    ellipses = (np.vstack([chebyshev.semi_axes(radii), [1.0, 0.0]]), np.append(chebyshev.remainders(radii), ROUNDING))
+    sizes = jnp.stack(lax.map(on, ellipses), axis=1)
+    # What margins alone need comes last, and is not bounded.
+    proved = values[:, : sizes.shape[1]]
+    amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
+    rounding = sizes[-1] * amplified[None] + COEFFICIENTS * jnp.max(jnp.abs(proved), axis=0)
+    nodes, bound = _bounds(problem, block, proved, jnp.min(sizes[:-1], axis=0) + rounding)
+    if margins:
+        nodes[1] = values[:, sizes.shape[1]]
+    return BlockBounds(jnp.stack(nodes, axis=1), jnp.stack(bound), jnp.max(rounding[:CABLES], axis=0))
+
+
+def _values(problem: Problem, block: _Block, here: State, *, margins: bool) -> list[Pair]:
+    # At one node, two at a time, which XLA then computes in one loop: kappa and D, what rounding is multiplied with,
+    # what the limits need, and the normalised determinant.
+    robot = problem.robot
+    wires = cables(robot, here.position, here.turn)
+
+    def slowed(vector):
+        return tuple(x / block.squared for x in vector)
+
+    force, moment = inertial_wrench(robot, slowed(here.acceleration), here.turn, here.omega, here.spin)
+    found = balance(wires, force, slowed(moment))
+    inverse = 1.0 / found.volume
+    squares = [dot(ray, ray) for ray in wires.rays]
+    amplified = math.prod(squares[2::2], start=squares[0]) * inverse * inverse
+    share = inverse * inverse * inverse / block.regular
+    kappa = [x * (share * (CABLES * block.z0 / robot.gravity)) for x in found.numerators]
+    regular = found.denominator * share
+    pairs = [*zip(kappa[::2], kappa[1::2], strict=True), (regular, amplified)]
+    instant = Here(here, wires, kappa, block.squared, block.z0)
+    for quantity, row in _quantities(problem).items():
+        pairs += QUANTITIES[quantity].values(instant, getattr(problem.limits, row[0].name))
+    if margins:
+        standing = cables(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
+        rest = [dot(ray, ray) for ray in standing.rays]
+        lengths = [jnp.sqrt(a / b) for a, b in zip(rest, squares, strict=True)]
+        pairs.append((regular * math.prod(lengths[1:], start=lengths[0]), regular))
+    return pairs
+
+
+def _level(like: Array):
+    one, nothing = jnp.ones_like(like), jnp.zeros_like(like)
+    return tuple(tuple(one if i == j else nothing for j in range(3)) for i in range(3))
+
+
+def _quantities(problem: Problem) -> dict[str, list[Limit]]:
+    # Quantities that limits bound, each with its limits.
+    rows: dict[str, list[Limit]] = {}
+    for row in of_motion(problem):
+        rows.setdefault(row.quantity, []).append(row)
+    return rows
+
+
+def _lengths(robot: PlatformRobot, here: State) -> tuple[list[Array], list[Array]]:
+    # Of the cables, and from the spools to the mass centre.
+    wires = cables(robot, here.position, here.turn)
+    offs = [tuple(here.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]
+    rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (wires.rays, offs))
+    return rays, away
+
+
+def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths) -> list[Array]:
+    # Largest sizes on an ellipse of what `_values` gives, in its order, by Hadamard's inequality: moments in platform
+    # axes, over the mean arm times the growth.
+    robot, squared, z0 = problem.robot, block.squared, block.z0
+    sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
+    arm, arms = jnp.sqrt(jnp.mean(sizes**2)), [sizes[k] for k in range(CABLES)]
+    shift, turn = along * bounds.speed, jnp.minimum(along * bounds.turn, bounds.growth + 1.0)
+    moved = [shift + own * turn for own in arms]
+    rays = [ray + move for ray, move in zip(lengths[0], moved, strict=True)]
+    columns = [
+        jnp.sqrt(ray**2 + (own / arm * (away + shift)) ** 2)
+        for ray, own, away in zip(rays, arms, lengths[1], strict=True)
+    ]
+    inertia = robot.inertia / robot.mass
+    apart = inertia - jnp.trace(inertia) / 3.0 * jnp.eye(3)
+    whirl = jnp.sqrt(jnp.sum(inertia**2)) * bounds.spin + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
+    force = bounds.bend / squared + robot.gravity
+    wrench = jnp.sqrt(force**2 + (whirl / squared / (arm * bounds.growth)) ** 2)
+    whole = (arm * bounds.growth) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
+    kappa = [CABLES * z0 / robot.gravity * whole * wrench / column for column in columns]
+    paces = [bounds.speed + own * bounds.turn for own in arms]
+    pulls = [bounds.bend + own * bounds.growth * (bounds.spin + bounds.omega**2) for own in arms]
+    is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
+    found = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0)
+    every = [*kappa, whole, jnp.zeros_like(whole)]
+    for quantity, row in _quantities(problem).items():
+        every += QUANTITIES[quantity].sizes(found, getattr(problem.limits, row[0].name))
+    return every
+
+
+def _bounds(problem: Problem, block: _Block, values: Array, rests: Array) -> tuple[list[Array], list[Array]]:
+    # Smallest slacks at the nodes, (m, n) each, and their lower bounds, (n,) each; `values` (m, n_values, n), `rests`
+    # (n_values, n).
+    matrix = chebyshev.bernstein()
+    every = (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
+    low, high, share = every - rests[None], every + rests[None], values[:, REGULAR]
+    regular = low[:, REGULAR, None], high[:, REGULAR, None]
+    nodes = [jnp.min(quotient(values[:, :CABLES], share), axis=1), share]
+    bound = [jnp.min(ratio(low[:, :CABLES], regular), axis=(0, 1)), jnp.min(low[:, REGULAR], axis=0)]
+    scale = scales(CABLES, problem.robot.mass * problem.robot.gravity, block.z0)
+    part, found = slice(0, REGULAR + 2), {}
+    for quantity, rows in _quantities(problem).items():
+        factor, size = scale.get(quantity, (1.0, jnp.ones(())))
+        part = slice(part.stop, part.stop + QUANTITIES[quantity].width)
+        enclosed = Enclosed(low[:, part], high[:, part], values[:, part], regular, share)
+        for row in rows:
+            limit = getattr(problem.limits, row.name) * (factor / size)
+            found[row.name] = QUANTITIES[quantity].slacks(enclosed, limit, row.sense == "least")
+    for row in of_motion(problem):
+        nodes.append(found[row.name][0])
+        bound.append(found[row.name][1])
+    return nodes, bound
