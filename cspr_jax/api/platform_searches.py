@@ -54,7 +54,7 @@ def minimum_pose_arcs(  # noqa: PLR0913
         variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
 
     Returns:
-        the answers, (n,) each; sampled with care, not proved.
+        the answers, (n,) each, proved.
 
     Raises:
         InputError: as `minimum_arcs` does; quaternions that are not of unit length; a robot that is singular or slack

@@ -46,7 +46,8 @@ def bernstein() -> np.ndarray:
         for i, t in enumerate(places)
     ]
     for k in range(DEGREE + 1):
-        pivot = max(range(k, DEGREE + 1), key=lambda i, k=k: abs(rows[i][k]))
+        sizes = [abs(row[k]) for row in rows[k:]]
+        pivot = k + sizes.index(max(sizes))
         rows[k], rows[pivot] = rows[pivot], rows[k]
         rows[k] = [x / rows[k][k] for x in rows[k]]
         for i in range(DEGREE + 1):

@@ -18,6 +18,8 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
+# Limits may be touched: a slack within the tolerances of proofs counts as met.
+TOUCHED = 3.1e-6
 _OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
 
@@ -127,9 +129,11 @@ class PlatformMap(GridMap):
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         feasible = answers["arcs"] > 0
-        margins = np.minimum(np.minimum(answers["margin"], answers["limit_margin"]), answers["det_margin"])
+        margin = answers["margin"]
         return {
-            "a feasible cell with a margin below zero": feasible & ~(margins > 0.0),
+            "a feasible cell with a margin below zero": feasible & ~(np.minimum(margin, answers["det_margin"]) > 0.0),
+            "a feasible cell that breaks a limit": feasible & ~(answers["limit_margin"] > -TOUCHED),
+            "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
             "an infeasible cell whose verdict is 0": ~feasible & (answers["verdict"] == 0),
             "a feasible cell without a duration": feasible & ~(answers["duration"] > 0.0),
         }

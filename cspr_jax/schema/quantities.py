@@ -76,7 +76,7 @@ QUANTITIES = {
             "margin_bound",
             "1",
             "proved lower bound of the margin",
-            "No instant of the segment has a smaller margin: proved for point masses, absent for platforms.",
+            "No instant of the segment has a smaller margin: proved; absent on more than six cables.",
         ),
         Quantity(
             "feasible_at_infinity",

@@ -12,7 +12,7 @@ A limit that is touched counts as met, as with point masses: limits are allowed 
 import dataclasses
 import itertools
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -99,13 +99,14 @@ class Certifier:
             the proofs.
         """
         blocks = first = parts_of_arcs(arcs, self._knots, FROM_REST if self._kind.from_rest else BETWEEN)
-        state, nodes = _State(len(arcs), self._allowed), np.zeros(0)
+        state = _State(len(arcs), self._allowed)
+        nodes = np.zeros((chebyshev.DEGREE + 1, len(self._allowed), 0))
         standing = _standing(self._orders[0].problem, segments)
         for level in range(HALVINGS + 1):
             if not len(blocks.row):
                 break
             found = self._looked_at(blocks, (segments, arcs, standing), margins=margins)
-            nodes = nodes if level else found.nodes
+            nodes = nodes if level else np.asarray(found.nodes)
             is_open = state.told(blocks, found, near, last=level == HALVINGS)
             crowded = np.bincount(blocks.row[is_open], minlength=len(arcs)) > OPEN * arcs
             state.is_stuck |= crowded
@@ -152,7 +153,7 @@ class _State:
         # Takes in what was found of blocks; which of them are to be halved.
         nodes, low = found.nodes.min(0).T, found.bound.T
         np.minimum.at(self.attained, blocks.row, nodes)
-        self._note_instants(blocks, found.nodes.min(1))
+        self._note_instants(blocks, np.asarray(found.nodes).min(1))
         # NaN refutes nothing, and proves nothing.
         self.is_refuted[blocks.row[(nodes + self._allowed < -TOLERANCE).any(1)]] = True
         is_proved = (low > TOLERANCE - self._allowed).all(1)
@@ -201,7 +202,7 @@ def _reordered(problem: Problem, order: list[int]) -> Problem:
     points = {name: np.asarray(getattr(robot, name))[order] for name in ("base_points", "platform_points")}
     changed = dataclasses.replace(robot, **points, joints=tuple(range(CABLES)), limits=Limits())
     each = {row.name: getattr(limits, row.name) for row in LIMITS}
-    own = {
+    own: dict[str, Any] = {
         row.name: np.asarray(each[row.name])[order] if row.per_cable and each[row.name] is not None else each[row.name]
         for row in LIMITS
     }

@@ -66,9 +66,9 @@ class Enclosed(NamedTuple):
     """A quantity on n blocks.
 
     Fields:
-        low: (m, width, n) Bernstein coefficients less what the polynomials leave out.
-        high: (m, width, n) these and that.
-        nodes: (m, width, n) values at the nodes.
+        low: (m, n_cables, n) Bernstein coefficients less what the polynomials leave out.
+        high: (m, n_cables, n) these and that.
+        nodes: (m, n_cables, n) values at the nodes.
         regular: low and high of D, (m, 1, n) each.
         share: (m, n) D at the nodes.
     """
@@ -116,11 +116,11 @@ def quotient(top: Array, share: Array) -> Array:
     """Quotients at nodes.
 
     Args:
-        top: (m, width, n).
+        top: (m, n_cables, n).
         share: (m, n) D.
 
     Returns:
-        (m, width, n); -inf where D is not positive.
+        (m, n_cables, n); -inf where D is not positive.
     """
     is_positive = (share > 0.0)[:, None]
     return jnp.where(is_positive, top / jnp.where(is_positive, share[:, None], 1.0), -jnp.inf)

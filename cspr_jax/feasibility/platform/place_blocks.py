@@ -41,7 +41,7 @@ class PlaceBounds(NamedTuple):
         clear: (n,) lower bound of the distance between cables that can meet, and of that of the cables from the sectors
             of their corners, m.
         slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
-        nodes: (m, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between cables, m.
+        nodes: (n_instants, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between cables, m.
         speeds: (2, n) bounds of |p'| and of the norm of the derivative of the rotation matrix.
     """
 
@@ -81,7 +81,7 @@ def place_blocks(
         problem: robot, limits, amplitude.
         platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
         one: () the number 1; see `arithmetic.lanes.stored`.
-        items: segments (leaves (n, ...)), arcs (n,), and where blocks start and stop (n,), with no knot inside.
+        items: segments (leaves (n, ...)), arcs (n,), and where blocks start (n,) and stop (n,), with no knot inside.
         pairs: of cables that can meet.
         kind: of the motions.
         margins: whether distances between cables are wanted; else they are infinite.
@@ -170,7 +170,7 @@ def _residuals(platform, seen: Array) -> Array:
         share = jnp.sum(seen * side, axis=2, keepdims=True) / jnp.sum(side * side, axis=2, keepdims=True)
         left.append(seen - jnp.maximum(share, 0.0) * side)
     squares = [jnp.sum(x * x, axis=2, keepdims=True) for x in left]
-    return jnp.where(inside, up, jnp.where(squares[0] <= squares[1], *left))
+    return jnp.where(inside, up, jnp.where(squares[0] <= squares[1], left[0], left[1]))
 
 
 def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: Cables, bends: _Bends) -> Array:
@@ -181,7 +181,7 @@ def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: Cables
     values = []
     for (i, j), e in zip(pairs, gaps, strict=True):
         first, last = dot(e, wires.rays[i]), dot(e, wires.rays[j])
-        spools = sum(e[k] * (robot.base_points[j, k] - robot.base_points[i, k]) for k in range(3))
+        spools = dot(e, [robot.base_points[j, k] - robot.base_points[i, k] for k in range(3)])
         between = jnp.sqrt(jnp.sum((robot.platform_points[i] - robot.platform_points[j]) ** 2))
         values += [
             spools,

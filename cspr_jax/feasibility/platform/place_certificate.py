@@ -112,19 +112,25 @@ class PlaceCertifier:
         blocks = first = parts_of_arcs(arcs, self._knots, PARTS)
         count, width = len(arcs), len(self._allowed)
         met, hit, broken, stuck = (np.zeros(count, bool) for _ in range(4))
-        attained, bound, nodes = np.full((count, width + 1), np.inf), np.full((count, width), np.inf), np.zeros(0)
+        attained, bound, nodes = (
+            np.full((count, width + 1), np.inf),
+            np.full((count, width), np.inf),
+            np.zeros((0, 0, 0)),
+        )
         for level in range(HALVINGS + 1):
             if not len(blocks.row):
                 break
             found = self._looked_at(blocks, segments, arcs, margins=margins)
-            nodes = nodes if level else found.nodes
+            nodes = nodes if level else np.asarray(found.nodes)
             least, low = found.nodes.min(0).T, found.slacks.T
             np.minimum.at(attained, blocks.row, least)
             broken[blocks.row[(least[:, :-1] + self._allowed < -TOLERANCE).any(1)]] = True
             is_met = (low > TOLERANCE - self._allowed).all(1)
-            is_clear = found.clear > self._touch
+            is_clear = np.asarray(found.clear) > self._touch
             if level >= NEAR_CONTACT and not is_clear.all():
-                self._note_meetings(blocks.some(~is_clear), found.speeds[:, ~is_clear], (segments, arcs), (met, hit))
+                self._note_meetings(
+                    blocks.some(~is_clear), np.asarray(found.speeds)[:, ~is_clear], (segments, arcs), (met, hit)
+                )
             is_known = ((least[:, :-1] - low <= 0.5 * TOLERANCE) & ~(low > TOLERANCE - self._allowed)).any(1)
             is_done = (is_met & is_clear) | is_known | np.isnan(least).any(1) | (level == HALVINGS)
             stuck[blocks.row[is_done & ~(is_met & is_clear)]] = True

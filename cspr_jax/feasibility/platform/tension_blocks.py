@@ -51,7 +51,7 @@ class BlockBounds(NamedTuple):
     """Slacks on n blocks: of taut cables, of the determinant (D), of the limits on the motion that are given.
 
     Fields:
-        nodes: (m, n_criteria, n) smallest ones at the nodes; of the determinant that of
+        nodes: (n_nodes, n_criteria, n) smallest ones at the nodes; of the determinant that of
             `wrench_lanes.normalised_determinant` over its value at rest in P0, where margins are asked for.
         bound: (n_criteria, n) proved lower bounds.
         rounding: (n,) largest allowance for rounding in those of taut cables, before these are divided by D.
@@ -89,8 +89,8 @@ def tension_blocks(problem: Problem, one: Array, items, *, kind: Kind, margins: 
     Args:
         problem: robot, limits, amplitude.
         one: () the number 1; see `arithmetic.lanes.stored`.
-        items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start and stop (n,), with no knot
-            inside.
+        items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start (n,) and stop (n,), with
+            no knot inside.
         kind: of the motions.
         margins: whether the normalised determinant is wanted.
 
@@ -214,7 +214,7 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
 def _bounds(problem: Problem, block: _Block, values: Array, rests: Array) -> tuple[list[Array], list[Array]]:
     # Smallest slacks at the nodes, (m, n) each, and their lower bounds, (n,) each; `values` (m, n_values, n), `rests`
     # (n_values, n).
-    matrix = chebyshev.bernstein()
+    matrix = jnp.asarray(chebyshev.bernstein())
     every = (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
     low, high, share = every - rests[None], every + rests[None], values[:, REGULAR]
     regular = low[:, REGULAR, None], high[:, REGULAR, None]

@@ -1,0 +1,144 @@
+"""Proofs about contacts and limits on the pose: bounds on blocks, meetings, and verdicts against dense samples."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from oracles import platform as oracle
+from support.platforms import FROM_REST, USUAL, Z0, limits_of, stacked
+from test_tension_bounds import BATCH, ROBOTS, drawn, motions_of, problem_of
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.feasibility.platform import meetings
+from cspr_jax.feasibility.platform.place_blocks import STEPS, place_blocks
+from cspr_jax.feasibility.platform.place_certificate import PlaceCertifier
+from cspr_jax.robots.interference import contacts
+
+TIGHT = {"floor": 2.0, "cable_length_max": 3.0}
+FINE = 33
+
+
+def seen(robot, segment, p, beta, tau):
+    """By the oracle: distances between cables, slacks of depth and limits, cables as the platform sees them."""
+    m = oracle.motion(robot, segment, p, beta, tau)
+    shortest, _ = oracle.cable_vectors(robot, m.position, m.rotation)
+    lines = oracle.cables(robot, m.position, m.rotation)
+    lengths = np.linalg.norm(lines, axis=2)
+    depth = m.position[:, 2]
+    slacks = np.array([depth / Z0, (TIGHT["floor"] - depth) / Z0, (1.0 - lengths / TIGHT["cable_length_max"]).min(1)])
+    return np.linalg.norm(shortest, axis=2).min(1), slacks, -np.einsum("nki,nij->nkj", lines, m.rotation)
+
+
+def sector_distance(sides, normal, vectors):
+    """Distance of vectors (n, n_cables, 3) from the sectors of their corners, over many points of these."""
+    share = np.concatenate([np.linspace(0.0, 1.0, 41), [0.5]])
+    spokes = sides[None, :, 0] * share[:, None, None] + sides[None, :, 1] * (1.0 - share)[:, None, None]
+    spokes = spokes / np.linalg.norm(spokes, axis=2, keepdims=True)
+    along = np.maximum(np.einsum("nki,ski->nsk", vectors, spokes), 0.0)
+    rest = vectors[:, None] - along[..., None] * spokes[None]
+    return np.linalg.norm(rest, axis=3).min((1, 2))
+
+
+def block_breaks(count, seed, kind, robot):
+    """Bounds on random blocks against dense samples: how many are broken, how many blocks are clear."""
+    rng = np.random.default_rng(seed)
+    segments, theirs, arcs, betas = drawn(rng, robot, kind, count)
+    problem = problem_of(robot, limits_of(**TIGHT))
+    near = contacts(problem.robot)
+    start = rng.uniform(0.0, 0.95, count)
+    stop = np.minimum(start + rng.uniform(0.05, 0.5, count) / arcs, 1.0)
+    pairs = tuple((int(i), int(j)) for i, j in near.pairs)
+    kernel = partial(
+        place_blocks, problem, (near.sides, near.normal), np.ones(()), pairs=pairs, kind=kind, margins=True
+    )
+    found = in_batches(kernel, (segments, arcs.astype(float), start, stop), size=BATCH, axis=-1)
+    broken = 0
+    for i, (segment, p, beta) in enumerate(zip(theirs, arcs, betas, strict=True)):
+        tau = np.linspace(start[i], stop[i], STEPS * (FINE - 1) + 1)
+        apart, slacks, vectors = seen(robot, segment, int(p), beta, tau)
+        broken += bool((found.slacks[:, i] > slacks.min(1) + 1e-12).any())
+        broken += bool(found.clear[i] > 0.0 and found.clear[i] > apart.min() + 1e-12)
+        off = sector_distance(near.sides, near.normal, vectors).min()
+        broken += bool(found.clear[i] > 0.0 and found.clear[i] > off + 1e-12)
+        at = tau[:: FINE - 1]
+        assert np.allclose(found.nodes[-1 if len(pairs) else 0, -1, i], apart[-1], atol=1e-9), at
+        broken += bool(not np.allclose(found.nodes[:, :3, i].T, slacks[:, :: FINE - 1], rtol=1e-9, atol=1e-9))
+    return broken, float((found.clear > 0.0).mean())
+
+
+@pytest.mark.parametrize("kind", [USUAL, FROM_REST], ids=["between", "from rest"])
+def test_bounds_on_blocks_hold(kind):
+    """Distances, depths and lengths between the instants; most blocks are seen to be clear."""
+    broken, clear = block_breaks(64, 21, kind, ROBOTS["mssm"])
+    assert not broken and clear > 0.3
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", list(ROBOTS))
+@pytest.mark.parametrize("kind", [USUAL, FROM_REST], ids=["between", "from rest"])
+def test_bounds_on_many_blocks_hold(kind, name):
+    """20,000 stretches in all."""
+    assert not block_breaks(5000, 31, kind, ROBOTS[name])[0]
+
+
+def verdict_breaks(count, seed, kind, robot, instants):
+    """Proofs of random motions: contradicted by samples, undecided, met or hit, clear."""
+    some = motions_of(np.random.default_rng(seed), robot, kind, count)
+    problem = problem_of(robot)
+    proof = PlaceCertifier(problem, kind, batch=BATCH).prove(
+        stacked([x[3] for x in some]), np.array([x[1] for x in some])
+    )
+    contradicted = 0
+    for i, (segment, p, beta, _) in enumerate(some):
+        m = oracle.motion(robot, segment, p, beta, np.linspace(0.0, 1.0, instants))
+        shortest, _ = oracle.cable_vectors(robot, m.position, m.rotation)
+        crossed = bool(oracle.cables_cross(shortest).any())
+        hit = bool(oracle.platform_hit(robot, m.position, m.rotation).any())
+        contradicted += bool(proof.is_proved[i]) and (crossed or hit or not (m.position[:, 2] > 0.0).all())
+        contradicted += (bool(proof.met[i]) and not crossed) + (bool(proof.hit[i]) and not hit)
+    undecided = ~(proof.is_proved | proof.met | proof.hit | proof.is_broken)
+    return contradicted, int(undecided.sum()), int((proof.met | proof.hit).sum()), int(proof.is_proved.sum())
+
+
+@pytest.mark.parametrize("kind", [USUAL, FROM_REST], ids=["between", "from rest"])
+def test_proofs_agree_with_samples(kind):
+    """What is proved to be clear is, what is proved to meet does, and nothing else happens."""
+    contradicted, undecided, meet, clear = verdict_breaks(48, 23, kind, ROBOTS["mssm"], 4001)
+    assert contradicted == 0 and undecided <= 1 and meet > 3 and clear > 10
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", list(ROBOTS))
+@pytest.mark.parametrize("kind", [USUAL, FROM_REST], ids=["between", "from rest"])
+def test_proofs_agree_with_many_samples(kind, name):
+    """1,000 motions of each robot and kind, 20,001 instants."""
+    contradicted, undecided, _, _ = verdict_breaks(1000, 29, kind, ROBOTS[name], 20_001)
+    assert contradicted == 0 and undecided < 5
+
+
+def step_of(first, last, moved):
+    """A step of two cables whose rays go straight from the first ones to the last ones."""
+    rays = np.stack([first, 0.5 * (first + last), last])[:, None]
+    return meetings.Step(rays, rays, np.full((1, 2), moved), np.full((1, 2), moved))
+
+
+def test_cables_that_meet():
+    """Two cables pass through each other; beyond their ends they do not, nor where they may move by more."""
+    base, pairs = np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.0]]), np.array([[0, 1]])
+    first = np.array([[2.0, 0.0, 0.1], [0.0, 2.0, 0.0]])
+    last = np.array([[2.0, 0.0, -0.1], [0.0, 2.0, 0.0]])
+    assert meetings.cables_meet(base, pairs, step_of(first, last, 0.1)).all()
+    assert not meetings.cables_meet(base, pairs, step_of(first, last, 1.5)).any()
+    assert not meetings.cables_meet(base, pairs, step_of(first * 0.4, last * 0.4, 0.1)).any()
+    assert not meetings.cables_meet(base, pairs, step_of(first, first, 0.1)).any()
+
+
+def test_cables_on_the_platform():
+    """A cable falls through its corner's sector; beside the sector it does not count."""
+    sides = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]] * 2)
+    normal = np.array([0.0, 0.0, 1.0])
+    high, low = np.array([[1.0, 0.5, 0.1]] * 2), np.array([[1.0, 0.5, -0.1]] * 2)
+    assert meetings.cables_hit(sides, normal, step_of(high, low, 0.2)).all()
+    assert not meetings.cables_hit(sides, normal, step_of(high, low, 0.6)).any()
+    beside = high * [-1.0, 1.0, 1.0], low * [-1.0, 1.0, 1.0]
+    assert not meetings.cables_hit(sides, normal, step_of(*beside, 0.2)).any()
