@@ -142,7 +142,7 @@ def test_least_norm_against_a_general_minimiser(dof, count):
             method="SLSQP",
             options={"ftol": 1e-14, "maxiter": 300},
         )
-        assert answer.success
+        assert answer.status in (0, 8)  # 8: on some machines its last digits do not get better
         np.testing.assert_allclose(least.tensions[i], answer.x, rtol=0, atol=1e-5 * np.abs(answer.x).max())
 
 

@@ -1,11 +1,15 @@
 """Blocks of a platform's motions: parts of arcs, cut at the knots of the amplitude function, and halved where open."""
 
+import itertools
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 # So many times a block is halved at most, and so many of an arc may be open.
 HALVINGS, OPEN = 20, 64
+# Of a part more that a piece between knots gets as little as this is not worth a block.
+SLIVER = 0.3
 
 
 class Blocks(NamedTuple):
@@ -36,19 +40,25 @@ class Blocks(NamedTuple):
 
 
 def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: int) -> Blocks:
-    """Equal parts of all arcs of motions.
+    """Parts of all arcs of motions, nearly equal.
 
     Args:
         arcs: (n,) number of arcs of each motion, 1 or more.
         knots: of the amplitude function, inside ]0, 1[.
-        parts: how many an arc.
+        parts: how many an arc, or nearly.
 
     Returns:
         the blocks, those of a motion side by side, in time.
     """
-    edges = {
-        int(p): np.unique(np.concatenate([np.arange(parts * p + 1) / (parts * p), knots])) for p in np.unique(arcs)
-    }
+    pieces = list(itertools.pairwise([0.0, *knots.tolist(), 1.0]))
+
+    def edges_of(p: int) -> np.ndarray:
+        # Equal within each piece, so that no sliver is left beside a knot.
+        counts = [max(1, math.ceil(parts * p * (stop - start) - SLIVER)) for start, stop in pieces]
+        inside = [np.linspace(*piece, count + 1)[:-1] for piece, count in zip(pieces, counts, strict=True)]
+        return np.concatenate([*inside, [1.0]])
+
+    edges = {p: edges_of(p) for p in np.unique(arcs).tolist()}
     each = [edges[int(p)] for p in arcs]
     row = np.repeat(np.arange(len(arcs)), [len(x) - 1 for x in each])
     nothing = np.zeros(0)

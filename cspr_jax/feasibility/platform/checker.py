@@ -33,8 +33,8 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
 
-# Blocks of a call; so many arcs are held at a time.
-BLOCKS, ARCS = 256, 8 * MANY
+# Blocks of a call at most; so many arcs are held at a time.
+BLOCKS, ARCS = 1024, 8 * MANY
 # Where margins are asked for no bound is less than this part of what is attained.
 NEAR = 0.5
 TOUCH = 1e-6  # of the platform's size: poses nearer to a contact cannot be asked for
@@ -67,8 +67,8 @@ class PoseChecker(MotionChecker):
         knots = np.asarray(problem.amplitude.knots)
         count = partial(self._count, "prefilter")
         self.prefilter = Prefilter(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
-        self._tensions = Certifier(problem, kind, batch=BLOCKS)
-        self._places = PlaceCertifier(problem, kind, batch=BLOCKS)
+        self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS))
+        self._places = PlaceCertifier(problem, kind, batch=min(batch, BLOCKS))
         self._pairs = tuple((int(i), int(j)) for i, j in contacts(problem.robot).pairs)
         self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
         # Limits may be touched; cables may not be slack, and the rest may not be reached.

@@ -41,7 +41,8 @@ class PlaceBounds(NamedTuple):
         clear: (n,) lower bound of the distance between cables that can meet, and of that of the cables from the sectors
             of their corners, m.
         slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
-        nodes: (n_instants, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between cables, m.
+        nodes: (n_instants, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between
+            cables, m.
         speeds: (2, n) bounds of |p'| and of the norm of the derivative of the rotation matrix.
     """
 
