@@ -149,8 +149,10 @@ class PoseChecker(MotionChecker):
         if not len(every):
             return
         own = np.argsort(self._order)
-        # Limits on speeds and accelerations are proved as other functions of the same sign: only true slacks count.
+        # Limits on speeds and accelerations are proved as other functions of the same sign, and beyond a singularity
+        # nothing is: only true slacks count.
         least[own[1 : self._n_moving]] = np.inf
+        least[np.isneginf(least)] = np.inf
         # The ends of motions, and what may jump at a knot.
         for tau in (0.0, 1.0, *self._knots):
             least[:, every] = np.fmin(least[:, every], values_at(every, np.full(len(every), tau)))
