@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from oracles import platform as oracle
 from support.platforms import FROM_REST, USUAL, Z0, limits_of, stacked
-from test_tension_bounds import BATCH, ROBOTS, drawn, motions_of, problem_of
+from support.random_motions import BATCH, ROBOTS, drawn, motions_of, problem_of
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.platform import meetings
+from cspr_jax.feasibility.platform.meetings import Cables
 from cspr_jax.feasibility.platform.place_blocks import STEPS, place_blocks
 from cspr_jax.feasibility.platform.place_certificate import PlaceCertifier
 from cspr_jax.robots.interference import contacts
@@ -60,8 +61,7 @@ def block_breaks(count, seed, kind, robot):
         broken += bool(found.clear[i] > 0.0 and found.clear[i] > apart.min() + 1e-12)
         off = sector_distance(near.sides, near.normal, vectors).min()
         broken += bool(found.clear[i] > 0.0 and found.clear[i] > off + 1e-12)
-        at = tau[:: FINE - 1]
-        assert np.allclose(found.nodes[-1 if len(pairs) else 0, -1, i], apart[-1], atol=1e-9), at
+        assert np.allclose(found.nodes[:, -1, i], apart[:: FINE - 1], atol=1e-9)
         broken += bool(not np.allclose(found.nodes[:, :3, i].T, slacks[:, :: FINE - 1], rtol=1e-9, atol=1e-9))
     return broken, float((found.clear > 0.0).mean())
 
@@ -85,9 +85,8 @@ def verdict_breaks(count, seed, kind, robot, instants):
     """Proofs of random motions: contradicted by samples, undecided, met or hit, clear."""
     some = motions_of(np.random.default_rng(seed), robot, kind, count)
     problem = problem_of(robot)
-    proof = PlaceCertifier(problem, kind, batch=BATCH).prove(
-        stacked([x[3] for x in some]), np.array([x[1] for x in some])
-    )
+    certifier = PlaceCertifier(problem, kind, batch=BATCH, count_instants=lambda count: None)
+    proof = certifier.prove(stacked([x[3] for x in some]), np.array([x[1] for x in some]))
     contradicted = 0
     for i, (segment, p, beta, _) in enumerate(some):
         m = oracle.motion(robot, segment, p, beta, np.linspace(0.0, 1.0, instants))
@@ -96,7 +95,7 @@ def verdict_breaks(count, seed, kind, robot, instants):
         hit = bool(oracle.platform_hit(robot, m.position, m.rotation).any())
         contradicted += bool(proof.is_proved[i]) and (crossed or hit or not (m.position[:, 2] > 0.0).all())
         contradicted += (bool(proof.met[i]) and not crossed) + (bool(proof.hit[i]) and not hit)
-    undecided = ~(proof.is_proved | proof.met | proof.hit | proof.is_broken)
+    undecided = ~(proof.is_proved | proof.is_refuted)
     return contradicted, int(undecided.sum()), int((proof.met | proof.hit).sum()), int(proof.is_proved.sum())
 
 
@@ -116,21 +115,35 @@ def test_proofs_agree_with_many_samples(kind, name):
     assert contradicted == 0 and undecided < 5
 
 
-def step_of(first, last, moved):
-    """A step of two cables whose rays go straight from the first ones to the last ones."""
-    rays = np.stack([first, 0.5 * (first + last), last])[:, None]
-    return meetings.Step(rays, rays, np.full((1, 2), moved), np.full((1, 2), moved))
+def cables_from(first, last, bent, steps=2):
+    """Two cables of one block whose rays go straight from the first ones to the last ones, in equal steps."""
+    rays = np.linspace(first, last, steps + 1)[:, None]
+    return Cables(rays, rays, np.full((1, 2), bent), np.full(1, bent))
 
 
 def test_cables_that_meet():
-    """Two cables pass through each other; beyond their ends they do not, nor where they may move by more."""
+    """Two cables pass through each other; beyond their ends they do not, nor where they may bend by more."""
     base, pairs = np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.0]]), np.array([[0, 1]])
     first = np.array([[2.0, 0.0, 0.1], [0.0, 2.0, 0.0]])
     last = np.array([[2.0, 0.0, -0.1], [0.0, 2.0, 0.0]])
-    assert meetings.cables_meet(base, pairs, step_of(first, last, 0.1)).all()
-    assert not meetings.cables_meet(base, pairs, step_of(first, last, 1.5)).any()
-    assert not meetings.cables_meet(base, pairs, step_of(first * 0.4, last * 0.4, 0.1)).any()
-    assert not meetings.cables_meet(base, pairs, step_of(first, first, 0.1)).any()
+    for meets, cables in (
+        (True, cables_from(first, last, 0.1, steps=3)),
+        (False, cables_from(first, last, 1.5, steps=3)),
+        (False, cables_from(first * 0.4, last * 0.4, 0.1, steps=3)),
+        (False, cables_from(first, first, 0.1)),
+        # Exactly in one plane at an instant: no sign changes beyond rounding, in this step or in that.
+        (False, cables_from(first, last, 0.0, steps=2)),
+    ):
+        assert meetings.cables_meet(base, pairs, cables).tolist() == [meets]
+
+
+def test_cables_in_wide_steps():
+    """A cable that sweeps past the end of another within a step is not said to meet it."""
+    base, pairs = np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.0]]), np.array([[0, 1]])
+    low, high = np.array([[2.0, 0.0, -0.1], [0.0, 2.0, 0.0]]), np.array([[2.0, 0.0, 0.1], [0.0, 2.0, 0.0]])
+    for shift, meets in ((0.0, True), (1.5, False), (-1.5, False)):
+        moved = high + np.array([[0.0, 0.0, 0.0], [shift, 0.0, 0.0]])
+        assert meetings.cables_meet(base, pairs, cables_from(low, moved, 0.0, steps=1)).tolist() == [meets]
 
 
 def test_cables_on_the_platform():
@@ -138,7 +151,20 @@ def test_cables_on_the_platform():
     sides = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]] * 2)
     normal = np.array([0.0, 0.0, 1.0])
     high, low = np.array([[1.0, 0.5, 0.1]] * 2), np.array([[1.0, 0.5, -0.1]] * 2)
-    assert meetings.cables_hit(sides, normal, step_of(high, low, 0.2)).all()
-    assert not meetings.cables_hit(sides, normal, step_of(high, low, 0.6)).any()
     beside = high * [-1.0, 1.0, 1.0], low * [-1.0, 1.0, 1.0]
-    assert not meetings.cables_hit(sides, normal, step_of(*beside, 0.2)).any()
+    for hits, cables in (
+        (True, cables_from(high, low, 0.2, steps=3)),
+        (False, cables_from(high, low, 0.6, steps=3)),
+        (False, cables_from(*beside, 0.2, steps=3)),
+    ):
+        assert meetings.cables_hit(sides, normal, cables).tolist() == [hits]
+
+
+def test_what_touches_in_a_wide_step_stays_in_the_sector():
+    """Straight from inside to inside: a chord of the sector; from inside to outside: nothing is known."""
+    sides = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
+    normal = np.array([0.0, 0.0, 1.0])
+    high, near, far = (np.array([[1.0, y, z]]) for y, z in ((0.9, 0.1), (0.7, -0.1), (-0.5, -0.1)))
+    for last, hits in ((near, True), (far, False)):
+        cables = cables_from(high, last, 0.0, steps=1)
+        assert meetings.cables_hit(sides, normal, cables).tolist() == [hits]

@@ -39,8 +39,7 @@ from cspr_jax.robots.platform import rays as rays_of
 from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.store.result import open_result
-from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_lanes import instant, instant_of_arc, state
+from cspr_jax.trajectories.platform_lanes import instant, state
 from cspr_jax.trajectories.platform_segment import USUAL, Kind, motion
 
 REST = "{ rest = true }"
@@ -217,29 +216,6 @@ def test_lanes_are_the_readable_slacks_all(robot):
         own = directions / np.linalg.norm(directions, axis=2, keepdims=True)
         np.testing.assert_allclose(own, wanted_directions, atol=1e-9)
     assert seen > 40
-
-
-def test_hits_of_lanes():
-    """As `interference.platform_hit`, cable by cable, on random pairs of directions."""
-    near, rng = interference.contacts(ours(MSSM)), np.random.default_rng(4)
-    before, after = rng.normal(size=(2, 500, 6, 3))
-    wanted = interference.platform_hit(near.sides, near.normal, before, after).any(1)
-    vectors = [[tuple(x[:, k].T) for k in range(6)] for x in (before, after)]
-    found = jax.jit(contact_lanes.platform_hit)(near.sides, near.normal, *vectors)
-    assert (np.asarray(found) == wanted).all()
-    assert 50 < wanted.sum() < 450
-
-
-def test_instants_of_arcs():
-    """A place within an arc is an instant of the whole."""
-    amplitude, rng = named("effective-c3", 0.2), np.random.default_rng(5)
-    of_arc, of_all = jax.jit(instant_of_arc), jax.jit(instant)
-    for p in (1, 4, 7):
-        arc, within = rng.integers(0, p, 20).astype(float), np.asarray(rng.random())
-        sense = 1.0 if p % 2 else -1.0
-        found = of_arc(amplitude, np.full(20, sense), np.full(20, float(p)), arc, within)
-        wanted = of_all(amplitude, np.full(20, sense), np.full(20, float(p)), (arc + within) / p)
-        np.testing.assert_allclose(np.stack(found), np.stack(wanted), atol=1e-12)
 
 
 def test_time_functions_of_the_rotation():

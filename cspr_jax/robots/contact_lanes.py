@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.lanes import Matrix, Vector, combined, cross, dot, turned_back
+from cspr_jax.arithmetic.lanes import Matrix, Vector, dot, turned_back
 from cspr_jax.robots.interference import PARALLEL
 from cspr_jax.robots.wrench_lanes import Cables
 
@@ -62,44 +62,3 @@ def as_arrays(between: Sequence[Vector], directions: Sequence[Vector]) -> tuple[
     """
     arrays = [jnp.stack([jnp.stack(v, -1) for v in vectors], 1) for vectors in (between, directions) if vectors]
     return arrays[0] if between else jnp.zeros((len(arrays[-1]), 0, 3)), arrays[-1]
-
-
-def turns_much(before: Sequence[Vector], after: Sequence[Vector], least_cosine: float) -> Array:
-    """Whether any of some vectors turns by more than an angle between two instants.
-
-    Args:
-        before: vectors.
-        after: as many.
-        least_cosine: cosine of the angle.
-
-    Returns:
-        (n,).
-    """
-    turns = jnp.asarray(False)
-    for a, b in zip(before, after, strict=True):
-        inner = dot(a, b)
-        turns = turns | (inner < 0.0) | (inner * inner < least_cosine**2 * dot(a, a) * dot(b, b))
-    return turns
-
-
-def platform_hit(sides: Array, normal: Array, before: Sequence[Vector], after: Sequence[Vector]) -> Array:
-    """Whether any cable passed over the platform between two instants; see `interference.platform_hit`.
-
-    Args:
-        sides: (n_cables, 2, 3) of `interference.contacts`.
-        normal: (3,) of it.
-        before: of `cable_directions`.
-        after: of `cable_directions`.
-
-    Returns:
-        (n,).
-    """
-    hit, up = jnp.asarray(False), [normal[i] for i in range(3)]
-    for k, (a, b) in enumerate(zip(before, after, strict=True)):
-        one, two = ([sides[k, j, i] for i in range(3)] for j in range(2))
-        high, low = dot(a, up), dot(b, up)
-        weight = combined([(jnp.abs(low), a), (jnp.abs(high), b)])
-        across = dot(cross(one, two), up)
-        inside = (dot(cross(weight, two), up) * across >= 0.0) & (dot(cross(one, weight), up) * across >= 0.0)
-        hit = hit | ((high * low <= 0.0) & inside)
-    return hit

@@ -18,8 +18,9 @@ from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cros
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
-# Terms of a Chebyshev fit on s in [0, 1] of W = arccos(s) / sqrt(1 - s^2): accurate to 1e-14, its derivatives to 1e-10.
-_TERMS = 24
+# Degree of Chebyshev fits on s in [0, 1] of W = arccos(s) / sqrt(1 - s^2) and of its derivatives, one each: accurate to
+# 2e-15. A derivative of the fit of W would be wrong by 3e-10.
+_DEGREE = 22
 
 
 class Instant(NamedTuple):
@@ -79,26 +80,6 @@ def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> Inst
     """
     a, a1, a2, a3 = derivatives(amplitude, tau, order=3)
     return Instant(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
-
-
-def instant_of_arc(amplitude: Amplitude, sense: Array, arcs: Array, arc: Array, within: Array) -> Instant:
-    """Instant common to segments at the same place within one of their arcs, of which they may have any number.
-
-    Args:
-        amplitude: A.
-        sense: (n,) +1 (odd) or -1 (even).
-        arcs: (n,) number of arcs, a float.
-        arc: (n,) which of them, from 0 on, a float.
-        within: () from 0 at its beginning to 1 at its end.
-
-    Returns:
-        the instant, (n,) each.
-    """
-    tau = (arc + within) / arcs
-    a, a1, a2, a3 = derivatives(amplitude, tau, order=3)
-    sine, cosine = sincospi(within)
-    sign = 1.0 - 2.0 * (arc - 2.0 * jnp.floor(0.5 * arc))
-    return Instant(tau, a, a1, a2, a3, sense * sign * sine, sign * cosine)
 
 
 def squared_duration(segment: PoseSegment, arcs: Array) -> Array:
@@ -209,12 +190,16 @@ def _about_one_axis(
     return about_axis(axis, sine, cosine), tuple(rate * e for e in axis), tuple(bend * e for e in axis)
 
 
-def _angle_ratio_coefficients() -> list[float]:
-    # In powers of x = 1 - s, by a fit to the series, which is exact.
+def _angle_ratio_coefficients() -> list[list[float]]:
+    # Of W and its derivatives in x = 1 - s, in powers of x, by fits to the series, which are exact.
     terms = np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(120))])
     nodes = np.polynomial.chebyshev.chebpts1(64) * 0.5 + 0.5
-    fit = np.polynomial.Chebyshev.fit(nodes, np.polynomial.polynomial.polyval(nodes, terms), _TERMS, domain=[0, 1])
-    return [float(c) for c in fit.convert(kind=np.polynomial.Polynomial).coef]
+    every = []
+    for order in range(3):
+        values = np.polynomial.Polynomial(terms).deriv(order)(nodes)
+        fit = np.polynomial.Chebyshev.fit(nodes, values, _DEGREE, domain=[0, 1])
+        every.append([float(c) for c in fit.convert(kind=np.polynomial.Polynomial).coef])
+    return every
 
 
 _RATIO = _angle_ratio_coefficients()
@@ -230,7 +215,7 @@ def _half_vector(segment: PoseSegment, now: Instant, beats: tuple[Array, ...]) -
     q1 = [x * rate for x in along]
     q2 = [x * bend - y * rate * rate for x, y in zip(along, q, strict=True)]
     x = 1.0 - q[0]
-    w, w1, w2 = (polynomial([math.perm(k, j) * _RATIO[k] for k in range(j, _TERMS + 1)], x) for j in range(3))
+    w, w1, w2 = (polynomial(each, x) for each in _RATIO)
     w1 = -w1
     u = combined([(w, q[1:])])
     u1 = combined([(w, q1[1:]), (w1 * q1[0], q[1:])])

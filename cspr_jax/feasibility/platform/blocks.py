@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-# So many times a block is halved at most, and so many of an arc may be open.
-HALVINGS, OPEN = 20, 64
 # Of a part more that a piece between knots gets as little as this is not worth a block.
 SLIVER = 0.3
 
@@ -28,6 +26,17 @@ class Blocks(NamedTuple):
     def some(self, which: np.ndarray) -> "Blocks":
         """Blocks chosen by indices, or by a mask (k,)."""
         return Blocks(*(x[which] for x in self))
+
+    def instants(self, places: np.ndarray) -> np.ndarray:
+        """Instants at the same places of each block.
+
+        Args:
+            places: (m,) from -1 at its start to 1 at its stop.
+
+        Returns:
+            (m, k) tau.
+        """
+        return 0.5 * (self.start + self.stop) + places[:, None] * (0.5 * (self.stop - self.start))
 
     def halves(self) -> "Blocks":
         """Both halves of each block, (2 k,)."""

@@ -13,22 +13,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.arithmetic import chebyshev
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.platform.certificate import TOLERANCE, Certifier, TensionProof
+from cspr_jax.feasibility.platform.certificate import Certifier, TensionProof
 from cspr_jax.feasibility.platform.end_acceleration import endpoint
 from cspr_jax.feasibility.platform.kernels import slacks_at
 from cspr_jax.feasibility.platform.margins import Samples, narrowed
 from cspr_jax.feasibility.platform.motion_checker import FEW, MANY, MotionChecker, PoseChecks
 from cspr_jax.feasibility.platform.motions import Motions
-from cspr_jax.feasibility.platform.place_blocks import STEPS
 from cspr_jax.feasibility.platform.place_certificate import PlaceCertifier, PlaceProof
 from cspr_jax.feasibility.platform.prefilter import FIRST, Prefilter
 from cspr_jax.feasibility.platform.slack_lanes import order
 from cspr_jax.feasibility.platform.slacks import flags
 from cspr_jax.feasibility.platform.tension_blocks import of_motion
+from cspr_jax.feasibility.platform.work_list import TOLERANCE, allowance
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.robots.interference import contacts
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
@@ -55,37 +53,29 @@ class PoseChecker(MotionChecker):
 
     Fields:
         prefilter: the first look, which comes before checks.
-        done: how many instants of motions were looked at so far in the first look; how many motions were checked, and
-            how many blocks of them.
+        done: how many instants of motions were looked at so far, in the first look and in checks, and how many motions
+            were checked.
     """
 
     def __init__(self, problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> None:
         """Find what can meet."""
         super().__init__(problem, kind, batch=batch)
-        self._lock, self._counts = threading.Lock(), {"prefilter": 0, "motions": 0}
+        self._lock, self.done = threading.Lock(), {"prefilter": 0, "motions": 0, "checks": 0}
         self.flags = flags(problem.limits)
         knots = np.asarray(problem.amplitude.knots)
-        count = partial(self._count, "prefilter")
+        count, count_checks = partial(self._count, "prefilter"), partial(self._count, "checks")
         self.prefilter = Prefilter(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
-        self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS))
-        self._places = PlaceCertifier(problem, kind, batch=min(batch, BLOCKS))
-        self._pairs = tuple((int(i), int(j)) for i, j in contacts(problem.robot).pairs)
+        self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+        self._places = PlaceCertifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
-        # Limits may be touched; cables may not be slack, and the rest may not be reached.
-        is_limit = np.arange(len(self.flags)) >= len(flags(Limits()))
-        self._allowed = 2.0 * TOLERANCE * is_limit
+        self._allowed = allowance(np.arange(len(self.flags)) >= len(flags(Limits())))
         # Where each criterion is among those that depend on the motion, and then those that depend on the pose alone.
         self._order = np.array(order(problem.limits))
         self._n_moving = 1 + len(of_motion(problem))
 
-    @property
-    def done(self) -> dict[str, int]:
-        """Work so far."""
-        return self._counts | {"checks": self._tensions.done + self._places.done}
-
     def _count(self, what: str, many: int) -> None:
         with self._lock:
-            self._counts[what] += many
+            self.done[what] += many
 
     def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
         """Values of (3.91) and (3.92); see `MotionChecker.end_interval`."""
@@ -106,19 +96,21 @@ class PoseChecker(MotionChecker):
         checks = self.nothing(len(motions.arcs))
         tensions = self._tensions.prove(*motions, near=NEAR if margins else 0.0, margins=margins)
         checks.verdict[:] = np.where(tensions.is_refuted, Verdict.SLACK_CABLE.value, Verdict.UNDECIDED.value)
-        checks.instant[:] = np.where(tensions.is_refuted, tensions.instant, np.nan)
+        checks.instant[:] = tensions.instant
         some = np.flatnonzero(np.logical_or(whole, ~tensions.is_refuted))
         if not len(some):
             return checks
         part = motions.rows(some)
         places = self._places.prove(*part, margins=margins)
-        is_finite = np.isfinite(tensions.attained[some]).all(1) | (tensions.attained[some] == -np.inf).any(1)
-        is_finite &= ~np.isnan(places.attained).any(1) & (self.durations(*part) > 0.0)
+        is_finite = ~np.isnan(tensions.attained[some]).any(1) & ~np.isnan(places.attained).any(1)
+        is_finite &= self.durations(*part) > 0.0
         is_proved = tensions.is_proved[some] & places.is_proved & is_finite
         checks.bound[some] = np.where(is_proved, np.minimum(tensions.bound[some, 0], places.bound[:, 0]), np.nan)
         least = self._attained(tensions.attained[some], places.attained)
         if margins:
-            self._narrow(least, part, (tensions, some), places, np.logical_or(whole, is_proved))
+            moving, still = self._narrowed_criteria()
+            samples = _samples(moving, tensions, some), _samples(still, places, np.arange(len(some)))
+            self._narrow(least, part, samples, np.logical_or(whole, is_proved))
         verdict = self._verdict(least[:-1], is_proved, places)
         checks.verdict[some] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
         checks.slack[some] = np.where(is_finite, least[:-1], np.nan).T
@@ -138,41 +130,37 @@ class PoseChecker(MotionChecker):
         every = np.concatenate([moving[:, :1], moving[:, 2:], moving[:, 1:2], still[:, :-1]], axis=1)
         return np.concatenate([every[:, self._order], still[:, -1:]], axis=1).T
 
-    def _narrow(self, least: np.ndarray, motions: Motions, tensions: tuple, places: PlaceProof, wanted) -> None:
-        # Puts margins of wanted motions into what was attained, (n_criteria + 1, n); `tensions` is of all motions, with
-        # which of them these are.
+    def _narrowed_criteria(self) -> tuple[np.ndarray, np.ndarray]:
+        # Where the values of both proofs are among the criteria, the distance between cables last. The determinant
+        # stands second among what depends on the motion, and first after it among all.
+        own = np.argsort(self._order)
+        moving = own[[0, self._n_moving, *range(1, self._n_moving)]]
+        return moving, np.append(own[self._n_moving + 1 :], len(self.flags))
+
+    def _narrow(self, least: np.ndarray, motions: Motions, samples: tuple[Samples, ...], wanted: np.ndarray) -> None:
+        # Puts margins of wanted motions into what was attained, (n_criteria + 1, n).
         def values_at(row: np.ndarray, tau: np.ndarray) -> np.ndarray:
-            kernel = partial(slacks_at, self.problem, pairs=self._pairs, kind=self.kind)
+            kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
             return np.stack(in_batches(kernel, (*motions.items(row), tau), size=self.batch))
 
         every = np.flatnonzero(wanted)
         if not len(every):
             return
-        own = np.argsort(self._order)
         # Limits on speeds and accelerations are proved as other functions of the same sign, and beyond a singularity
         # nothing is: only true slacks count.
-        least[own[1 : self._n_moving]] = np.inf
+        least[np.argsort(self._order)[1 : self._n_moving]] = np.inf
         least[np.isneginf(least)] = np.inf
         # The ends of motions, and what may jump at a knot.
         for tau in (0.0, 1.0, *self._knots):
             least[:, every] = np.fmin(least[:, every], values_at(every, np.full(len(every), tau)))
-        # The determinant stands second among what depends on the motion, and first after it among all.
-        moving = own[[0, self._n_moving, *range(1, self._n_moving)]]
-        still = np.append(own[self._n_moving + 1 :], len(self.flags))
-        for one in (_tension_samples(moving, *tensions), _place_samples(still, places)):
+        for one in samples:
             narrowed(values_at, least, one, wanted)
 
 
-def _tension_samples(which: np.ndarray, proof: TensionProof, some: np.ndarray) -> Samples:
-    # At the nodes of blocks of some of the motions, numbered among these.
+def _samples(which: np.ndarray, proof: TensionProof | PlaceProof, some: np.ndarray) -> Samples:
+    # At the instants of blocks of some of the motions, numbered among these.
     own = np.full(len(proof.is_proved), -1)
     own[some] = np.arange(len(some))
-    row = own[proof.blocks.row]
-    blocks = proof.blocks.some(row >= 0)
-    middle, half = 0.5 * (blocks.start + blocks.stop), 0.5 * (blocks.stop - blocks.start)
-    return Samples(which, row[row >= 0], middle + half * chebyshev.nodes()[:, None], proof.nodes[:, :, row >= 0])
-
-
-def _place_samples(which: np.ndarray, proof: PlaceProof) -> Samples:
-    blocks, step = proof.blocks, np.linspace(0.0, 1.0, STEPS + 1)[:, None]
-    return Samples(which, blocks.row, blocks.start + (blocks.stop - blocks.start) * step, proof.nodes)
+    row = own[proof.row]
+    is_here = row >= 0
+    return Samples(which, row[is_here], proof.first.tau[:, is_here], proof.first.nodes[:, :, is_here])

@@ -1,9 +1,11 @@
-"""Proofs that cables meet each other, or lie on the platform, at some instant between two others.
+"""Proofs that cables meet each other, or lie on the platform, in a step between two instants.
 
-Two cables from a and b along u and v lie in one plane where F = (b - a) . (u x v) vanishes. If F changes its sign
-between two instants, and the lines' nearest points stay inside both cables all the while, the cables meet in between.
-A cable is on the platform where its height over the platform's plane vanishes while it points into its corner's sector.
-What stays so is bounded from the middle of the step, by how far points can move.
+Two cables from a and b along u and v lie in one plane where F = (b - a) . (u x v) vanishes. If F changes its sign in a
+step, and the lines' nearest points stay inside both cables all the while, the cables meet in between. A cable is on the
+platform where its height over the platform's plane vanishes while it points into its corner's sector.
+
+A vector r with |r''| <= C stays within |r1 - r0| / 2 + C h^2 / 8 of the mean of its values at both ends of a step of
+length h: from that follows what stays so. Steps in which no sign changes are not looked at.
 """
 
 from typing import NamedTuple
@@ -14,77 +16,105 @@ import numpy as np
 ROUNDING = 1e-13
 
 
-class Step(NamedTuple):
-    """Cables at the beginning, in the middle and at the end of n steps, the first axis.
+class Cables(NamedTuple):
+    """Cables at instants of n blocks, equal steps apart.
 
     Fields:
-        rays: (3, n, n_cables, 3) from spool to platform, m.
-        seen: (3, n, n_cables, 3) from platform to spool in platform axes, m.
-        moved: (n, n_cables) bound of how far the ends of the cables move from the middle on, m.
-        turned: (n, n_cables) likewise of the cables as the platform sees them, m.
+        rays: (m, n, n_cables, 3) from spool to platform, m.
+        seen: (m, n, n_cables, 3) from platform to spool in platform axes, m.
+        bent: (n, n_cables) C h^2 / 8 of the rays, m.
+        seen_bent: (n,) of the cables as the platform sees them, m.
     """
 
     rays: np.ndarray
     seen: np.ndarray
-    moved: np.ndarray
-    turned: np.ndarray
+    bent: np.ndarray
+    seen_bent: np.ndarray
 
 
-def cables_meet(base: np.ndarray, pairs: np.ndarray, step: Step) -> np.ndarray:
-    """Steps in which two cables meet for certain.
+class _Around(NamedTuple):
+    # Vectors (k, 3), and how far from them others may be, (k,).
+    mean: np.ndarray
+    off: np.ndarray
+
+    def cross(self, other: "_Around") -> "_Around":
+        return _Around(np.cross(self.mean, other.mean), self._product_off(other))
+
+    def dot(self, other: "_Around") -> tuple[np.ndarray, np.ndarray]:
+        # The least and the largest product.
+        product, off = (self.mean * other.mean).sum(-1), self._product_off(other)
+        return product - off, product + off
+
+    def _product_off(self, other: "_Around") -> np.ndarray:
+        return _size(self.mean) * other.off + _size(other.mean) * self.off + self.off * other.off
+
+
+def cables_meet(base: np.ndarray, pairs: np.ndarray, found: Cables) -> np.ndarray:
+    """Blocks in which two cables meet for certain.
 
     Args:
         base: (n_cables, 3) spools, m.
         pairs: (n_pairs, 2) of cables that can meet.
-        step: n steps.
+        found: of n blocks.
 
     Returns:
         (n,).
     """
-    if not len(pairs):
-        return np.zeros(step.rays.shape[1], bool)
+    meets = np.zeros(found.rays.shape[1], bool)
     i, j = pairs.T
-    apart = (base[j] - base[i])[None]
-    u, v = step.rays[:, :, i], step.rays[:, :, j]
-    volume = (apart[None] * np.cross(u, v)).sum(-1)
-    sizes = np.linalg.norm(apart, axis=-1) * np.linalg.norm(u, axis=-1).max(0) * np.linalg.norm(v, axis=-1).max(0)
-    changes = (volume[0] * volume[2] < 0.0) & (np.abs(volume[[0, 2]]) > ROUNDING * sizes).all(0)
-    # At the middle, and by how much these vectors may differ in the step.
-    u, v, off_u, off_v = u[1], v[1], step.moved[:, i], step.moved[:, j]
-    across, size = np.cross(u, v), np.linalg.norm
-    off = size(u, axis=-1) * off_v + size(v, axis=-1) * off_u + off_u * off_v
-    square = size(across, axis=-1) ** 2
-    spread = 2.0 * size(across, axis=-1) * off + off**2
-    inside = changes & (spread < square)
-    for other, moved in ((v, off_v), (u, off_u)):
-        weight = np.cross(np.broadcast_to(apart, other.shape), other)
-        off_weight = size(apart, axis=-1) * moved
-        top = (weight * across).sum(-1)
-        slack = size(weight, axis=-1) * off + off_weight * size(across, axis=-1) + off_weight * off
-        # The share of the cable at which the lines are nearest, between 0 and 1.
-        inside &= (top - slack > 0.0) & (top + slack < square - spread)
-    return inside.any(1)
+    apart = base[j] - base[i]
+    u, v = found.rays[:, :, i], found.rays[:, :, j]
+    volume = (np.cross(apart, u) * v).sum(-1)
+    step, block, pair = _sign_changes(volume, _size(apart) * (_size(u) * _size(v)).max(0))
+    first = _within(found.rays, (step, block, i[pair]), found.bent)
+    second = _within(found.rays, (step, block, j[pair]), found.bent)
+    between = _Around(apart[pair], np.zeros(len(pair)))
+    normal = first.cross(second)
+    least = normal.dot(normal)[0]
+    inside = least > 0.0
+    for other in (second, first):
+        # The share of a cable at which the lines are nearest, times the square of the normal.
+        low, high = between.cross(other).dot(normal)
+        inside &= (low > 0.0) & (high < least)
+    meets[block[inside]] = True
+    return meets
 
 
-def cables_hit(sides: np.ndarray, normal: np.ndarray, step: Step) -> np.ndarray:
-    """Steps in which a cable lies on the platform for certain.
+def cables_hit(sides: np.ndarray, normal: np.ndarray, found: Cables) -> np.ndarray:
+    """Blocks in which a cable lies on the platform for certain.
 
     Args:
         sides: (n_cables, 2, 3) of `interference.contacts`.
         normal: (3,) of it.
-        step: n steps.
+        found: of n blocks.
 
     Returns:
         (n,).
     """
-    height = step.seen @ normal
-    sizes = np.linalg.norm(step.seen, axis=-1).max(0)
-    hits = (height[0] * height[2] < 0.0) & (np.abs(height[[0, 2]]) > ROUNDING * sizes).all(0)
-    one, two = sides[:, 0], sides[:, 1]
-    across = np.cross(one, two) @ normal
-    for first, second in ((step.seen[1], two), (one, step.seen[1])):
-        side = np.linalg.norm(two if second is two else one, axis=-1)
-        # A coordinate along one side times the area that the sides span: it changes by no more than the other's length.
-        share = (np.cross(first, second) @ normal) * np.sign(across)
-        hits &= share > side * step.turned
-    return hits.any(1)
+    hits = np.zeros(found.seen.shape[1], bool)
+    step, block, cable = _sign_changes(found.seen @ normal, _size(found.seen).max(0))
+    seen = _within(found.seen, (step, block, cable), np.broadcast_to(found.seen_bent[:, None], found.seen.shape[1:3]))
+    one, two = sides[cable, 0], sides[cable, 1]
+    turn = np.sign(np.cross(one, two) @ normal)
+    # A coordinate along one side, times the area that the sides span, changes by no more than the other's length.
+    inside = turn * (np.cross(seen.mean, two) @ normal) > _size(two) * seen.off
+    inside &= turn * (np.cross(one, seen.mean) @ normal) > _size(one) * seen.off
+    hits[block[inside]] = True
+    return hits
+
+
+def _sign_changes(values: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, ...]:
+    # Steps, blocks and pairs, or cables, in which values (m, n, ...) change their sign, beyond rounding.
+    is_high, is_low = values > ROUNDING * sizes, values < -ROUNDING * sizes
+    return np.nonzero((is_high[:-1] & is_low[1:]) | (is_low[:-1] & is_high[1:]))
+
+
+def _within(vectors: np.ndarray, which: tuple[np.ndarray, ...], bent: np.ndarray) -> _Around:
+    # Of vectors at instants, during the steps after them.
+    step, block, cable = which
+    before, after = vectors[step, block, cable], vectors[step + 1, block, cable]
+    return _Around(0.5 * (before + after), 0.5 * _size(after - before) + bent[block, cable])
+
+
+def _size(vectors: np.ndarray) -> np.ndarray:
+    return np.sqrt((vectors * vectors).sum(-1))

@@ -43,13 +43,14 @@ class PlaceBounds(NamedTuple):
         slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
         nodes: (n_instants, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between
             cables, m.
-        speeds: (2, n) bounds of |p'| and of the norm of the derivative of the rotation matrix.
+        bends: (3, n) what may be missed between two instants, C h^2 / 8: of the mass centre, m; of a point of the
+            platform beside it, over its distance; of vectors as the platform sees them, m.
     """
 
     clear: Array
     slacks: Array
     nodes: Array
-    speeds: Array
+    bends: Array
 
 
 class _Bends(NamedTuple):
@@ -131,7 +132,7 @@ def place_blocks(
         jnp.min(jnp.real(first), axis=0) - ROUNDING * size,
         jnp.stack([jnp.min(x, axis=0) - step - ROUNDING for x, step in zip(nodes[:-1], steps, strict=True)]),
         jnp.stack(nodes, axis=1),
-        jnp.stack([bounds.speed, bounds.turn]),
+        jnp.stack(bends),
     )
 
 

@@ -5,6 +5,7 @@ proved to meet between two instants (`meetings`); else, after many halvings, it 
 """
 
 import dataclasses
+from collections.abc import Callable
 from functools import partial
 
 import jax
@@ -12,11 +13,11 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.platform import meetings
-from cspr_jax.feasibility.platform.blocks import HALVINGS, OPEN, Blocks, parts_of_arcs
-from cspr_jax.feasibility.platform.certificate import TOLERANCE
+from cspr_jax.feasibility.platform.blocks import Blocks, parts_of_arcs
+from cspr_jax.feasibility.platform.meetings import Cables, cables_hit, cables_meet
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.feasibility.platform.place_blocks import STEPS, PlaceBounds, of_pose, place_blocks
+from cspr_jax.feasibility.platform.work_list import Looked, WorkList
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import contact_lanes
 from cspr_jax.robots.interference import contacts
@@ -27,8 +28,8 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 # Parts of an arc that are looked at first; nearer than this part of the platform's size is undecided.
 PARTS, TOUCH = 4, 1e-9
-# Blocks halved so often are held to be near a contact.
-NEAR_CONTACT = 3
+# From so many halvings on meetings are looked for. Instants of a block, from -1 to 1.
+NEAR_CONTACT, PLACES = 1, np.linspace(-1.0, 1.0, STEPS + 1)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,23 +38,23 @@ class PlaceProof:
 
     Fields:
         is_proved: (n,) nothing meets, and every criterion is met, at every instant.
+        is_refuted: (n,) something meets, or a criterion is broken at an instant.
         met: (n,) two cables meet.
         hit: (n,) a cable lies on the platform.
-        is_broken: (n,) a criterion is broken at an instant.
         attained: (n, n_criteria + 1) smallest slacks at the instants that were looked at, and distance between cables.
-        bound: (n, n_criteria) proved lower bounds; as attained of motions that are not proved.
-        blocks: those that were looked at first.
-        nodes: (m, n_criteria + 1, k) of theirs.
+        bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
+        row: (k,) whose blocks were looked at first.
+        first: what was found of these.
     """
 
     is_proved: np.ndarray
+    is_refuted: np.ndarray
     met: np.ndarray
     hit: np.ndarray
-    is_broken: np.ndarray
     attained: np.ndarray
     bound: np.ndarray
-    blocks: Blocks
-    nodes: np.ndarray
+    row: np.ndarray
+    first: Looked
 
 
 @partial(jax.jit, static_argnames="kind")
@@ -76,27 +77,26 @@ def wires_beside(problem: Problem, items, *, kind: Kind) -> tuple[Array, Array]:
 
 
 class PlaceCertifier:
-    """Certifier of what depends on the pose alone along motions of one robot.
+    """Certifier of contacts, depth and limits on the pose along motions of one robot on six cables.
 
     Args:
         problem: robot, limits, amplitude.
         kind: of the motions.
         batch: how many blocks are computed at a time.
+        count_instants: is told how many were looked at.
 
     Fields:
-        done: how many blocks were looked at so far.
+        pairs: of cables that can meet.
     """
 
-    def __init__(self, problem: Problem, kind: Kind, *, batch: int) -> None:
+    def __init__(self, problem: Problem, kind: Kind, *, batch: int, count_instants: Callable[[int], None]) -> None:
         """Find what can meet."""
-        self._problem, self._kind, self._batch = problem, kind, batch
-        near, robot = contacts(problem.robot), problem.robot
-        self._platform, self._pairs = (near.sides, near.normal), near.pairs
-        self._base, arms = np.asarray(robot.base_points), np.linalg.norm(np.asarray(robot.platform_points), axis=1)
-        self._arms, self._touch = arms, TOUCH * float(arms.max())
+        self._problem, self._kind, self._batch, self._count = problem, kind, batch, count_instants
+        near, points = contacts(problem.robot), np.asarray(problem.robot.platform_points)
+        self.pairs = tuple((int(i), int(j)) for i, j in near.pairs)
+        self._near, self._arms = near, np.linalg.norm(points, axis=1)
         self._knots = np.asarray(problem.amplitude.knots)
-        self._allowed = 2.0 * TOLERANCE * (np.arange(1 + len(of_pose(problem))) >= 1)
-        self.done = 0
+        self._limits = np.arange(1 + len(of_pose(problem))) >= 1
 
     def prove(self, segments: PoseSegment, arcs: np.ndarray, *, margins: bool = False) -> PlaceProof:
         """Prove motions clear, or that something meets or is broken.
@@ -109,69 +109,47 @@ class PlaceCertifier:
         Returns:
             the proofs.
         """
-        blocks = first = parts_of_arcs(arcs, self._knots, PARTS)
-        count, width = len(arcs), len(self._allowed)
-        met, hit, broken, stuck = (np.zeros(count, bool) for _ in range(4))
-        attained, bound, nodes = (
-            np.full((count, width + 1), np.inf),
-            np.full((count, width), np.inf),
-            np.zeros((0, 0, 0)),
-        )
-        for level in range(HALVINGS + 1):
-            if not len(blocks.row):
-                break
-            found = self._looked_at(blocks, segments, arcs, margins=margins)
-            nodes = nodes if level else np.asarray(found.nodes)
-            least, low = found.nodes.min(0).T, found.slacks.T
-            np.minimum.at(attained, blocks.row, least)
-            broken[blocks.row[(least[:, :-1] + self._allowed < -TOLERANCE).any(1)]] = True
-            is_met = (low > TOLERANCE - self._allowed).all(1)
-            is_clear = np.asarray(found.clear) > self._touch
-            if level >= NEAR_CONTACT and not is_clear.all():
-                self._note_meetings(
-                    blocks.some(~is_clear), np.asarray(found.speeds)[:, ~is_clear], (segments, arcs), (met, hit)
-                )
-            is_known = ((least[:, :-1] - low <= 0.5 * TOLERANCE) & ~(low > TOLERANCE - self._allowed)).any(1)
-            is_done = (is_met & is_clear) | is_known | np.isnan(least).any(1) | (level == HALVINGS)
-            stuck[blocks.row[is_done & ~(is_met & is_clear)]] = True
-            np.minimum.at(bound, blocks.row[is_done], low[is_done])
-            is_open = ~is_done & ~(met | hit | broken | stuck)[blocks.row]
-            stuck |= np.bincount(blocks.row[is_open], minlength=count) > OPEN * arcs
-            blocks = blocks.some(is_open & ~stuck[blocks.row]).halves()
-        is_proved = ~(met | hit | broken | stuck)
-        bound = np.where(is_proved[:, None], bound, np.minimum(bound, attained[:, :-1]))
-        return PlaceProof(is_proved, met, hit, broken, attained, bound, first, nodes)
+        blocks, work = parts_of_arcs(arcs, self._knots, PARTS), WorkList(arcs, self._limits)
+        met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
 
-    def _looked_at(self, blocks: Blocks, segments: PoseSegment, arcs: np.ndarray, *, margins: bool) -> PlaceBounds:
-        self.done += len(blocks.row)
-        pairs = tuple((int(i), int(j)) for i, j in self._pairs)
+        def look(some: Blocks, level: int) -> Looked:
+            found = self._bounds(some, segments, arcs, margins=margins)
+            is_clear = np.asarray(found.clear) > touch
+            doubtful = np.flatnonzero(~is_clear)
+            if level >= NEAR_CONTACT and len(doubtful):
+                cables = self._cables(some.some(doubtful), np.asarray(found.bends)[:, doubtful], (segments, arcs))
+                row = some.row[doubtful]
+                met[row[cables_meet(np.asarray(self._problem.robot.base_points), self._near.pairs, cables)]] = True
+                hit[row[cables_hit(self._near.sides, self._near.normal, cables)]] = True
+                work.is_refuted |= met | hit
+            nodes, bound = np.asarray(found.nodes), np.asarray(found.slacks)
+            return Looked(nodes, bound, some.instants(PLACES), lambda _: is_clear)
+
+        first = work.work_off(blocks, look)
+        is_proved = ~work.is_refuted & ~work.is_stuck
+        return PlaceProof(is_proved, work.is_refuted, met, hit, work.attained, work.bound, blocks.row, first)
+
+    def _bounds(self, blocks: Blocks, segments: PoseSegment, arcs: np.ndarray, *, margins: bool) -> PlaceBounds:
+        self._count(len(blocks.row) * len(PLACES))
         kernel = partial(
             place_blocks,
             self._problem,
-            self._platform,
+            (self._near.sides, self._near.normal),
             np.ones(()),
-            pairs=pairs,
+            pairs=self.pairs,
             kind=self._kind,
             margins=margins,
         )
         items = (rows(segments, blocks.row), arcs[blocks.row].astype(float), blocks.start, blocks.stop)
         return in_batches(kernel, items, size=self._batch, axis=-1)
 
-    def _note_meetings(self, blocks: Blocks, speeds: np.ndarray, motions, found: tuple[np.ndarray, np.ndarray]) -> None:
-        # Of all steps of blocks that are not clear.
+    def _cables(self, blocks: Blocks, bends: np.ndarray, motions) -> Cables:
+        # At the instants of blocks.
         segments, arcs = motions
-        step = np.tile(np.arange(STEPS), len(blocks.row))
-        own, (speed, turn) = np.repeat(np.arange(len(blocks.row)), STEPS), speeds
+        own = np.tile(np.arange(len(blocks.row)), len(PLACES))
         row, middle = blocks.row[own], 0.5 * (blocks.start + blocks.stop)[own]
-        width = ((blocks.stop - blocks.start) / STEPS)[own]
-        items = rows(segments, row), arcs[row].astype(float), middle
-        kernel = partial(wires_beside, self._problem, kind=self._kind)
-        places = [(step + k - 0.5 * STEPS) * width for k in (0.0, 0.5, 1.0)]
-        rays, seen = zip(*(in_batches(kernel, (*items, off), size=self._batch) for off in places), strict=True)
-        moved = 0.5 * width[:, None] * (speed[own, None] + self._arms * turn[own, None])
-        away = np.linalg.norm(rays[1], axis=2).max(1)[:, None] + self._arms.max() + moved.max(1, keepdims=True)
-        turned = 0.5 * width[:, None] * (speed[own, None] + turn[own, None] * away)
-        steps = meetings.Step(np.array(rays), np.array(seen), moved, np.broadcast_to(turned, moved.shape))
-        met, hit = found
-        met[row[meetings.cables_meet(self._base, self._pairs, steps)]] = True
-        hit[row[meetings.cables_hit(*self._platform, steps)]] = True
+        items = rows(segments, row), arcs[row].astype(float), middle, blocks.instants(PLACES).ravel() - middle
+        found = in_batches(partial(wires_beside, self._problem, kind=self._kind), items, size=self._batch)
+        rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in found)
+        centre, arm, platform = bends
+        return Cables(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)

@@ -1,0 +1,112 @@
+"""Work list of a proof: blocks of motions are closed, or halved until they are, or until their motion is refuted."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.feasibility.platform.blocks import Blocks
+
+TOLERANCE = 1e-6
+# So many times a block is halved at most, and so many of an arc may be open.
+HALVINGS, OPEN = 20, 64
+
+
+class Looked(NamedTuple):
+    """What was found of k blocks.
+
+    Fields:
+        nodes: (m, n_criteria or more, k) values at instants: slacks first.
+        bound: (n_criteria, k) proved lower bounds of the slacks.
+        tau: (m, k) the instants.
+        is_enough: of smallest values so far, (n, n_criteria or more): which blocks need not be halved if their slacks
+            are proved, (k,).
+    """
+
+    nodes: np.ndarray
+    bound: np.ndarray
+    tau: np.ndarray
+    is_enough: Callable[[np.ndarray], np.ndarray]
+
+
+class WorkList:
+    """Work list of n motions.
+
+    Args:
+        arcs: (n,) numbers of arcs.
+        limits: (n_criteria,) whether each slack is one of a limit, which may be touched.
+
+    Fields:
+        is_refuted: (n,) an instant breaks a criterion, or who looked has set it.
+        is_stuck: (n,) undecided.
+        attained: (n, n_criteria or more) smallest values at the instants that were looked at.
+        bound: (n, n_criteria) proved lower bounds of motions that are neither.
+        instant: (n,) tau of what broke a criterion by most; NaN where none is broken.
+    """
+
+    def __init__(self, arcs: np.ndarray, limits: np.ndarray) -> None:
+        """Nothing is known yet."""
+        self._arcs, self._allowed = arcs, allowance(limits)
+        self.is_refuted, self.is_stuck = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool)
+        self.bound, self.instant = np.full((len(arcs), len(limits)), np.inf), np.full(len(arcs), np.nan)
+        self.attained, self._worst = np.zeros((len(arcs), 0)), np.full(len(arcs), -TOLERANCE)
+
+    def work_off(self, blocks: Blocks, look: Callable[[Blocks, int], Looked]) -> Looked:
+        """Look at blocks, and at halves of what stays open.
+
+        Args:
+            blocks: of the motions.
+            look: of blocks that were halved so many times.
+
+        Returns:
+            what was found of the blocks that were given.
+        """
+        first = found = look(blocks, 0)
+        self.attained = np.full((len(self._arcs), found.nodes.shape[1]), np.inf)
+        for level in range(HALVINGS + 1):
+            is_open = self._told(blocks, found, last=level == HALVINGS)
+            self.is_stuck |= np.bincount(blocks.row[is_open], minlength=len(self._arcs)) > OPEN * self._arcs
+            is_open &= ~self.is_stuck[blocks.row]
+            if not is_open.any():
+                break
+            blocks = blocks.some(is_open).halves()
+            found = look(blocks, level + 1)
+        self.bound[self.is_refuted | self.is_stuck] = np.nan
+        return first
+
+    def _told(self, blocks: Blocks, found: Looked, *, last: bool) -> np.ndarray:
+        # Takes in what was found of blocks; which of them are to be halved.
+        least, low = found.nodes.min(0).T, found.bound.T
+        np.minimum.at(self.attained, blocks.row, least)
+        slack = least[:, : low.shape[1]]
+        # NaN refutes nothing, and proves nothing.
+        self._note_instants(blocks, found)
+        self.is_refuted[blocks.row[(slack + self._allowed < -TOLERANCE).any(1)]] = True
+        is_above = low > TOLERANCE - self._allowed
+        is_proved = is_above.all(1) & found.is_enough(self.attained)
+        with np.errstate(invalid="ignore"):  # of infinities: singular poses, blocks without a bound
+            is_known = ((slack - low <= 0.5 * TOLERANCE) & ~is_above).any(1)
+        is_done = is_proved | is_known | last | np.isnan(least).any(1)
+        self.is_stuck[blocks.row[is_done & ~is_proved]] = True
+        np.minimum.at(self.bound, blocks.row[is_done], low[is_done])
+        return ~is_done & ~(self.is_refuted | self.is_stuck)[blocks.row]
+
+    def _note_instants(self, blocks: Blocks, found: Looked) -> None:
+        worst = (found.nodes[:, : len(self._allowed)] + self._allowed[None, :, None]).min(1)
+        place = worst.argmin(0)
+        value, tau = worst[place, np.arange(len(place))], found.tau[place, np.arange(len(place))]
+        breaks = np.flatnonzero(value < self._worst[blocks.row])
+        breaks = breaks[np.argsort(-value[breaks], kind="stable")]  # the worst of a motion is written last
+        self._worst[blocks.row[breaks]], self.instant[blocks.row[breaks]] = value[breaks], tau[breaks]
+
+
+def allowance(limits: np.ndarray) -> np.ndarray:
+    """What slacks may be below zero: limits may be touched; cables may not be slack, and the rest may not be reached.
+
+    Args:
+        limits: (n_criteria,) whether each is the slack of a limit.
+
+    Returns:
+        (n_criteria,).
+    """
+    return 2.0 * TOLERANCE * limits
