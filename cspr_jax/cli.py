@@ -26,7 +26,7 @@ EPILOGUE = (
 
 # Of a process that is ours: Python's passes over the many objects of jax take a tenth of what a command takes.
 FEWER_COLLECTIONS = (200_000, 20, 50)
-VERIFIED = ("tiles", "shards", "missing", "cells", "cells_near_zero", "mixed", "rows", "segments", "feasible")
+VERIFIED = ("tiles", "shards", "missing", "cells", "cells_near_zero", "proved", "mixed", "rows", "segments", "feasible")
 
 
 class _Parser(argparse.ArgumentParser):

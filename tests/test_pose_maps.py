@@ -38,6 +38,7 @@ from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.platform import rays as rays_of
 from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import open_result
 from cspr_jax.trajectories.platform_lanes import instant, state
 from cspr_jax.trajectories.platform_segment import USUAL, Kind, motion
@@ -99,6 +100,8 @@ def test_cells_are_plans(tmp_path, start):
             assert result.data[name][cell] == pytest.approx(getattr(answers, name)[0], rel=1e-6, abs=1e-9), name
         assert result.data["beta_hat"][cell] == pytest.approx(answers.beta_hat[0, 1], rel=1e-9)
     assert (result.data["arcs"] > 0).any()
+    unsure = Verdict.UNDECIDED.value | Verdict.FEWER_ARCS_UNDECIDED.value
+    assert result.attributes["proved"] == 1.0 - ((result.data["verdict"] & unsure) != 0).mean()
 
 
 def test_mirrored_cells(tmp_path):

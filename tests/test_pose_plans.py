@@ -103,10 +103,11 @@ def check_verdicts(checker, count):
 
 
 @pytest.mark.soak
-def test_verdicts_do_not_change_with_more_samples(checker, monkeypatch):
+def test_verdicts_do_not_change_with_more_blocks(checker, monkeypatch):
     cases = random_cases(12, 40, lowest=-5.0, highest=0.0, arcs=(3, 9))
     before = checked(checker, cases)
-    monkeypatch.setattr("cspr_jax.feasibility.platform.motions.SAMPLES", 201)
+    for name, parts in (("certificate.FROM_REST", 7), ("certificate.BETWEEN", 19), ("place_certificate.PARTS", 9)):
+        monkeypatch.setattr(f"cspr_jax.feasibility.platform.{name}", parts)
     after = checked(checker, cases)
     np.testing.assert_array_equal(after.verdict, before.verdict)
     regular = after.slack[:, 1] > 0.0

@@ -43,13 +43,17 @@ def reach_breaks(count, seed, kind, robot):
         angle, inward = rng.uniform(0.0, 2.0 * np.pi, 48), np.sqrt(rng.uniform(0.0, 1.0, 48))
         inward[:24] = 1.0
         tau = middle[i] + inward * (axes[0][i] * np.cos(angle) + 1j * axes[1][i] * np.sin(angle))
-        place, q = jets(robot, segment, int(p), beta, tau)
+        # Where the oracle's series in (1 - q_0) / 2 has converged, by terms that are not so large that nothing but
+        # rounding is left of their sum.
+        tau = tau[np.abs(1.0 - oracle.envelope(segment, int(p), tau)[0, :, 0]) < 1.4]
+        place, q, turns = jets(robot, segment, int(p), beta, tau)
+        place, q = (x[:, (np.abs(q[0]).max(1) < 100.0) & (np.abs(turns) < 5.0)] for x in (place, q))
         turn = oracle.matrix(q[0])
         omega, spin = (2.0 * oracle.product(x, oracle.conjugate(q[0]))[:, 1:] for x in q[1:])
         size = partial(np.linalg.norm, axis=1)
         norms = [np.linalg.norm(x, 2, axis=(1, 2)) for x in (turn, np.cross(omega[:, None, :], turn, axisb=1).mT)]
         values = size(place[1]), size(place[2]), *norms, size(omega), size(spin)
-        worst = np.maximum(worst, [np.max(v) / bounds[i] for v, bounds in zip(values, found, strict=True)])
+        worst = np.maximum(worst, [np.max(v, initial=0.0) / b[i] for v, b in zip(values, found, strict=True)])
     return worst
 
 
@@ -221,7 +225,7 @@ def test_every_order_of_the_cables_gives_the_same_bounds():
 
 def precise(robot, segment, p, beta, tau):
     """Slacks of taut cables times D, and D, with a mantissa of 64 bits: (n, 6) and (n,)."""
-    (place, _, bend), q = jets(robot, segment, p, beta, tau.astype(np.longdouble))
+    (place, _, bend), q, _ = jets(robot, segment, p, beta, tau.astype(np.longdouble))
     squared = np.longdouble(oracle.plan(robot, segment, p)[2]) ** 2
     omega, spin = (2 * oracle.product(x, oracle.conjugate(q[0]))[:, 1:] for x in q[1:])
     turn = oracle.matrix(q[0])

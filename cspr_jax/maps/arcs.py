@@ -15,6 +15,8 @@ _OF_STARTS = ("from_x", "from_y", "from_z", "z0")
 class MinimumArcsMap(PointMassMap):
     """The smallest number of arcs to each target; see `GridMap`."""
 
+    proves = True
+
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a planar robot; build what all tiles share."""
         if spec.is_planar:

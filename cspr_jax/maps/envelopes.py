@@ -44,6 +44,8 @@ def _instants(amplitude: Amplitude, arguments) -> tuple[jax.Array, ...]:
 class TransitionEnvelopesMap(MinimumOscillationsMap):
     """Squared oscillations and envelopes of each instant; see `GridMap`."""
 
+    proves = False
+
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         targets = self._targets(cells)

@@ -16,6 +16,8 @@ from cspr_jax.robots.point_mass import is_planar, plane_normal, rest_point
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
+# Answers that are not proved, or not proved to be the smallest ones.
+_NOT_PROVED = FLAGS(Verdict.UNDECIDED.value | Verdict.FEWER_ARCS_UNDECIDED.value)
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
 # Limits may be touched: a slack within the tolerances of proofs counts as met.
@@ -34,12 +36,14 @@ class GridMap(abc.ABC):
 
     Fields:
         any_cables: whether the robot may have more cables than degrees of freedom.
+        proves: whether the verdicts of its motions are proofs, but for those that say that they are none.
 
     Raises:
         ConfigError: the robot, the amplitude function or the limits cannot be used.
     """
 
     any_cables: ClassVar[bool] = False
+    proves: ClassVar[bool] = False
 
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Build what all tiles share."""
@@ -69,6 +73,17 @@ class GridMap(abc.ABC):
         Returns:
             for each kind of contradiction, (n,) where it is.
         """
+
+    def undecided(self, answers: dict[str, np.ndarray]) -> int | None:
+        """Number of cells whose answer is not proved: a feasible motion, the smallest number of arcs, or none at all.
+
+        Args:
+            answers: (n,) each.
+
+        Returns:
+            the number; None: the map proves nothing.
+        """
+        return int(((answers["verdict"] & _NOT_PROVED) != 0).sum()) if self.proves else None
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse a grid in which no cell can have an answer, as where all targets are out of reach.

@@ -11,6 +11,8 @@ from cspr_jax.search.least_time import least_times
 class LeastTimeMap(FromPlacesMap):
     """The least duration of the S-model to each target; see `GridMap`."""
 
+    proves = True
+
     any_cables = True
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -19,6 +19,9 @@ FLOATS = tuple(name for name in MAP_KINDS["orientations"].quantities if QUANTITI
 class OrientationsMap(AttainabilityMap):
     """The smallest number of arcs to each orientation of tilt and torsion; see `GridMap`."""
 
+    proves = True
+    undecided = PlatformMap.undecided
+
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         places, z0 = self._targets(cells), self._depths(cells)

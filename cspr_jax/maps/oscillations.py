@@ -20,6 +20,8 @@ _ANY_DEPTH = 1.0
 class MinimumOscillationsMap(PointMassMap):
     """The smallest number of oscillations to each target; see `GridMap`."""
 
+    proves = True
+
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Build what all tiles share; bounds may be asked for."""
         super().__init__(spec, keys, file, for_bounds=True)

@@ -102,6 +102,10 @@ class AttainabilityMap(OrientationWorkspaceMap):
         more = answers["attainable"] > answers["accessible"]
         return super().contradictions(answers) | {"more orientations attainable than accessible": more}
 
+    def undecided(self, answers: dict[str, np.ndarray]) -> int | None:
+        """Number of places of which some orientation stays undecided; see `GridMap.undecided`."""
+        return int((answers["undecided_fraction"] > 0.0).sum())
+
 
 def _of_sets(fine: list[Accessible], coarse: list[Accessible]) -> dict[str, np.ndarray]:
     volume, rough = (np.array([inside.volume.sum() for inside in sets]) for sets in (fine, coarse))

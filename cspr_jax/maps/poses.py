@@ -21,6 +21,8 @@ TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 class PosesMap(PlatformMap):
     """The smallest number of arcs to each pose; see `GridMap`."""
 
+    proves = True
+
     def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a start that is no pose."""
         super().__init__(spec, keys, file)

@@ -47,8 +47,7 @@ def verdict_text(verdict: int, feasible: bool) -> str:
         feasible: whether the segment is; a smaller number of arcs may still be undecided.
 
     Returns:
-        "feasible" (proved for point masses, found at refined samples for platforms), "undecided", or the flags joined
-        by "+".
+        "feasible" (proved; on more than six cables found at samples), "undecided", or the flags joined by "+".
     """
     return "feasible" if feasible else Verdict(int(verdict)).text
 
@@ -63,6 +62,7 @@ _OF_SOME = (
     "cable_interference",
     "cable_distance_min",
     "platform_interference",
+    "refuted_at",
     "beta_hat",
     "acceleration_time",
     "active",

@@ -109,7 +109,7 @@ class Plan:
 
     @property
     def feasible(self) -> bool:
-        """Whether every segment is feasible: proved for point masses, found at refined samples for platforms."""
+        """Whether every segment is feasible: proved, on more than six cables found at samples."""
         return bool(self.is_feasible.all())
 
     @property

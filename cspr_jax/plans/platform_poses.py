@@ -14,9 +14,8 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import Pose
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.feasibility.platform.checker import TOUCH
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
-from cspr_jax.feasibility.platform.motion_checker import FEW, MANY, MotionChecker
+from cspr_jax.feasibility.platform.motion_checker import FEW, MANY, TOUCH, MotionChecker
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg, each
 from cspr_jax.plans.stops import Stops

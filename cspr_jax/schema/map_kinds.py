@@ -87,7 +87,7 @@ _OF_TRANSITIONS = ("least_oscillations", "inclination_gain", "used_inclination",
 _OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
 _OF_POSES = (
     *("arcs", "tried_arcs", "verdict", "duration", "margin", "margin_bound", "det_margin", "cable_distance"),
-    *("limit_margin", "beta_hat"),
+    *("limit_margin", "refuted_at", "beta_hat"),
 )
 _POSES_STORED = ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat")
 _OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")

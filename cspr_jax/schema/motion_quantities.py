@@ -3,7 +3,7 @@
 from cspr_jax.schema.quantity import Quantity
 
 # What verdicts rest on, and what they are about.
-HOW = ", proved for point masses, from refined samples for platforms"
+HOW = ", proved; only sampled on more than six cables"
 MARGIN = (
     "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
     "or depth below the spools over z0; platforms on more cables: how far all tensions can keep from their limits, "

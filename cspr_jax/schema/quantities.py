@@ -157,6 +157,12 @@ QUANTITIES = {
             "smallest distance between cables",
             "Between cables that share neither spool nor platform point.",
         ),
+        Quantity(
+            "refuted_at",
+            "s",
+            "time of refutation",
+            "Of the motion of `tried_arcs`, by its tensions, else by limits or contacts; NaN where it is not refuted.",
+        ),
         Quantity("beta_hat", "1", "beta-hat at the target", "Of the motion that the other quantities belong to."),
         Quantity(
             "accessible",

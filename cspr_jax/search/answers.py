@@ -2,7 +2,7 @@
 
 The candidates of a point mass that the bounds leave are proved or refuted in increasing order, until one is proved
 feasible. Never by bisection: more arcs can lose margin (tests). Where none is feasible, the candidate with the largest
-margin is reported. Answers of platforms (`search.platform_answers`) rest on refined samples instead.
+margin is reported. Answers of platforms are those of `search.platform_answers`.
 """
 
 import dataclasses
@@ -35,12 +35,12 @@ class Answers(Columns):
     """One answer a segment.
 
     Fields:
-        arcs: (n,) smallest number of arcs proved feasible, of platforms found feasible at refined samples; 0: none.
+        arcs: (n,) smallest number of arcs proved feasible, on more than six cables found so at samples; 0: none.
         tried_arcs: (n,) the number of arcs that duration and margins belong to: `arcs`, else the best candidate.
         verdict: (n,) `Verdict` flags; 0 is feasible.
         duration: (n,) s.
         margin: (n,) smallest normalised pseudotension, or depth below the spools over z0.
-        margin_bound: (n,) proved lower bound of the same; NaN where nothing is proved, as of platforms.
+        margin_bound: (n,) proved lower bound of the same; NaN where nothing is proved, as on more than six cables.
         limit_margin: (n,) smallest slack of the limits; inf where none is given.
         feasible_at_infinity: (n,) left-hand side of (2.55).
     """
@@ -56,7 +56,7 @@ class Answers(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Whether each segment is feasible, (n,): proved of point masses, found at refined samples of platforms."""
+        """Whether each segment is feasible, (n,): proved, on more than six cables found at samples."""
         return self.arcs > 0
 
     def details(self, i: int) -> dict[str, Any]:

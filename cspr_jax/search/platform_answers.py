@@ -26,11 +26,14 @@ class PoseAnswers(Answers):
         det_margin: (n,) smallest determinant over its value at rest in P0; NaN on more than six cables, where there is
             none, and cables are not held against the platform.
         cable_distance: (n,) smallest distance between cables that can meet, m.
+        refuted_at: (n,) time at which the motion of `tried_arcs` is refuted, s: by its tensions, else by limits or
+            contacts; NaN where it is not, or was only sampled.
     """
 
     beta_hat: np.ndarray
     det_margin: np.ndarray
     cable_distance: np.ndarray
+    refuted_at: np.ndarray
 
     def details(self, i: int) -> dict[str, Any]:
         """Determinant, contacts and beta-hat; see `Answers.details`."""
@@ -41,6 +44,7 @@ class PoseAnswers(Answers):
             "cable_interference": bool(verdict & Verdict.CABLE_CABLE),
             "cable_distance_min": float(self.cable_distance[i]),
             "platform_interference": bool(verdict & Verdict.CABLE_PLATFORM) if has_determinant else None,
+            "refuted_at": float(self.refuted_at[i]),
             "beta_hat": [float(value) for value in self.beta_hat[i]],
         }
 
@@ -91,6 +95,7 @@ def settled(
         beta_hat=beta_hats,
         det_margin=checks.slack[:, 1],
         cable_distance=checks.gap,
+        refuted_at=checks.instant * duration,
     )
     return answers, segments
 

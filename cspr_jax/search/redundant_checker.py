@@ -3,9 +3,8 @@
 Motion and limits leave a choice of tensions. The margin of an instant is that of a workspace at its pose, for the
 wrench that the motion asks for: the largest s such that tensions between f_min + s and f_max - s supply it,
 `feasibility.workspace`. No determinant is asked about, nor which side of the spools the platform is on: where the
-cables cannot supply the wrench there is no s. Samples and tolerance are those of `feasibility.platform.checker`, and
-nothing here is a proof either. Cables are held against each other, thick ones too, but not against the platform, whose
-attachment points need not lie in a plane.
+cables cannot supply the wrench there is no s. Nothing here is a proof that a motion is feasible. Cables are held
+against each other, thick ones too, but not against the platform, whose attachment points need not lie in a plane.
 """
 
 from functools import partial
@@ -14,10 +13,16 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed
-from cspr_jax.feasibility.platform.checker import BESIDE_KNOT, TOUCH
 from cspr_jax.feasibility.platform.crossings import CableVectors, passed_over
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
-from cspr_jax.feasibility.platform.motion_checker import FEW, TOLERANCE, MotionChecker, PoseChecks
+from cspr_jax.feasibility.platform.motion_checker import (
+    BESIDE_KNOT,
+    FEW,
+    TOLERANCE,
+    TOUCH,
+    MotionChecker,
+    PoseChecks,
+)
 from cspr_jax.feasibility.platform.motions import Motions, rows
 from cspr_jax.feasibility.platform.redundant_kernels import cable_vectors, end_wrenches, instants, other_limits
 from cspr_jax.feasibility.problem import Problem

@@ -45,6 +45,7 @@ class Content:
         tiles: how many.
         near_zero: cells whose margin lies within 1e-9 of zero.
         mixed: whether its shards come from different environments.
+        proved: part of the cells whose answer is proved; None: not said.
     """
 
     identity: str
@@ -53,6 +54,7 @@ class Content:
     tiles: int
     near_zero: int
     mixed: bool
+    proved: float | None
 
 
 def consolidate(
@@ -79,7 +81,7 @@ def consolidate(
     Raises:
         StoreError: the disk refuses, or does not give back what was written.
     """
-    digests, environments, near_zero = [], set(), 0
+    digests, environments, near_zero, undecided = [], set(), 0, []
     with new_file(disk, path) as descriptor:
         with open_hdf5(disk, descriptor, attributes) as file:
             settings = json.loads(attributes["settings"])
@@ -91,14 +93,21 @@ def consolidate(
                 digests.append(shard.digest)
                 environments.add(shard.environment)
                 near_zero += shard.near_zero
+                undecided.append(shard.undecided)
             mixed = int(environments != {attributes["environment"]})
             totals = {"cells_near_zero": near_zero, "mixed": mixed, "environments": " ".join(sorted(environments))}
-            set_attributes(file, totals)
+            set_attributes(file, totals | _proved(undecided, grid.size))
             set_attributes(file, {"content_sha256": _fold(grid.axes, digests)})
         with os.fdopen(os.dup(descriptor), "rb") as again, h5py.File(again, "r") as file:
             again_digests = _digests(file, grid, layout.store, between)
             if again_digests != digests or _fold(grid.axes, digests) != plain(file.attrs["content_sha256"]):
                 raise StoreError(f"{path}: the disk does not give back what was written: check the disk")
+
+
+def _proved(undecided: list[int | None], cells: int) -> dict[str, float]:
+    # The part of the cells whose answer is proved, where every shard says it.
+    known = [count for count in undecided if count is not None]
+    return {"proved": 1.0 - sum(known) / cells} if len(known) == len(undecided) else {}
 
 
 def _fold(axes: dict[str, np.ndarray], digests: list[str]) -> str:
@@ -158,9 +167,11 @@ def content_of(path: Path, begun: Callable[[Iterable[Found]], None] = lambda _: 
             if _fold(grid.axes, digests) != _text(file, "content_sha256"):
                 raise DamagedError("its content has changed")
             near_zero, mixed = (int(guard.numbers(file, name, "int64") or 0) for name in ("cells_near_zero", "mixed"))
+            proved = guard.numbers(file, "proved", "float64")
+            share = None if proved is None else float(proved)
     except (StoreError, *UNREADABLE, MemoryError) as error:
         raise DamagedError(f"it cannot be read: {reason(error)}") from error
-    return Content(identity(settings), settings, grid.size, len(grid.tiling), near_zero, bool(mixed))
+    return Content(identity(settings), settings, grid.size, len(grid.tiling), near_zero, bool(mixed), share)
 
 
 def _text(file: h5py.File, name: str) -> str:

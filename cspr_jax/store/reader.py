@@ -35,7 +35,7 @@ _TEXTS = (
     *("Conventions", "title", "map", "identity", "z_axis", "robot", "software", "environment", "environments"),
     *("content_sha256", "family"),
 )
-_INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass", "z0")
+_INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass", "z0", "proved")
 
 
 def serve() -> None:

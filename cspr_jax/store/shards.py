@@ -44,12 +44,14 @@ class Shard:
         environment: hash of what computed it.
         near_zero: cells whose margin lies within 1e-9 of zero.
         values: (n_1, ..., n_k) for each stored quantity.
+        undecided: cells whose answer is not proved; None: the map proves nothing, or an earlier version wrote it.
     """
 
     index: int
     environment: str
     near_zero: int
     values: dict[str, np.ndarray]
+    undecided: int | None = None
 
     @property
     def digest(self) -> str:
@@ -86,7 +88,7 @@ def encode(layout: Layout, shard: Shard) -> bytes:
     """
     memory = io.BytesIO()
     with h5py.File(memory, "w", libver=LAYOUT) as file:
-        file.attrs["header"] = canonical_json(_header(layout, shard.index, shard.environment, shard.near_zero))
+        file.attrs["header"] = canonical_json(_header(layout, shard))
         file.attrs["content_sha256"] = shard.digest
         for name in layout.store:
             array = shard.values[name]
@@ -94,8 +96,9 @@ def encode(layout: Layout, shard: Shard) -> bytes:
     return sealed(memory.getvalue())
 
 
-def _header(layout: Layout, index: int, environment: str, near_zero: int) -> dict[str, Any]:
-    return {"identity": layout.identity, "tile": index, "environment": environment, "near_zero": near_zero}
+def _header(layout: Layout, shard: Shard) -> dict[str, Any]:
+    of_shard = {name: getattr(shard, name) for name in ("environment", "near_zero", "undecided")}
+    return {"identity": layout.identity, "tile": shard.index, **of_shard}
 
 
 def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -> Shard:
@@ -137,7 +140,7 @@ def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -
     if digest_of(values) != written:
         raise DamagedError("its content has changed")
     values = {name: array.astype(kinds[name], copy=False) for name, array in values.items()}
-    return Shard(index, str(header["environment"]), int(header["near_zero"]), values)
+    return Shard(index, str(header["environment"]), int(header["near_zero"]), values, header.get("undecided"))
 
 
 def owners(paths: Iterable[Path]) -> set[tuple[str, str]]:

@@ -142,12 +142,14 @@ def _verify_result(path: Path, record: Record, report: dict[str, Any]) -> None:
 
 
 def _counts(inside: dict[str, Any]) -> dict[str, Any]:
-    return {
+    counts = {
         "cells": inside["cells"],
         "cells_near_zero": inside["near_zero"],
         "mixed": inside["mixed"],
         "tiles": inside["tiles"],
+        "proved": inside["proved"],
     }
+    return {name: count for name, count in counts.items() if count is not None}
 
 
 def _record(directory: Path) -> Record:

@@ -64,7 +64,8 @@ class TileMap:
         # Counts and flags fit their small types: max_arcs is at most 1000.
         values = {n: answers[n].astype(kind).reshape(tiling.extent(index)) for n, kind in self._sweep.types.items()}
         now = environment()
-        return Computed(Shard(index, digest(now), _near_zero(answers), values), now)
+        undecided = self._cells.undecided(answers)
+        return Computed(Shard(index, digest(now), _near_zero(answers), values, undecided), now)
 
 
 def _near_zero(answers: dict[str, np.ndarray]) -> int:

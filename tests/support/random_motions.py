@@ -52,11 +52,12 @@ def drawn(rng, robot, kind, count):
 
 
 def jets(robot, segment, p, beta, tau):
-    """Position and quaternion with derivatives in tau, which may be complex: (3, n, 3) and (3, n, 4)."""
+    """Position and quaternion with derivatives in tau, which may be complex, and beta: (3, n, 3), (3, n, 4), (n,)."""
     theta, cusps, _ = oracle.plan(robot, segment, p)
     seconds = beta[0] * theta**2 * (cusps - 1), beta[1] * theta**2 * (cusps - 1)
     env = oracle.envelope(segment, p, tau)
-    return oracle.translation(robot, segment, p, tau), oracle.orientation_jet(env, oracle.beta_ff(tau, p, seconds))
+    beta = oracle.beta_ff(tau, p, seconds)
+    return oracle.translation(robot, segment, p, tau), oracle.orientation_jet(env, beta), beta[0]
 
 
 def problem_of(robot, limits=None):

@@ -18,7 +18,7 @@ from cspr_jax.feasibility.platform.certificate import Certifier, TensionProof
 from cspr_jax.feasibility.platform.end_acceleration import endpoint
 from cspr_jax.feasibility.platform.kernels import slacks_at
 from cspr_jax.feasibility.platform.margins import Samples, narrowed
-from cspr_jax.feasibility.platform.motion_checker import FEW, MANY, MotionChecker, PoseChecks
+from cspr_jax.feasibility.platform.motion_checker import BESIDE_KNOT, FEW, MANY, MotionChecker, PoseChecks
 from cspr_jax.feasibility.platform.motions import Motions
 from cspr_jax.feasibility.platform.place_certificate import PlaceCertifier, PlaceProof
 from cspr_jax.feasibility.platform.prefilter import FIRST, Prefilter
@@ -35,8 +35,6 @@ from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
 BLOCKS, ARCS = 1024, 8 * MANY
 # Where margins are asked for no bound is less than this part of what is attained.
 NEAR = 0.5
-TOUCH = 1e-6  # of the platform's size: poses nearer to a contact cannot be asked for
-BESIDE_KNOT = 1e-12
 
 
 # One function for XLA instead of some hundred small ones.
@@ -96,12 +94,13 @@ class PoseChecker(MotionChecker):
         checks = self.nothing(len(motions.arcs))
         tensions = self._tensions.prove(*motions, near=NEAR if margins else 0.0, margins=margins)
         checks.verdict[:] = np.where(tensions.is_refuted, Verdict.SLACK_CABLE.value, Verdict.UNDECIDED.value)
-        checks.instant[:] = tensions.instant
+        checks.instant[:] = np.where(tensions.is_refuted, tensions.instant, np.nan)
         some = np.flatnonzero(np.logical_or(whole, ~tensions.is_refuted))
         if not len(some):
             return checks
         part = motions.rows(some)
         places = self._places.prove(*part, margins=margins)
+        checks.instant[some] = np.where(tensions.is_refuted[some], tensions.instant[some], places.instant)
         is_finite = ~np.isnan(tensions.attained[some]).any(1) & ~np.isnan(places.attained).any(1)
         is_finite &= self.durations(*part) > 0.0
         is_proved = tensions.is_proved[some] & places.is_proved & is_finite

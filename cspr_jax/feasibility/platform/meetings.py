@@ -50,7 +50,7 @@ class _Around(NamedTuple):
 
 
 def cables_meet(base: np.ndarray, pairs: np.ndarray, found: Cables) -> np.ndarray:
-    """Blocks in which two cables meet for certain.
+    """Steps in which two cables meet for certain.
 
     Args:
         base: (n_cables, 3) spools, m.
@@ -58,9 +58,9 @@ def cables_meet(base: np.ndarray, pairs: np.ndarray, found: Cables) -> np.ndarra
         found: of n blocks.
 
     Returns:
-        (n,).
+        (n,) one of each block, from 0 on; -1: none.
     """
-    meets = np.zeros(found.rays.shape[1], bool)
+    meets = np.full(found.rays.shape[1], -1)
     i, j = pairs.T
     apart = base[j] - base[i]
     u, v = found.rays[:, :, i], found.rays[:, :, j]
@@ -76,12 +76,12 @@ def cables_meet(base: np.ndarray, pairs: np.ndarray, found: Cables) -> np.ndarra
         # The share of a cable at which the lines are nearest, times the square of the normal.
         low, high = between.cross(other).dot(normal)
         inside &= (low > 0.0) & (high < least)
-    meets[block[inside]] = True
+    meets[block[inside]] = step[inside]
     return meets
 
 
 def cables_hit(sides: np.ndarray, normal: np.ndarray, found: Cables) -> np.ndarray:
-    """Blocks in which a cable lies on the platform for certain.
+    """Steps in which a cable lies on the platform for certain.
 
     Args:
         sides: (n_cables, 2, 3) of `interference.contacts`.
@@ -89,9 +89,9 @@ def cables_hit(sides: np.ndarray, normal: np.ndarray, found: Cables) -> np.ndarr
         found: of n blocks.
 
     Returns:
-        (n,).
+        (n,) one of each block, from 0 on; -1: none.
     """
-    hits = np.zeros(found.seen.shape[1], bool)
+    hits = np.full(found.seen.shape[1], -1)
     step, block, cable = _sign_changes(found.seen @ normal, _size(found.seen).max(0))
     seen = _within(found.seen, (step, block, cable), np.broadcast_to(found.seen_bent[:, None], found.seen.shape[1:3]))
     one, two = sides[cable, 0], sides[cable, 1]
@@ -99,7 +99,7 @@ def cables_hit(sides: np.ndarray, normal: np.ndarray, found: Cables) -> np.ndarr
     # A coordinate along one side, times the area that the sides span, changes by no more than the other's length.
     inside = turn * (np.cross(seen.mean, two) @ normal) > _size(two) * seen.off
     inside &= turn * (np.cross(one, seen.mean) @ normal) > _size(one) * seen.off
-    hits[block[inside]] = True
+    hits[block[inside]] = step[inside]
     return hits
 
 

@@ -15,6 +15,8 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment, duration
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
 FEW, MANY = 256, 2048
 TOLERANCE = 1e-7
+TOUCH = 1e-6  # of the platform's size: poses nearer to a contact cannot be asked for
+BESIDE_KNOT = 1e-12
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,7 +29,8 @@ class PoseChecks:
         gap: (n,) smallest distance between cables that can meet, m; infinite where none can.
         bound: (n,) proved lower bound of the slack of taut cables and of the depth below the spools; NaN where nothing
             is proved.
-        instant: (n,) tau at which tensions or limits on them refute the motion; NaN elsewhere.
+        instant: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a small
+            step of it); NaN where it is not, or was only sampled.
     """
 
     verdict: np.ndarray

@@ -28,8 +28,9 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 # Parts of an arc that are looked at first; nearer than this part of the platform's size is undecided.
 PARTS, TOUCH = 4, 1e-9
-# From so many halvings on meetings are looked for. Instants of a block, from -1 to 1.
+# From so many halvings on meetings are looked for. Instants of a block, from -1 to 1, and those halfway between.
 NEAR_CONTACT, PLACES = 1, np.linspace(-1.0, 1.0, STEPS + 1)
+MIDDLES = 0.5 * (PLACES[1:] + PLACES[:-1])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,6 +44,8 @@ class PlaceProof:
         hit: (n,) a cable lies on the platform.
         attained: (n, n_criteria + 1) smallest slacks at the instants that were looked at, and distance between cables.
         bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
+        instant: (n,) tau at which a criterion is broken by most, or in the middle of a step in which something meets;
+            NaN where there is none.
         row: (k,) whose blocks were looked at first.
         first: what was found of these.
     """
@@ -53,6 +56,7 @@ class PlaceProof:
     hit: np.ndarray
     attained: np.ndarray
     bound: np.ndarray
+    instant: np.ndarray
     row: np.ndarray
     first: Looked
 
@@ -117,17 +121,23 @@ class PlaceCertifier:
             is_clear = np.asarray(found.clear) > touch
             doubtful = np.flatnonzero(~is_clear)
             if level >= NEAR_CONTACT and len(doubtful):
-                cables = self._cables(some.some(doubtful), np.asarray(found.bends)[:, doubtful], (segments, arcs))
-                row = some.row[doubtful]
-                met[row[cables_meet(np.asarray(self._problem.robot.base_points), self._near.pairs, cables)]] = True
-                hit[row[cables_hit(self._near.sides, self._near.normal, cables)]] = True
-                work.is_refuted |= met | hit
+                own = some.some(doubtful)
+                cables = self._cables(own, np.asarray(found.bends)[:, doubtful], (segments, arcs))
+                base, between = np.asarray(self._problem.robot.base_points), own.instants(MIDDLES)
+                for flag, step in (
+                    (met, cables_meet(base, self._near.pairs, cables)),
+                    (hit, cables_hit(self._near.sides, self._near.normal, cables)),
+                ):
+                    which = np.flatnonzero(step >= 0)
+                    flag[own.row[which]] = True
+                    work.refute(own.row[which], between[step[which], which])
             nodes, bound = np.asarray(found.nodes), np.asarray(found.slacks)
             return Looked(nodes, bound, some.instants(PLACES), lambda _: is_clear)
 
         first = work.work_off(blocks, look)
         is_proved = ~work.is_refuted & ~work.is_stuck
-        return PlaceProof(is_proved, work.is_refuted, met, hit, work.attained, work.bound, blocks.row, first)
+        known = work.attained, work.bound, work.instant
+        return PlaceProof(is_proved, work.is_refuted, met, hit, *known, blocks.row, first)
 
     def _bounds(self, blocks: Blocks, segments: PoseSegment, arcs: np.ndarray, *, margins: bool) -> PlaceBounds:
         self._count(len(blocks.row) * len(PLACES))

@@ -37,11 +37,12 @@ class WorkList:
         limits: (n_criteria,) whether each slack is one of a limit, which may be touched.
 
     Fields:
-        is_refuted: (n,) an instant breaks a criterion, or who looked has set it.
+        is_refuted: (n,) an instant breaks a criterion, or `refute` was called.
         is_stuck: (n,) undecided.
         attained: (n, n_criteria or more) smallest values at the instants that were looked at.
         bound: (n, n_criteria) proved lower bounds of motions that are neither.
-        instant: (n,) tau of what broke a criterion by most; NaN where none is broken.
+        instant: (n,) tau of what broke a criterion by most, else of what else refutes the motion; NaN where nothing
+            does.
     """
 
     def __init__(self, arcs: np.ndarray, limits: np.ndarray) -> None:
@@ -73,6 +74,17 @@ class WorkList:
             found = look(blocks, level + 1)
         self.bound[self.is_refuted | self.is_stuck] = np.nan
         return first
+
+    def refute(self, row: np.ndarray, tau: np.ndarray) -> None:
+        """Note that motions are refuted by other things than criteria.
+
+        Args:
+            row: (k,) motions.
+            tau: (k,) when.
+        """
+        self.is_refuted[row] = True
+        is_new = np.isnan(self.instant[row])
+        self.instant[row[is_new]] = tau[is_new]
 
     def _told(self, blocks: Blocks, found: Looked, *, last: bool) -> np.ndarray:
         # Takes in what was found of blocks; which of them are to be halved.
