@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.schema.map_kinds import MapKind, registered
 from cspr_jax.schema.quantity import Quantity
 
@@ -32,7 +33,7 @@ tile = [1, 3, 2]
 TILES = 6
 
 
-class ToyMap:
+class ToyMap(GridMap):
     """Distance of each target from the origin."""
 
     def __init__(self, spec, keys, file):

@@ -29,7 +29,7 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 # Parts of an arc that are looked at first; nearer than this part of the platform's size is undecided.
 PARTS, TOUCH = 4, 1e-9
 # From so many halvings on meetings are looked for. Instants of a block, from -1 to 1, and those halfway between.
-NEAR_CONTACT, PLACES = 1, np.linspace(-1.0, 1.0, STEPS + 1)
+NEAR_CONTACT, PLACES = 3, np.linspace(-1.0, 1.0, STEPS + 1)
 MIDDLES = 0.5 * (PLACES[1:] + PLACES[:-1])
 
 
