@@ -6,6 +6,7 @@ The oracle is NumPy's version of the printed formulas: it knows complex time too
 from functools import partial
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from oracles import platform as oracle
@@ -17,7 +18,7 @@ from cspr_jax.feasibility.platform import certificate, tension_blocks
 from cspr_jax.feasibility.platform.blocks import Blocks
 from cspr_jax.feasibility.platform.certificate import Certifier, determinant_at_rest
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.trajectories import platform_reach
+from cspr_jax.trajectories import platform_lanes, platform_reach
 from cspr_jax.trajectories.platform_segment import USUAL, Kind
 
 STANDARD = Kind(variable=False, plain=True)
@@ -293,6 +294,50 @@ def test_values_at_nodes_are_wrong_by_a_tenth_of_what_is_allowed(kind, name, mon
     assert len(used) > 1000 and used.max() < 0.1, used.max()
 
 
+@partial(jax.jit, static_argnames="kind")
+def _rests(problem, items, *, kind):
+    segments, arcs, regular, start, stop = items
+    middle, half = platform_reach.middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
+    z0 = problem.robot.gravity / segments.rate
+    block = tension_blocks._Block(segments, platform_lanes.squared_duration(segments, arcs), regular, z0)
+    now = platform_reach.instant_beside(middle, segments.sense, arcs, 0.0 * half)
+    lengths = tension_blocks._lengths(problem.robot, platform_lanes.state(segments, arcs, now, kind))
+    radii, every = np.array(chebyshev.RADII), []
+    for (along, aside), factor in zip(chebyshev.semi_axes(radii), chebyshev.remainders(radii), strict=True):
+        bounds = platform_reach.reach(segments, arcs, middle, (along * half, aside * half), kind)
+        sizes = jnp.stack(tension_blocks._sizes(problem, block, bounds, along * half, lengths)[:7])
+        every.append(jnp.where(jnp.isnan(sizes), jnp.inf, sizes * factor))
+    return jnp.min(jnp.stack(every), axis=0)
+
+
+def remainders_used(count, seed, kind, robot):
+    """The largest part that polynomials leave out, over what is allowed for it, of the tensions times D and of D."""
+    rng, x = np.random.default_rng(seed), chebyshev.nodes()
+    segments, theirs, arcs, betas = drawn(rng, robot, kind, count)
+    start = rng.uniform(0.0, 0.5, count)
+    blocks, problem = Blocks(np.arange(count), start, start + rng.uniform(0.3, 1.5, count) / arcs), problem_of(robot)
+    standing = determinant_at_rest(problem, segments)
+    rests = np.asarray(_rests(problem, (segments, arcs.astype(float), standing, *blocks[1:]), kind=kind))
+    far, used = np.linspace(-1.0, 1.0, 101), 0.0
+    for i, (segment, p, beta) in enumerate(zip(theirs, arcs, betas, strict=True)):
+        at_nodes, between = (
+            np.column_stack(precise(robot, segment, int(p), beta, blocks.instants(places)[:, i])).astype(float)
+            for places in (x, far)
+        )
+        fit = np.polynomial.chebyshev.chebfit(x, at_nodes, chebyshev.DEGREE)
+        off = np.abs(np.polynomial.chebyshev.chebval(far, fit).T - between).max(0)
+        off = np.where(off > 1e-9 * np.abs(at_nodes).max(0), off, 0.0)
+        used = max(used, float((off / rests[:, i]).max()))
+    return used
+
+
+@pytest.mark.parametrize("kind", [USUAL, FROM_REST], ids=["between", "from rest"])
+def test_polynomials_leave_out_less_than_is_allowed(kind):
+    """Of random blocks, by numbers with a mantissa of 64 bits; the allowance is coarse, but not by any amount."""
+    used = remainders_used(24, 41, kind, ROBOTS["general"])
+    assert 1e-11 < used < 1.0, used
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("fault", ["rounded polynomial", "less growth", "no wrench", "remainder"])
 def test_planted_errors_in_bounds_are_found(monkeypatch, fault):
@@ -300,22 +345,24 @@ def test_planted_errors_in_bounds_are_found(monkeypatch, fault):
     jax.clear_caches()
     if fault == "less growth":
         whole = platform_reach.reach
-        monkeypatch.setattr(
-            platform_reach,
-            "reach",
-            lambda *a: (lambda r: r._replace(omega=0.5 * r.omega, spin=0.5 * r.spin))(whole(*a)),
-        )
+
+        def less(*given):
+            found = whole(*given)
+            return found._replace(omega=0.5 * found.omega, spin=0.5 * found.spin)
+
+        monkeypatch.setattr(platform_reach, "reach", less)
         assert (reach_breaks(200, 1, USUAL, ROBOTS["mssm"]) > 1.0).any()
-        return
-    if fault == "remainder":
-        monkeypatch.setattr(chebyshev, "remainders", lambda radii: 0.0 * radii)
-        monkeypatch.setattr(tension_blocks, "ROUNDING", 0.0)
+    elif fault == "rounded polynomial":
+        monkeypatch.setattr(chebyshev, "bernstein", lambda: np.eye(chebyshev.DEGREE + 1))
+        assert block_breaks(400, 3, USUAL, ROBOTS["general"], None)[0]
     elif fault == "no wrench":
         whole = tension_blocks._sizes
-        monkeypatch.setattr(tension_blocks, "_sizes", lambda *a: [1e-6 * x for x in whole(*a)])
+        monkeypatch.setattr(tension_blocks, "_sizes", lambda *given: [1e-11 * x for x in whole(*given)])
+        assert remainders_used(24, 41, USUAL, ROBOTS["general"]) > 1.0
     else:
-        monkeypatch.setattr(chebyshev, "bernstein", lambda: np.eye(chebyshev.DEGREE + 1))
-    assert block_breaks(2000, 3, USUAL, ROBOTS["general"], None)[0]
+        plain = chebyshev.remainders
+        monkeypatch.setattr(chebyshev, "remainders", lambda radii: plain(radii) * radii ** (-3.0 * chebyshev.DEGREE))
+        assert remainders_used(24, 41, USUAL, ROBOTS["general"]) > 1.0
     jax.clear_caches()
 
 
