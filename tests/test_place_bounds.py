@@ -26,7 +26,10 @@ def seen(robot, segment, p, beta, tau):
     lines = oracle.cables(robot, m.position, m.rotation)
     lengths = np.linalg.norm(lines, axis=2)
     depth = m.position[:, 2]
-    slacks = np.array([depth / Z0, (TIGHT["floor"] - depth) / Z0, (1.0 - lengths / TIGHT["cable_length_max"]).min(1)])
+    # Below the plane of least squares through the spools, along the vertical.
+    slope, *_ = np.linalg.lstsq(robot.base[:, :2], robot.base[:, 2], rcond=None)
+    below = depth - m.position[:, :2] @ slope
+    slacks = np.array([below / Z0, (TIGHT["floor"] - depth) / Z0, (1.0 - lengths / TIGHT["cable_length_max"]).min(1)])
     return np.linalg.norm(shortest, axis=2).min(1), slacks, -np.einsum("nki,nij->nkj", lines, m.rotation)
 
 
