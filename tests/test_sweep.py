@@ -18,6 +18,7 @@ from cspr_jax.errors import SelfCheckError
 from cspr_jax.maps.arcs import MinimumArcsMap
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES as EVERY
+from cspr_jax.store import consolidation
 from cspr_jax.sweep.definition import read_sweep
 
 ROOT = Path(__file__).parent.parent
@@ -335,3 +336,9 @@ def test_all_errors_of_a_sweep(tmp_path):
         code, out, err = cspr("run", path, *arguments)
         assert (code, out, len(err.splitlines())) == (2, "", count)
     assert "unknown key trajectory.max_arc = 3: did you mean max_arcs?" in err and "axes.x.count = 0: must be" in err
+
+
+def test_what_part_is_proved():
+    """Of all shards, if every one says it: those of earlier versions, and of maps that prove nothing, do not."""
+    assert consolidation._proved([1, 0, 2], 12) == {"proved": 0.75}
+    assert consolidation._proved([1, None, 2], 12) == {}
