@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from cspr_jax.problem import load_robot as load_robot
     from cspr_jax.robots.cables import with_cables as with_cables
     from cspr_jax.robots.limits import Limits as Limits
+    from cspr_jax.robots.limits import Uncertainty as Uncertainty
     from cspr_jax.robots.point_mass import point_mass_robot as point_mass_robot
     from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
     from cspr_jax.schema.verdicts import Verdict as Verdict
@@ -66,6 +67,7 @@ _PUBLIC = {
     "ImportedRobot": ("cspr_jax.api.imports", "ImportedRobot"),
     "LaunchErrors": ("cspr_jax.search.landings", "LaunchErrors"),
     "Limits": ("cspr_jax.robots.limits", "Limits"),
+    "Uncertainty": ("cspr_jax.robots.limits", "Uncertainty"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
     "WorkspaceVolume": ("cspr_jax.api.volumes", "WorkspaceVolume"),
     "accessible": ("cspr_jax.api.platform_searches", "accessible"),
@@ -120,6 +122,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "ImportedRobot",
     "LaunchErrors",
     "Limits",
+    "Uncertainty",
     "Verdict",
     "WorkspaceVolume",
     "accessible",

@@ -13,7 +13,7 @@ from cspr_jax.config.limits import LimitKeys, LimitTable
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.feasibility.given_limits import check_bounded, limits_of
+from cspr_jax.feasibility.given_limits import check_bounded, check_certain, limits_of
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.cables import with_cables
@@ -261,7 +261,7 @@ def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
     Raises:
         InputError: of some pair no tension is within the limits of both cables.
     """
-    values = {
+    values: dict[str, Any] = {
         row.name: leaf(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
         for row in LIMITS
         if row.per_cable and (value := getattr(limits, row.name)) is not None
@@ -277,13 +277,20 @@ def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
     return dataclasses.replace(limits, **values)
 
 
-def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None, *, any_tensions: bool = False) -> Limits:
+def limits_over(
+    robot: PointMassRobot | PlatformRobot,
+    limits: Limits | None,
+    *,
+    any_tensions: bool = False,
+    families: tuple[str, ...] = (),
+) -> Limits:
     """Limits that are given over those of a robot, as the kernels take them.
 
     Args:
         robot: in its own axes.
         limits: one number or one a cable each, in the robot's axes; None: those of the robot.
         any_tensions: whether some of the largest tensions may be infinite.
+        families: of the trajectories that are judged by all of an uncertainty; none: there may be none.
 
     Returns:
         the limits.
@@ -295,6 +302,7 @@ def limits_over(robot: PointMassRobot | PlatformRobot, limits: Limits | None, *,
     found = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
     if not any_tensions:
         check_bounded(found)
+    check_certain(robot, found, families)
     return found
 
 
@@ -333,6 +341,7 @@ def build_problem(
     try:
         if not _is_redundant_platform(robot):
             check_bounded(given)
+        check_certain(robot, given, keys.families, in_pairs=spec.pairs is not None)
     except InputError as error:
         raise ConfigError(file, str(error)) from error
     return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)

@@ -82,6 +82,11 @@ IMAGES = {
         ("straight_line",),
         "plan",
     ),
+    "tolerances": Image(
+        "Displacement of the spools, in mm, within which the motion to each target is proved feasible for every robot.",
+        90,
+        "--quantity tolerated",
+    ),
     "least_time": Image("Least duration of the S-model from one place to each target.", 10),
     "active_bounds": Image(
         "What holds back the acceleration on the way to each target: cables, or max_acceleration.",

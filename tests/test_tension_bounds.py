@@ -14,8 +14,8 @@ from support.platforms import FROM_REST, Z0, limits_of, stacked
 from support.random_motions import BATCH, QUINTIC, ROBOTS, drawn, jets, motions_of, problem_of
 
 from cspr_jax.arithmetic import chebyshev
+from cspr_jax.feasibility.blocks import Blocks
 from cspr_jax.feasibility.platform import certificate, tension_blocks
-from cspr_jax.feasibility.platform.blocks import Blocks
 from cspr_jax.feasibility.platform.certificate import Certifier, determinant_at_rest
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.trajectories import platform_lanes, platform_reach

@@ -58,7 +58,12 @@ def amplitude_of(given: str | Amplitude, *, free_end: bool | None = None) -> Amp
 
 
 def kernel_problem(
-    robot: Any, amplitude: str | Amplitude, limits: Limits | None, *, free_end: bool | None = False
+    robot: Any,
+    amplitude: str | Amplitude,
+    limits: Limits | None,
+    *,
+    free_end: bool | None = False,
+    families: tuple[str, ...] = (),
 ) -> tuple[Problem, Frame]:
     """Robot, limits and amplitude function, as the kernels take them.
 
@@ -67,6 +72,7 @@ def kernel_problem(
         amplitude: its name, or the function.
         limits: over those of the robot; None: those.
         free_end: as in `amplitude_of`.
+        families: as in `limits_over`.
 
     Returns:
         the problem, and the frame of the robot.
@@ -77,7 +83,7 @@ def kernel_problem(
     function = amplitude_of(amplitude, free_end=free_end)
     check_determined(robot)
     own, frame = prepared(robot)
-    return Problem(own, limits_over(robot, limits), function), frame
+    return Problem(own, limits_over(robot, limits, families=families), function), frame
 
 
 def batched(kind, segments, problem: Problem, answers: Answers, frame: Frame, *more) -> Any:

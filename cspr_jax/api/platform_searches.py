@@ -65,7 +65,7 @@ def minimum_pose_arcs(  # noqa: PLR0913
     places = points_of("positions", positions)
     depth, turns = depths(z0, len(places)), quaternions("orientations", orientations, len(places))
     with double_precision():
-        problem, frame = kernel_problem(robot, amplitude, limits)
+        problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",))
         for each in np.unique(depth):
             reference_pose(problem.robot, float(each))
         checker = PoseChecker(problem, Kind(variable, from_rest=start is None), batch=MANY)
@@ -163,5 +163,5 @@ def _of_place(
     if divisions % 2 or not 4 <= divisions <= 128:
         raise InputError("divisions", divisions, "an even number from 4 to 128")
     where = points_of("place", [place])
-    problem, frame = kernel_problem(robot, amplitude, limits)
+    problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",))
     return problem, frame.inward(where)[0]

@@ -58,7 +58,7 @@ def minimum_arcs(
     if given is not None and given.shape not in ((3,), ends.shape):
         raise InputError("start", f"shape {given.shape}", f"finite numbers of shape (3,) or {ends.shape}")
     with double_precision():
-        problem, frame = kernel_problem(robot, amplitude or "quintic", limits)
+        problem, frame = kernel_problem(robot, amplitude or "quintic", limits, families=("hypocycloid-standard",))
         starts = rest_point(depth) if given is None else frame.inward(points_of("start", np.atleast_2d(given)))
         given_points = (np.broadcast_to(starts, ends.shape).copy(), frame.inward(ends), depth)
         answers = search_arcs(problem, *given_points, max_arcs=max_arcs)
@@ -101,7 +101,7 @@ def minimum_oscillations(
     ends = points_of("targets", targets)
     depth = depths(z0, len(ends))
     with double_precision():
-        problem, frame = kernel_problem(robot, amplitude, limits, free_end=True)
+        problem, frame = kernel_problem(robot, amplitude, limits, free_end=True, families=("transition",))
         segments = transitions_to(problem, frame.inward(ends), depth)
         answers = search_oscillations(problem, segments, depth, max_arcs=max_arcs)
 

@@ -4,10 +4,19 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, PlainSerializer, Tag, create_model
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    PlainSerializer,
+    Tag,
+    create_model,
+    model_validator,
+)
 
 from cspr_jax.config.reading import Table
-from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 
 # Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.point_mass`, with jax.
 LARGEST_LENGTH = 1e6
@@ -79,11 +88,36 @@ class LimitKeys(_Cables):
     """Limits beyond taut cables; a plan's or a sweep's stand over those of the robot file."""
 
 
+def _uncertainty_keys() -> dict[str, Any]:
+    return {
+        row.name: (
+            Annotated[float, Field(ge=row.least, le=row.largest)],
+            Field(row.least, description=f"{row.description}, {row.unit}"),
+        )
+        for row in UNCERTAINTIES
+    }
+
+
+_Uncertainties: Any = create_model("_Uncertainties", __base__=Table, **_uncertainty_keys())
 _Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(per_cable=False))
+
+
+class UncertaintyTable(_Uncertainties):
+    """Uncertainty of the robot, for all of which motions are to be feasible."""
+
+    @model_validator(mode="after")
+    def _some(self) -> "UncertaintyTable":
+        if all(getattr(self, row.name) == row.least for row in UNCERTAINTIES):
+            raise ValueError("at least one of its keys beyond its smallest value, else nothing is uncertain")
+        return self
 
 
 class LimitTable(_Heights):
     """Limits of all motions of the file."""
+
+    uncertainty: UncertaintyTable | None = Field(
+        None, description="hypocycloids and transitions: feasible means so for every robot within this"
+    )
 
     if TYPE_CHECKING:
         floor: float | None = None

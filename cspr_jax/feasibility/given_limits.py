@@ -9,9 +9,12 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.errors import InputError
-from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.limits import Limits, Uncertainty
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.given_numbers import numbers
-from cspr_jax.schema.limits import LIMITS, Limit
+from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
 
 
 def limits_of(
@@ -43,7 +46,20 @@ def limits_of(
         raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
     if values["floor"] is not None:
         values["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
-    return Limits(**values)
+    uncertain = given.get("uncertainty")
+    uncertain = own.get("uncertainty") if uncertain is None else uncertain
+    return Limits(**values, uncertainty=None if uncertain is None else _uncertainty(uncertain, f"{at}uncertainty."))
+
+
+def _uncertainty(given: Any, at: str) -> Uncertainty:
+    values = {}
+    for row in UNCERTAINTIES:
+        value = getattr(given, row.name)
+        number = numbers(f"{at}{row.name}", value, row.allowed)
+        if number.shape != () or not row.least <= number <= row.largest:
+            raise InputError(f"{at}{row.name}", value, row.allowed)
+        values[row.name] = leaf(number)
+    return Uncertainty(**values)
 
 
 def check_bounded(limits: Limits) -> None:
@@ -62,6 +78,34 @@ def check_bounded(limits: Limits) -> None:
             np.asarray(high).tolist(),
             "finite, or absent (only workspaces and platforms on more than six cables take infinite ones)",
         )
+
+
+def check_certain(
+    robot: PointMassRobot | PlatformRobot, limits: Limits, families: tuple[str, ...], *, in_pairs: bool = False
+) -> None:
+    """Refuse an uncertainty where motions are not judged by it.
+
+    Args:
+        robot: that moves.
+        limits: with an uncertainty, or without.
+        families: names of the trajectories; none: no motion of a family.
+        in_pairs: whether its cables stand for pairs of cables.
+
+    Raises:
+        InputError: the uncertainty, and why it must be absent.
+    """
+    given = limits.uncertainty
+    if given is None:
+        return
+    known = [row.name for row in FAMILIES.values() if row.knows_uncertainty]
+    if not families or not set(families) <= set(known):
+        raise InputError("uncertainty", None, f"must be absent but for the families {', '.join(known)}", fault="given")
+    if robot.n_cables != robot.dof or in_pairs:
+        raise InputError(
+            "uncertainty", None, "must be absent on redundant cables and on pairs of cables", fault="given"
+        )
+    if not isinstance(robot, PlatformRobot) and float(given.mass_centre) > 0.0:
+        raise InputError("uncertainty.mass_centre", float(given.mass_centre), "absent: a point mass has no other one")
 
 
 def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:

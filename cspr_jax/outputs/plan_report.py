@@ -88,6 +88,8 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "margin": float(answers.margin[i]),
         "margin_bound": float(answers.margin_bound[i]),
         "limit_margin": float(answers.limit_margin[i]),
+        "tolerated": float(answers.tolerated[i]),
+        "not_tolerated": float(answers.not_tolerated[i]),
         "tension_margin": _tension_margin(plan, i),
         "det_sign_constant": bool(asked.depth_min[i] > 0.0),
         "verdict": verdict_text(answers.verdict[i], bool(plan.is_feasible[i])),

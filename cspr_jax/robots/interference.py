@@ -85,6 +85,22 @@ def between(a: Array, u: Array, b: Array, v: Array) -> Array:
     Returns:
         (..., 3) from the first to the second, m.
     """
+    s, t = nearest(a, u, b, v)
+    return b - a + t[..., None] * v - s[..., None] * u
+
+
+def nearest(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
+    """Where segments a + s u and b + t v are nearest to each other.
+
+    Args:
+        a: (..., 3) where the first ones start, m.
+        u: (..., 3) along them, m.
+        b: (..., 3) likewise of the second ones.
+        v: (..., 3).
+
+    Returns:
+        s and t, (...) each, in [0, 1].
+    """
     # The nearest points of the lines, then of the ends.
     apart = b - a
     uu, uv, vv = (jnp.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v)))
@@ -93,8 +109,7 @@ def between(a: Array, u: Array, b: Array, v: Array) -> Array:
     is_parallel = denominator <= PARALLEL * uu * vv
     s = jnp.clip(jnp.where(is_parallel, 0.0, (au * vv - av * uv) / jnp.where(is_parallel, 1.0, denominator)), 0.0, 1.0)
     t = jnp.clip((s * uv - av) / vv, 0.0, 1.0)
-    s = jnp.clip((au + t * uv) / uu, 0.0, 1.0)
-    return apart + t[..., None] * v - s[..., None] * u
+    return jnp.clip((au + t * uv) / uu, 0.0, 1.0), t
 
 
 def cable_directions(robot: PlatformRobot, position: Array, rotation: Array) -> Array:

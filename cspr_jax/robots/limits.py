@@ -1,9 +1,25 @@
-"""Limits of a robot beyond taut cables: data only."""
+"""Limits of a robot beyond taut cables, and what is uncertain about it: data only."""
 
 import dataclasses
 
 import jax
 from jax import Array
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Uncertainty:
+    """Uncertainty of a robot, for all of which a motion is to be feasible.
+
+    Fields:
+        spool_positions: () radius of the ball around each spool that holds it, m.
+        mass_centre: () radius of the ball around the mass centre that holds it, platform axes, m; 0 of a point mass.
+        mass_factor: () from 1 on; the mass, and with it the inertia, is between 1 / factor and factor times its value.
+    """
+
+    spool_positions: Array | float = 0.0
+    mass_centre: Array | float = 0.0
+    mass_factor: Array | float = 1.0
 
 
 @jax.tree_util.register_dataclass
@@ -18,6 +34,7 @@ class Limits:
         cable_length_max: (n_cables,) m.
         cable_speed_max: (n_cables,) m/s, of paying out and of winding in.
         cable_acceleration_max: (n_cables,) m/s^2, of either sign.
+        uncertainty: for all of which limits are to be met and cables taut.
     """
 
     tension_min: Array | None = None
@@ -26,6 +43,7 @@ class Limits:
     cable_length_max: Array | None = None
     cable_speed_max: Array | None = None
     cable_acceleration_max: Array | None = None
+    uncertainty: Uncertainty | None = None
 
 
 NO_LIMITS = Limits()

@@ -24,6 +24,7 @@ class Family:
             function.
         any_cables: patterns of the robots that may have more cables than degrees of freedom.
         is_line: whether its motions are straight lines, in the least time of their law.
+        knows_uncertainty: whether its motions are judged by all of an uncertainty.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Family:
     rests_anywhere: bool = False
     any_cables: tuple[str, ...] = ()
     is_line: bool = False
+    knows_uncertainty: bool = False
 
     def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.
@@ -59,18 +61,21 @@ _ROWS = (
         "standard hypocycloids between any poses (thesis chapter 2)",
         {"3T": _LEGS.format("hypocycloids:Hypocycloids"), "3R3T": _LEGS.format("platform_poses:StandardPoses")},
         any_cables=("3R3T",),
+        knows_uncertainty=True,
     ),
     Family(
         "transition",
         "from rest to a target, swings at it, and back to rest (1)",
         {"2T": _LEGS.format("transitions:Transitions"), "3T": _LEGS.format("transitions:Transitions")},
         free_end=True,
+        knows_uncertainty=True,
     ),
     Family(
         "hypocycloid",
         "hypocycloids of variable amplitude (3), for platforms",
         {"3R3T": _LEGS.format("platform_poses:VariablePoses")},
         any_cables=("3R3T",),
+        knows_uncertainty=True,
     ),
     *(
         Family(

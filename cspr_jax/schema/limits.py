@@ -5,6 +5,40 @@ from typing import Literal
 
 from cspr_jax.schema.verdicts import Verdict
 
+# Multiples of an uncertainty are not followed further.
+LARGEST_MULTIPLE = 1000.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Uncertain:
+    """A part of the uncertainty of a robot.
+
+    Fields:
+        name: key in files, and field of `robots.limits.Uncertainty`.
+        unit: of it.
+        least: smallest value, of a robot without this uncertainty.
+        largest: largest value.
+        description: for the reference.
+    """
+
+    name: str
+    unit: str
+    least: float
+    largest: float
+    description: str
+
+    @property
+    def allowed(self) -> str:
+        """Allowed values, in words."""
+        return f"a number from {self.least:g} to {self.largest:g}"
+
+
+UNCERTAINTIES = (
+    Uncertain("spool_positions", "m", 0.0, 1e6, "every spool is within this distance of its place"),
+    Uncertain("mass_centre", "m", 0.0, 1e6, "platform: the mass centre is within this distance of its place"),
+    Uncertain("mass_factor", "1", 1.0, 1e6, "the mass is between 1 / factor and factor times the robot's; inertia too"),
+)
+
 
 @dataclasses.dataclass(frozen=True)
 class Limit:

@@ -82,12 +82,14 @@ class MapKind:
         return getattr(importlib.import_module(module), name)
 
 
+_TOLERATED = ("tolerated", "not_tolerated")
+_UNCERTAIN = (("limits.uncertainty", _TOLERATED),)
 _COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
 _OF_TRANSITIONS = ("least_oscillations", "inclination_gain", "used_inclination", "used_z0")
 _OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
 _OF_POSES = (
     *("arcs", "tried_arcs", "verdict", "duration", "margin", "margin_bound", "det_margin", "cable_distance"),
-    *("limit_margin", "refuted_at", "beta_hat"),
+    *("limit_margin", "refuted_at", "beta_hat", *_TOLERATED),
 )
 _POSES_STORED = ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat")
 _OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
@@ -126,21 +128,25 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Smallest number of arcs",
             description="smallest number of arcs to each target",
             implementation="cspr_jax.maps.arcs:MinimumArcsMap",
-            quantities=("arcs", "tried_arcs", *_COMMON),
+            quantities=("arcs", "tried_arcs", *_COMMON, *_TOLERATED),
             stored=("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
             pictured=("arcs",),
             families=("hypocycloid-standard",),
             patterns=("3T",),
             start="point",
             needs=("axes.z0",),
-            takes=("axes.from_x", "axes.from_y", "axes.from_z", "limits"),
+            takes=("axes.from_x", "axes.from_y", "axes.from_z", "limits", "limits.uncertainty"),
+            stored_with=_UNCERTAIN,
         ),
         MapKind(
             name="minimum-oscillations",
             title="Smallest number of oscillations",
             description="smallest number of oscillations of a transition from rest to each target",
             implementation="cspr_jax.maps.oscillations:MinimumOscillationsMap",
-            quantities=("oscillations", "tried_oscillations", "envelope_oscillations", *_OF_TRANSITIONS, *_COMMON),
+            quantities=(
+                *("oscillations", "tried_oscillations", "envelope_oscillations", *_OF_TRANSITIONS, *_COMMON),
+                *_TOLERATED,
+            ),
             stored=(
                 *("oscillations", "envelope_oscillations", "least_oscillations", "verdict", "duration", "margin"),
                 *("inclination_gain", "used_inclination", "used_z0"),
@@ -148,7 +154,8 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("oscillations",),
             families=("transition",),
             patterns=("2T", "3T"),
-            takes=("limits",),
+            takes=("limits", "limits.uncertainty"),
+            stored_with=_UNCERTAIN,
             one_of=_DEPTHS,
         ),
         MapKind(
@@ -180,8 +187,9 @@ MAP_KINDS: dict[str, MapKind] = {
             needs=("axes.z0",),
             takes=(
                 *("axes.tilt_azimuth", "axes.tilt", "axes.torsion", "trajectory.beta_hat", "trajectory.beat"),
-                "limits",
+                *("limits", "limits.uncertainty"),
             ),
+            stored_with=_UNCERTAIN,
         ),
         MapKind(
             name="orientations",
@@ -193,7 +201,8 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("arcs",),
             families=_OF_PLATFORMS,
             patterns=("3R3T",),
-            takes=("axes.z0", "orientations", "orientations.values", "limits"),
+            takes=("axes.z0", "orientations", "orientations.values", "limits", "limits.uncertainty"),
+            stored_with=_UNCERTAIN,
             definitions=("grid",),
             is_over_orientations=True,
         ),
@@ -222,7 +231,7 @@ MAP_KINDS: dict[str, MapKind] = {
             motionless=_OF_PLACES,
             families=_OF_PLATFORMS,
             patterns=("3R3T",),
-            takes=("axes.z0", "orientations", "orientations.values", "limits"),
+            takes=("axes.z0", "orientations", "orientations.values", "limits", "limits.uncertainty"),
             cells=16,
         ),
         MapKind(

@@ -5,6 +5,7 @@ from collections import ChainMap
 import numpy as np
 
 from cspr_jax.errors import InputError
+from cspr_jax.schema.limits import LARGEST_MULTIPLE
 from cspr_jax.schema.motion_quantities import FLIGHT, HOW, MARGIN, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.pose_quantities import POSES
 from cspr_jax.schema.quantity import Quantity
@@ -97,6 +98,21 @@ QUANTITIES = {
             "smallest slack of the limits",
             "Smallest dimensionless slack of the limits given; infinite where none is. Point masses and platforms have "
             "formulas of their own (docs/theory.md), equal in sign alone.",
+        ),
+        Quantity(
+            "tolerated",
+            "1",
+            "tolerated multiple of the uncertainty",
+            "Largest multiple of `limits.uncertainty` found within which the motion of `tried_arcs` is proved feasible "
+            f"for every robot; at most {LARGEST_MULTIPLE:g}, 0 where nothing is proved; NaN where the motion is not "
+            "feasible as planned.",
+        ),
+        Quantity(
+            "not_tolerated",
+            "1",
+            "multiple of the uncertainty not tolerated",
+            "Smallest multiple of `limits.uncertainty` found within which the motion of `tried_arcs` is refuted for "
+            "some robot; infinite where none was found; NaN where the motion is not feasible as planned.",
         ),
         Quantity(
             "oscillations",

@@ -29,6 +29,7 @@ class Verdict(enum.IntFlag):
     NOT_ACCESSIBLE = 16384
     WRENCH_INFEASIBLE = 32768
     OBSTACLE = 65536
+    UNCERTAINTY = 131072
 
     @property
     def text(self) -> str:
@@ -56,4 +57,5 @@ SENTENCES = {
     Verdict.NOT_ACCESSIBLE: "No way leads there from the reference orientation without interference or singularity.",
     Verdict.WRENCH_INFEASIBLE: "Within their limits of tension the cables cannot supply a wrench that they must.",
     Verdict.OBSTACLE: "A cable or the platform touches an obstacle.",
+    Verdict.UNCERTAINTY: "Feasible for the robot as it is described, but not for every robot within its uncertainty.",
 }

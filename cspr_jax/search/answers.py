@@ -16,8 +16,10 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.point_mass import criteria
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, prove
+from cspr_jax.feasibility.point_mass.enclosures import tolerated_by_point_masses
 from cspr_jax.feasibility.point_mass.margins import margins
 from cspr_jax.feasibility.problem import Problem
+from cspr_jax.feasibility.tolerances import Tolerated
 from cspr_jax.schema.labelled import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.trajectories import hypocycloid
@@ -43,6 +45,8 @@ class Answers(Columns):
         margin_bound: (n,) proved lower bound of the same; NaN where nothing is proved, as on more than six cables.
         limit_margin: (n,) smallest slack of the limits; inf where none is given.
         feasible_at_infinity: (n,) left-hand side of (2.55).
+        tolerated: (n,) largest multiple of the uncertainty that the motion is proved to stand; NaN where none is given.
+        not_tolerated: (n,) smallest one found that it does not.
     """
 
     arcs: np.ndarray
@@ -53,6 +57,8 @@ class Answers(Columns):
     margin_bound: np.ndarray
     limit_margin: np.ndarray
     feasible_at_infinity: np.ndarray
+    tolerated: np.ndarray
+    not_tolerated: np.ndarray
 
     @property
     def feasible(self) -> np.ndarray:
@@ -128,17 +134,21 @@ def decided(
     chosen = pick(parities, np.arange(len(smallest)), tried)
     duration = in_batches(_durations, (chosen, tried.astype(float)), size=BATCH)
     none = np.flatnonzero(smallest == 0)
+    is_feasible = smallest > 0
     if len(none):
-        bound[none] = prove(problem, pick(parities, none, tried[none]), tried[none]).bound[:, :2].min(1)
+        proof = prove(problem, pick(parities, none, tried[none]), tried[none])
+        bound[none], is_feasible[none] = proof.bound[:, :2].min(1), proof.feasible
+    multiples = _tolerated(problem, chosen, tried, np.flatnonzero(is_feasible))
     answers = Answers(
         smallest,
         tried,
-        _verdicts(problem, smallest, doubtful, slack),
+        _verdicts(problem, smallest, doubtful, slack, multiples),
         duration,
         slack[:, :2].min(1),
         bound,
         slack[:, 2:].min(1, initial=np.inf),
         infinity,
+        *multiples,
     )
     return answers, chosen
 
@@ -221,9 +231,14 @@ def _search(
         if not len(rows):
             continue
         proof = prove(problem, pick(parities, rows, arcs), arcs)
-        smallest[rows[proof.feasible]] = arcs[proof.feasible]
+        is_feasible, is_refuted = proof.feasible.copy(), proof.infeasible.copy()
+        if problem.limits.uncertainty is not None:
+            some = np.flatnonzero(is_feasible)
+            found = tolerated_by_point_masses(problem, pick(parities, rows[some], arcs[some]), arcs[some], whole=False)
+            is_feasible[some], is_refuted[some] = found.proved >= 1.0, found.refuted <= 1.0
+        smallest[rows[is_feasible]] = arcs[is_feasible]
         bound[rows] = proof.bound[:, :2].min(1)
-        doubtful[rows[~proof.feasible & ~proof.infeasible]] = True
+        doubtful[rows[~is_feasible & ~is_refuted]] = True
         alive[rows, arcs - 1] = False
 
 
@@ -248,8 +263,20 @@ def _best(
         best[rows[better]] = candidate.min(1)[better]
 
 
-def _verdicts(problem: Problem, smallest: np.ndarray, doubtful: np.ndarray, slack: np.ndarray) -> np.ndarray:
-    broken = np.zeros(len(smallest), FLAGS)
+def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, which: np.ndarray) -> Tolerated:
+    # Of all segments, of which some are feasible as they are planned; NaN of the others, and without an uncertainty.
+    every = Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
+    if problem.limits.uncertainty is not None and len(which):
+        some = jax.tree.map(lambda leaf: np.asarray(leaf)[which], segments)
+        for own, found in zip(every, tolerated_by_point_masses(problem, some, arcs[which]), strict=True):
+            own[which] = found
+    return every
+
+
+def _verdicts(
+    problem: Problem, smallest: np.ndarray, doubtful: np.ndarray, slack: np.ndarray, multiples: Tolerated
+) -> np.ndarray:
+    broken = np.where(multiples.refuted <= 1.0, Verdict.UNCERTAINTY.value, 0).astype(FLAGS)
     for flag, column in zip(criteria.flags(problem.limits), slack.T, strict=True):
         broken |= np.where(column <= 0.0, flag.value, 0).astype(FLAGS)
     broken |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(FLAGS)

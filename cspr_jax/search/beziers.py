@@ -106,7 +106,8 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
     """
     motions = segments.motions
     own, count = verdicts(problem, motions), len(motions.time)
-    none, intervals = np.zeros(count, int), np.empty(count, object)
+    none, nothing = np.zeros(count, int), np.full(count, np.nan)
+    intervals = np.empty(count, object)
     intervals[:] = segments.taut_durations
     return BezierAnswers(
         none,
@@ -116,9 +117,8 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
         own.margin,
         own.bound,
         own.room,
-        np.full(count, np.nan),
+        *(nothing, nothing, nothing),
         np.stack([motions.start, motions.middle, motions.end], axis=1),
         intervals,
-        np.full(count, np.nan),
-        np.full(count, np.nan),
+        *(np.full(count, np.nan) for _ in range(2)),
     )

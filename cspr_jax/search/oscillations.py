@@ -206,7 +206,8 @@ def minimum_oscillations(
     allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
     parities, wanted = {0: segments, 1: segments}, only(upper, arcs)
     if steady is None:
-        known = None if given(problem.limits) else _known(problem, segments, (weights, v), allowed)
+        is_plain = not given(problem.limits) and problem.limits.uncertainty is None
+        known = _known(problem, segments, (weights, v), allowed) if is_plain else None
         answers, _ = decided(problem, parities, wanted, infinity, known=known, measure=transition_margins)
     else:
         answers, _ = decided(problem, parities, wanted, infinity)

@@ -92,6 +92,8 @@ def settled(
         margin_bound=checks.bound,
         limit_margin=checks.slack[:, 3:].min(1, initial=np.inf),
         feasible_at_infinity=nothing,
+        tolerated=checks.tolerated,
+        not_tolerated=checks.not_tolerated,
         beta_hat=beta_hats,
         det_margin=checks.slack[:, 1],
         cable_distance=checks.gap,

@@ -209,6 +209,5 @@ class RedundantChecker(MotionChecker):
             np.where(is_finite, verdict, Verdict.NOT_FINITE.value),
             np.where(is_finite[:, None], slacks, np.nan),
             np.where(is_finite, nearest, np.nan),
-            np.full(len(margin), np.nan),
-            np.full(len(margin), np.nan),
+            *(np.full(len(margin), np.nan) for _ in range(4)),
         )

@@ -59,6 +59,8 @@ def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400)
         margin_bound=np.full(len(motions), np.nan),
         limit_margin=slack[:, is_limit].min(1, initial=np.inf),
         feasible_at_infinity=np.full(len(motions), np.nan),
+        tolerated=np.full(len(motions), np.nan),
+        not_tolerated=np.full(len(motions), np.nan),
     )
 
 

@@ -84,7 +84,7 @@ def timed_lines(
         own.margin,
         own.bound,
         own.room,
-        nothing,
+        *(nothing, nothing, nothing),
         np.where(moves, found.ratio, 0.5) * duration,
         np.where(moves, found.least, np.nan),
         np.stack([np.where(moves, x + 1, 0) for x in (found.up, found.down)], axis=1),

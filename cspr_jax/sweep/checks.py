@@ -18,7 +18,7 @@ _SPECIAL = (
     *(f"axes.{name}" for name in Axes.model_fields if name not in _TARGETS),
     *("trajectory.inclination", "trajectory.beta_hat", "trajectory.beat"),
     *("trajectory.max_acceleration", "trajectory.rule"),
-    *("limits", "orientations", "orientations.values", "launch", "workspace"),
+    *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace"),
 )
 # More kinds than these are no hint.
 _FEW = 3

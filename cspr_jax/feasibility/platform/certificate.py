@@ -19,9 +19,9 @@ import numpy as np
 
 from cspr_jax.arithmetic import chebyshev
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.platform.blocks import Blocks, parts_of_arcs
+from cspr_jax.feasibility.blocks import Blocks, parts_of_arcs
 from cspr_jax.feasibility.platform.motions import rows
-from cspr_jax.feasibility.platform.tension_blocks import BlockBounds, of_motion, tension_blocks
+from cspr_jax.feasibility.platform.tension_blocks import BlockBounds, of_motion, tension_blocks, tension_ranges
 from cspr_jax.feasibility.platform.work_list import TOLERANCE, Looked, WorkList
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
@@ -63,6 +63,7 @@ class _Order(NamedTuple):
     # The same robot, its cables in another order, and the sign that this gives to determinants.
     problem: Problem
     sign: float
+    cables: list[int]
 
 
 class Certifier:
@@ -134,12 +135,44 @@ class Certifier:
         Returns:
             the bounds, NumPy arrays.
         """
+        problem, items = self._items(order, blocks, motions)
+        kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins)
+        return in_batches(kernel, items, size=self._batch, axis=-1)
+
+    def _items(self, order: int, blocks: Blocks, motions) -> tuple[Problem, tuple]:
+        # The robot with its cables in an order, and its blocks as kernels take them.
         segments, arcs, standing = motions
-        problem, sign = self._orders[order]
+        problem, sign, _ = self._orders[order]
         self._count(len(blocks.row) * (chebyshev.DEGREE + 1))
         own = rows(segments, blocks.row), arcs[blocks.row].astype(float), sign * standing[blocks.row]
-        kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins)
-        return in_batches(kernel, (*own, blocks.start, blocks.stop), size=self._batch, axis=-1)
+        return problem, (*own, blocks.start, blocks.stop)
+
+    def ranges(self, blocks: Blocks, segments: PoseSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Ranges of the tensions on blocks.
+
+        Args:
+            blocks: k of them.
+            segments: leaves (n, ...), of the parity of `arcs`.
+            arcs: (n,).
+
+        Returns:
+            (k, n_cables) proved lower and upper bounds, per mass and length, over those of equal ones at rest in P0.
+        """
+        motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
+        count = len(blocks.row)
+        low, high = np.full((count, CABLES), -np.inf), np.full((count, CABLES), np.inf)
+        which = np.arange(count)
+        for k, order in enumerate(self._orders):
+            problem, items = self._items(k, blocks.some(which), motions)
+            kernel = partial(tension_ranges, problem._replace(limits=Limits()), np.ones(()), kind=self._kind)
+            found = in_batches(kernel, items, size=self._batch, axis=-1)
+            own = np.ix_(which, np.array(order.cables))
+            low[own], high[own] = np.fmax(low[own], found.low.T), np.fmin(high[own], found.high.T)
+            # As in `_looked_at`, where the first three cables lie nearly in one plane.
+            which = which[found.rounding > 0.25 * TOLERANCE]
+            if not len(which):
+                break
+        return low, high
 
 
 def _orders(problem: Problem) -> list[_Order]:
@@ -155,7 +188,7 @@ def _orders(problem: Problem) -> list[_Order]:
     for three in threes[: ORDERS - 1]:
         others = [k for k in range(CABLES) if k not in three]
         every.append([k for pair in zip(three, others, strict=True) for k in pair])
-    return [_Order(_reordered(problem, order), _sign(order)) for order in every]
+    return [_Order(_reordered(problem, order), _sign(order), order) for order in every]
 
 
 def _sign(order: list[int]) -> float:

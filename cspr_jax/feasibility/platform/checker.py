@@ -15,6 +15,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.platform.certificate import Certifier, TensionProof
+from cspr_jax.feasibility.platform.enclosures import Robustness
 from cspr_jax.feasibility.platform.end_acceleration import endpoint
 from cspr_jax.feasibility.platform.kernels import slacks_at
 from cspr_jax.feasibility.platform.margins import Samples, narrowed
@@ -65,6 +66,9 @@ class PoseChecker(MotionChecker):
         self.prefilter = Prefilter(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
         self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._places = PlaceCertifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+        self._robustness = None
+        if problem.limits.uncertainty is not None:
+            self._robustness = Robustness(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
         self._allowed = allowance(np.arange(len(self.flags)) >= len(flags(Limits())))
         # Where each criterion is among those that depend on the motion, and then those that depend on the pose alone.
@@ -111,10 +115,24 @@ class PoseChecker(MotionChecker):
             samples = _samples(moving, tensions, some), _samples(still, places, np.arange(len(some)))
             self._narrow(least, part, samples, np.logical_or(whole, is_proved))
         verdict = self._verdict(least[:-1], is_proved, places)
+        if self._robustness is not None:
+            self._weigh(checks, some, part, verdict, whole=margins)
         checks.verdict[some] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
         checks.slack[some] = np.where(is_finite, least[:-1], np.nan).T
         checks.gap[some] = np.where(is_finite, least[-1], np.nan)
         return checks
+
+    def _weigh(
+        self, checks: PoseChecks, some: np.ndarray, motions: Motions, verdict: np.ndarray, *, whole: bool
+    ) -> None:
+        # Judges motions that are feasible as they are planned by all robots within the uncertainty.
+        which = np.flatnonzero(verdict == Verdict.FEASIBLE)
+        if self._robustness is None or not len(which):
+            return
+        found = self._robustness.tolerated(*motions.rows(which), whole=whole)
+        checks.tolerated[some[which]], checks.not_tolerated[some[which]] = found
+        open_ones = np.where(found.refuted <= 1.0, Verdict.UNCERTAINTY.value, Verdict.UNDECIDED.value)
+        verdict[which] = np.where(found.proved >= 1.0, Verdict.FEASIBLE.value, open_ones)
 
     def _verdict(self, least: np.ndarray, is_proved: np.ndarray, places: PlaceProof) -> np.ndarray:
         # What is broken for certain is said alone.

@@ -31,6 +31,8 @@ class PoseChecks:
             is proved.
         instant: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a small
             step of it); NaN where it is not, or was only sampled.
+        tolerated: (n,) multiple of the uncertainty that it is proved to stand; NaN where none is given.
+        not_tolerated: (n,) one that it does not.
     """
 
     verdict: np.ndarray
@@ -38,6 +40,8 @@ class PoseChecks:
     gap: np.ndarray
     bound: np.ndarray
     instant: np.ndarray
+    tolerated: np.ndarray
+    not_tolerated: np.ndarray
 
     def put(self, which: np.ndarray, others: "PoseChecks") -> None:
         """Write others into it.
@@ -138,7 +142,7 @@ class MotionChecker(abc.ABC):
         Returns:
             verdicts 0, the rest NaN.
         """
-        numbers = [np.full(count, np.nan) for _ in ("gap", "bound", "instant")]
+        numbers = [np.full(count, np.nan) for _ in range(5)]
         return PoseChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
 
     @abc.abstractmethod

@@ -108,12 +108,12 @@ def place_blocks(
     ]
     seen = turning * (jnp.sqrt(largest(away)) + half * bounds.speed) + bounds.bend + 2.0 * bounds.omega * bounds.speed
     bends = stored(_Bends(bounds.bend * share, turning * share, seen * share), one)
-    gaps, residuals = _separators(problem.robot, platform, pairs, stored((wires, here.turn), one))
+    gaps, left = _separators(problem.robot, platform, pairs, stored((wires, here.turn), one))
 
     def on(place):
         now, lines = at(place)
         apart = _apart(problem.robot, pairs, gaps, lines, bends)
-        away = zip(residuals, contact_lanes.cable_directions(lines, now.turn), strict=True)
+        away = zip(left, contact_lanes.cable_directions(lines, now.turn), strict=True)
         clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
         values = _slacks(problem, segments, now, lines)
         if margins and pairs:
@@ -140,12 +140,12 @@ def _separators(robot: PlatformRobot, platform, pairs: tuple, middle) -> tuple[l
     # Unit vectors between cables, one a pair, and off the sectors, one a cable. As arrays: once a block, little code.
     wires, turn = middle
     rays, seen = contact_lanes.as_arrays(wires.rays, contact_lanes.cable_directions(wires, turn))
-    residuals = _lanes(_residuals(platform, seen))
+    left = _lanes(residuals(platform, seen))
     if not pairs:
-        return [], residuals
+        return [], left
     i, j = (np.array([pair[k] for pair in pairs]) for k in range(2))
     base = robot.base_points
-    return _lanes(between(base[i][None], rays[:, i], base[j][None], rays[:, j])), residuals
+    return _lanes(between(base[i][None], rays[:, i], base[j][None], rays[:, j])), left
 
 
 def _lanes(vectors: Array) -> list[Vector]:
@@ -155,8 +155,16 @@ def _lanes(vectors: Array) -> list[Vector]:
     return [tuple(columns[k, i] for i in range(3)) for k in range(columns.shape[0])]
 
 
-def _residuals(platform, seen: Array) -> Array:
-    # What is left of vectors (n, n_cables, 3) after their projection onto the sectors of their corners.
+def residuals(platform, seen: Array) -> Array:
+    """What is left of cables after their projection onto the sectors of their corners.
+
+    Args:
+        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
+        seen: (n, n_cables, 3) from the platform, platform axes, m.
+
+    Returns:
+        (n, n_cables, 3) m; they are normal to the projections, and as long as the distances.
+    """
     sides, normal = platform
     height = jnp.sum(seen * normal[None, None], axis=2, keepdims=True)
     up = height * normal[None, None]

@@ -13,7 +13,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.platform.blocks import Blocks, parts_of_arcs
+from cspr_jax.feasibility.blocks import Blocks, parts_of_arcs
 from cspr_jax.feasibility.platform.meetings import Cables, cables_hit, cables_meet
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.feasibility.platform.place_blocks import STEPS, PlaceBounds, of_pose, place_blocks

@@ -97,6 +97,66 @@ def tension_blocks(problem: Problem, one: Array, items, *, kind: Kind, margins: 
     Returns:
         the bounds.
     """
+    found = _taken(problem, one, items, kind=kind, margins=margins)
+    # What margins alone need comes last, and is not bounded.
+    count = found.rests.shape[0]
+    nodes, bound = _bounds(problem, found.block, found.values[:, :count], found.rests)
+    if margins:
+        nodes[1] = found.values[:, count]
+    return BlockBounds(jnp.stack(nodes, axis=1), jnp.stack(bound), jnp.max(found.rounding[:CABLES], axis=0))
+
+
+class TensionRange(NamedTuple):
+    """Tensions on n blocks, per mass and length, over those of six equal cables at rest in P0.
+
+    Fields:
+        low: (n_cables, n) proved lower bounds.
+        high: (n_cables, n) proved upper bounds; infinite where the determinant may vanish.
+        rounding: (n,) as in `BlockBounds`.
+    """
+
+    low: Array
+    high: Array
+    rounding: Array
+
+
+@partial(jax.jit, static_argnames="kind")
+def tension_ranges(problem: Problem, one: Array, items, *, kind: Kind) -> TensionRange:
+    """Ranges of the tensions of each cable on blocks.
+
+    Args:
+        problem: robot, limits, amplitude.
+        one: () the number 1; see `arithmetic.lanes.stored`.
+        items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start (n,) and stop (n,), with
+            no knot inside.
+        kind: of the motions.
+
+    Returns:
+        the ranges.
+    """
+    found = _taken(problem, one, items, kind=kind, margins=False)
+    low, high = (_coefficients(found.values) + sign * found.rests[None] for sign in (-1.0, 1.0))
+    regular = low[:, REGULAR, None], high[:, REGULAR, None]
+    least, most = ratio(low[:, :CABLES], regular), ratio(-high[:, :CABLES], regular)
+    return TensionRange(jnp.min(least, axis=0), -jnp.min(most, axis=0), jnp.max(found.rounding[:CABLES], axis=0))
+
+
+def _coefficients(values: Array) -> Array:
+    # Bernstein coefficients of polynomials through values (m, n_values, n) at the nodes.
+    matrix = jnp.asarray(chebyshev.bernstein())
+    return (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
+
+
+class _Taken(NamedTuple):
+    # Values of blocks at the nodes (m, n_values, n), what polynomials through the first of them leave out (n_rests, n),
+    # and the part of it that is rounding.
+    block: _Block
+    values: Array
+    rests: Array
+    rounding: Array
+
+
+def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool) -> _Taken:
     segments, arcs, regular, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
     block = _Block(segments, squared_duration(segments, arcs), regular, problem.robot.gravity / segments.rate)
@@ -121,14 +181,10 @@ def tension_blocks(problem: Problem, one: Array, items, *, kind: Kind, margins: 
     radii = np.array(chebyshev.RADII)
     ellipses = (np.vstack([chebyshev.semi_axes(radii), [1.0, 0.0]]), np.append(chebyshev.remainders(radii), ROUNDING))
     sizes = jnp.stack(lax.map(on, ellipses), axis=1)
-    # What margins alone need comes last, and is not bounded.
     proved = values[:, : sizes.shape[1]]
     amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
     rounding = sizes[-1] * amplified[None] + COEFFICIENTS * jnp.max(jnp.abs(proved), axis=0)
-    nodes, bound = _bounds(problem, block, proved, jnp.min(sizes[:-1], axis=0) + rounding)
-    if margins:
-        nodes[1] = values[:, sizes.shape[1]]
-    return BlockBounds(jnp.stack(nodes, axis=1), jnp.stack(bound), jnp.max(rounding[:CABLES], axis=0))
+    return _Taken(block, values, jnp.min(sizes[:-1], axis=0) + rounding, rounding)
 
 
 def _values(problem: Problem, block: _Block, here: State, *, margins: bool) -> list[Pair]:
@@ -214,8 +270,7 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
 def _bounds(problem: Problem, block: _Block, values: Array, rests: Array) -> tuple[list[Array], list[Array]]:
     # Smallest slacks at the nodes, (m, n) each, and their lower bounds, (n,) each; `values` (m, n_values, n), `rests`
     # (n_values, n).
-    matrix = jnp.asarray(chebyshev.bernstein())
-    every = (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
+    every = _coefficients(values)
     low, high, share = every - rests[None], every + rests[None], values[:, REGULAR]
     regular = low[:, REGULAR, None], high[:, REGULAR, None]
     nodes = [jnp.min(quotient(values[:, :CABLES], share), axis=1), share]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cspr_jax.feasibility.platform.blocks import Blocks
+from cspr_jax.feasibility.blocks import Blocks
 
 TOLERANCE = 1e-6
 # So many times a block is halved at most, and so many of an arc may be open.

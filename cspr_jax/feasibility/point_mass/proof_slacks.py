@@ -179,7 +179,7 @@ def limit_curvatures(
     if not given(limits):
         return ()
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
-    pace, pull = _pace(segment, arcs, over)
+    pace, pull = pace_bounds(segment, arcs, over)
     eta = row_bounds(segment, arcs, over, segment.tilt)
     length = _length(robot, segment, over, pace, eta)
     depth = row_bounds(segment, arcs, over, segment.plane[2])
@@ -188,8 +188,18 @@ def limit_curvatures(
     return tuple(jnp.max(CLOSED[row.name].curvature(here, getattr(limits, row.name))) for row in given(limits))
 
 
-def _pace(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]:
-    # Bounds of the length of c and of its first two derivatives; the same of its second derivative.
+def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]:
+    """Bounds of how the mass moves over an interval, derivatives in normalised time.
+
+    Args:
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        over: the interval.
+
+    Returns:
+        the bounds, () each: of the distance from P0 and of its first two derivatives, m; of the second derivative and
+        of its first two.
+    """
     ratio, steady, period = oscillation(segment, arcs)
     omega, gain = math.pi * arcs, steady / period
     turn = math.pi * segment.precession

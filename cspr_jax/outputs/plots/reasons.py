@@ -22,6 +22,7 @@ REASONS = {
     Verdict.CABLE_TOO_LONG: ("cable too long", "#8c6d31"),
     Verdict.CABLE_TOO_FAST: ("cable too fast", "#7b4173"),
     Verdict.CABLE_OVER_ACCELERATION: ("cable acceleration", "#bd9e39"),
+    Verdict.UNCERTAINTY: ("not every robot", "#B3CDE3"),
 }
 FEASIBLE_COLOUR = "#009E73"
 

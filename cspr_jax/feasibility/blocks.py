@@ -1,4 +1,4 @@
-"""Blocks of a platform's motions: parts of arcs, cut at the knots of the amplitude function, and halved where open."""
+"""Blocks of motions: parts of arcs, cut at the knots of the amplitude function, and halved where open."""
 
 import itertools
 import math

@@ -1,0 +1,225 @@
+"""Enclosures of a robot on its way: what is known of one block of time, for bounds over robots that differ a little.
+
+NumPy throughout: blocks are few, and the inverse of the structure matrix is LAPACK's. All vectors are in axes in which
+the attachment points do not move, those of the platform; of a point mass these are the fixed ones.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Distances(NamedTuple):
+    """Distances that shrink as spools move, m.
+
+    Fields:
+        bound: (k, m) lower bounds in the middle of each block, along some unit vectors.
+        change: (k, m) by how much these can be less within it.
+        tilt: (k, m) by how much they are more, per displacement, along vectors tilted against spools that move.
+        slope: (k, m) of that tilt, 1/m; bounds are less by the cosine of its angle.
+        swing: (k, m) by how much the tilted ones can be less within a block besides, per displacement.
+        spools: (m,) by how many times the largest displacement of a spool each can shrink.
+        here: (k, l) distances in the middle.
+        here_spools: (k, l) by how many times the displacement these shrink if the spools move as is worst.
+    """
+
+    bound: np.ndarray
+    change: np.ndarray
+    tilt: np.ndarray
+    slope: np.ndarray
+    swing: np.ndarray
+    spools: np.ndarray
+    here: np.ndarray
+    here_spools: np.ndarray
+
+    def hold(self, spools: np.ndarray) -> np.ndarray:
+        """Whether all stay positive within blocks, however spools move: proved.
+
+        Args:
+            spools: (k,) largest displacement, m.
+
+        Returns:
+            (k,).
+        """
+        far = spools[:, None]
+        cosine = np.sqrt(np.maximum(1.0 - (far * self.slope) ** 2, 0.0))
+        low = cosine * self.bound - self.change + far * (self.tilt - self.swing)
+        return ((low > self.spools * far) & (far * self.slope < 1.0)).all(1)
+
+    def fail(self, spools: np.ndarray) -> np.ndarray:
+        """Whether some are lost in the middles of blocks where spools move as is worst.
+
+        Args:
+            spools: (k,) largest displacement, m.
+
+        Returns:
+            (k,).
+        """
+        return (self.here < self.here_spools * spools[:, None]).any(1)
+
+
+class Rates(NamedTuple):
+    """Motion of the attachment points, for rates of cables.
+
+    Fields:
+        velocity: (k, n_cables, 3) in the middle, m/s.
+        acceleration: (k, n_cables, 3) m/s^2.
+        velocity_change: (k, n_cables) by how much it differs at most within the block, m/s.
+        acceleration_change: (k, n_cables) m/s^2.
+    """
+
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    velocity_change: np.ndarray
+    acceleration_change: np.ndarray
+
+
+class Enclosure(NamedTuple):
+    """What is known of k blocks of motions; "in the middle" is at the middle instant.
+
+    Fields:
+        rays: (k, n_cables, 3) from spool to attachment point in the middle, m.
+        arms: (n_cables, 3) attachment points from the mass centre, m; zero of a point mass.
+        force: (k, 3) that the cables supply per mass, in the middle, m/s^2.
+        moment: (k, 3) about the mass centre, per mass, m^2/s^2.
+        whirl: (k, 3, 3) acceleration of points of the platform relative to the mass centre, over their place, 1/s^2.
+        way: (k, n_cables, 3) how far the tangents of the rays lead from the middle to the stop, m.
+        bent: (k, n_cables) by how much rays differ from their tangents at most within the block, m.
+        force_change: (k,) by how much the force does, m/s^2.
+        whirl_change: (k,) 1/s^2.
+        low: (k, n_cables) tensions per mass and length within the block: at least, 1/s^2.
+        high: (k, n_cables) at most.
+        distances: those that shrink.
+        rates: of the attachment points.
+    """
+
+    rays: np.ndarray
+    arms: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+    whirl: np.ndarray
+    way: np.ndarray
+    bent: np.ndarray
+    force_change: np.ndarray
+    whirl_change: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    distances: Distances
+    rates: Rates
+
+    @property
+    def moved(self) -> np.ndarray:
+        """By how much rays differ at most within the block, (k, n_cables) m."""
+        return np.linalg.norm(self.way, axis=2) + self.bent
+
+    def some(self, which: np.ndarray) -> "Enclosure":
+        """Blocks chosen by indices, or by a mask (k,)."""
+        distances = self.distances._replace(
+            **{name: value[which] for name, value in self.distances._asdict().items() if name != "spools"}
+        )
+        rates = Rates(*(x[which] for x in self.rates))
+        own = {
+            name: value[which] for name, value in self._asdict().items() if name not in ("arms", "distances", "rates")
+        }
+        return self._replace(**own, distances=distances, rates=rates)
+
+    def middle(self, mu: np.ndarray) -> "Enclosure":
+        """What is known of the middles alone: blocks without a length.
+
+        Args:
+            mu: (k, n_cables) tensions per mass and length there, 1/s^2.
+
+        Returns:
+            the enclosure.
+        """
+        names = "way", "bent", "force_change", "whirl_change"
+        changes = {name: np.zeros_like(getattr(self, name)) for name in names}
+        still = {name: np.zeros_like(getattr(self.rates, name)) for name in ("velocity_change", "acceleration_change")}
+        nothing = np.zeros_like(self.distances.change)
+        distances = self.distances._replace(change=nothing, swing=nothing)
+        return self._replace(**changes, low=mu, high=mu, distances=distances, rates=self.rates._replace(**still))
+
+
+def structure(rays: np.ndarray, arms: np.ndarray, *, is_platform: bool) -> np.ndarray:
+    """Structure matrices: the wrenches per mass of tensions per mass and length.
+
+    Args:
+        rays: (k, n_cables, 3) from spool to attachment point, m.
+        arms: (n_cables, 3) m.
+        is_platform: whether moments count.
+
+    Returns:
+        (k, 6 or 3, n_cables).
+    """
+    forces = -rays
+    if not is_platform:
+        return np.swapaxes(forces, 1, 2)
+    return np.swapaxes(np.concatenate([forces, np.cross(arms, forces)], axis=2), 1, 2)
+
+
+class Influence(NamedTuple):
+    """First-order influence of a displaced spool and mass centre on tensions in the middle of k blocks, and lengths.
+
+    With e_j the displacement of spool j and delta that of the mass centre,
+    mu_k changes by -(sum over j of g_kj . e_j mu_j) + h_k . delta.
+
+    Fields:
+        spools: (k, n_cables, n_cables, 3) g_kj, 1/m.
+        across: likewise, the part of g_kj across ray j: along it a displacement changes no tension.
+        centre: (k, n_cables, 3) h_k, 1/(m s^2).
+        forces: (k, n_cables, 3) mu_k for unit forces per mass, 1/m.
+        moments: (k, n_cables, 3) for unit moments per mass, 1/m^2.
+        lengths: (k, n_cables) of the cables, m.
+        mu: (k, n_cables) tensions per mass and length, 1/s^2.
+    """
+
+    spools: np.ndarray
+    across: np.ndarray
+    centre: np.ndarray
+    forces: np.ndarray
+    moments: np.ndarray
+    lengths: np.ndarray
+    mu: np.ndarray
+
+    def some(self, which: np.ndarray) -> "Influence":
+        """Blocks chosen by indices, or by a mask (k,)."""
+        return Influence(*(x[which] for x in self))
+
+
+def influence(known: Enclosure) -> Influence:
+    """Influence in the middle of blocks.
+
+    Args:
+        known: of the blocks.
+
+    Returns:
+        the influence; NaN where the structure matrix is singular.
+    """
+    is_platform = bool(known.arms.any())
+    inverse = inverted(structure(known.rays, known.arms, is_platform=is_platform))
+    forces = inverse[..., :3]
+    moments = inverse[..., 3:] if is_platform else np.zeros_like(forces)
+    spools = forces[:, :, None] + np.cross(moments[:, :, None], known.arms)
+    lengths = np.linalg.norm(known.rays, axis=2)
+    units = known.rays / lengths[..., None]
+    across = spools - np.sum(spools * units[:, None], axis=3, keepdims=True) * units[:, None]
+    centre = forces @ known.whirl + np.cross(known.force[:, None], moments)
+    wrench = np.concatenate([known.force, known.moment], axis=1)[..., None] if is_platform else known.force[..., None]
+    return Influence(spools, across, centre, forces, moments, lengths, (inverse @ wrench)[..., 0])
+
+
+def inverted(matrices: np.ndarray) -> np.ndarray:
+    """Inverses, of tall matrices the pseudo-inverses; NaN where there is none.
+
+    Args:
+        matrices: (k, dof, n).
+
+    Returns:
+        (k, n, dof).
+    """
+    if matrices.shape[1] == matrices.shape[2]:
+        is_regular = np.isfinite(matrices).all((1, 2)) & (np.linalg.det(matrices) != 0.0)
+        safe = np.where(is_regular[:, None, None], matrices, np.eye(matrices.shape[1]))
+        return np.where(is_regular[:, None, None], np.linalg.inv(safe), np.nan)
+    finite = np.isfinite(matrices).all((1, 2))[:, None, None]
+    return np.where(finite, np.linalg.pinv(np.where(finite, matrices, 1.0)), np.nan)
