@@ -1,4 +1,4 @@
-"""The quick tests catch faults: ten are planted, one at a time, in a copy of the package; a test file must then fail.
+"""The quick tests catch faults: some are planted, one at a time, in a copy of the package; a test file must then fail.
 
 Each is a text that stands in one place of the package, what takes its place, and the quick tests that catch it. Who
 changes the text changes it here too.
@@ -56,6 +56,21 @@ FAULTS = {
         "last = jnp.where(odd, rotations.conjugate(last), last)",
         "last = jnp.where(odd, last, rotations.conjugate(last))",
         "test_platform.py::test_motions_are_the_oracle_s",
+    ),
+    "a mass centre that is left out of tolerances": (
+        "return _Reaches(off, np.minimum(known.moved / found.lengths, 1.0), radius * rest)",
+        "return _Reaches(off, np.minimum(known.moved / found.lengths, 1.0), 0.0 * rest)",
+        "test_uncertainty.py",
+    ),
+    "spools that are displaced half as far": (
+        "multiple * float(given.spool_positions),",
+        "0.5 * multiple * float(given.spool_positions),",
+        "test_uncertainty.py",
+    ),
+    "tolerances whose functional is not corrected": (
+        "more, last = (moved + shifted) * (1.0 + SPARE)",
+        "more, last = -(moved + shifted) * (1.0 + SPARE)",
+        "test_uncertainty.py",
     ),
     "a margin that is not refined": ("1.0 / 4.0, 1.0 / 6.0, 7", "1.0 / 4.0, 1.0 / 6.0, 1", "test_margins.py"),
 }

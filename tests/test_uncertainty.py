@@ -20,7 +20,7 @@ from cspr_jax.feasibility.platform.enclosures import Robustness
 from cspr_jax.feasibility.platform.motions import rows as some_of
 from cspr_jax.feasibility.point_mass.enclosures import tolerated_by_point_masses
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.feasibility.uncertainty import demands_of, worst
+from cspr_jax.feasibility.uncertainty import closer_changes, demands_of, deviations, worst
 from cspr_jax.feasibility.uncertainty import tensions as tensions_of
 from cspr_jax.robots.limits import Limits, Uncertainty
 from cspr_jax.robots.point_mass import point_mass_robot
@@ -128,6 +128,59 @@ def test_a_robot_that_refutes_a_multiple_fails_in_the_oracle_too():
         fails.append(mu[k].min() < 0.0)
     # Else what fails are contacts, or the instant is between these.
     assert np.mean(fails) > 0.5
+
+
+@pytest.mark.parametrize(("spools", "centre"), [(0.004, 0.0), (0.0, 0.006), (0.004, 0.006)])
+@pytest.mark.parametrize(("name", "kind"), [("mssm", FROM_REST), ("general", BETWEEN)])
+def test_no_robot_deviates_more_than_is_bounded(name, kind, spools, centre):
+    """At random instants of blocks, feasible motions or not; and the bounds are not far off."""
+    robot, rng = ROBOTS[name], np.random.default_rng(4)
+    drawn = motions_of(rng, robot, kind, 20)
+    segments, arcs = stacked([own[3] for own in drawn]), np.array([own[1] for own in drawn])
+    problem = problem_of(robot, Limits(uncertainty=BALLS))
+    robustness = Robustness(problem, kind, batch=64, count_instants=lambda _: None)
+    blocks = parts_of_arcs(arcs, np.zeros(0), 512)
+    blocks = blocks.some(rng.choice(len(blocks.row), 200, replace=False))
+    known = robustness.enclosure(segments, arcs, blocks)
+    found, sizes = influence(known), [np.full(200, x) for x in (spools, centre)]
+    off = deviations(known, found, *sizes)
+    sound = np.isfinite(off).all(1) & (known.low > 0.0).all(1)
+    # Of each block the largest smallest tensions, as parts of the planned ones, that are proved to be kept.
+    least, most = np.full_like(known.low, -np.inf), np.full_like(known.low, np.inf)
+    for part in np.linspace(0.0, 0.99, 12):
+        tried = part * np.where(sound[:, None], known.low, 0.0)
+        changes = closer_changes(known, found, *sizes, np.where(np.isfinite(off), off, 0.0), tried, upwards=True)
+        kept = sound & (known.low - changes.down > tried).all(1)
+        least[kept] = tried[kept]
+        most = np.where(np.isfinite(changes.up), np.minimum(most, changes.up), most)
+    bad = worst(known, found, demands_of(problem, np.asarray(segments.rate)[blocks.row] / 6))
+    reached = []
+    for k in np.flatnonzero(sound):
+        tau = rng.uniform(blocks.start[k], blocks.stop[k], 4)
+        motion = oracle_motion(robot, drawn[blocks.row[k]], tau)
+        planned = ratios(robot, motion)
+        lengths = np.linalg.norm(oracle.cables(robot, motion.position, motion.rotation), axis=2)
+        assert (planned >= known.low[k] - 1e-9 * known.high[k]).all()
+        assert (planned <= known.high[k] * (1.0 + 1e-9)).all()
+        turn = motion.rotation[0]
+        others = [displaced(robot, on_balls(rng, (6,), spools), on_balls(rng, (), centre)) for _ in range(4)]
+        others += [displaced(robot, spools * bad.spools[i, k] @ turn.T, centre * bad.centre[i, k]) for i in (0, 1)]
+        for other in others:
+            more = np.linalg.norm(oracle.cables(other, motion.position, motion.rotation), axis=2)
+            # Tensions over planned lengths: a spool that moves along its ray changes none.
+            change = ratios(other, motion) * more / lengths - planned
+            slack = (planned + off[k]) * (1.0 / np.sqrt(1.0 - (spools / lengths) ** 2) - 1.0) + 1e-9 * known.high[k]
+            assert (change >= -off[k] - 1e-9 * known.high[k]).all()
+            assert (change <= off[k] + slack).all()
+            reached.append((np.abs(change) / off[k]).max())
+            assert (planned + change >= least[k] - 1e-9 * known.high[k]).all()
+            assert (change <= most[k] + slack).all()
+    # They are not far off.
+    proved = sound & (known.low - off > 0.2 * known.low).all(1)
+    kept = least[proved] / (known.low[proved] - off[proved])
+    assert len(reached) > 200
+    assert np.quantile(reached, 0.9) > 0.5
+    assert np.median(kept) > 0.8
 
 
 def test_verdicts_are_those_of_the_multiples():

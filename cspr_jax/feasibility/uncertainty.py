@@ -24,6 +24,8 @@ from cspr_jax.robots.limits import Limits, Uncertainty
 
 # Of the slacks of taut cables, as in other proofs.
 TOLERANCE = 1e-6
+# Blocks of which nothing is known have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
+UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
 # What solving for a deviation may be wrong by, as a part of it, and of the tensions.
 ROUNDING = 1e-9
 # Rounds in which functionals are corrected, and by how much more than is known to be needed.
@@ -91,9 +93,8 @@ class _Reaches(NamedTuple):
 def _reaches(known: Enclosure, found: Influence, spools: np.ndarray, centre: np.ndarray) -> _Reaches:
     near = found.lengths - known.moved
     share = spools[:, None] / np.where(near > 0.0, near, np.nan)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        # A displaced spool as one that is displaced across its ray alone, at the planned length.
-        off = np.where(share < 1.0, spools[:, None] / np.sqrt(1.0 - share**2), np.nan)
+    # A displaced spool as one that is displaced across its ray alone, at the planned length.
+    off = np.where(share < 1.0, spools[:, None] / np.sqrt(1.0 - share**2), np.nan)
     own, moment, force = (np.linalg.norm(x, axis=2) for x in (found.centre, found.moments, found.forces))
     whirl, radius = np.linalg.norm(known.whirl, axis=(1, 2)) + known.whirl_change, centre[:, None]
     rest = own + force * known.whirl_change[:, None] + moment * (known.force_change + centre * whirl)[:, None]
@@ -114,6 +115,7 @@ def _changes(known: Enclosure, found: Influence, vectors: np.ndarray, far: _Reac
     return np.abs(np.sum(vectors * way, axis=-1)) + whole * bent, off * np.minimum(whole, across + whole * turned)
 
 
+@UNKNOWN
 def deviations(known: Enclosure, found: Influence, spools: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Largest differences between tensions of robots and the planned ones, at the same instant of a block.
 
@@ -144,6 +146,7 @@ class Changes(NamedTuple):
     up: np.ndarray
 
 
+@UNKNOWN
 def closer_changes(
     known: Enclosure,
     found: Influence,
@@ -178,8 +181,7 @@ def closer_changes(
     own = np.eye(displaced.shape[1])[None] * displaced
     rest = np.sum(within * off[:, None], axis=2) + far.centre + ROUNDING * known.high
     down = _largest_sum(known, found, displaced - own, far) + rest + np.sum(own, axis=2) * least
-    with np.errstate(invalid="ignore"):
-        is_valid = (known.low - down > least).all(1)
+    is_valid = (known.low - down > least).all(1)
     up = _largest_sum(known, found, displaced, far) + rest if upwards else np.full_like(down, np.inf)
     return Changes(*(np.where(is_valid[:, None], x, np.inf) for x in (down, up)))
 
@@ -195,8 +197,7 @@ def _largest_sum(known: Enclosure, found: Influence, weights: np.ndarray, far: _
     functional = np.einsum("kij,kjlx->kilx", weights + last, found.spools)
     moved, shifted = _changes(known, found, functional, far)
     total = np.sum((weights + last) * (known.high + far.centre)[:, None] + moved * known.high[:, None], axis=2)
-    with np.errstate(invalid="ignore"):
-        is_valid = (moved + shifted <= last).all(2)
+    is_valid = (moved + shifted <= last).all(2)
     return np.where(is_valid, total, np.inf)
 
 
@@ -207,12 +208,12 @@ def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
     system = np.where(is_finite[:, None, None], np.eye(count) - matrix, np.eye(count))
     system = np.where((np.linalg.det(system) != 0.0)[:, None, None], system, np.eye(count))
     x = np.linalg.solve(system, np.where(is_finite[:, None], rest, 0.0)[..., None])[..., 0] * (1.0 + ROUNDING)
-    with np.errstate(invalid="ignore"):
-        holds = is_finite & (x > 0.0).all(1) & (rest > 0.0).all(1)
-        holds &= ((matrix @ x[..., None])[..., 0] + rest <= x).all(1)
+    holds = is_finite & (x > 0.0).all(1) & (rest > 0.0).all(1)
+    holds &= ((matrix @ x[..., None])[..., 0] + rest <= x).all(1)
     return np.where(holds[:, None], x, np.inf)
 
 
+@UNKNOWN
 def holds(known: Enclosure, found: Influence, asked: Demands, multiple: np.ndarray) -> np.ndarray:
     """Blocks in which every robot within a multiple of the uncertainty meets everything: proved.
 
@@ -257,9 +258,8 @@ def _tensions_hold(known: Enclosure, found: Influence, asked: Demands, some: _Sh
     if limit is None:
         return is_met
     near, far = found.lengths - known.moved, found.lengths + known.moved
-    with np.errstate(invalid="ignore", divide="ignore"):
-        longest = far / np.sqrt(1.0 - np.minimum(some.spools[:, None] / near, 1.0) ** 2)
-        most = (known.high + changes.up) * longest * (asked.mass * some.factor)[:, None]
+    longest = far / np.sqrt(1.0 - np.minimum(some.spools[:, None] / near, 1.0) ** 2)
+    most = (known.high + changes.up) * longest * (asked.mass * some.factor)[:, None]
     return is_met & (most <= limit + _unit(asked)[:, None]).all(1)
 
 
@@ -281,6 +281,7 @@ class Worst(NamedTuple):
     centre: np.ndarray
 
 
+@UNKNOWN
 def worst(known: Enclosure, found: Influence, asked: Demands) -> Worst:
     """Robots that are worst to first order.
 
@@ -301,13 +302,13 @@ def worst(known: Enclosure, found: Influence, asked: Demands) -> Worst:
     high = np.inf if limits.tension_max is None else limits.tension_max / pull
     spools, centre = [], []
     for room, sign in ((found.mu - low, 1.0), (high - found.mu, -1.0)):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            cable = np.argmin(np.nan_to_num(room / change, nan=np.inf), axis=1)
+        cable = np.argmin(np.nan_to_num(room / change, nan=np.inf), axis=1)
         spools.append(sign * unit_vectors(found.across[every, cable] * np.sign(found.mu)[..., None]))
         centre.append(-sign * unit_vectors(found.centre[every, cable]))
     return Worst(np.stack(spools), np.stack(centre))
 
 
+@UNKNOWN
 def fails(known: Enclosure, found: Influence, worst: Worst, asked: Demands, multiple: np.ndarray) -> np.ndarray:
     """Blocks in whose middles one of the worst robots within a multiple of the uncertainty breaks something.
 
