@@ -12,7 +12,9 @@ from support.other_robots import displaced, on_balls, ratios, worst_robot
 from support.platforms import FROM_REST, stacked
 from support.random_motions import ROBOTS, motions_of, problem_of, quintic
 
+from cspr_jax import least_time, load_robot, minimum_arcs
 from cspr_jax.cli import main
+from cspr_jax.errors import InputError
 from cspr_jax.feasibility.blocks import parts_of_arcs
 from cspr_jax.feasibility.enclosures import influence
 from cspr_jax.feasibility.platform.checker import PoseChecker
@@ -436,3 +438,37 @@ def test_families_that_know_no_uncertainty_say_so(tmp_path, capsys):
     code, _, said = plan_of(tmp_path, capsys, family="s-curve", arcs=1, spools=0.001)
     assert code == 2
     assert "uncertainty" in said and "transition" in said
+
+
+def test_numbers_that_are_none_are_refused_from_python():
+    robot = load_robot("prototype")
+    for given in (5, Uncertainty(spool_positions=-0.1), Uncertainty(mass_centre=0.1)):
+        with pytest.raises(InputError, match="uncertainty"):
+            minimum_arcs(robot, [[0.3, 0.0, 1.0]], z0=1.0, limits=Limits(uncertainty=given))
+    hall = load_robot("boralugoda-rectangle")
+    with pytest.raises(InputError, match="must be absent but for the families"):
+        least_time(hall, [[15, 28, 3]], start=[1, 20, 7], limits=Limits(uncertainty=uncertain(spool_positions=0.1)))
+
+
+POSES = """
+schema = 1
+robot = "laval-mssm"
+family = "hypocycloid"
+amplitude = { name = "effective-c3", epsilon = 0.1 }
+z0 = 1.7
+[limits]
+uncertainty = { spool_positions = 0.001, mass_centre = 0.001, mass_factor = 1.1 }
+[[pose]]
+rest = true
+[[pose]]
+position = [0.9, 0.3, 1.7]
+tilt_torsion = [0.3, 0.3, 0.1]
+"""
+
+
+def test_a_plan_of_poses_says_what_it_stands(tmp_path, capsys):
+    file = tmp_path / "plan.toml"
+    file.write_text(POSES, "utf-8")
+    assert main(["plan", str(file), "--json"]) == 0
+    segment = json.loads(capsys.readouterr().out)["segments"][0]
+    assert 1.0 < segment["tolerated"] <= segment["not_tolerated"] < 1.2 * segment["tolerated"]

@@ -54,7 +54,7 @@ def limits_of(
 def _uncertainty(given: Any, at: str) -> Uncertainty:
     values = {}
     for row in UNCERTAINTIES:
-        value = getattr(given, row.name)
+        value = getattr(given, row.name, None)
         number = numbers(f"{at}{row.name}", value, row.allowed)
         if number.shape != () or not row.least <= number <= row.largest:
             raise InputError(f"{at}{row.name}", value, row.allowed)

@@ -75,6 +75,10 @@ def settled(
     segments, checks = segments_with(checker.problem.robot, candidates, tried), smallest.checks
     others = np.flatnonzero(smallest.arcs == 0)
     checks.put(others, checker.check(rows(segments, others), tried[others]))
+    known = np.flatnonzero(~np.isnan(checks.tolerated))
+    found = checker.tolerated(rows(segments, known), tried[known])
+    checks.tolerated[known] = np.maximum(checks.tolerated[known], found.proved)
+    checks.not_tolerated[known] = np.minimum(checks.not_tolerated[known], found.refuted)
     duration = checker.durations(segments, tried)
     beta_hats = np.stack(candidates.beta_hats, axis=1)
     if checker.kind.plain:  # (3.66) has the one that its cosine has

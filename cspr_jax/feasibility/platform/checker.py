@@ -28,6 +28,7 @@ from cspr_jax.feasibility.platform.slacks import flags
 from cspr_jax.feasibility.platform.tension_blocks import of_motion
 from cspr_jax.feasibility.platform.work_list import TOLERANCE, allowance
 from cspr_jax.feasibility.problem import Problem
+from cspr_jax.feasibility.tolerances import Tolerated
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
@@ -115,21 +116,24 @@ class PoseChecker(MotionChecker):
             samples = _samples(moving, tensions, some), _samples(still, places, np.arange(len(some)))
             self._narrow(least, part, samples, np.logical_or(whole, is_proved))
         verdict = self._verdict(least[:-1], is_proved, places)
-        if self._robustness is not None:
-            self._weigh(checks, some, part, verdict, whole=margins)
+        self._weigh(checks, some, part, verdict)
         checks.verdict[some] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
         checks.slack[some] = np.where(is_finite, least[:-1], np.nan).T
         checks.gap[some] = np.where(is_finite, least[-1], np.nan)
         return checks
 
-    def _weigh(
-        self, checks: PoseChecks, some: np.ndarray, motions: Motions, verdict: np.ndarray, *, whole: bool
-    ) -> None:
+    def tolerated(self, segments: PoseSegment, arcs: np.ndarray) -> Tolerated:
+        """Multiples of the uncertainty that motions stand; see `MotionChecker.tolerated`."""
+        if self._robustness is None:
+            return super().tolerated(segments, arcs)
+        return self._robustness.tolerated(segments, arcs)
+
+    def _weigh(self, checks: PoseChecks, some: np.ndarray, motions: Motions, verdict: np.ndarray) -> None:
         # Judges motions that are feasible as they are planned by all robots within the uncertainty.
         which = np.flatnonzero(verdict == Verdict.FEASIBLE)
         if self._robustness is None or not len(which):
             return
-        found = self._robustness.tolerated(*motions.rows(which), whole=whole)
+        found = self._robustness.tolerated(*motions.rows(which), whole=False)
         checks.tolerated[some[which]], checks.not_tolerated[some[which]] = found
         open_ones = np.where(found.refuted <= 1.0, Verdict.UNCERTAINTY.value, Verdict.UNDECIDED.value)
         verdict[which] = np.where(found.proved >= 1.0, Verdict.FEASIBLE.value, open_ones)

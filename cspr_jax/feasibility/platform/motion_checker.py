@@ -9,6 +9,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.problem import Problem
+from cspr_jax.feasibility.tolerances import Tolerated
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment, duration
 
@@ -31,8 +32,9 @@ class PoseChecks:
             is proved.
         instant: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a small
             step of it); NaN where it is not, or was only sampled.
-        tolerated: (n,) multiple of the uncertainty that it is proved to stand; NaN where none is given.
-        not_tolerated: (n,) one that it does not.
+        tolerated: (n,) multiple of the uncertainty that it is proved to stand, 1 or 0 as far as verdicts need it; NaN
+            where none is given, or the motion is not feasible as planned.
+        not_tolerated: (n,) one that it does not, likewise; infinite where none was found.
     """
 
     verdict: np.ndarray
@@ -144,6 +146,18 @@ class MotionChecker(abc.ABC):
         """
         numbers = [np.full(count, np.nan) for _ in range(5)]
         return PoseChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
+
+    def tolerated(self, segments: PoseSegment, arcs: np.ndarray) -> Tolerated:
+        """Multiples of the uncertainty that motions stand, as closely as they can be found.
+
+        Args:
+            segments: leaves (n, ...), of the parity of `arcs`; feasible as they are planned.
+            arcs: (n,).
+
+        Returns:
+            the multiples; NaN where there is no uncertainty.
+        """
+        return Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
 
     @abc.abstractmethod
     def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True, margins: bool = True) -> PoseChecks:
