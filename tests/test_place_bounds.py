@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from oracles import platform as oracle
+from scipy.spatial.transform import Rotation
 from support.platforms import FROM_REST, MSSM, USUAL, Z0, general, limits_of, stacked
 from support.random_motions import BATCH, ROBOTS, drawn, motions_of, problem_of, turned
 
@@ -16,6 +17,8 @@ from cspr_jax.feasibility.platform.place_blocks import STEPS, place_blocks
 from cspr_jax.feasibility.platform.place_certificate import PARTS, PlaceCertifier
 from cspr_jax.robots.interference import contacts
 
+# Spools far from level: the plane through them rises by 80 degrees.
+STEEP = turned(dataclasses.replace(MSSM, base=MSSM.base @ Rotation.from_euler("x", 80, degrees=True).as_matrix().T))
 TIGHT = {"floor": 2.0, "cable_length_max": 3.0}
 FINE = 33
 # The oracle knows only flat platforms.
@@ -88,12 +91,17 @@ def test_bounds_on_blocks_hold(kind):
     assert not broken and clear > 0.3
 
 
+def test_bounds_of_depth_hold_below_steep_spools():
+    """Depth is along the vertical, to a plane whose normal is longer than 1 where its vertical part is 1."""
+    assert not block_breaks(192, 21, FROM_REST, STEEP)[0]
+
+
 @pytest.mark.soak
-@pytest.mark.parametrize("name", list(ROBOTS))
+@pytest.mark.parametrize("name", [*ROBOTS, "steep"])
 @pytest.mark.parametrize("kind", [USUAL, FROM_REST], ids=["between", "from rest"])
 def test_bounds_on_many_blocks_hold(kind, name):
-    """20,000 stretches in all."""
-    assert not block_breaks(5000, 31, kind, ROBOTS[name])[0]
+    """30,000 stretches in all."""
+    assert not block_breaks(5000, 31, kind, (ROBOTS | {"steep": STEEP})[name])[0]
 
 
 def happens_near(robot, segment, p, beta, tau):

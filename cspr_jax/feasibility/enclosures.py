@@ -8,6 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+# By this part of them limits may be touched.
+TOUCHED = 2e-6
+
 
 class Distances(NamedTuple):
     """Distances that shrink as spools move, m.
@@ -110,7 +113,7 @@ class Enclosure(NamedTuple):
     @property
     def moved(self) -> np.ndarray:
         """By how much rays differ at most within the block, (k, n_cables) m."""
-        return np.linalg.norm(self.way, axis=2) + self.bent
+        return largest_moves(self.way, self.bent)
 
     def some(self, which: np.ndarray) -> "Enclosure":
         """Blocks chosen by indices, or by a mask (k,)."""
@@ -138,6 +141,32 @@ class Enclosure(NamedTuple):
         nothing = np.zeros_like(self.distances.change)
         distances = self.distances._replace(change=nothing, swing=nothing)
         return self._replace(**changes, low=mu, high=mu, distances=distances, rates=self.rates._replace(**still))
+
+
+def largest_moves(way: np.ndarray, bent: np.ndarray) -> np.ndarray:
+    """Largest differences of rays from those in the middles of blocks.
+
+    Args:
+        way: (..., 3) how far their tangents lead, m.
+        bent: (...) by how much they differ from these, m.
+
+    Returns:
+        (...) m.
+    """
+    return np.linalg.norm(way, axis=-1) + bent
+
+
+def unit_vectors(vectors: np.ndarray) -> np.ndarray:
+    """Vectors of length 1, or of length 0.
+
+    Args:
+        vectors: (..., 3).
+
+    Returns:
+        (..., 3).
+    """
+    sizes = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(sizes > 0.0, sizes, 1.0)
 
 
 def structure(rays: np.ndarray, arms: np.ndarray, *, is_platform: bool) -> np.ndarray:
@@ -209,13 +238,13 @@ def influence(known: Enclosure) -> Influence:
 
 
 def inverted(matrices: np.ndarray) -> np.ndarray:
-    """Inverses, of tall matrices the pseudo-inverses; NaN where there is none.
+    """Inverses, and of two cables in the plane y = 0, which know no force across it, pseudo-inverses; NaN without any.
 
     Args:
-        matrices: (k, dof, n).
+        matrices: (k, m, n), m = n, or 3 and 2.
 
     Returns:
-        (k, n, dof).
+        (k, n, m).
     """
     if matrices.shape[1] == matrices.shape[2]:
         is_regular = np.isfinite(matrices).all((1, 2)) & (np.linalg.det(matrices) != 0.0)

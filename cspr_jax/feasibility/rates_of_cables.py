@@ -2,11 +2,8 @@
 
 import numpy as np
 
-from cspr_jax.feasibility.enclosures import Enclosure, Influence
+from cspr_jax.feasibility.enclosures import TOUCHED, Enclosure, Influence, unit_vectors
 from cspr_jax.robots.limits import Limits
-
-# By this part of them limits may be touched.
-TOUCHED = 2e-6
 
 
 def rates_hold(known: Enclosure, found: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
@@ -87,16 +84,3 @@ def rates_fail(known: Enclosure, found: Influence, limits: Limits, spools: np.nd
             bend = (np.sum(velocity**2 + rays * acceleration, axis=2) - rate**2) / lengths
             broken |= ((np.abs(rate) > largest[0]) | (np.abs(bend) > largest[1])).any(1)
     return broken
-
-
-def unit_vectors(vectors: np.ndarray) -> np.ndarray:
-    """Vectors of length 1, or of length 0.
-
-    Args:
-        vectors: (..., 3).
-
-    Returns:
-        (..., 3).
-    """
-    sizes = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(sizes > 0.0, sizes, 1.0)

@@ -12,7 +12,7 @@ import numpy as np
 
 from cspr_jax.feasibility.blocks import Blocks
 from cspr_jax.feasibility.enclosures import Enclosure, Influence, influence
-from cspr_jax.feasibility.uncertainty import Demands, Worst, fails, holds, worst
+from cspr_jax.feasibility.uncertainty import Requirements, Worst, fails, holds, worst
 from cspr_jax.schema.limits import LARGEST_MULTIPLE
 
 # Multiples that are tried first, one after the other; then they are divided, down to the first one or less.
@@ -47,7 +47,7 @@ class _Open:
     known: Enclosure
     found: Influence
     worst: Worst
-    asked: Demands
+    asked: Requirements
 
     def some(self, which: np.ndarray) -> "_Open":
         worst = Worst(*(x[:, which] for x in self.worst))
@@ -66,7 +66,7 @@ class _Open:
 
 
 def tolerated(
-    blocks: Blocks, arcs: np.ndarray, asked: Demands, enclose: Callable[[Blocks], Enclosure], *, whole: bool = True
+    blocks: Blocks, arcs: np.ndarray, asked: Requirements, enclose: Callable[[Blocks], Enclosure], *, whole: bool = True
 ) -> Tolerated:
     """Multiples of an uncertainty that motions stand, and that they do not.
 
@@ -163,7 +163,7 @@ def _reachable(now: _Open, wanted: np.ndarray) -> np.ndarray:
     return np.where(least < wanted, _near(least), wanted)
 
 
-def _looked_at(blocks: Blocks, asked: Demands, enclose: Callable[[Blocks], Enclosure]) -> _Open:
+def _looked_at(blocks: Blocks, asked: Requirements, enclose: Callable[[Blocks], Enclosure]) -> _Open:
     known = enclose(blocks)
     found, own = influence(known), dataclasses.replace(asked, slack=asked.slack[blocks.row])
     return _Open(blocks, known, found, worst(known, found, own), own)

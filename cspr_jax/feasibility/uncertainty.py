@@ -17,9 +17,9 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax.feasibility.enclosures import Enclosure, Influence, inverted, structure
+from cspr_jax.feasibility.enclosures import TOUCHED, Enclosure, Influence, inverted, structure, unit_vectors
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.feasibility.rates_of_cables import TOUCHED, rates_fail, rates_hold, unit_vectors
+from cspr_jax.feasibility.rates_of_cables import rates_fail, rates_hold
 from cspr_jax.robots.limits import Limits, Uncertainty
 
 # Of the slacks of taut cables, as in other proofs.
@@ -33,37 +33,39 @@ ROUNDS, SPARE = 8, 0.01
 
 
 @dataclasses.dataclass(frozen=True)
-class Demands:
+class Requirements:
     """What is asked of all robots within an uncertainty.
 
     Fields:
         mass: kg.
         slack: tension per mass and length over the slack of a taut cable, g / (n z0), 1/s^2, one a motion (n,).
-        limits: the limits, NumPy; the uncertainty among them.
+        limits: the limits, NumPy.
+        uncertainty: the uncertainty.
     """
 
     mass: float
     slack: np.ndarray
     limits: Limits
-
-    @property
-    def uncertainty(self) -> Uncertainty:
-        """Uncertainty, which must be given."""
-        given = self.limits.uncertainty
-        return Uncertainty() if given is None else given
+    uncertainty: Uncertainty
 
 
-def demands_of(problem: Problem, slack: np.ndarray) -> Demands:
+def requirements_of(problem: Problem, slack: np.ndarray) -> Requirements:
     """What is asked of all robots within the uncertainty of a problem.
 
     Args:
         problem: robot, and limits with the uncertainty.
-        slack: (n,) as in `Demands`.
+        slack: (n,) as in `Requirements`.
 
     Returns:
-        the demands.
+        the requirements.
+
+    Raises:
+        ValueError: no uncertainty is given.
     """
-    return Demands(float(problem.robot.mass), slack, jax.tree.map(np.asarray, problem.limits))
+    limits = jax.tree.map(np.asarray, problem.limits)
+    if limits.uncertainty is None:
+        raise ValueError("limits of robots within an uncertainty have none")
+    return Requirements(float(problem.robot.mass), slack, limits, limits.uncertainty)
 
 
 class _Share(NamedTuple):
@@ -73,7 +75,7 @@ class _Share(NamedTuple):
     factor: np.ndarray
 
 
-def _share(asked: Demands, multiple: np.ndarray) -> _Share:
+def _share(asked: Requirements, multiple: np.ndarray) -> _Share:
     given = asked.uncertainty
     return _Share(
         multiple * float(given.spool_positions),
@@ -214,7 +216,7 @@ def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 @UNKNOWN
-def holds(known: Enclosure, found: Influence, asked: Demands, multiple: np.ndarray) -> np.ndarray:
+def holds(known: Enclosure, found: Influence, asked: Requirements, multiple: np.ndarray) -> np.ndarray:
     """Blocks in which every robot within a multiple of the uncertainty meets everything: proved.
 
     Args:
@@ -243,7 +245,7 @@ def holds(known: Enclosure, found: Influence, asked: Demands, multiple: np.ndarr
     return is_met & is_taut
 
 
-def _least(known: Enclosure, found: Influence, asked: Demands, some: _Share) -> np.ndarray:
+def _least(known: Enclosure, found: Influence, asked: Requirements, some: _Share) -> np.ndarray:
     # Smallest tensions per mass and length that are allowed within blocks.
     least = np.repeat(TOLERANCE * asked.slack[:, None], found.lengths.shape[1], axis=1)
     limit = asked.limits.tension_min
@@ -253,7 +255,9 @@ def _least(known: Enclosure, found: Influence, asked: Demands, some: _Share) -> 
     return np.maximum(least, (limit - _unit(asked)[:, None]) / (near * (asked.mass / some.factor)[:, None]))
 
 
-def _tensions_hold(known: Enclosure, found: Influence, asked: Demands, some: _Share, changes: Changes) -> np.ndarray:
+def _tensions_hold(
+    known: Enclosure, found: Influence, asked: Requirements, some: _Share, changes: Changes
+) -> np.ndarray:
     is_met, limit = (known.low - changes.down > _least(known, found, asked, some)).all(1), asked.limits.tension_max
     if limit is None:
         return is_met
@@ -263,7 +267,7 @@ def _tensions_hold(known: Enclosure, found: Influence, asked: Demands, some: _Sh
     return is_met & (most <= limit + _unit(asked)[:, None]).all(1)
 
 
-def _unit(asked: Demands) -> np.ndarray:
+def _unit(asked: Requirements) -> np.ndarray:
     # Of tensions, by which limits may be missed: as in proofs of the planned motion.
     return TOUCHED * asked.mass * asked.slack
 
@@ -272,9 +276,9 @@ class Worst(NamedTuple):
     """Robots that are worst to first order in the middles of k blocks, per displacement.
 
     Fields:
-        spools: (2, k, n_cables, 3) unit displacements: of the cable that falls slack first, and of the one that comes
-            to its largest tension first.
-        centre: (2, k, 3) likewise.
+        spools: (1 or 2, k, n_cables, 3) unit displacements: of the cable that falls slack first and, where a largest
+            tension is given, of the one that comes to it first.
+        centre: (1 or 2, k, 3) likewise.
     """
 
     spools: np.ndarray
@@ -282,7 +286,7 @@ class Worst(NamedTuple):
 
 
 @UNKNOWN
-def worst(known: Enclosure, found: Influence, asked: Demands) -> Worst:
+def worst(known: Enclosure, found: Influence, asked: Requirements) -> Worst:
     """Robots that are worst to first order.
 
     Args:
@@ -299,9 +303,11 @@ def worst(known: Enclosure, found: Influence, asked: Demands) -> Worst:
     change += float(given.mass_centre) * np.linalg.norm(found.centre, axis=2)
     limits, pull = asked.limits, asked.mass * found.lengths
     low = 0.0 if limits.tension_min is None else limits.tension_min / pull
-    high = np.inf if limits.tension_max is None else limits.tension_max / pull
+    rooms = [(found.mu - low, 1.0)]
+    if limits.tension_max is not None:
+        rooms.append((np.asarray(limits.tension_max) / pull - found.mu, -1.0))
     spools, centre = [], []
-    for room, sign in ((found.mu - low, 1.0), (high - found.mu, -1.0)):
+    for room, sign in rooms:
         cable = np.argmin(np.nan_to_num(room / change, nan=np.inf), axis=1)
         spools.append(sign * unit_vectors(found.across[every, cable] * np.sign(found.mu)[..., None]))
         centre.append(-sign * unit_vectors(found.centre[every, cable]))
@@ -309,7 +315,7 @@ def worst(known: Enclosure, found: Influence, asked: Demands) -> Worst:
 
 
 @UNKNOWN
-def fails(known: Enclosure, found: Influence, worst: Worst, asked: Demands, multiple: np.ndarray) -> np.ndarray:
+def fails(known: Enclosure, found: Influence, worst: Worst, asked: Requirements, multiple: np.ndarray) -> np.ndarray:
     """Blocks in whose middles one of the worst robots within a multiple of the uncertainty breaks something.
 
     Args:

@@ -5,6 +5,14 @@ import dataclasses
 import numpy as np
 from oracles import platform as oracle
 
+from cspr_jax.robots.limits import Uncertainty
+
+
+def uncertain(**numbers):
+    """An uncertainty; what is not given is certain."""
+    given = {"spool_positions": 0.0, "mass_centre": 0.0, "mass_factor": 1.0} | numbers
+    return Uncertainty(**{name: np.asarray(value) for name, value in given.items()})
+
 
 def on_balls(rng, shape, radius):
     """Vectors (..., 3) of one length."""

@@ -14,18 +14,16 @@ from jax import Array
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.lanes import stored
 from cspr_jax.feasibility.blocks import Blocks, parts_of_arcs
-from cspr_jax.feasibility.enclosures import Distances, Enclosure, Rates
+from cspr_jax.feasibility.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves, unit_vectors
 from cspr_jax.feasibility.platform.certificate import Certifier
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.feasibility.platform.place_blocks import residuals
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.feasibility.rates_of_cables import TOUCHED
 from cspr_jax.feasibility.tolerances import Tolerated, tolerated
-from cspr_jax.feasibility.uncertainty import demands_of
+from cspr_jax.feasibility.uncertainty import requirements_of
 from cspr_jax.robots.interference import between, contacts, nearest
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import CABLES
 from cspr_jax.trajectories.platform_lanes import State, squared_duration, state
 from cspr_jax.trajectories.platform_reach import Reach, instant_beside, middle_of, reach
@@ -75,8 +73,7 @@ def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Ar
 
 class _Middle(NamedTuple):
     # In the middles of k blocks, platform axes and time: rays, their rates (what turns with the platform stands still),
-    # velocity and acceleration of the attachment points (k, 6, 3); force, moment (k, 3) and whirl (k, 3, 3) per mass;
-    # depth below the spools (k,).
+    # velocity and acceleration of the attachment points (k, 6, 3); force, moment (k, 3) and whirl (k, 3, 3) per mass.
     rays: np.ndarray
     pace: np.ndarray
     velocity: np.ndarray
@@ -84,21 +81,19 @@ class _Middle(NamedTuple):
     force: np.ndarray
     moment: np.ndarray
     whirl: np.ndarray
-    depth: np.ndarray
 
 
 class _Within(NamedTuple):
     # How far the tangents of the rays lead to the stops of k blocks (k, 6, 3), and bounds of changes within these: of
-    # rays, velocities and accelerations of the attachment points, of what rays differ from their tangents (k, 6), of
-    # force, whirl and depth (k,).
+    # velocities and accelerations of the attachment points, of what rays differ from their tangents, of rays (k, 6), of
+    # force and whirl (k,).
     way: np.ndarray
-    moved: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
     bent: np.ndarray
+    moved: np.ndarray
     force: np.ndarray
     whirl: np.ndarray
-    depth: np.ndarray
 
 
 def _middle(robot: PlatformRobot, here: State, squared: np.ndarray) -> _Middle:
@@ -126,7 +121,6 @@ def _middle(robot: PlatformRobot, here: State, squared: np.ndarray) -> _Middle:
         acceleration - float(robot.gravity) * turn[:, 2],
         moment,
         whirl,
-        position @ np.asarray(plane_normal(robot)),
     )
 
 
@@ -148,16 +142,16 @@ def _within(robot: PlatformRobot, found: _Middle, moving: _Moving, half: np.ndar
     whirl = (wide.spin / radius + 3.0 * near.omega * near.spin) / squared
     pace = near.speed + arms * near.omega
     pull = near.bend + arms * (near.spin + near.omega**2)
-    steep = jerk + arms * wide.growth * (wide.spin / radius + 2.0 * wide.omega * wide.spin + wide.omega**2 / radius)
+    steep = jerk + arms * wide.growth * (wide.spin + wide.omega**2) / radius
     bent = 0.5 * half**2 * (near.bend + 2.0 * near.omega * near.speed + (near.spin + near.omega**2) * away)
     way = found.pace * (half * time)[..., None]
     return _Within(
         way,
-        np.minimum(half * (near.speed + near.omega * away), np.linalg.norm(way, axis=2) + bent),
         half * (pull + near.omega * pace) / time,
         half * (steep + near.omega * pull) / squared,
         bent,
-        *(half * x for x in (force, whirl, near.speed)),
+        largest_moves(way, bent),
+        *(half * x for x in (force, whirl)),
     )
 
 
@@ -180,15 +174,13 @@ class _Columns:
 
 def _distances(problem: Problem, pairs: tuple, found: _Middle, within: _Within, met) -> Distances:
     robot, (places, gaps, left) = problem.robot, met
-    columns, tips = _Columns(len(found.depth)), np.asarray(robot.platform_points)
+    columns, tips = _Columns(len(found.rays)), np.asarray(robot.platform_points)
     for n, pair in enumerate(pairs):
         _add_gap(columns, gaps[:, n], places[:, n], found, within, tips, pair)
     for k in range(CABLES):
-        height = np.linalg.norm(left[:, k], axis=1)
-        e = left[:, k] / np.where(height > 0.0, height, 1.0)[:, None]
+        e, height = unit_vectors(left[:, k]), np.linalg.norm(left[:, k], axis=1)
         change = np.abs(np.sum(e * within.way[:, k], axis=1)) + within.bent[:, k]
         columns.add(-np.sum(e * found.rays[:, k], axis=1), change, 1.0, height, 1.0)
-    columns.add(found.depth, within.depth[:, 0], 1.0, found.depth, 1.0)
     longest = problem.limits.cable_length_max
     for k, length in enumerate([] if longest is None else np.asarray(longest).tolist()):
         room = length * (1.0 + TOUCHED) - np.linalg.norm(found.rays[:, k], axis=1)
@@ -199,8 +191,7 @@ def _distances(problem: Problem, pairs: tuple, found: _Middle, within: _Within, 
 def _add_gap(columns: _Columns, gaps, places, found: _Middle, within: _Within, tips: np.ndarray, pair) -> None:
     # The distance of two cables, by the four pairs of their ends: seen from the platform the spools alone move.
     i, j = pair
-    gap = np.linalg.norm(gaps, axis=1)
-    e = gaps / np.where(gap > 0.0, gap, 1.0)[:, None]
+    e, gap = unit_vectors(gaps), np.linalg.norm(gaps, axis=1)
     tilt = _tilted(found.rays[:, i], found.rays[:, j], places)
     slope = np.linalg.norm(tilt, axis=1)
     along = [np.sum(e * within.way[:, k], axis=1) for k in pair]
@@ -256,7 +247,7 @@ class Robustness:
             the multiples.
         """
         blocks = parts_of_arcs(arcs, self._knots, PARTS)
-        asked = demands_of(self._problem, np.asarray(segments.rate) / CABLES)
+        asked = requirements_of(self._problem, np.asarray(segments.rate) / CABLES)
         return tolerated(blocks, arcs, asked, partial(self.enclosure, segments, arcs), whole=whole)
 
     def enclosure(self, segments: PoseSegment, arcs: np.ndarray, blocks: Blocks) -> Enclosure:

@@ -220,7 +220,7 @@ def _slacks(problem: Problem, segments: PoseSegment, here: State, wires: Cables)
 def _steps(problem: Problem, segments: PoseSegment, bends: _Bends) -> list[Array]:
     # What these may fall below their values at two instants; a length is convex along the chord of its ray.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
-    steps = [bends.centre / z0]
+    steps = [jnp.sqrt(jnp.sum(plane_normal(robot) ** 2)) * bends.centre / z0]
     factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
     arms = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
     for row in of_pose(problem):

@@ -10,14 +10,13 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.blocks import Blocks, parts_of_arcs
-from cspr_jax.feasibility.enclosures import Distances, Enclosure, Rates
+from cspr_jax.feasibility.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves
 from cspr_jax.feasibility.point_mass.blocks import INTERVALS
 from cspr_jax.feasibility.point_mass.proof_slacks import pace_bounds
 from cspr_jax.feasibility.point_mass.slacks import instant, row_bounds, stretch, taut_bounds
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.feasibility.rates_of_cables import TOUCHED
 from cspr_jax.feasibility.tolerances import Tolerated, tolerated
-from cspr_jax.feasibility.uncertainty import demands_of
+from cspr_jax.feasibility.uncertainty import requirements_of
 from cspr_jax.trajectories.hypocycloid import Segment, duration, motion
 
 # Parts of an arc that are looked at first, and blocks computed at a time.
@@ -95,7 +94,7 @@ def enclosure(problem: Problem, segments: Segment, arcs: np.ndarray, blocks: Blo
     nothing, each = np.zeros(count), (count, n_cables, 3)
     half = 0.5 * (blocks.stop - blocks.start)
     way = (half * in_batches(_durations, items[:2], size=BATCH))[:, None] * known.velocity
-    moved = (np.linalg.norm(way, axis=1) + known.bent)[:, None]
+    moved = largest_moves(way, known.bent)[:, None]
     lengths, longest = np.linalg.norm(known.rays, axis=2), problem.limits.cable_length_max
     room = np.zeros((count, 0)) if longest is None else np.asarray(longest) * (1.0 + TOUCHED) - lengths
     once = np.ones(room.shape)
@@ -134,5 +133,5 @@ def tolerated_by_point_masses(
     """
     blocks = parts_of_arcs(arcs, np.asarray(problem.amplitude.knots), PARTS)
     rates: Any = np.asarray(segments.rate)
-    asked = demands_of(problem, rates / problem.robot.base_points.shape[0])
+    asked = requirements_of(problem, rates / problem.robot.base_points.shape[0])
     return tolerated(blocks, arcs, asked, partial(enclosure, problem, segments, arcs), whole=whole)
