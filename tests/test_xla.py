@@ -110,10 +110,10 @@ def test_commands_set_it_before_they_import_jax(tmp_path, words):
 
 KEEP = """
 import resource, sys
-from cspr_jax import cli
+from cspr_jax.cli.command import warn
 from cspr_jax.runtime import xla
 {before}
-xla.prepare(None, cli._warn)
+xla.prepare(None, warn)
 import jax, jax.numpy as jnp
 found = [jax.jit(lambda x, k=k: jnp.sin(x @ x.T + k).sum())(jnp.ones((20, 20))) for k in range(3)]
 print(float(found[-1]))

@@ -1,0 +1,80 @@
+"""Commands about files to start from, and what there is: import, robots, quantities, examples."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from cspr_jax.cli.command import Command, add_json, add_output, print_json, print_table, warn
+from cspr_jax.errors import ConfigError, ExitCode
+
+
+def _add_import(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, help="NAME_cables.xml, beside NAME_bodies.xml, or .json, .yaml, .wcrfx")
+    add_output(parser, "write FILE.toml (default: print it)", metavar="FILE")
+    parser.add_argument("--set", metavar="NAME", help="set of cables of a model of CASPR (default: its own choice)")
+
+
+def _import(options: argparse.Namespace) -> int:
+    if options.output is not None and options.output.suffix != ".toml":
+        raise ConfigError("-o", f"{options.output}: must end in .toml")
+    from cspr_jax.api.imports import import_robot
+
+    found = import_robot(options.file, options.set)
+    for line in found.warnings:
+        warn(f"{options.file}: {line}")
+    if options.output is None:
+        sys.stdout.write(found.to_toml())
+    else:
+        sys.stdout.write(f"{found.save(options.output)}\n")
+    return ExitCode.DONE
+
+
+def _add_list(parser: argparse.ArgumentParser) -> None:
+    add_json(parser, "array")
+
+
+def _robots(options: argparse.Namespace) -> int:
+    from cspr_jax.api import lists
+    from cspr_jax.outputs.listings import robots_table
+
+    return _listed(options, lists.list_robots(), robots_table)
+
+
+def _quantities(options: argparse.Namespace) -> int:
+    from cspr_jax.api import lists
+    from cspr_jax.outputs.listings import quantities_table
+
+    return _listed(options, lists.list_quantities(), quantities_table)
+
+
+def _listed(options: argparse.Namespace, listed: Any, table: Callable[[Any], Any]) -> int:
+    print_json(listed) if options.json else print_table(table(listed))
+    return ExitCode.DONE
+
+
+def _add_examples(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", nargs="*", help="those to copy (default: list them)")
+    parser.add_argument("--all", action="store_true", help="copy all of them")
+    add_output(parser, "to this folder (default .)", default=Path(), metavar="DIR")
+    add_json(parser)
+
+
+def _examples(options: argparse.Namespace) -> int:
+    from cspr_jax.api import examples
+
+    known = examples.list_examples()
+    names = list(known) if options.all else options.name
+    shown = [str(path) for path in examples.copy_examples(names, options.output)] if names else known
+    lines = shown if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
+    print_json(shown) if options.json else sys.stdout.write("".join(f"{line}\n" for line in lines))
+    return ExitCode.DONE
+
+
+COMMANDS = (
+    Command("import", "read a robot of CASPR, cdpyr or WireX as a robot file", _add_import, _import),
+    Command("robots", "list the catalogue of robots", _add_list, _robots),
+    Command("quantities", "list the quantities that a result can hold", _add_list, _quantities),
+    Command("examples", "list sweep and plan files to start from, or copy them", _add_examples, _examples),
+)

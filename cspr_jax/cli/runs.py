@@ -1,0 +1,127 @@
+"""Commands about sweeps and their runs: run, status, verify, volume."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from cspr_jax.cli.command import (
+    Command,
+    add_all_errors,
+    add_device,
+    add_json,
+    add_output,
+    prepare_jax,
+    print_json,
+    warn,
+)
+from cspr_jax.errors import ConfigError, ExitCode
+from cspr_jax.runtime.progress import progress
+from cspr_jax.sweep.signals import stop_signals
+
+VERIFIED = ("tiles", "shards", "missing", "cells", "cells_near_zero", "proved", "mixed", "rows", "segments", "feasible")
+
+
+def _add_run(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("sweep", type=Path, help="sweep file (TOML)")
+    add_output(parser, "run directory (default results/...)", metavar="DIR")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes on this machine (default 1)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="dask.distributed scheduler, such as tcp://host:8786")
+    parser.add_argument(
+        "--accept-environment-change", action="store_true", help="go on with another version, machine or library"
+    )
+    parser.add_argument("--prune", action="store_true", help="remove the shards once the result is complete")
+    add_all_errors(parser)
+    add_device(parser)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from cspr_jax.api import sweeps
+    from cspr_jax.sweep import engine
+
+    if options.scheduler is not None and options.device is not None:
+        raise ConfigError("--device", f"{options.device}: must be absent beside --scheduler, whose workers choose")
+    sweep = sweeps.sweep_given(options.sweep)
+    directory = options.output or sweeps.run_directory(sweep)
+    choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
+    with stop_signals(warn) as stop, progress() as on_tile:
+        hooks = engine.Hooks(stop, on_tile, warn=warn)
+        job = sweeps.Job(sweep, directory, choices, hooks, options.workers, options.scheduler)
+        path = job.finished()
+        if path is None:
+            path = job.go(lambda: prepare_jax(options))
+        else:
+            sys.stdout.write("already finished; nothing was computed\n")
+    sys.stdout.write(f"{path}\n")
+    return ExitCode.DONE
+
+
+def _add_status(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("path", type=Path, help="run directory")
+    add_json(parser)
+
+
+def _status(options: argparse.Namespace) -> int:
+    from cspr_jax.api.runs import status
+
+    state = status(options.path)
+    if options.json:
+        print_json(state)
+        return ExitCode.DONE
+    last = state["last"] or {}
+    sys.stdout.write(
+        f"{state['directory']}: {state['sweep']}, identity {state['identity'][:12]}\n"
+        f"  {state['shards']} of {state['tiles']} tiles as shards, {state['quarantined']} set aside, "
+        f"{state['unfinished']} unfinished\n"
+        f"  result: {state['result'] or 'not yet'}\n"
+        f"  last: {last.get('event', '-')} at {last.get('time', '-')}\n"
+    )
+    return ExitCode.DONE
+
+
+def _add_verify(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("path", type=Path, help="run directory, result or motion")
+    add_json(parser)
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from cspr_jax.api.runs import verify
+
+    report = verify(options.path)
+    if options.json:
+        print_json(report)
+    else:
+        counts = ", ".join(f"{key} {report[key]}" for key in VERIFIED if key in report)
+        sys.stdout.write(f"{report['path']}: {counts}\n")
+    again = "run the sweep" if "shards" in report else "run or plan it"
+    for fault in report["faults"]:
+        sys.stderr.write(f"cspr: {fault}: {again} again to make it anew\n")
+    return ExitCode.INPUT_OUTPUT if report["faults"] else ExitCode.DONE
+
+
+def _add_volume(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("path", type=Path, help="result, or run directory")
+    add_json(parser)
+
+
+def _volume(options: argparse.Namespace) -> int:
+    from cspr_jax.api import volumes
+    from cspr_jax.outputs.plots.selection import result_at
+
+    found = volumes.workspace_volume(result_at(options.path))
+    sys.stdout.write("" if options.json else "".join(f"{line}\n" for line in found.lines()))
+    if options.json:
+        print_json(found.to_dict())
+    return ExitCode.DONE
+
+
+COMMANDS = (
+    Command("run", "compute a sweep file into an HDF5 result; its path is the last line printed", _add_run, _run),
+    Command("status", "say how far a run has come, without touching it", _add_status, _status),
+    Command("verify", "read again everything of a run, or a result or motion file, and check it", _add_verify, _verify),
+    Command(
+        "volume",
+        "say how large the workspace of a map is, with the error that its grid leaves",
+        _add_volume,
+        _volume,
+    ),
+)

@@ -1,0 +1,67 @@
+"""Commands about published figures and speed: table, bench."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from cspr_jax.cli.command import Command, add_device, add_json, prepare_jax, print_json, print_table
+from cspr_jax.errors import ExitCode
+from cspr_jax.runtime.progress import waiting
+
+
+def _add_table(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", nargs="?", help="such as 2.1")
+    parser.add_argument("--list", action="store_true", help="list the tables")
+    add_json(parser)
+    parser.add_argument(
+        "--definition", choices=("grid", "scan", "equal-volume", "all"), help="3.3, 3.4: accessible set"
+    )
+    parser.add_argument("--amplitude", choices=("quintic", "effective", "effective-c3", "all"), help="3.3, 3.4")
+    parser.add_argument("--fine", action="store_true", help="3.3, 3.4: step pi/64 instead of pi/32")
+    add_device(parser)
+
+
+def _table(options: argparse.Namespace) -> int:
+    with waiting():
+        prepare_jax(options)
+        from cspr_jax.api import tables
+        from cspr_jax.published.tables import table_for_people, table_object
+
+    if options.list:
+        sys.stdout.write("".join(f"{name}  {title}\n" for name, title in tables.table_names().items()))
+        return ExitCode.DONE
+    choices = {name: getattr(options, name) for name in ("definition", "amplitude", "fine")}
+    with waiting():
+        cells = tables.table(options.name, **choices)
+    if options.json:
+        print_json(table_object(options.name, cells))
+    else:
+        print_table(table_for_people(options.name, cells))
+    return ExitCode.DONE
+
+
+def _add_bench(parser: argparse.ArgumentParser) -> None:
+    add_json(parser)
+    parser.add_argument(
+        "--kernels", type=Path, metavar="DIR", help="beside C++ kernels of this folder, such as benchmarks"
+    )
+    add_device(parser)
+
+
+def _bench(options: argparse.Namespace) -> int:
+    prepare_jax(options)
+    from cspr_jax.api.speed import benchmark
+    from cspr_jax.bench import lines
+
+    report = benchmark(options.kernels)
+    if options.json:
+        print_json(report)
+    else:
+        sys.stdout.write("\n".join(lines(report)) + "\n")
+    return ExitCode.DONE
+
+
+COMMANDS = (
+    Command("table", "compute a published table again, beside the printed numbers", _add_table, _table),
+    Command("bench", "measure checks per second beside a NumPy version of the same check", _add_bench, _bench),
+)
