@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from cspr_jax.api.platform_searches import accessible as accessible
     from cspr_jax.api.platform_searches import attainable as attainable
     from cspr_jax.api.platform_searches import minimum_pose_arcs as minimum_pose_arcs
+    from cspr_jax.api.reports import report as report
     from cspr_jax.api.robots import parallel_pair_robot as parallel_pair_robot
     from cspr_jax.api.robots import platform as platform
     from cspr_jax.api.robots import point_mass as point_mass
@@ -102,6 +103,7 @@ _PUBLIC = {
     "plot": ("cspr_jax.api.pictures", "plot"),
     "point_mass": ("cspr_jax.api.robots", "point_mass"),
     "point_mass_robot": ("cspr_jax.robots.point_mass", "point_mass_robot"),
+    "report": ("cspr_jax.api.reports", "report"),
     "run": ("cspr_jax.api.sweeps", "run"),
     "sampled_margin": ("cspr_jax.api.motions", "sampled_margin"),
     "sensitivity": ("cspr_jax.api.sensitivities", "sensitivity"),
@@ -157,6 +159,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "plot",
     "point_mass",
     "point_mass_robot",
+    "report",
     "run",
     "sampled_margin",
     "sensitivity",

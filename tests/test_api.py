@@ -56,6 +56,7 @@ FUNCTIONS = {
     "volume": ("workspace_volume",),
     "plan": ("plan",),
     "plot": ("plot", "open_result"),
+    "report": ("report",),
     "table": ("table", "table_names"),
     "bench": ("benchmark",),
     "import": ("import_robot",),
@@ -107,6 +108,7 @@ def test_every_command_has_its_function():
         own = NAMES | {"run": {"output": "directory"}, "plan": {"output": "path"}}.get(name, {})
         own |= {"name": "names", "output": "folder"} if name == "examples" else {}
         own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}
+        own |= {"result": "given", "cell": "cells"} if name == "report" else {}
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
         options = {action.dest for action in parser._actions} - PRINTING
         assert {own.get(option, option) for option in options} <= known, name

@@ -1,9 +1,10 @@
-"""Commands about pictures of results: plot."""
+"""Commands about pictures and pages of results: plot, report."""
 
 import argparse
 import sys
+from pathlib import Path
 
-from cspr_jax.cli.command import Command, prepare_jax
+from cspr_jax.cli.command import Command, add_device, add_output, prepare_jax, warn
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.options import ACCELERATION, add_plot
 from cspr_jax.runtime.progress import waiting
@@ -27,4 +28,38 @@ def _plot(options: argparse.Namespace) -> int:
     return ExitCode.DONE
 
 
-COMMANDS = (Command("plot", "draw a result file, or several maps in one picture", add_plot, _plot),)
+def _add_report(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("result", type=Path, help="result or run directory, motion of `cspr plan -o`, or plan file")
+    add_output(parser, "page: .html (default: beside)", metavar="FILE")
+    parser.add_argument("--quantity", help="of a map, that is shown first")
+    parser.add_argument(
+        "--trajectories", type=int, default=50, metavar="K", help="motions of so many telling cells (default 50)"
+    )
+    parser.add_argument(
+        "--cell", action="append", default=[], metavar="AXIS=VALUE,...", help="the motion of this cell, too"
+    )
+    add_device(parser)
+
+
+def _report(options: argparse.Namespace) -> int:
+    from cspr_jax.outputs.plots import selection
+
+    cells = [selection.places(words.split(",")) for words in options.cell]
+    output = options.output or options.result.with_suffix(".html")
+    with waiting():
+        prepare_jax(options)
+        from cspr_jax.api.reports import report
+
+        warnings = report(
+            options.result, output, trajectories=options.trajectories, cells=cells, quantity=options.quantity
+        )
+    for line in warnings:
+        warn(line)
+    sys.stdout.write(f"{output}\n")
+    return ExitCode.DONE
+
+
+COMMANDS = (
+    Command("plot", "draw a result file, or several maps in one picture", add_plot, _plot),
+    Command("report", "write a page to explore a result or a plan in a browser", _add_report, _report),
+)

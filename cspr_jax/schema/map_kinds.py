@@ -32,6 +32,7 @@ class MapKind:
         stored: those that are stored where the sweep file does not say.
         stored_with: by key, those that are stored besides where that key is given. A key that came later than its map
             leaves what is stored without it, and so the identities of older sweeps, as they were.
+        planned: whether a cell is the motion of a plan of two poses, which `plans.of_cells` writes.
         pictured: those of which a picture shows the first that there is, where nobody says which.
         motionless: those that belong to a place or an instant, not to a motion.
         families: trajectory families that it takes; none: its cells are places, and it knows no motion.
@@ -66,6 +67,7 @@ class MapKind:
     cells: int = LARGEST_TILE
     patterns: tuple[str, ...] = ()
     stored_with: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    planned: bool = False
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -132,6 +134,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
             pictured=("arcs",),
             families=("hypocycloid-standard",),
+            planned=True,
             patterns=("3T",),
             start="point",
             needs=("axes.z0",),
@@ -153,6 +156,7 @@ MAP_KINDS: dict[str, MapKind] = {
             ),
             pictured=("oscillations",),
             families=("transition",),
+            planned=True,
             patterns=("2T", "3T"),
             takes=("limits", "limits.uncertainty"),
             stored_with=_UNCERTAIN,
@@ -182,6 +186,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
+            planned=True,
             patterns=("3R3T",),
             start="pose",
             needs=("axes.z0",),
@@ -200,6 +205,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
+            planned=True,
             patterns=("3R3T",),
             takes=("axes.z0", "orientations", "orientations.values", "limits", "limits.uncertainty"),
             stored_with=_UNCERTAIN,
@@ -256,6 +262,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=_OF_LINES,
             pictured=("duration",),
             families=("s-curve",),
+            planned=True,
             patterns=("2T", "3T"),
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.max_acceleration", "limits"),

@@ -16,16 +16,13 @@ from cspr_jax.outputs.plots.motion import motion_figure
 from cspr_jax.outputs.plots.notes import notes
 from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION
 from cspr_jax.outputs.plots.path_accelerations import path_figure
-from cspr_jax.outputs.plots.sections import AROUND, POLAR, Section, section_figure, tells
+from cspr_jax.outputs.plots.planes import in_order
+from cspr_jax.outputs.plots.sections import POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.outputs.plots.solid import SPACE, solid_figure
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
 
-# Pairs of axes that belong into one plane, the second upward or, in polar coordinates, outward: the first of these that
-# vary, or the one of the others that has the most cells.
-PLANES = (("x", "y"), POLAR, ("from_x", "from_y"))
-OTHERS = (AROUND, ("x", "z"), ("y", "z"), ("radius", "z"))
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 WORKSPACE = "workspace"
 
@@ -201,12 +198,7 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
         axis = view.across[0]
         only = {"": [Line(result.axes[axis], view.data)]}
         return line_figure(result, view.name, only, axis, heading(result, view.name), _constant(result, view))
-    plane = next((pair for pair in PLANES if set(pair) <= set(view.across)), None) or max(
-        (pair for pair in OTHERS if set(pair) <= set(view.across)),
-        key=lambda pair: len(result.axes[pair[0]]) * len(result.axes[pair[1]]),
-        default=(),
-    )
-    order = [*plane, *(axis for axis in view.across if axis not in plane)]
+    order = in_order(result, view.across)
     view = _panelled(result, view, order)
     data, panels = view.data, view.across[2] if len(view.across) > 2 else None
     told = _told(result, at, order) if tuple(view.across[:2]) == POLAR else None

@@ -78,7 +78,7 @@ def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
     turn = turn @ rotation_matrix(quaternion / size)
     base = np.array(spec.base_points, float)
     own = np.zeros_like(base) if spec.platform_points is None else np.array(spec.platform_points, float)
-    faces, edges = _shape(own)
+    faces, edges = hull_of(own)
     return Posed(base, place + own @ turn.T, place + faces @ turn.T, place + edges @ turn.T)
 
 
@@ -86,8 +86,15 @@ def _about(axis: str, angle: float) -> np.ndarray:
     return rotation_matrix(np.array([np.cos(0.5 * angle), 0.0, 0.0, 0.0]) + np.sin(0.5 * angle) * TURN[axis])
 
 
-def _shape(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # (m, 3, 3) faces and (k, 2, 3) edges of the hull of points; of points in a plane a polygon, of a line its ends.
+def hull_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Hull of the points of a platform; of points in a plane a polygon, of points on a line its ends.
+
+    Args:
+        points: (n, 3) m.
+
+    Returns:
+        (m, 3, 3) faces and (k, 2, 3) edges of it, m.
+    """
     if not is_flat(points):
         found = hull(points)
         return found.triangles, found.edges

@@ -1,0 +1,177 @@
+"""Pages to explore results and plans in a browser, as `cspr report` writes them."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.api.plans import Plan, plan
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.outputs import motion_files
+from cspr_jax.outputs.plots.kept import kept
+from cspr_jax.outputs.plots.labels import heading, robot_name, value
+from cspr_jax.outputs.plots.pages.maps import map_content, order_of
+from cspr_jax.outputs.plots.pages.motions import MOST_ROWS, motion_content
+from cspr_jax.outputs.plots.pages.page import page_of
+from cspr_jax.outputs.plots.pages.telling import telling
+from cspr_jax.outputs.plots.selection import nearest, result_at
+from cspr_jax.plans.of_cells import cell_plan
+from cspr_jax.runtime.stages import stage
+from cspr_jax.schema.map_kinds import MAP_KINDS
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.publishing import publish
+from cspr_jax.store.result import Result, open_result
+
+# Motions of cells where nobody says how many, and at most; rows a second of a plan's motion.
+USUAL, MOST, RATE = 50, 500, 60.0
+
+
+def report(
+    given: str | Path | Result | Plan,
+    output: str | Path,
+    *,
+    trajectories: int = USUAL,
+    cells: Sequence[Mapping[str, float]] = (),
+    quantity: str | None = None,
+) -> list[str]:
+    """Write a page to explore a map, or a plan, in a browser: one file that needs no network.
+
+    Of a map it shows sections with sliders over the other axes, what each cell holds, and the motions of some cells;
+    of a plan its motion.
+
+    Args:
+        given: a result of `cspr run` or its run directory, a motion of `cspr plan -o`, a plan file; or one of these
+            that is loaded.
+        output: page to write, .html.
+        trajectories: cells of a map whose motions it computes, besides `cells`: the most telling ones.
+        cells: of these the motions are computed, too: coordinates by axis, the nearest point is taken; axes that are
+            missing are at their first point.
+        quantity: of a map, that is shown first; None: the one that its kind of map is about.
+
+    Returns:
+        what its reader should know, one line each.
+
+    Raises:
+        ConfigError: a mistake in a file or an argument, or plotly is not installed.
+        StoreError: a file cannot be read, or the page cannot be written.
+    """
+    output = Path(output)
+    if output.suffix != ".html":
+        raise ConfigError("-o", f"{output}: must end in .html")
+    if not 0 <= trajectories <= MOST:
+        raise ConfigError("--trajectories", f"{trajectories}: must be an integer from 0 to {MOST}")
+    try:
+        loaded = _loaded(given)
+        if isinstance(loaded, Result) and loaded.is_map:
+            title, content, warnings = _of_map(loaded, trajectories, cells, quantity)
+        elif cells or quantity is not None:
+            raise InputError("--cell" if cells else "--quantity", "given", "absent but with a map")
+        else:
+            title, content, warnings = _of_motion(loaded, str(given))
+        page = page_of(title, content)
+    except InputError as error:
+        raise ConfigError(given if isinstance(given, str | Path) else "report", str(error)) from error
+    publish(Disk(), output, page.encode())
+    return warnings
+
+
+def _loaded(given: str | Path | Result | Plan) -> Result | Plan:
+    if isinstance(given, Result | Plan):
+        return given
+    path = Path(given)
+    if path.suffix == ".toml":
+        return plan(path)
+    stage("reading")
+    return open_result(result_at(path))
+
+
+def _of_motion(given: Result | Plan, name: str) -> tuple[str, dict[str, Any], list[str]]:
+    if isinstance(given, Plan):
+        robot, content, feasible = given.spec.name, _planned(given, f"{len(given.points) - 1} segments"), given.feasible
+    else:
+        spec, keys = kept(given, name, "report")
+        columns, robot = given.axes | given.data, robot_name(given)
+        content = motion_content(f"{len(given.data['segment_end'])} segments", columns, given.data, spec, keys)
+        feasible = bool(given.attributes.get("feasible", 1))
+    doubt = "" if feasible else "not proved feasible"
+    page: dict[str, Any] = {
+        "title": f"Motion of {robot}",
+        "notes": doubt,
+        "map": None,
+        "motions": [content],
+        "cells": {},
+    }
+    return page["title"], page, ["not proved feasible; the page says so itself"] if doubt else []
+
+
+def _planned(planned: Plan, title: str) -> dict[str, Any]:
+    with double_precision():
+        length = float(np.sum(planned.answers.duration))
+        columns = motion_files.rows(planned, rate=min(RATE, MOST_ROWS / length))
+        more = motion_files.flight(planned)
+        return motion_content(title, columns | more, motion_files.segments(planned), planned.spec, planned.keys)
+
+
+def _of_map(
+    result: Result, count: int, cells: Sequence[Mapping[str, float]], quantity: str | None
+) -> tuple[str, dict[str, Any], list[str]]:
+    content, left = map_content(result, quantity)
+    wanted = [tuple(nearest(result, axis, own)[0] for axis, own in _places(result, cell).items()) for cell in cells]
+    warnings = [f"left out, for a page of all would be too large: {', '.join(left)}"] if left else []
+    if MAP_KINDS[result.attributes["map"]].planned and "verdict" in result.data:
+        wanted += telling(result.data, result.data["verdict"], count)
+    elif cells:
+        raise InputError("--cell", "given", f'absent with map = "{result.attributes["map"]}", whose cells do not move')
+    names, points = order_of(result)
+    motions, found = list[dict[str, Any]](), dict[str, int]()
+    for index in dict.fromkeys(wanted):
+        planned = _cell(result, index)
+        if planned is None:
+            warnings.append(f"{_words(result, index)}: no motion, its numbers are not finite")
+            continue
+        place = dict(zip(result.axes, index, strict=True))
+        # Of points that occur twice the first is shown.
+        same = [_rank(result.axes[name], own, place[name]) for name, own in zip(names, points, strict=True)]
+        found[str(int(np.ravel_multi_index(same, content["shape"])))] = len(motions)
+        motions.append(planned)
+    first = next(iter(found), None)
+    content["first"] = _first(content["shape"], first)
+    title = heading(result, quantity or content["quantities"][0]["name"])
+    page = {"title": title, "map": content, "motions": motions, "cells": found, "shown": found.get(first or "", 0)}
+    return title, page, warnings
+
+
+def _first(shape: list[int], flat: str | None) -> list[int]:
+    if flat is None:
+        return [0] * (len(shape) - 2) + [count // 2 for count in shape[-2:]]
+    return [int(i) for i in np.unravel_index(int(flat), shape)]
+
+
+def _rank(points: np.ndarray, chosen: np.ndarray, place: int) -> int:
+    return int(np.searchsorted(points[chosen], points[place]))
+
+
+def _places(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
+    for axis, own in cell.items():
+        nearest(result, axis, own)  # refuses axes that there are not
+    return {axis: float(cell.get(axis, points[0])) for axis, points in result.axes.items()}
+
+
+def _words(result: Result, index: tuple[int, ...]) -> str:
+    varying = [(axis, i) for axis, i in zip(result.axes, index, strict=True) if len(result.axes[axis]) > 1]
+    return ", ".join(value(result, axis, result.axes[axis][i]) for axis, i in varying)
+
+
+def _cell(result: Result, index: tuple[int, ...]) -> dict[str, Any] | None:
+    place = {axis: float(points[i]) for (axis, points), i in zip(result.axes.items(), index, strict=True)}
+    values = {name: data[index] for name, data in result.data.items()}
+    keys = cell_plan(result.settings, place, values)
+    if keys is None:
+        return None
+    stage("motions of cells")
+    planned = plan(keys)
+    if not np.isfinite(planned.answers.duration).all():
+        return None
+    return _planned(planned, _words(result, index))

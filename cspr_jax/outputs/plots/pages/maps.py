@@ -1,0 +1,163 @@
+"""Content of a page about a map: its axes, quantities with their colours, and the reasons of its cells."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import BoundaryNorm, to_hex
+
+from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.colours import Scale, scale_of
+from cspr_jax.outputs.plots.labels import WORDS, as_drawn, axis_label, label, unit, value
+from cspr_jax.outputs.plots.notes import notes
+from cspr_jax.outputs.plots.pages.packing import packed
+from cspr_jax.outputs.plots.planes import in_order
+from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
+from cspr_jax.outputs.plots.worded import word_scale, worded
+from cspr_jax.schema.map_kinds import MAP_KINDS
+from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.verdicts import SENTENCES, Verdict
+from cspr_jax.store.result import Result
+
+# Quantities that come first, and letters of all that a page may hold; the script of the charts has some five millions.
+FIRST = ("verdict", "duration", "margin")
+LARGEST = 14_000_000
+SHADES = 32
+
+
+def order_of(result: Result) -> tuple[list[str], list[np.ndarray]]:
+    """Order of the axes in a page, the last one that of a row, and of their points.
+
+    Args:
+        result: the map.
+
+    Returns:
+        names: those of the plane last, upward before across.
+        points: indices of each axis' points, ascending, each value once.
+    """
+    varying = [axis for axis, points in result.axes.items() if len(np.unique(points)) > 1]
+    alone = [axis for axis in result.axes if axis not in varying]
+    order = in_order(result, varying)
+    # Of a map over one axis the plane is a line.
+    plane = order[:2] if len(order) > 1 else [*order, *alone][:2]
+    names = [*(axis for axis in [*alone, *order] if axis not in plane), *reversed(plane)]
+    return names, [np.unique(result.axes[axis], return_index=True)[1] for axis in names]
+
+
+def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, Any], list[str]]:
+    """What a page shows of a map.
+
+    Args:
+        result: the map.
+        quantity: that it shows first; None: the one that its kind of map is about.
+
+    Returns:
+        plain values, for JSON; the names of quantities that are left out, since a page of all would be too large.
+
+    Raises:
+        InputError: no such quantity.
+    """
+    kind = MAP_KINDS[result.attributes["map"]]
+    known = [name for name in dict.fromkeys((*kind.pictured, *FIRST, *result.data)) if name in result.data]
+    if quantity is not None and quantity not in known:
+        raise InputError("--quantity", quantity, "one of " + ", ".join(sorted(result.data)))
+    first = quantity or known[0]
+    names, points = order_of(result)
+    places = [list(result.axes).index(name) for name in names]
+    shape = [len(chosen) for chosen in points]
+
+    def arranged(name: str) -> np.ndarray:
+        return result.data[name].transpose(places)[np.ix_(*points)]
+
+    quantities, left, room = list[dict[str, Any]](), list[str](), LARGEST
+    for name in sorted(known, key=lambda name: name != first):
+        content = _quantity(result, name, arranged(name))
+        room -= len(content["values"]["data"])
+        if room < 0 and quantities:
+            left.append(name)
+            continue
+        quantities.append(content)
+    return {
+        "shape": shape,
+        "axes": [_axis(result, name, result.axes[name][own]) for name, own in zip(names, points, strict=True)],
+        "quantities": quantities,
+        "reasons": _reasons(arranged("verdict")) if "verdict" in result.data else None,
+        "notes": notes(result, "", [], [name for name, count in zip(names, shape, strict=True) if count > 1]),
+        "isDown": names[-2:-1] == ["z"] and result.attributes.get("z_axis", "down") == "down",
+        "isEqual": len(names) > 1 and all(result.units[name] == "m" for name in names[-2:]),
+    }, left
+
+
+def _axis(result: Result, name: str, points: np.ndarray) -> dict[str, Any]:
+    return {
+        "label": axis_label(result, name),
+        "name": WORDS.get(name, name),
+        "unit": unit(result, name),
+        "values": [float(f"{x:.9g}") for x in as_drawn(result, name, points)],
+        "words": [value(result, name, x, digits=6) for x in points],
+    }
+
+
+def _quantity(result: Result, name: str, data: np.ndarray) -> dict[str, Any]:
+    row = QUANTITIES[name]
+    found, drawn = worded(result, name, data), as_drawn(result, name, data)
+    if found is not None:
+        drawn, scale = found[0], word_scale(*found[1:])
+    else:
+        scale = scale_of(drawn, signed=row.signed)
+    return {
+        "name": name,
+        "label": label(result, name),
+        "unit": unit(result, name),
+        "description": row.description,
+        "isCount": drawn.dtype.kind in "iu" and found is None,
+        "words": None if found is None else found[1],
+        "values": packed(drawn),
+        "scale": _scale(scale),
+    }
+
+
+def _scale(scale: Scale) -> dict[str, Any]:
+    # Colours for a browser: steps where matplotlib has steps, of which the first may stand for "none".
+    if not isinstance(scale.norm, BoundaryNorm):
+        shades = [_hex(scale, part) for part in np.linspace(0.0, 1.0, SHADES).tolist()]
+        ends = float(scale.norm.vmin or 0.0), float(scale.norm.vmax or 0.0)
+        return {"bounds": ends, "shades": shades, "stepped": False, "ticks": None, "beyond": scale.beyond}
+    ticks, texts = scale.ticks or ([], [])
+    bounds = np.asarray(scale.norm.boundaries, float).tolist()
+    shades = [_hex(scale, i) for i in range(scale.colours.N)]
+    if texts[:1] == ["none"]:
+        bounds, shades, ticks, texts = bounds[1:], shades[1:], ticks[1:], texts[1:]
+    if scale.extend == "max":
+        shades.append(_hex(scale, scale.colours.N))
+        bounds.append(bounds[-1] + 1.0)
+    return {
+        "bounds": (bounds[0], bounds[-1]),
+        "shades": shades,
+        "stepped": True,
+        "ticks": {"values": ticks, "texts": texts},
+        "beyond": scale.beyond,
+    }
+
+
+def _hex(scale: Scale, place: float) -> str:
+    # A whole number is the number of a colour, a fraction a place on the scale; beyond the last one is what lies over.
+    red, green, blue, alpha = scale.colours(place)
+    return to_hex((red, green, blue, alpha))
+
+
+def _reasons(verdicts: np.ndarray) -> dict[str, Any]:
+    # Each combination of flags that occurs, with its sentences and the colour of the first reason.
+    flags, index = np.unique(verdicts.astype(np.int64), return_inverse=True)
+    entries = []
+    for code in flags.tolist():
+        own = [flag for flag in (*REASONS, *SENTENCES) if code & flag.value]
+        word, colour = next((REASONS[flag] for flag in own if flag in REASONS), ("feasible", FEASIBLE_COLOUR))
+        entries.append(
+            {
+                "word": word,
+                "colour": colour,
+                "text": Verdict(code).text.replace("_", " ").replace("+", ", "),
+                "sentences": [SENTENCES[flag] for flag in dict.fromkeys(own) if flag in SENTENCES],
+            }
+        )
+    return {"entries": entries, "values": packed(index.reshape(verdicts.shape))}

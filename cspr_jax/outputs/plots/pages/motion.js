@@ -1,0 +1,182 @@
+// The motion: the robot in space with its cables coloured by tension, and its tensions over time.
+const motion = { own: null, row: 0, playing: null };
+const PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"];
+const DASHES = ["solid", "dash", "dashdot", "dot"];
+const TENSION = [[0, "#7e03a8"], [0.35, "#b73779"], [0.7, "#e8622c"], [1, "#f9a63a"]];
+const known = new Map();
+
+async function loaded(number) {
+  if (!known.has(number)) {
+    const given = content.motions[number], names = ["t", "path", "attached", "corners", "tension"];
+    const arrays = await Promise.all(names.map((name) => unpacked(given[name])));
+    known.set(number, { ...given, ...Object.fromEntries(names.map((name, k) => [name, arrays[k]])) });
+  }
+  return known.get(number);
+}
+
+const columnOf = (values, width, k) => Array.from({ length: values.length / width }, (_, i) => values[i * width + k]);
+
+function extremes(values) {
+  let low = Infinity, high = -Infinity;
+  for (const value of values) {
+    if (Number.isFinite(value)) { low = Math.min(low, value); high = Math.max(high, value); }
+  }
+  return low <= high ? [low, high] : [0, 1];
+}
+
+function shade(value, [low, high]) {
+  const part = high > low ? Math.min(Math.max((value - low) / (high - low), 0), 1) : 0.5;
+  const next = Math.max(1, TENSION.findIndex(([end]) => end >= part));
+  const [[a, first], [b, last]] = [TENSION[next - 1], TENSION[next]];
+  const hex = (colour, k) => parseInt(colour.slice(1 + 2 * k, 3 + 2 * k), 16);
+  const mixed = [0, 1, 2].map((k) => Math.round(hex(first, k) + ((part - a) / (b - a)) * (hex(last, k) - hex(first, k))));
+  return value < 0 ? colours().ink : `rgb(${mixed})`;
+}
+
+// Coordinates of the traces that move, at one row: cables, edges of the platform, the effector.
+function moving(row) {
+  const { own, range } = motion, { cables, edges } = own;
+  const at = (values, width, k) => [0, 1, 2].map((axis) => values[row * width + 3 * k + axis]);
+  const lines = Array.from({ length: cables }, (_, k) => [own.base[k], at(own.attached, 3 * cables, k)]);
+  const shape = Array.from({ length: edges }, (_, k) => [at(own.corners, 6 * edges, 2 * k),
+    at(own.corners, 6 * edges, 2 * k + 1), [null, null, null]]).flat();
+  const place = [[0, 1, 2].map((axis) => own.path[3 * row + axis])];
+  const parts = [...lines, shape, place];
+  const tension = Array.from({ length: cables }, (_, k) => own.tension[row * cables + k]);
+  return {
+    x: parts.map((part) => part.map((point) => point[0])), y: parts.map((part) => part.map((point) => point[1])),
+    z: parts.map((part) => part.map((point) => point[2])), tension, shades: tension.map((value) => shade(value, range)),
+  };
+}
+
+function robotTraces() {
+  const { own, range } = motion, theme = colours(), now = moving(motion.row);
+  const line = (k, extra) => ({ type: "scatter3d", x: now.x[k], y: now.y[k], z: now.z[k], showlegend: false,
+    mode: "lines", hoverinfo: "skip", ...extra });
+  const traces = now.tension.map((value, k) => line(k, { name: `cable ${k + 1}`, hoverinfo: "name",
+    line: { width: 5, color: now.shades[k] } }));
+  traces.push(line(own.cables, { line: { width: 7, color: theme.ink } }));
+  traces.push(line(own.cables + 1, { mode: "markers",
+    marker: { size: own.edges ? 0 : 5, color: theme.ink } }));
+  const points = (values, extra) => ({ type: "scatter3d", x: values[0], y: values[1], z: values[2], showlegend: false,
+    hoverinfo: "skip", ...extra });
+  const path = [0, 1, 2].map((k) => columnOf(own.path, 3, k));
+  traces.push(points(path, { mode: "lines", line: { width: 2, color: theme.soft } }));
+  const base = [0, 1, 2].map((k) => own.base.map((point) => point[k]));
+  traces.push(points(base, { mode: "markers", name: "spools", marker: { size: 4, symbol: "square", color: theme.soft,
+    colorscale: TENSION, cmin: range[0], cmax: range[1], showscale: false } }));
+  if (own.flight) {
+    const flight = [0, 1, 2].map((k) => own.flight.map((point) => point[k]));
+    traces.push(points(flight, { mode: "lines", line: { width: 3, dash: "dash", color: theme.mark } }));
+  }
+  // A trace without points holds the bar of the colours.
+  traces.push(points([[null], [null], [null]], { mode: "markers", marker: { size: 0.1, color: [range[0]],
+    colorscale: TENSION, cmin: range[0], cmax: range[1], showscale: true,
+    colorbar: { title: { text: "tension (N)", side: "right" }, len: 0.75, thickness: 14, outlinewidth: 0 } } }));
+  return traces;
+}
+
+function box() {
+  const { own } = motion, every = [0, 1, 2].map((k) => [...own.base.map((point) => point[k]),
+    ...columnOf(own.attached, 3, k), ...(own.flight ?? []).map((point) => point[k])]);
+  const ranges = every.map(extremes), margin = 0.04 * Math.max(...ranges.map(([low, high]) => high - low));
+  return ranges.map(([low, high]) => [low - margin, high + margin]);
+}
+
+function drawRobot() {
+  const signs = motion.own.isDown ? [1, -1, -1] : [1, 1, 1], ranges = box();
+  Plotly.react("robot", robotTraces(), layoutOf((axis, theme) => {
+    const own = ["x", "y", "z"].map((name, k) => ({ title: { text: `${name} (m)` }, gridcolor: theme.line,
+      zerolinecolor: theme.line, showbackground: false, showspikes: false, nticks: 6,
+      range: signs[k] > 0 ? ranges[k] : [...ranges[k]].reverse(), autorange: false }));
+    const sizes = ranges.map(([low, high]) => high - low), [x, y, z] = sizes.map((own) => 1.9 * own / Math.hypot(...sizes));
+    const aspectratio = { x, y, z };
+    return { margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "robot",
+      scene: { xaxis: own[0], yaxis: own[1], zaxis: own[2], aspectmode: "manual", aspectratio,
+        camera: { eye: { x: 1.0, y: -1.4, z: 0.55 }, projection: { type: "orthographic" } } } };
+  }), CHARTS);
+}
+
+const cursor = (theme) => ({ type: "line", yref: "paper", y0: 0, y1: 1, x0: motion.own.t[motion.row],
+  x1: motion.own.t[motion.row], line: { color: theme.mark, width: 2 } });
+
+function drawTensions() {
+  const { own } = motion, t = Array.from(own.t);
+  const traces = Array.from({ length: own.cables }, (_, k) => ({ type: "scatter", mode: "lines",
+    name: `cable ${k + 1}`, x: t, y: columnOf(own.tension, own.cables, k), hovertemplate: "%{y:.4g} N",
+    line: { width: 1.8, color: PALETTE[k % PALETTE.length], dash: DASHES[Math.floor(k / PALETTE.length) % 4] } }));
+  const [, high] = motion.range, near = own.limits.filter((limit) => limit.value < 3 * high);
+  Plotly.react("tensions", traces, layoutOf((axis, theme) => ({
+    hovermode: "x unified", legend: { orientation: "h", y: 1.16 }, margin: { l: 60, r: 15, t: 30, b: 45 },
+    xaxis: { ...axis, title: { text: "time (s)" }, hoverformat: ".4g" },
+    yaxis: { ...axis, title: { text: "tension (N)" }, rangemode: "tozero" },
+    shapes: [cursor(theme),
+      ...own.segments.slice(0, -1).map((part) => ({ type: "line", yref: "paper", y0: 0, y1: 1, x0: part.end,
+        x1: part.end, line: { color: theme.soft, width: 1, dash: "dot" } })),
+      ...near.map((limit) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: limit.value, y1: limit.value,
+        line: { color: theme.ink, width: 1, dash: "dash" } }))],
+    annotations: near.map((limit) => ({ xref: "paper", x: 0.01, xanchor: "left", y: limit.value, yanchor: "bottom",
+      showarrow: false, text: `${limit.words} ${shown(limit.value, 4)} N` })),
+  })), CHARTS);
+}
+
+function tellSegments() {
+  const { own } = motion, time = own.t[motion.row];
+  const rows = own.segments.map((part, k) => [k + 1, `${shown(part.start, 4)} – ${shown(part.end, 4)} s`,
+    part.arcs || "–", part.margin === null ? "–" : shown(part.margin, 4), part.isFeasible ? "feasible" : part.verdict]);
+  rowsInto(element("segments"), rows, ["segment", "time", "arcs", "margin", "verdict"]);
+  const now = own.segments.findIndex((part) => time <= part.end);
+  if (own.segments.length > 1 && now >= 0) element("segments").rows[now + 1].className = "now";
+}
+
+function setRow(row) {
+  const { own } = motion;
+  motion.row = Math.min(Math.max(row, 0), own.count - 1);
+  const now = moving(motion.row), which = now.x.map((_, k) => k), theme = colours();
+  const shades = [...now.shades, theme.ink, theme.ink];
+  Plotly.restyle("robot", { x: now.x, y: now.y, z: now.z, "line.color": shades }, which);
+  Plotly.relayout("tensions", { "shapes[0].x0": own.t[motion.row], "shapes[0].x1": own.t[motion.row] });
+  element("time").value = motion.row;
+  element("clock").textContent = `${own.t[motion.row].toFixed(2)} of ${own.t[own.count - 1].toFixed(2)} s`;
+  tellSegments();
+}
+
+function play(isOn) {
+  cancelAnimationFrame(motion.playing);
+  motion.playing = null;
+  element("play").textContent = isOn ? "❚❚" : "▶";
+  element("play").setAttribute("aria-label", isOn ? "pause" : "play");
+  if (!isOn) return;
+  if (motion.row === motion.own.count - 1) setRow(0);
+  let last = performance.now(), time = motion.own.t[motion.row];
+  const step = (now) => {
+    time += ((now - last) / 1000) * Number(element("speed").value);
+    last = now;
+    const { own } = motion;
+    let row = motion.row;
+    while (row < own.count - 1 && own.t[row + 1] <= time) row += 1;
+    if (row !== motion.row) setRow(row);
+    if (row === own.count - 1) play(false);
+    else motion.playing = requestAnimationFrame(step);
+  };
+  motion.playing = requestAnimationFrame(step);
+}
+
+async function showMotion(number) {
+  play(false);
+  motion.own = await loaded(number);
+  motion.range = extremes(motion.own.tension);
+  motion.row = 0;
+  const wasHidden = element("motion-side").hidden;
+  element("motion-side").hidden = false;
+  element("motion-title").textContent = motion.own.title;
+  element("time").max = motion.own.count - 1;
+  drawMotion();
+  if (content.map && wasHidden) drawMap();
+}
+
+function drawMotion() {
+  drawRobot();
+  drawTensions();
+  setRow(motion.row);
+}

@@ -1,0 +1,103 @@
+"""Content of a page about a motion: the robot at its rows, its tensions, and what there is of its segments."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.pages.packing import packed
+from cspr_jax.outputs.plots.posed import hull_of
+from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
+from cspr_jax.robots.shapes import rotation_matrix
+from cspr_jax.schema.verdicts import Verdict
+
+# Rows of a motion in a page, at most.
+MOST_ROWS = 1200
+
+
+def motion_content(
+    title: str,
+    columns: Mapping[str, np.ndarray],
+    segments: Mapping[str, np.ndarray],
+    spec: RobotFile,
+    keys: PlanFile,
+) -> dict[str, Any]:
+    """What a page shows of a motion.
+
+    Args:
+        title: of the motion.
+        columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, and the flight if there is one.
+        segments: by the names of `schema.motion_quantities.SEGMENTS`.
+        spec: the robot whose cables have these tensions.
+        keys: the plan, for the limits.
+
+    Returns:
+        plain values, for JSON.
+    """
+    rows = _chosen(np.asarray(columns["t"]))
+    position, tension = (np.asarray(columns[name])[rows] for name in ("position", "tension"))
+    quaternion = np.asarray(columns["quaternion"])[rows] if "quaternion" in columns else None
+    base = np.asarray(spec.base_points, float)
+    own = np.zeros_like(base) if spec.platform_points is None else np.asarray(spec.platform_points, float)
+    edges = hull_of(own)[1] if quaternion is not None else np.empty((0, 2, 3))
+    turn = np.array([np.eye(3)] if quaternion is None else [rotation_matrix(x) for x in quaternion])
+    # What turns with the platform, at each row.
+    attached, corners = (position[:, None] + np.einsum("rij,kj->rki", turn, x) for x in (own, edges.reshape(-1, 3)))
+    return {
+        "title": title,
+        "isDown": spec.z_axis == "down",
+        "count": len(rows),
+        "cables": len(base),
+        "base": np.round(base, 9).tolist(),
+        "t": packed(np.asarray(columns["t"])[rows]),
+        "path": packed(position),
+        "attached": packed(attached),
+        "corners": packed(corners),
+        "edges": len(edges),
+        "tension": packed(tension),
+        "flight": np.asarray(columns["flight_position"]).tolist() if "flight_position" in columns else None,
+        "limits": _limits(spec, keys),
+        "segments": _segments(segments),
+    }
+
+
+def _chosen(time: np.ndarray) -> np.ndarray:
+    # Evenly in time, as many as there are or a page takes; where segments meet rows are twice.
+    count = min(len(time), MOST_ROWS)
+    wanted = np.linspace(time[0], time[-1], count)
+    return np.unique(np.clip(np.searchsorted(time, wanted - 1e-12), 0, len(time) - 1))
+
+
+def _limits(spec: RobotFile, keys: PlanFile) -> list[dict[str, Any]]:
+    found = []
+    for name, words in (("tension_min", "smallest allowed"), ("tension_max", "largest allowed")):
+        own = getattr(keys, name)
+        given = getattr(spec, name) if own is None else own
+        values = np.unique(np.atleast_1d(np.array([] if given is None else given, float)))
+        found += [{"words": words, "value": value} for value in values[np.isfinite(values) & (values > 0.0)].tolist()]
+    return found
+
+
+def _segments(segments: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
+    rows = []
+    for i, end in enumerate(np.asarray(segments.get("segment_end", ())).tolist()):
+        code = int(segments["segment_verdict"][i])
+        colour = next((REASONS[flag][1] for flag in REASONS if code & flag.value), FEASIBLE_COLOUR)
+        rows.append(
+            {
+                "start": float(segments["segment_start"][i]),
+                "end": end,
+                "arcs": int(segments["segment_tried_arcs"][i]),
+                "margin": _number(segments["segment_margin"][i]),
+                "isFeasible": int(segments["segment_arcs"][i]) > 0 or code == 0,
+                "verdict": Verdict(code).text.replace("_", " ").replace("+", ", "),
+                "colour": colour,
+            }
+        )
+    return rows
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None

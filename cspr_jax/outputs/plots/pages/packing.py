@@ -1,0 +1,45 @@
+"""Arrays inside of a page: compressed, and as text."""
+
+import base64
+import gzip
+from typing import Any
+
+import numpy as np
+
+# Names of typed arrays of browsers by NumPy's.
+TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}
+
+
+def packed(values: np.ndarray) -> dict[str, Any]:
+    """Values for a page.
+
+    Args:
+        values: (...) numbers; floats keep seven digits.
+
+    Returns:
+        the typed array of browsers that has them, and its bytes, compressed, in base64; C order.
+    """
+    values = np.asarray(values)
+    if values.dtype.kind == "f":
+        name = "float32"
+        values = np.clip(values, -3e38, 3e38, where=np.isfinite(values), out=values.astype(float))
+    else:
+        low, high = int(values.min(initial=0)), int(values.max(initial=0))
+        name = "int32" if low < 0 or high > 65535 else "uint8" if high < 256 else "uint16"
+    # No time of writing: the same values are the same text.
+    data = gzip.compress(np.ascontiguousarray(values, np.dtype(name).newbyteorder("<")).tobytes(), 6, mtime=0)
+    return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}
+
+
+def unpacked(given: dict[str, Any]) -> np.ndarray:
+    """Values of a page, as a browser has them.
+
+    Args:
+        given: of `packed`.
+
+    Returns:
+        (n,) numbers.
+    """
+    name = next(name for name, other in TYPES.items() if other == given["type"])
+    data = gzip.decompress(base64.b64decode(given["data"]))
+    return np.frombuffer(data, np.dtype(name).newbyteorder("<"))

@@ -1,0 +1,50 @@
+"""Cells of a map whose motions tell most: those at the edges of what is feasible, and others far from these."""
+
+import numpy as np
+
+# Quantities whose extremes tell something.
+EXTREME = ("margin", "duration", "arcs", "oscillations")
+
+
+def telling(data: dict[str, np.ndarray], verdict: np.ndarray, count: int) -> list[tuple[int, ...]]:
+    """Cells to look at, all of them feasible.
+
+    First the extremes of margins, durations and counts, and of each count the cell with the smallest margin; then one
+    after the other the cell that is farthest from those chosen, in steps of the grid over its size.
+
+    Args:
+        data: quantities of the map, each of the shape of `verdict`.
+        verdict: (...) flags; 0 is feasible.
+        count: cells, at most.
+
+    Returns:
+        their indices; fewer where fewer are feasible.
+    """
+    feasible = np.argwhere(verdict == 0)
+    if not len(feasible) or count < 1:
+        return []
+    where = tuple(feasible.T)
+    values = {name: data[name][where].astype(float) for name in EXTREME if name in data}
+    chosen = list(dict.fromkeys(_extremes(values)))[:count]
+    if not chosen:
+        chosen = [0]
+    places = feasible / np.maximum(np.array(verdict.shape) - 1.0, 1.0)
+    gap = np.min([np.square(places - places[i]).sum(1) for i in chosen], axis=0)
+    while len(chosen) < min(count, len(feasible)):
+        chosen.append(int(np.argmax(gap)))
+        gap = np.minimum(gap, np.square(places - places[chosen[-1]]).sum(1))
+    return [tuple(int(i) for i in feasible[k]) for k in chosen]
+
+
+def _extremes(values: dict[str, np.ndarray]) -> list[int]:
+    found = []
+    for own in values.values():
+        if np.isfinite(own).any():
+            found += [int(np.nanargmin(own)), int(np.nanargmax(own))]
+    counts = next((values[name] for name in ("arcs", "oscillations") if name in values), None)
+    if counts is not None and "margin" in values:
+        for number in np.unique(counts):
+            least = np.where(counts == number, values["margin"], np.inf)
+            if np.isfinite(least).any():
+                found.append(int(np.argmin(least)))
+    return found

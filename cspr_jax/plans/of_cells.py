@@ -1,0 +1,76 @@
+"""Plans of single cells of a map: the motion whose verdict, duration and margins the cell holds."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.schema.map_kinds import MAP_KINDS
+
+# Quantities that fix the number of arcs, and how many arcs one is.
+COUNTS = {"arcs": 1, "tried_arcs": 1, "oscillations": 2, "tried_oscillations": 2}
+# Axes of an orientation; those that a map lacks are 0.
+ORIENTATION = ("tilt_azimuth", "tilt", "torsion")
+
+
+def cell_plan(
+    settings: Mapping[str, Any], place: Mapping[str, float], values: Mapping[str, Any], *, samples: int = 120
+) -> dict[str, Any] | None:
+    """Plan of the motion of one cell, as a plan file has it.
+
+    Args:
+        settings: of the sweep, with its robot as a table.
+        place: coordinates of the cell by axis, SI units.
+        values: quantities of the cell; those of `COUNTS` fix the number of arcs where they are positive, beta_hat that
+            of the target.
+        samples: rows of its motion.
+
+    Returns:
+        what a plan file holds; None of a kind of map whose cells are no motions from pose to pose.
+    """
+    kind = MAP_KINDS[settings["map"]]
+    if not kind.planned:
+        return None
+    shared = TrajectoryKeys.model_fields.keys() & PlanFile.model_fields.keys()
+    trajectory = settings.get("trajectory", {})
+    given = {name: value for name, value in trajectory.items() if name in shared}
+    depth = {name: place[name] for name in ("z0", "inclination") if name in place}
+    used = float(values.get("used_inclination", np.nan))
+    if given.get("inclination") == "best" and np.isfinite(used):
+        depth["inclination"] = used
+    if kind.is_over_orientations and not depth:
+        robot = settings["robot"]
+        frame = frame_of(np.asarray(robot["base_points"], float), robot.get("z_axis", "down"))
+        depth["z0"] = float(frame.depth(place["z"]))  # horizontal transitions
+    target: dict[str, Any] = {"position": _target(settings, place)}
+    if any(axis in place for axis in ORIENTATION):
+        target["tilt_torsion"] = [float(place.get(axis, 0.0)) for axis in ORIENTATION]
+    if np.isfinite(values.get("beta_hat", np.nan)):
+        target["beta_hat"] = float(values["beta_hat"])
+    count = next((int(values[name]) * arcs for name, arcs in COUNTS.items() if int(values.get(name, 0)) > 0), 0)
+    if count:
+        target["arcs"] = count
+    plan = {"schema": 1, "robot": settings["robot"], "samples": samples, **given, **depth}
+    plan["pose"] = [_start(settings, place), target]
+    if settings.get("limits"):
+        plan["limits"] = settings["limits"]
+    return plan
+
+
+def _start(settings: Mapping[str, Any], place: Mapping[str, float]) -> dict[str, Any]:
+    if "from_x" in place:
+        return {"position": [float(place[f"from_{name}"]) for name in "xyz"]}
+    return dict(settings.get("trajectory", {}).get("from") or {"rest": True})
+
+
+def _target(settings: Mapping[str, Any], place: Mapping[str, float]) -> list[float]:
+    if "radius" not in place:
+        return [float(place[name]) for name in "xyz"]
+    # About the vertical through the centroid of the spools.
+    centre = np.mean(np.asarray(settings["robot"]["base_points"], float), axis=0)
+    radius, azimuth = place["radius"], place["azimuth"]
+    x, y = centre[:2] + radius * np.array([np.cos(azimuth), np.sin(azimuth)])
+    return [float(x), float(y), float(place["z"])]

@@ -1,0 +1,33 @@
+"""A browser without a window, for tests of pages."""
+
+import contextlib
+import shutil
+
+# The renderer is software, and the sandbox of a container's root is none.
+SWITCHES = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+PATIENCE = 120_000  # ms
+
+
+@contextlib.contextmanager
+def opened(path):
+    """A page that is ready, and what it told on its console or tried to fetch, which should be nothing."""
+    from playwright.sync_api import sync_playwright
+
+    told = []
+    with sync_playwright() as player:
+        browser = player.chromium.launch(executable_path=shutil.which("chromium"), args=SWITCHES)
+        tab = browser.new_page(viewport={"width": 1300, "height": 900})
+        tab.set_default_timeout(PATIENCE)
+        tab.on("console", lambda message: told.append(message.text) if message.type == "error" else None)
+        tab.on("pageerror", lambda error: told.append(str(error)))
+        tab.on("request", lambda request: told.append(request.url) if not _is_own(request.url) else None)
+        tab.goto(path.as_uri())
+        tab.wait_for_function("document.documentElement.dataset.ready === 'yes'")
+        try:
+            yield tab, told
+        finally:
+            browser.close()
+
+
+def _is_own(address):
+    return address.startswith(("file:", "data:", "blob:"))

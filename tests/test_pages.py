@@ -1,0 +1,303 @@
+"""Pages to explore: their content against what is stored, and in a real browser."""
+
+import dataclasses
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from scipy.spatial.transform import Rotation
+from support.browsers import opened
+
+import cspr_jax
+from cspr_jax.config.plan import plan_keys
+from cspr_jax.config.robot import resolve_robot
+from cspr_jax.errors import ConfigError
+from cspr_jax.outputs.plots.pages.maps import map_content, order_of
+from cspr_jax.outputs.plots.pages.motions import motion_content
+from cspr_jax.outputs.plots.pages.packing import packed, unpacked
+from cspr_jax.outputs.plots.pages.telling import telling
+
+SWEEP = {
+    "schema": 1,
+    "map": "minimum-arcs",
+    "robot": "prototype",
+    "axes": {"y": [0.6, 0.0, 0.3, 1.4], "x": [-0.3, 0.1, 0.5], "z0": [1.3, 1.7], "z": [1.2]},
+    "trajectory": {"family": "hypocycloid-standard", "from": {"rest": True}, "max_arcs": 6},
+    "limits": {"tension_max": 4.0},
+}
+PLAN = {
+    "schema": 1,
+    "robot": "prototype",
+    "family": "transition",
+    "z0": 1.2,
+    "tension_min": 0.1,
+    "pose": [{"rest": True}, {"position": [0.5, 0.2, 1.2], "arcs": 10}, {"rest": True}],
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("pages")
+
+
+@pytest.fixture(scope="module")
+def result(folder):
+    return cspr_jax.open_result(cspr_jax.run(SWEEP, folder / "run"))
+
+
+@pytest.fixture(scope="module")
+def page(result, folder):
+    path = folder / "map.html"
+    assert cspr_jax.report(result, path, trajectories=3, cells=[{"x": 0.11, "y": 0.3, "z0": 1.7}]) == []
+    return path
+
+
+def content_of(path):
+    text = path.read_text("utf-8")
+    return json.loads(re.search(r'<script type="application/json" id="content">(.*?)</script>', text, re.DOTALL)[1])
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    arrays.arrays(st.sampled_from([np.int16, np.uint32, np.float64]), st.integers(0, 30), elements=None)
+    | arrays.arrays(np.uint8, 5)
+)
+def test_packed_values_are_the_same(values):
+    values = np.clip(values, -1e9, 1e9) if values.dtype.kind == "f" else values // 4
+    with np.errstate(all="ignore"):
+        wanted = values.astype(np.float32) if values.dtype.kind == "f" else values
+    np.testing.assert_array_equal(unpacked(packed(values)), wanted)
+
+
+def test_every_cell_of_a_page_has_its_stored_values(result, page):
+    found = content_of(page)["map"]
+    names, points = order_of(result)
+    assert names[-2:] == ["y", "x"]
+    assert [axis["values"] for axis in found["axes"]] == [sorted(result.axes[name]) for name in names]
+    quantities = {own["name"]: own for own in found["quantities"]}
+    assert set(quantities) == set(result.data)
+    assert found["quantities"][0]["name"] == "arcs"
+    for name, own in quantities.items():
+        values = unpacked(own["values"]).reshape(found["shape"])
+        for index in np.ndindex(*found["shape"]):
+            place = dict(zip(names, (own[i] for own, i in zip(points, index, strict=True)), strict=True))
+            stored = result.data[name][tuple(place[axis] for axis in result.axes)]
+            if name == "verdict":
+                entry = found["reasons"]["entries"][unpacked(found["reasons"]["values"]).reshape(found["shape"])[index]]
+                assert set(entry["text"].split(", ")) == set(
+                    cspr_jax.Verdict(int(stored)).text.replace("_", " ").split("+")
+                )
+            else:
+                np.testing.assert_allclose(values[index], stored, rtol=1e-6)
+
+
+def test_motions_of_cells_are_theirs(result, page):
+    content = content_of(page)
+    found, names = content["map"], order_of(result)[0]
+    assert len(content["cells"]) == len(content["motions"]) == 4
+    duration = next(own for own in found["quantities"] if own["name"] == "duration")
+    durations = unpacked(duration["values"])
+    for flat, number in content["cells"].items():
+        motion = content["motions"][number]
+        t, path = unpacked(motion["t"]), unpacked(motion["path"]).reshape(-1, 3)
+        assert t[-1] == pytest.approx(durations[int(flat)], rel=1e-6)
+        index = np.unravel_index(int(flat), found["shape"])
+        place = {name: axis["values"][i] for name, axis, i in zip(names, found["axes"], index, strict=True)}
+        np.testing.assert_allclose(path[-1], [place["x"], place["y"], place["z"]], atol=1e-6)
+        np.testing.assert_allclose(path[0], [0.0, 0.0, place["z0"]], atol=1e-6)
+        attached = unpacked(motion["attached"]).reshape(-1, 3, 3)
+        np.testing.assert_allclose(attached, np.repeat(path[:, None], 3, axis=1))
+        assert motion["limits"] == [{"words": "largest allowed", "value": 4.0}]
+        # Taut, and between them the forces carry weight and inertia at rest.
+        tension = unpacked(motion["tension"]).reshape(-1, 3)
+        units = np.array(motion["base"]) - path[0]
+        units /= np.linalg.norm(units, axis=1, keepdims=True)
+        np.testing.assert_allclose(tension[0] @ units, [0.0, 0.0, -0.198 * 9.81], atol=1e-3)
+
+
+def test_a_platform_s_points_turn_with_it():
+    rng, count = np.random.default_rng(3), 9
+    spec = resolve_robot("laval-mssm", Path("plan"), Path())
+    quaternion = Rotation.random(count, rng=rng).as_quat(scalar_first=True)
+    position = rng.uniform(-1.0, 1.0, (count, 3))
+    columns = {"t": np.arange(count) / 8.0, "position": position, "quaternion": quaternion}
+    columns["tension"] = rng.uniform(size=(count, 6))
+    keys = plan_keys({"schema": 1, "robot": "laval-mssm", "pose": [{"rest": True}, {"rest": True}]}, "plan")
+    found = motion_content("motion", columns, {}, spec, keys)
+    attached = unpacked(found["attached"]).reshape(count, 6, 3)
+    own = np.array(spec.platform_points)
+    for row in range(count):
+        turned = position[row] + Rotation.from_quat(quaternion[row], scalar_first=True).apply(own)
+        np.testing.assert_allclose(attached[row], turned, atol=1e-6)
+    # The edges join points of the platform, and all of these.
+    corners = unpacked(found["corners"]).reshape(count, 2 * found["edges"], 3)
+    gaps = np.linalg.norm(corners[:, :, None] - attached[:, None], axis=3)
+    assert gaps.min(2).max() < 1e-6
+    assert gaps.min(1).max() < 1e-6
+
+
+def test_the_same_result_gives_the_same_page(result, page, folder):
+    again = folder / "again.html"
+    cspr_jax.report(result, again, trajectories=3, cells=[{"x": 0.11, "y": 0.3, "z0": 1.7}])
+    assert again.read_bytes() == page.read_bytes()
+
+
+def test_telling_cells_are_feasible_and_differ():
+    rng = np.random.default_rng(0)
+    verdict = rng.integers(0, 2, (7, 5, 3)).astype(np.uint32)
+    data = {"arcs": rng.integers(1, 5, verdict.shape), "margin": rng.uniform(size=verdict.shape)}
+    for count in (0, 1, 12, 1000):
+        cells = telling(data, verdict, count)
+        assert len(cells) == len(set(cells)) == min(count, int((verdict == 0).sum()))
+        assert all(verdict[cell] == 0 for cell in cells)
+    least = np.where(verdict == 0, data["margin"], np.inf)
+    assert np.unravel_index(np.argmin(least), verdict.shape) in telling(data, verdict, 12)
+
+
+def test_a_large_map_is_a_page_below_twenty_megabytes(result):
+    """Numbers without any order, the worst for compression, of the quantities that such a map stores."""
+    rng, shape = np.random.default_rng(0), (200, 200, 20, 1)
+    axes = dict(zip(("x", "y", "z", "z0"), (np.arange(n) / 100.0 for n in shape), strict=True))
+    data = {
+        "arcs": rng.integers(0, 30, shape).astype(np.int16),
+        "verdict": (rng.integers(0, 2, shape) * 513).astype(np.uint32),
+        **{name: rng.uniform(size=shape) for name in ("duration", "margin", "feasible_at_infinity")},
+    }
+    content, left = map_content(dataclasses.replace(result, axes=axes, data=data))
+    charts = 6_000_000
+    assert len(json.dumps(content)) + charts < 20_000_000
+    assert set(left) | {own["name"] for own in content["quantities"]} == set(data)
+    assert {"arcs", "verdict", "duration", "margin"}.isdisjoint(left)
+
+
+@pytest.mark.parametrize(
+    ("choices", "said"),
+    [
+        ({"output": "page.pdf"}, "must end in .html"),
+        ({"trajectories": -1}, "--trajectories: -1: must be an integer from 0 to"),
+        ({"quantity": "speed"}, 'quantity = "speed": must be one of arcs'),
+        ({"cells": [{"q": 1.0}]}, '--at = "q": must be one of'),
+        ({"cells": [{"x": 9.0}]}, "must be x in"),
+    ],
+)
+def test_what_a_page_cannot_show_is_refused(result, folder, choices, said):
+    output = folder / choices.pop("output", "no.html")
+    with pytest.raises(ConfigError, match=re.escape(said)):
+        cspr_jax.report(result, output, **choices)
+    assert not output.exists()
+
+
+def test_cells_of_places_have_no_motions(folder, capsys):
+    sweep = {"schema": 1, "map": "workspace", "robot": "prototype", "workspace": {"conditions": ["wrench-feasible"]}}
+    sweep["axes"] = {"x": [0.0, 0.1], "y": [0.0, 0.1], "z": [1.0]}
+    path = cspr_jax.run(sweep, folder / "static")
+    assert cspr_jax.report(path, folder / "static.html") == []
+    assert content_of(folder / "static.html")["motions"] == []
+    with pytest.raises(ConfigError, match="whose cells do not move"):
+        cspr_jax.report(path, folder / "no.html", cells=[{"x": 0.1}])
+
+
+def test_a_motion_file_is_a_page_too(folder):
+    plan = cspr_jax.plan(PLAN)
+    file = plan.save(folder / "motion.h5")
+    assert cspr_jax.report(file, folder / "motion.html") == []
+    motion = content_of(folder / "motion.html")["motions"][0]
+    assert [part["arcs"] for part in motion["segments"]] == [10, 6]
+    assert motion["limits"] == [{"words": "smallest allowed", "value": 0.1}]
+    np.testing.assert_allclose(
+        unpacked(motion["tension"]).reshape(-1, 3).min(), plan.rows()["tension"].min(), rtol=1e-4
+    )
+
+
+# Where a cell is on the screen.
+PLACE = """([row, column]) => {
+    const node = document.getElementById("map"), box = node.getBoundingClientRect();
+    const { xaxis, yaxis } = node._fullLayout;
+    return [box.left + xaxis._offset + xaxis.d2p(node.data[0].x[column]),
+        box.top + yaxis._offset + yaxis.d2p(node.data[0].y[row])];
+}"""
+BROWSER = pytest.mark.skipif(shutil.which("chromium") is None, reason="chromium is not installed")
+
+
+@BROWSER
+def test_a_map_in_a_browser(result, page):
+    """Nothing goes wrong; slider, hover, keys and clicks show what is stored."""
+    with opened(page) as (tab, told):
+        assert tab.inner_text("#title") == "prototype: smallest number of arcs"
+        content = content_of(page)
+        before = tab.evaluate("JSON.stringify(document.getElementById('map').data[0].z)")
+        tab.focus("#sliders input")
+        tab.keyboard.press("ArrowRight" if tab.input_value("#sliders input") == "0" else "ArrowLeft")
+        after = tab.evaluate("JSON.stringify(document.getElementById('map').data[0].z)")
+        assert before != after
+        z0 = [1.3, 1.7][int(tab.input_value("#sliders input"))]
+        assert f"z0 = {z0} m" in tab.inner_text("#sliders")
+        # Each cell's colour is its stored number of arcs; none is blank.
+        y, x = (np.argsort(result.axes[name]) for name in ("y", "x"))
+        stored = result.data["arcs"][:, :, [1.3, 1.7].index(z0), 0][np.ix_(y, x)]
+        assert json.loads(after) == [[int(n) or None for n in row] for row in stored]
+        row, column = map(int, np.argwhere(stored > 0)[-1])
+        duration = result.data["duration"][y[row], x[column], [1.3, 1.7].index(z0), 0]
+        tab.mouse.move(*tab.evaluate(PLACE, [row, column]))
+        tab.wait_for_selector("#tip", state="visible")
+        hover = tab.text_content("#tip")
+        assert f"smallest number of arcs: {stored[row, column]}" in hover
+        assert float(re.search(r"duration: ([\d.]+) s", hover)[1]) == pytest.approx(duration, rel=1e-5)
+        # Keys move the cell, and Enter shows a motion where there is one.
+        tab.evaluate("chooseCell(0, 0)")
+        tab.focus("#map")
+        for key in ("ArrowRight", "ArrowUp", "ArrowUp"):
+            tab.keyboard.press(key)
+        assert "y\t0.6 m\nx\t0.1 m" in tab.inner_text("#cell")
+        tab.keyboard.press("n")
+        tab.wait_for_function("content.cells[flatCell()] !== undefined")
+        place = tab.inner_text("#cell")
+        assert "Enter or click shows it" in place
+        tab.keyboard.press("Enter")
+        number = tab.evaluate("content.cells[flatCell()]")
+        tab.wait_for_function(f"motion.own.title === content.motions[{number}].title")
+        assert len(content["motions"]) == 4
+        # So does a click: on another one, in the slice of the named cell.
+        flat = next(int(own) for own, k in content["cells"].items() if k == 0)
+        index, row, column = map(int, np.unravel_index(flat, content["map"]["shape"])[1:])
+        tab.evaluate(f"map.index[1] = {index}; drawMap()")
+        tab.mouse.move(*tab.evaluate(PLACE, [row, column]))
+        tab.wait_for_function("document.getElementById('tip').textContent.includes('click: its motion')")
+        tab.mouse.down()
+        tab.mouse.up()
+        tab.wait_for_function("motion.own.title === content.motions[0].title")
+        assert tab.evaluate("flatCell()") == flat
+        assert told == []
+
+
+@BROWSER
+def test_a_plan_in_a_browser(folder):
+    """The time moves robot and tensions; both themes; it plays to its end."""
+    path = folder / "plan.html"
+    cspr_jax.report(cspr_jax.plan(PLAN), path)
+    with opened(path) as (tab, told):
+        assert tab.is_hidden("#map-side")
+        first = tab.evaluate("JSON.stringify(document.getElementById('robot').data[0].x)")
+        tab.focus("#time")
+        tab.keyboard.press("End")
+        last = tab.evaluate("motion.own.count") - 1
+        assert tab.evaluate("motion.row") == last
+        total = tab.evaluate("motion.own.t[motion.own.count - 1]")
+        assert tab.inner_text("#clock") == f"{total:.2f} of {total:.2f} s"
+        assert tab.evaluate("document.getElementById('tensions').layout.shapes[0].x0") == pytest.approx(total)
+        tab.keyboard.press("PageDown")
+        assert 0 < tab.evaluate("motion.row") < last
+        assert tab.evaluate("JSON.stringify(document.getElementById('robot').data[0].x)") != first
+        paper = tab.evaluate("getComputedStyle(document.body).backgroundColor")
+        tab.click("#theme")
+        assert tab.evaluate("getComputedStyle(document.body).backgroundColor") != paper
+        tab.evaluate(f"setRow({last} - 12)")
+        tab.click("#play")
+        tab.wait_for_function(f"motion.row === {last} && motion.playing === null")
+        assert told == []
