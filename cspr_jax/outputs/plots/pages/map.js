@@ -113,7 +113,7 @@ function drawMap() {
   Plotly.react("map", traces, layoutOf((axis) => ({
     uirevision: "same", xaxis: { ...axis, title: { text: x.label }, constrain: "domain" },
     yaxis: { ...axis, title: { text: y.label }, constrain: "domain", autorange: isDown ? "reversed" : true,
-      ...(isEqual ? { scaleanchor: "x" } : {}) },
+      visible: y.values.length > 1, ...(isEqual && y.values.length > 1 ? { scaleanchor: "x" } : {}) },
   })), CHARTS);
   drawLegend(own.reason);
   tellCell();
@@ -209,6 +209,8 @@ const MAP_KEYS = {
 async function startMap() {
   const { quantities, reasons, shape, notes, first } = content.map;
   element("map-side").hidden = false;
+  // Of a map over one axis the plane is a strip.
+  if (shape.at(-2) === 1) element("map").style.height = "280px";
   element("notes").textContent = notes.join(", ");
   map.values = await Promise.all(quantities.map((own) => unpacked(own.values)));
   map.reasons = reasons ? await unpacked(reasons.values) : null;

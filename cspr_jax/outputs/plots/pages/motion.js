@@ -167,12 +167,9 @@ async function showMotion(number) {
   motion.own = await loaded(number);
   motion.range = extremes(motion.own.tension);
   motion.row = 0;
-  const wasHidden = element("motion-side").hidden;
-  element("motion-side").hidden = false;
   element("motion-title").textContent = motion.own.title;
   element("time").max = motion.own.count - 1;
   drawMotion();
-  if (content.map && wasHidden) drawMap();
 }
 
 function drawMotion() {
