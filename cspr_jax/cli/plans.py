@@ -93,7 +93,7 @@ def _plan(options: argparse.Namespace) -> int:
             with waiting():
                 save(path)
             if not plan.feasible:
-                warn(f"{path}: is not proved feasible" + ("; it says so itself" if path == options.output else ""))
+                warn(f"{path}: is not proved feasible; it says so itself")
         else:
             warn(f"{path}: not written, since a segment is not proved feasible (--anyway writes it)")
     return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE

@@ -26,7 +26,7 @@ THINNEST = 1e-4  # cables of a known diameter are drawn thicker than this
 DARK, BLUE, ORANGE = (0.2, 0.2, 0.2, 1.0), (0.1, 0.3, 0.6, 1.0), (0.85, 0.45, 0.1, 1.0)
 
 
-def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: str = "") -> str:
+def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: str = "", note: str = "") -> str:
     """A model of a robot for MuJoCo.
 
     Args:
@@ -34,6 +34,7 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
         moved: its motion, whose first row is the keyframe.
         step: of the integrator, s.
         control_file: name of the control file, which the model mentions.
+        note: what a reader should know, for the comment.
 
     Returns:
         the text of an MJCF file.
@@ -41,7 +42,7 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
     root = ElementTree.Element("mujoco", model=one_line(body.name))
     turned = "" if body.z_axis == "up" else ", turned by half a turn about x: (x, -y, -z) of the robot file"
     words = f"World axes are those of the robot file{turned}; z is up. A control is the tension of a cable, N."
-    root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words} "))
+    root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words}{note} "))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
     # A dense Jacobian of the tendons has one row a cable.
     gravity = [0.0, 0.0, -body.gravity]
@@ -155,6 +156,7 @@ def write_mjcf(plan: Plan, path: Path, step: float = STEP) -> None:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["t", *(f"tension_{k + 1}" for k in range(moved.tension.shape[1]))])
     writer.writerows([map(repr, row) for row in np.column_stack([moved.time, moved.tension]).tolist()])
+    note = "" if plan.feasible else " The plan is NOT PROVED FEASIBLE; no cable of the model pushes."
     # The model names the other one, which is there before it.
     publish(Disk(), beside, text.getvalue().encode())
-    publish(Disk(), path, model_xml(suspended(plan), moved, step, beside.name).encode())
+    publish(Disk(), path, model_xml(suspended(plan), moved, step, beside.name, note).encode())

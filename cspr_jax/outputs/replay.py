@@ -1,7 +1,9 @@
 """A plan played in MuJoCo: where its tensions take the model, and which tensions MuJoCo asks for along its path."""
 
+import contextlib
 import dataclasses
 import threading
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,8 +14,7 @@ from cspr_jax.outputs.mjcf import model_xml
 from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended, upward
 from cspr_jax.plans.planning import Plan
 
-# MuJoCo has one control callback a process.
-_CALLBACK = threading.Lock()
+_LENT = threading.Lock()
 
 
 class Way(NamedTuple):
@@ -192,37 +193,46 @@ def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bo
         ConfigError: MuJoCo is not installed.
     """
     mujoco = need_mujoco()
-    model = mujoco.MjModel.from_xml_string(model_xml(body, moved, step))
-    data, (places, rates, _) = mujoco.MjData(model), moved.coordinates(body.axes)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
+    places, rates, _ = moved.coordinates(body.axes)
     found, row = [], 0
 
     def pull(model: Any, data: Any) -> None:
         # RK4 asks at the start of a step, twice in its middle, and at its end.
         data.ctrl[:] = moved.tension[row + round(2.0 * (data.time - moved.time[row]) / model.opt.timestep)]
 
-    with _CALLBACK:
-        before = mujoco.get_mjcb_control()
+    with _callback_lent(mujoco):
+        model = mujoco.MjModel.from_xml_string(model_xml(body, moved, step))
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
         mujoco.set_mjcb_control(pull)
-        try:
-            for run in moved.runs():
-                if by_segment and moved.segment[run.start] != moved.segment[run.start - 1]:
-                    data.qpos[:], data.qvel[:] = places[run.start], rates[run.start]
+        for run in moved.runs():
+            if by_segment and moved.segment[run.start] != moved.segment[run.start - 1]:
+                data.qpos[:], data.qvel[:] = places[run.start], rates[run.start]
+            found.append(data.qpos.copy())
+            for row in run[:-1:2]:
+                data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
+                mujoco.mj_step(model, data)
                 found.append(data.qpos.copy())
-                for row in run[:-1:2]:
-                    data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
-                    mujoco.mj_step(model, data)
-                    found.append(data.qpos.copy())
+    return _way(moved, np.array(found), body.axes)
+
+
+@contextlib.contextmanager
+def _callback_lent(mujoco: Any) -> Iterator[None]:
+    # A process has one control callback, which MuJoCo calls when it compiles a model, too.
+    with _LENT:
+        before = mujoco.get_mjcb_control()
+        mujoco.set_mjcb_control(None)
+        try:
+            yield
         finally:
             mujoco.set_mjcb_control(before)
-    return _way(body, moved, np.array(found))
 
 
-def _way(body: Suspended, moved: Played, found: np.ndarray) -> Way:
+def _way(moved: Played, found: np.ndarray, axes: Sequence[int]) -> Way:
     rows = ends_of_steps(moved)
     position, turned = moved.position[rows], np.zeros(len(rows))
     if moved.rotation is None:
-        position[:, list(body.axes)] = found
+        position[:, list(axes)] = found
     else:
         position[:] = found[:, :3]
         turned = (moved.rotation[rows].inv() * Rotation.from_quat(np.roll(found[:, 3:], -1, axis=1))).magnitude()
@@ -243,7 +253,9 @@ def tension_deviation(body: Suspended, moved: Played) -> np.ndarray:
         ConfigError: MuJoCo is not installed.
     """
     mujoco = need_mujoco()
-    model, rows = mujoco.MjModel.from_xml_string(model_xml(body, moved)), ends_of_steps(moved)
+    with _callback_lent(mujoco):
+        model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
+    rows = ends_of_steps(moved)
     data, (places, rates, accelerations) = mujoco.MjData(model), moved.coordinates(body.axes)
     pulls, asked = np.empty((len(rows), model.nv, model.ntendon)), np.empty((len(rows), model.nv))
     for i, row in enumerate(rows.tolist()):
