@@ -142,6 +142,7 @@ def test_a_plan_that_is_not_feasible(folder, capsys):
     found = cspr_jax.replay(plan, anyway=True, step=0.01)
     assert found.tension.min() < 0.0 and found.path_deviation.max() > 0.01
     assert np.abs(found.tension_deviation).max() < 1e-9 * found.tension.max()
+    assert {path.name for path in set(folder.iterdir()) - before} == {"m.xml", "m_control.csv"}
 
 
 @pytest.mark.parametrize(

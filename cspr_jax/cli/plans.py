@@ -114,8 +114,10 @@ def _replay(options: argparse.Namespace) -> int:
     if options.output is not None and not options.output.suffix:
         raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     _check_step(options)
+    from cspr_jax.outputs.plots.style import style_of
     from cspr_jax.outputs.replay import need_mujoco
 
+    style_of(options.size, options.dpi, options.font_size)  # before what takes long
     need_mujoco()
     plan = _planned(options)
     if not (plan.feasible or options.anyway):
