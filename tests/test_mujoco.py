@@ -10,7 +10,7 @@ from support.platforms import EFFECTIVE, SHORT, Z0, cables_at, general, made, ou
 
 import cspr_jax
 from cspr_jax.outputs.mjcf import model_xml
-from cspr_jax.outputs.mujoco_motion import Played, Suspended, played, suspended, upward
+from cspr_jax.outputs.mujoco_motion import Played, Suspended, in_world, played, suspended, upward
 from cspr_jax.outputs.replay import ends_of_steps, tension_deviation, way_of
 from cspr_jax.trajectories.platform_segment import duration
 
@@ -58,17 +58,17 @@ def asymmetrical(_):
         at = states(segment, EFFECTIVE, arcs, tau)
         spread = np.linalg.svd(at.angular_velocity, compute_uv=False)
         assert spread[1] > 0.5 * spread[0]
-        turns = np.asarray(at.rotation) * np.outer(world.signs, world.signs)
-        back = np.swapaxes(turns, 1, 2)
-        spin = (at.angular_velocity, at.angular_acceleration)
-        return Played(
-            tau * float(duration(segment, float(arcs))),
-            np.ones(len(tau), int),
-            np.asarray(cables_at(robot, at)["tension"]),
-            *(world.turned(np.asarray(x)) for x in (at.position, at.velocity, at.acceleration)),
-            Rotation.from_matrix(turns),
-            *(np.einsum("nij,nj->ni", back, world.turned(np.asarray(x))) for x in spin),
-        )
+        columns = {
+            "t": tau * float(duration(segment, float(arcs))),
+            "position": at.position,
+            "velocity": at.velocity,
+            "acceleration": at.acceleration,
+            "quaternion": np.roll(Rotation.from_matrix(at.rotation).as_quat(), 1, axis=1),
+            "omega": at.angular_velocity,
+            "omega_dot": at.angular_acceleration,
+            "tension": cables_at(robot, at)["tension"],
+        }
+        return in_world({name: np.asarray(x) for name, x in columns.items()}, np.ones(len(tau), int), "down")
 
     scene = Scene(body, motion(STEPS // 2), motion(STEPS))
     assert scene.fine.tension.min() > 0.0

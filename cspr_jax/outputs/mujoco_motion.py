@@ -8,8 +8,8 @@ instant where the acceleration, or its derivative, may jump.
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -174,19 +174,34 @@ def played(plan: Plan, step: float = STEP) -> Played:
     if 2.0 * plan.answers.duration.sum() / step > LARGEST_ROWS:
         raise ConfigError("--step", f"{step:g} s: must give at most {LARGEST_ROWS} rows, two a step")
     taus, times = _instants(plan, step)
-    columns, world = rows_at(plan, taus), upward(plan.spec.z_axis)
-    moved = {name: world.turned(columns[name]) for name in ("position", "velocity", "acceleration")}
+    columns, segment = rows_at(plan, taus), np.repeat(np.arange(1, len(taus) + 1), [len(tau) for tau in taus])
+    columns |= {"t": times, "tension": columns["tension" if plan.spec.pairs is None else "tension_each"]}
+    if not all(np.isfinite(columns[name]).all() for name in ("tension", "position", "acceleration")):
+        raise ConfigError("plan", "cannot be played: its motion or its tensions are not finite; see its verdicts")
+    return in_world(columns, segment, plan.spec.z_axis)
+
+
+def in_world(columns: Mapping[str, np.ndarray], segment: np.ndarray, z_axis: str) -> Played:
+    """A motion in MuJoCo's axes.
+
+    Args:
+        columns: by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file, (n, ...) each.
+        segment: (n,) numbers of the segments.
+        z_axis: where the file's z points, "down" or "up".
+
+    Returns:
+        the motion.
+    """
+    world = upward(z_axis)
+    moved: dict[str, Any] = {name: world.turned(columns[name]) for name in ("position", "velocity", "acceleration")}
     if "quaternion" in columns:
+        # SciPy has the scalar last.
         rotation = Rotation.from_quat(np.roll(world.turned_quaternions(columns["quaternion"]), -1, axis=1))
         back = rotation.inv()
         # Nothing is added to the derivative in axes that turn: omega x omega is nil.
         moved |= {name: back.apply(world.turned(columns[name])) for name in ("omega", "omega_dot")}
         moved["rotation"] = rotation
-    tension = columns["tension" if plan.spec.pairs is None else "tension_each"]
-    if not all(np.isfinite(values).all() for values in (tension, moved["position"], moved["acceleration"])):
-        raise ConfigError("plan", "cannot be played: its motion or its tensions are not finite; see its verdicts")
-    segment = np.repeat(np.arange(1, len(taus) + 1), [len(tau) for tau in taus])
-    return Played(time=times, segment=segment, tension=tension, **moved)
+    return Played(time=columns["t"], segment=segment, tension=columns["tension"], **moved)
 
 
 def _instants(plan: Plan, step: float) -> tuple[list[np.ndarray], np.ndarray]:
