@@ -42,8 +42,8 @@ def replay_figure(replay: Replay) -> Figure:
     drawn["tension"].set_ylabel("tension off MuJoCo's (N)")
     path, tension = replay.path_deviation.max(), np.abs(replay.tension_deviation).max()
     figure.suptitle(
-        f"{replay.robot}: played in MuJoCo {replay.mujoco}, path within {path:.1e} m, tensions within {tension:.1e} N"
-        f"\nz axis {replay.z_axis}"
+        f"{replay.robot}: played in MuJoCo {replay.mujoco}, each segment from its start; z axis {replay.z_axis}"
+        f"\npath within {path:.1e} m, tensions within {tension:.1e} N"
     )
     return figure
 
