@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from cspr_jax.api.platform_searches import accessible as accessible
     from cspr_jax.api.platform_searches import attainable as attainable
     from cspr_jax.api.platform_searches import minimum_pose_arcs as minimum_pose_arcs
+    from cspr_jax.api.replays import Replay as Replay
+    from cspr_jax.api.replays import replay as replay
     from cspr_jax.api.reports import report as report
     from cspr_jax.api.robots import parallel_pair_robot as parallel_pair_robot
     from cspr_jax.api.robots import platform as platform
@@ -68,6 +70,7 @@ _PUBLIC = {
     "ImportedRobot": ("cspr_jax.api.imports", "ImportedRobot"),
     "LaunchErrors": ("cspr_jax.search.landings", "LaunchErrors"),
     "Limits": ("cspr_jax.robots.limits", "Limits"),
+    "Replay": ("cspr_jax.api.replays", "Replay"),
     "Uncertainty": ("cspr_jax.robots.limits", "Uncertainty"),
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
     "WorkspaceVolume": ("cspr_jax.api.volumes", "WorkspaceVolume"),
@@ -103,6 +106,7 @@ _PUBLIC = {
     "plot": ("cspr_jax.api.pictures", "plot"),
     "point_mass": ("cspr_jax.api.robots", "point_mass"),
     "point_mass_robot": ("cspr_jax.robots.point_mass", "point_mass_robot"),
+    "replay": ("cspr_jax.api.replays", "replay"),
     "report": ("cspr_jax.api.reports", "report"),
     "run": ("cspr_jax.api.sweeps", "run"),
     "sampled_margin": ("cspr_jax.api.motions", "sampled_margin"),
@@ -124,6 +128,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "ImportedRobot",
     "LaunchErrors",
     "Limits",
+    "Replay",
     "Uncertainty",
     "Verdict",
     "WorkspaceVolume",
@@ -159,6 +164,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "plot",
     "point_mass",
     "point_mass_robot",
+    "replay",
     "report",
     "run",
     "sampled_margin",

@@ -89,6 +89,10 @@ of feasible plans do not have that column.
 `cspr plot FILE.h5` draws path and tensions over time. With `--quantity acceleration` (point masses) it draws all
 accelerations that the cables can give at one instant, `--at t=1.2` or that of the smallest margin, and the motion's
 among them; with `--quantity path_acceleration` (straight lines) that column over the way, between its bounds.
+
+`cspr plan --mjcf NAME.xml` writes a model for MuJoCo, and `NAME_control.csv` with `t`, s, and `tension_1`, ..., N: two
+rows a step of at most `--step` seconds, and one more where steps end at a jump
+([plans in MuJoCo](concepts.md#plans-in-mujoco)).
 """
 
 

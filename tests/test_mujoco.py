@@ -5,34 +5,36 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from oracles import platform as oracle
+from scipy.spatial.transform import Rotation
 from support.platforms import EFFECTIVE, SHORT, Z0, cables_at, general, made, ours, states
 
 import cspr_jax
-from cspr_jax.outputs import motion_files
-from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.outputs.mjcf import model_xml
+from cspr_jax.outputs.mujoco_motion import Played, Suspended, in_world, played, suspended, upward
+from cspr_jax.outputs.replay import ends_of_steps, tension_deviation, way_of
 from cspr_jax.trajectories.platform_segment import duration
 
 mujoco = pytest.importorskip("mujoco")
 
-# Steps of a play, a segment. Ten divides them and their half, so that the knots of "effective-c3" lie between steps.
+# Steps of a play, a segment.
 STEPS = 1600
-SAMPLES = 2 * STEPS + 1
 
 
-class Motion(NamedTuple):
-    """A robot, and the columns of its motion: (n_segments, SAMPLES, ...) named as by `motion_files.rows`."""
+class Scene(NamedTuple):
+    """A robot, and its motion in few steps and in twice as many."""
 
-    robot: PlatformRobot
-    columns: dict[str, np.ndarray]
+    body: Suspended
+    coarse: Played
+    fine: Played
 
 
 def planned(folder):
-    """Rest, a pose, rest: rows of a plan. The platform turns about one fixed axis."""
-    (folder / "plan.toml").write_text(SHORT.replace("[[pose]]", f"samples = {SAMPLES}\n[[pose]]", 1))
+    """Rest, a pose, rest: a plan. The platform turns about one fixed axis."""
+    (folder / "plan.toml").write_text(SHORT)
     plan = cspr_jax.plan(folder / "plan.toml")
-    rows = motion_files.rows(plan)
-    assert (plan.answers.verdict == 0).all()
-    return Motion(plan.problem.robot, {name: x.reshape(2, SAMPLES, *x.shape[1:]) for name, x in rows.items()})
+    assert plan.feasible
+    step = float(plan.answers.duration.max()) / STEPS
+    return Scene(suspended(plan), *(played(plan, size) for size in (2.0 * step, step)))
 
 
 def asymmetrical(_):
@@ -43,131 +45,74 @@ def asymmetrical(_):
         position = np.array([*rng.uniform(-0.8, 0.8, 2), rng.uniform(1.1, 1.6)])
         angles = rng.uniform([-np.pi, 0.2, -0.5], [np.pi, 0.8, 0.5])
         poses.append((position, oracle.pose_quaternion(position, angles)))
-    segment, tau = made(robot, *poses, Z0, (-3.0, -2.0), arcs), np.linspace(0.0, 1.0, SAMPLES)
-    at = states(segment, EFFECTIVE, arcs, tau)
-    cables = cables_at(robot, at)
-    length, rate, _ = cables["motion"]
-    quaternion = np.zeros((SAMPLES, 4))
-    for q, rotation in zip(quaternion, np.asarray(at.rotation), strict=True):
-        mujoco.mju_mat2Quat(q, rotation.ravel())
-    columns = {
-        "t": tau * float(duration(segment, float(arcs))),
-        "position": at.position,
-        "velocity": at.velocity,
-        "acceleration": at.acceleration,
-        "quaternion": quaternion,
-        "omega": at.angular_velocity,
-        "omega_dot": at.angular_acceleration,
-        "length": length,
-        "rate": rate,
-        "tension": cables["tension"],
-    }
-    spread = np.linalg.svd(at.angular_velocity, compute_uv=False)
-    assert spread[1] > 0.5 * spread[0] and columns["tension"].min() > 0.0
-    return Motion(robot, {name: np.asarray(x)[None] for name, x in columns.items()})
+    segment, world = made(robot, *poses, Z0, (-3.0, -2.0), arcs), upward("down")
+    points, inertia = world.turned(np.asarray(robot.platform_points)), world.turned_tensor(np.asarray(robot.inertia))
+    body = Suspended(
+        *("mine", "down", (), float(robot.mass), inertia, float(robot.gravity)),
+        *(world.inward(np.asarray(robot.base_points)), points, np.full(6, np.inf)),
+    )
+
+    def motion(steps):
+        # Ten divides the steps: the knots of "effective-c3" lie between them.
+        tau = np.linspace(0.0, 1.0, 2 * steps + 1)
+        at = states(segment, EFFECTIVE, arcs, tau)
+        spread = np.linalg.svd(at.angular_velocity, compute_uv=False)
+        assert spread[1] > 0.5 * spread[0]
+        columns = {
+            "t": tau * float(duration(segment, float(arcs))),
+            "position": at.position,
+            "velocity": at.velocity,
+            "acceleration": at.acceleration,
+            "quaternion": np.roll(Rotation.from_matrix(at.rotation).as_quat(), 1, axis=1),
+            "omega": at.angular_velocity,
+            "omega_dot": at.angular_acceleration,
+            "tension": cables_at(robot, at)["tension"],
+        }
+        return in_world({name: np.asarray(x) for name, x in columns.items()}, np.ones(len(tau), int), "down")
+
+    scene = Scene(body, motion(STEPS // 2), motion(STEPS))
+    assert scene.fine.tension.min() > 0.0
+    return scene
 
 
 @pytest.fixture(scope="module", params=[planned, asymmetrical])
-def motion(request, tmp_path_factory):
+def scene(request, tmp_path_factory):
     return request.param(tmp_path_factory.mktemp("plan"))
 
 
-def model_of(robot):
-    """A free body on six cables without mass, a motor each whose control is the tension in N; no contact, no loss."""
-
-    def text(values):
-        return " ".join(repr(float(x)) for x in np.ravel(values))
-
-    def sites(name, points):
-        return "".join(f'<site name="{name}{k}" pos="{text(point)}"/>' for k, point in enumerate(points))
-
-    # Principal axes: MuJoCo 3 finds those of a full tensor to 6e-7 only.
-    moments, axes = np.linalg.eigh(robot.inertia)
-    turn = np.zeros(4)
-    mujoco.mju_mat2Quat(turn, (axes * np.linalg.det(axes)).ravel())
-    cables = "".join(
-        f'<spatial name="cable{k}"><site site="spool{k}"/><site site="point{k}"/></spatial>' for k in range(6)
-    )
-    motors = "".join(f'<motor tendon="cable{k}" gear="-1"/>' for k in range(6))
-    return mujoco.MjModel.from_xml_string(
-        f"""
-        <mujoco>
-          <compiler inertiafromgeom="false"/>
-          <option gravity="0 0 {text(robot.gravity)}"><flag constraint="disable" contact="disable"/></option>
-          <worldbody>
-            {sites("spool", np.asarray(robot.base_points))}
-            <body>
-              <freejoint/>
-              <inertial pos="0 0 0" mass="{text(robot.mass)}" diaginertia="{text(moments)}" quat="{text(turn)}"/>
-              {sites("point", np.asarray(robot.platform_points))}
-            </body>
-          </worldbody>
-          <tendon>{cables}</tendon>
-          <actuator>{motors}</actuator>
-        </mujoco>
-        """
-    )
+def test_mujoco_asks_for_the_same_tensions(scene):
+    """Its inverse dynamics through its own tendon Jacobian; what a cable is off by is found in that cable."""
+    body, moved = scene.body, scene.coarse
+    assert np.abs(tension_deviation(body, moved)).max() < 1e-12 * moved.tension.max()
+    wrong = moved.tension + np.eye(6)[3] * 0.1
+    found = tension_deviation(body, Played(**vars(moved) | {"tension": wrong}))
+    np.testing.assert_allclose(found, np.broadcast_to(-0.1 * np.eye(6)[3], found.shape), atol=1e-9)
 
 
-def test_mujoco_asks_for_the_same_tensions(motion):
-    """Its inverse dynamics through its own tendon Jacobian; its cables' lengths and rates too."""
-    model, columns = model_of(motion.robot), motion.columns
-    data, largest = mujoco.MjData(model), columns["tension"].max()
-    every = 53 * len(columns["t"])  # about 60 instants in all, out of step with the arcs
-    for segment in range(len(columns["t"])):
-        for i in range(0, SAMPLES, every):
-            at = {name: x[segment, i] for name, x in columns.items()}
-            # The angular velocity of a free joint is in platform axes; so is its derivative: omega x omega is nil.
-            back = oracle.matrix(at["quaternion"]).T
-            data.qpos[:] = *at["position"], *at["quaternion"]
-            data.qvel[:] = *at["velocity"], *(back @ at["omega"])
-            data.qacc[:] = *at["acceleration"], *(back @ at["omega_dot"])
-            mujoco.mj_inverse(model, data)
-            # Every cable depends on all six freedoms: a sparse Jacobian is laid out as a dense one.
-            pull = -np.reshape(data.ten_J, (6, 6)).T
-            tension = np.linalg.solve(pull, data.qfrc_inverse)
-            np.testing.assert_allclose(tension, at["tension"], rtol=0.0, atol=1e-12 * largest)
-            np.testing.assert_allclose(data.ten_length, at["length"], atol=1e-12)
-            np.testing.assert_allclose(data.ten_velocity, at["rate"], atol=1e-12)
-
-
-def played(motion, stride):
-    """Errors of position, m, and of orientation, rad: our tensions alone move MuJoCo's platform, by Runge and Kutta."""
-    # A step is 2 * stride samples long, and takes the tensions of its start, its middle and its end as they are.
-    model, columns = model_of(motion.robot), motion.columns
-    data, quaternion_rate = mujoco.MjData(model), np.zeros(4)
-
-    def slope(state, tension):
-        data.qpos[:], data.qvel[:], data.ctrl[:] = state[:7], state[7:], tension
-        data.qpos[3:] /= np.linalg.norm(state[3:7])
+def test_the_model_is_the_robot(scene):
+    """By the oracle's own rotations: lengths of the cables; gravity and inertia move what nothing pulls."""
+    body, moved = scene.body, scene.fine
+    model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
+    data, places = mujoco.MjData(model), moved.coordinates(())[0]
+    rng = np.random.default_rng(1)
+    for row in range(0, len(moved.time), 53 * len(moved.time) // 2000):
+        turn = oracle.matrix(places[row, 3:])
+        data.qpos[:], data.qvel[:], data.ctrl[:] = places[row], rng.normal(size=6), 0.0
         mujoco.mj_forward(model, data)
-        omega = np.array([0.0, *state[10:]])  # in platform axes
-        mujoco.mju_mulQuat(quaternion_rate, state[3:7], omega)
-        return np.concatenate([state[7:10], 0.5 * quaternion_rate, data.qacc])
-
-    first = {name: columns[name][0, 0] for name in ("position", "quaternion", "velocity", "omega")}
-    assert not np.any(first["velocity"]) and np.abs(first["omega"]).max() < 1e-12
-    state = np.concatenate([first["position"], first["quaternion"], np.zeros(6)])
-    away, turned = 0.0, 0.0
-    for segment in range(len(columns["t"])):
-        times, tensions, places, turns = (
-            columns[name][segment, ::stride] for name in ("t", "tension", "position", "quaternion")
-        )
-        for i in range(0, len(times) - 2, 2):
-            h = times[i + 2] - times[i]
-            k1 = slope(state, tensions[i])
-            k2 = slope(state + 0.5 * h * k1, tensions[i + 1])
-            k3 = slope(state + 0.5 * h * k2, tensions[i + 1])
-            k4 = slope(state + h * k3, tensions[i + 2])
-            state = state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-            away = max(away, np.linalg.norm(state[:3] - places[i + 2]))
-            turn = state[3:7] / np.linalg.norm(state[3:7])
-            turned = max(turned, 2.0 * min(np.linalg.norm(turn - s * turns[i + 2]) for s in (-1.0, 1.0)))
-    return np.array([away, turned])
+        lengths = np.linalg.norm(places[row, :3] + body.points @ turn.T - body.spools, axis=1)
+        np.testing.assert_allclose(data.ten_length, lengths, atol=1e-12)
+        omega = data.qvel[3:]
+        spin = -np.linalg.solve(body.inertia, np.cross(omega, body.inertia @ omega))
+        np.testing.assert_allclose(data.qacc, [0.0, 0.0, -body.gravity, *spin], atol=1e-10)
 
 
-def test_the_tensions_make_the_motion_in_mujoco(motion):
+def test_the_tensions_make_the_motion_in_mujoco(scene):
     """Open loop over the whole motion; what is left is the integrator's error, which falls with h to the fourth."""
-    coarse, fine = played(motion, 2), played(motion, 1)
+    errors = []
+    for moved in (scene.coarse, scene.fine):
+        way = way_of(scene.body, moved, by_segment=False)
+        planned = moved.position[ends_of_steps(moved)]
+        errors.append([np.linalg.norm(way.position - planned, axis=1).max(), way.turned.max()])
+    coarse, fine = np.array(errors)
     assert fine[0] < 5e-9 and fine[1] < 2e-7
     np.testing.assert_allclose(coarse / fine, 16.0, rtol=0.1)

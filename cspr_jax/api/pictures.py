@@ -1,6 +1,6 @@
 """Pictures of results from Python, as `cspr plot` draws them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs.plots.draw import drawn
 from cspr_jax.outputs.plots.selection import result_at
-from cspr_jax.outputs.plots.style import in_style, laid_out, rendered, style_of
+from cspr_jax.outputs.plots.style import Style, in_style, laid_out, rendered, style_of
 from cspr_jax.runtime.stages import stage
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
@@ -59,19 +59,42 @@ def plot(  # noqa: PLR0913
     files = [one if isinstance(one, Result) else result_at(Path(one)) for one in given]
     loaded = [one if isinstance(one, Result) else open_result(one) for one in files]
     names = [f"result {i + 1}" if isinstance(one, Result) else str(one) for i, one in enumerate(files)]
+
+    def draw() -> Figure:
+        given_at = None if at is None else dict(at)
+        return drawn(loaded, names, quantity=quantity, at=given_at, lines=lines, envelope=envelope, solid=solid)
+
+    return finished(draw, names[0], style, output)
+
+
+def finished(draw: Callable[[], Figure], name: str, style: Style, output: str | Path | None) -> Figure:
+    """A picture in the style of all, written if that is asked for.
+
+    Args:
+        draw: makes it.
+        name: of what is drawn, for errors.
+        style: the chosen one.
+        output: picture to write; its ending is the format. None: nothing is written.
+
+    Returns:
+        the figure of matplotlib.
+
+    Raises:
+        StoreError: the picture cannot be written.
+        ConfigError: nothing to draw, a size out of bounds, or an unknown picture format.
+    """
     picture = None
     stage("drawing")
     try:
         with in_style(style):
-            given_at = None if at is None else dict(at)
-            figure = drawn(loaded, names, quantity=quantity, at=given_at, lines=lines, envelope=envelope, solid=solid)
+            figure = draw()
             laid_out(figure, style)
             if output is not None:
                 picture = rendered(figure, Path(output).suffix, style)
     except InputError as error:
-        raise ConfigError(names[0], str(error)) from error
+        raise ConfigError(name, str(error)) from error
     except ValueError as error:
-        raise ConfigError(output or names[0], str(error).splitlines()[0]) from error
+        raise ConfigError(output or name, str(error).splitlines()[0]) from error
     if picture is not None:
         publish(Disk(), Path(str(output)), picture)
     return figure

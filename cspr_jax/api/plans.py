@@ -12,6 +12,8 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs import motion_files, plan_report
+from cspr_jax.outputs.mjcf import write_mjcf
+from cspr_jax.outputs.mujoco_motion import STEP
 from cspr_jax.plans import planning
 from cspr_jax.plans.released import scattered
 from cspr_jax.schema import labelled
@@ -66,6 +68,31 @@ class Plan(planning.Plan):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
         with double_precision():
             motion_files.write_rows(self, path, rate=rate)
+        return path
+
+    def save_mjcf(self, path: str | Path, step: float = STEP, anyway: bool = False) -> Path:
+        """Write a model of the robot for MuJoCo, and beside it NAME_control.csv, the tensions that play the plan.
+
+        Args:
+            path: of the model, NAME.xml; files of both names are replaced if they are there.
+            step: the longest step of MuJoCo's integrator, s.
+            anyway: whether to write a plan that is not feasible, too; no cable of the model pushes.
+
+        Returns:
+            the path.
+
+        Raises:
+            ConfigError: another ending, a plan that is not feasible or has no finite motion, or a step that is no
+                number > 0 or gives too many rows.
+            StoreError: the disk or the folder refuses.
+        """
+        path = Path(path)
+        if path.suffix != ".xml":
+            raise ConfigError(path, "must end in .xml")
+        if not (self.feasible or anyway):
+            raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
+        with double_precision():
+            write_mjcf(self, path, step)
         return path
 
     def to_dict(self) -> dict[str, Any]:

@@ -1,7 +1,9 @@
-"""Commands about sequences of poses: plan."""
+"""Commands about sequences of poses: plan, and replay, which plays one in MuJoCo."""
 
 import argparse
+import sys
 from pathlib import Path
+from typing import Any
 
 from cspr_jax.cli.command import (
     Command,
@@ -15,7 +17,10 @@ from cspr_jax.cli.command import (
     warn,
 )
 from cspr_jax.errors import ConfigError, ExitCode
+from cspr_jax.outputs.plots.options import add_look
 from cspr_jax.runtime.progress import waiting
+
+_STEP = "longest step of MuJoCo (default 0.0005)"
 
 
 def _add_plan(parser: argparse.ArgumentParser) -> None:
@@ -24,17 +29,39 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "write the motion to FILE.csv or FILE.h5", metavar="FILE")
     parser.add_argument("--anyway", action="store_true", help="write the best candidate's motion if it is not feasible")
     parser.add_argument("--rate", type=float, metavar="HZ", help="rows a second (default: `samples` rows a segment)")
+    parser.add_argument(
+        "--mjcf",
+        type=Path,
+        metavar="FILE.xml",
+        help="write a model for MuJoCo, and beside it FILE_control.csv, the tensions that play the plan in it",
+    )
+    parser.add_argument("--step", type=float, metavar="S", help=f"--mjcf: {_STEP}")
     add_all_errors(parser)
     add_device(parser)
 
 
-def _plan(options: argparse.Namespace) -> int:
+def _check_plan(options: argparse.Namespace) -> None:
     if options.output is not None and options.output.suffix not in (".csv", ".h5"):
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
     if options.rate is not None and not 0.0 < options.rate < float("inf"):
         raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
-    if options.anyway and options.output is None:
-        raise ConfigError("--anyway", "must be absent without -o")
+    if options.mjcf is not None and options.mjcf.suffix != ".xml":
+        raise ConfigError("--mjcf", f"{options.mjcf}: must end in .xml")
+    if options.mjcf is not None and options.output == options.mjcf.with_name(f"{options.mjcf.stem}_control.csv"):
+        raise ConfigError("-o", f"{options.output}: must be another name: --mjcf writes the control file there")
+    if options.step is not None and options.mjcf is None:
+        raise ConfigError("--step", "must be absent without --mjcf")
+    _check_step(options)
+    if options.anyway and options.output is None and options.mjcf is None:
+        raise ConfigError("--anyway", "must be absent without -o or --mjcf")
+
+
+def _check_step(options: argparse.Namespace) -> None:
+    if options.step is not None and not 0.0 < options.step < float("inf"):
+        raise ConfigError("--step", f"{options.step}: must be a number > 0, in s")
+
+
+def _planned(options: argparse.Namespace) -> Any:
     from cspr_jax.config.hints import plan_hints, robot_hints
 
     with waiting():
@@ -42,27 +69,76 @@ def _plan(options: argparse.Namespace) -> int:
         from cspr_jax.api import plans
 
         plan = plans.plan(options.plan)
-    feasible = plan.feasible
-    for line in plan.warnings:
+    hints = robot_hints(plan.spec) + ([] if plan.feasible else plan_hints(plan.keys, plan.spec))
+    for line in [*plan.warnings, *(f"hint: {line}" for line in hints)]:
         warn(line)
-    _hint(robot_hints(plan.spec) + ([] if feasible else plan_hints(plan.keys, plan.spec)))
+    return plan
+
+
+def _plan(options: argparse.Namespace) -> int:
+    _check_plan(options)
+    plan = _planned(options)
     if options.json:
         print_json(plan.to_dict())
     else:
         print_table(plan.to_table())
-    if options.output is not None and (feasible or options.anyway):
-        with waiting():
-            plan.save(options.output, options.rate, anyway=True)
-        if not feasible:
-            warn(f"{options.output}: is not proved feasible; it says so itself")
-    elif options.output is not None:
-        warn(f"{options.output}: not written, since a segment is not proved feasible (--anyway writes it)")
-    return ExitCode.DONE if feasible else ExitCode.NOT_FEASIBLE
+    of_mjcf = {} if options.step is None else {"step": options.step}
+    for path, save in (
+        (options.output, lambda path: plan.save(path, options.rate, anyway=True)),
+        (options.mjcf, lambda path: plan.save_mjcf(path, anyway=True, **of_mjcf)),
+    ):
+        if path is None:
+            continue
+        if plan.feasible or options.anyway:
+            with waiting():
+                save(path)
+            if not plan.feasible:
+                warn(f"{path}: is not proved feasible; it says so itself")
+        else:
+            warn(f"{path}: not written, since a segment is not proved feasible (--anyway writes it)")
+    return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
 
 
-def _hint(lines: list[str]) -> None:
-    for line in lines:
-        warn(f"hint: {line}")
+def _add_replay(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("plan", type=Path, help="plan file (TOML)")
+    add_json(parser)
+    add_output(parser, "draw both paths and the deviations: .png, .pdf, .svg", metavar="FILE")
+    parser.add_argument("--anyway", action="store_true", help="play the best candidate's motion if it is not feasible")
+    parser.add_argument("--step", type=float, metavar="S", help=_STEP)
+    add_look(parser)
+    add_all_errors(parser)
+    add_device(parser)
 
 
-COMMANDS = (Command("plan", "plan a sequence of poses", _add_plan, _plan),)
+def _replay(options: argparse.Namespace) -> int:
+    if options.output is not None and not options.output.suffix:
+        raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
+    _check_step(options)
+    from cspr_jax.outputs.plots.style import style_of
+    from cspr_jax.outputs.replay import need_mujoco
+
+    style_of(options.size, options.dpi, options.font_size)  # before what takes long
+    need_mujoco()
+    plan = _planned(options)
+    if not (plan.feasible or options.anyway):
+        warn(f"{options.plan}: not played, since a segment is not proved feasible (--anyway plays it)")
+        return ExitCode.NOT_FEASIBLE
+    with waiting():
+        from cspr_jax.api.replays import replay
+
+        found = replay(plan, anyway=True, **({} if options.step is None else {"step": options.step}))
+        if options.output is not None:
+            found.plot(output=options.output, size=options.size, dpi=options.dpi, font_size=options.font_size)
+    if options.json:
+        print_json(found.to_dict())
+    else:
+        sys.stdout.write("".join(f"{line}\n" for line in found.lines()))
+    return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
+
+
+COMMANDS = (
+    Command("plan", "plan a sequence of poses", _add_plan, _plan),
+    Command(
+        "replay", "play a plan in MuJoCo, and say how far path and tensions are from the planned", _add_replay, _replay
+    ),
+)

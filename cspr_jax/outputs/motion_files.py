@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -93,6 +94,30 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
         raise ConfigError("--rate", f"{rate:g} Hz: must give at most {LARGEST_ROWS} rows")
     if rate is None and plan.keys.samples * len(plan.answers.duration) > LARGEST_ROWS:
         raise ConfigError("samples", f"{plan.keys.samples}: must give at most {LARGEST_ROWS} rows in all")
+    starts = np.concatenate([[0.0], np.cumsum(plan.answers.duration)])
+    taus = []
+    for i, length in enumerate(plan.answers.duration):
+        if rate is None:
+            tau = np.linspace(0.0, 1.0, plan.keys.samples)
+        else:
+            ticks = np.arange(*np.ceil(starts[i : i + 2] * rate - SAME_TICK))
+            tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
+            if i == len(plan.answers.duration) - 1:
+                tau = np.append(tau, 1.0)
+        taus.append(tau)
+    return rows_at(plan, taus)
+
+
+def rows_at(plan: Plan, taus: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+    """States at given instants of the segments of a plan.
+
+    Args:
+        plan: the plan.
+        taus: of each segment, (n_i,) normalised times in [0, 1].
+
+    Returns:
+        as `rows`.
+    """
     duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     is_redundant = plan.problem.robot.n_cables > plan.problem.robot.dof
@@ -101,23 +126,20 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
     limits = plan.problem.limits if needs_limits else NO_LIMITS
     with_couples = is_redundant and is_rectangle(plan.problem.robot.base_points)
     pairs, parts = plan.spec.pairs, []
-    for i, length in enumerate(duration):
-        if rate is None:
-            tau = np.linspace(0.0, 1.0, plan.keys.samples)
-        else:
-            ticks = np.arange(*np.ceil(starts[i : i + 2] * rate - SAME_TICK))
-            tau = np.clip((ticks / rate - starts[i]) / length, 0.0, 1.0)
-            if i == len(duration) - 1:
-                tau = np.append(tau, 1.0)
+    longest = max(len(tau) for tau in taus)
+    for i, tau in enumerate(taus):
+        # Segments of one length are compiled once.
+        padded = np.concatenate([tau, np.ones(longest - len(tau))])
         some = _states(
-            plan.problem.robot, limits, motions[i], tau, rule=plan.keys.tension_rule, with_couples=with_couples
+            plan.problem.robot, limits, motions[i], padded, rule=plan.keys.tension_rule, with_couples=with_couples
         )
         state, of_cables = jax.tree.map(np.asarray, some)
         state = outward(plan.frame, state)
         part = {name: getattr(state, field) for name, field in _FIELDS.items()} | of_cables
+        part = {name: None if values is None else values[: len(tau)] for name, values in part.items()}
         if pairs is not None:
             part["tension_each"] = pairs.tensions(part["tension"])
-        parts.append({"t": starts[i] + tau * length, **part})
+        parts.append({"t": starts[i] + tau * duration[i], **part})
     names = [name for name in TRAJECTORY if all(part.get(name) is not None for part in parts)]
     return {name: np.concatenate([part[name] for part in parts]) for name in names}
 

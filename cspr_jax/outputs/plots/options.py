@@ -8,7 +8,7 @@ ACCELERATION, PATH_ACCELERATION, LANDING = "acceleration", "path_acceleration", 
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
-    """Arguments of the command that draws results; `style.style_of` reads the last three.
+    """Arguments of the command that draws results.
 
     Args:
         parser: of that command.
@@ -29,6 +29,15 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         "--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis: nearest point; t of a motion"
     )
     parser.set_defaults(device=None)
+    add_look(parser)
+
+
+def add_look(parser: argparse.ArgumentParser) -> None:
+    """Arguments of every picture; `style.style_of` reads them.
+
+    Args:
+        parser: of a command that draws.
+    """
     parser.add_argument("--size", metavar="WIDTHxHEIGHT", help="of the picture, cm, such as 16x10")
     parser.add_argument("--dpi", type=float, metavar="N", help="pixels an inch (default 160)")
     parser.add_argument("--font-size", type=float, metavar="PT", help="points (default 10)")

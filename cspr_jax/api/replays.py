@@ -1,0 +1,71 @@
+"""Plans played in MuJoCo from Python, as `cspr replay` plays them."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from cspr_jax.api.pictures import finished
+from cspr_jax.api.plans import NAME, Plan, plan
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.errors import ConfigError
+from cspr_jax.outputs import replay as replays
+from cspr_jax.outputs.mujoco_motion import STEP
+from cspr_jax.outputs.plots.replay import replay_figure
+from cspr_jax.outputs.plots.style import style_of
+
+
+@dataclasses.dataclass(frozen=True)
+class Replay(replays.Replay):
+    """A plan beside what MuJoCo makes of it; see `cspr_jax.outputs.replay.Replay` for its fields."""
+
+    def plot(
+        self,
+        *,
+        size: str | tuple[float, float] | None = None,
+        dpi: float | None = None,
+        font_size: float | None = None,
+        output: str | Path | None = None,
+    ) -> Figure:
+        """Draw planned and played path, and the deviations of path and tensions over time.
+
+        Args:
+            size: width and height, cm, as (16, 10) or "16x10"; None: what suits the picture.
+            dpi: pixels an inch of a file; None: 160.
+            font_size: points; None: 10.
+            output: picture to write; its ending is the format. None: nothing is written.
+
+        Returns:
+            the figure of matplotlib.
+
+        Raises:
+            ConfigError: a size out of bounds, or an unknown picture format.
+            StoreError: the picture cannot be written.
+        """
+        return finished(lambda: replay_figure(self), self.robot, style_of(size, dpi, font_size), output)
+
+
+def replay(given: str | Path | Mapping[str, Any] | Plan, *, step: float = STEP, anyway: bool = False) -> Replay:
+    """Play a plan in MuJoCo: where its tensions take the robot, and which tensions MuJoCo asks for along its path.
+
+    Args:
+        given: a plan, or what `plan` takes.
+        step: the longest step of MuJoCo's integrator, RK4, s.
+        anyway: whether to play a plan that is not feasible, too; no cable of MuJoCo's pushes.
+
+    Returns:
+        path and tensions beside the planned ones, at the ends of the steps.
+
+    Raises:
+        ConfigError: MuJoCo is not installed, a mistake in the plan, one that is not feasible, a step that is no number
+            > 0 or gives too many rows, or a plan without a finite motion.
+    """
+    replays.need_mujoco()
+    planned = given if isinstance(given, Plan) else plan(given)
+    if not (planned.feasible or anyway):
+        raise ConfigError(NAME, "not played, since a segment is not proved feasible (anyway=True plays it)")
+    with double_precision():
+        found = replays.replay(planned, step)
+    return Replay(**{field.name: getattr(found, field.name) for field in dataclasses.fields(found)})

@@ -1,0 +1,162 @@
+"""A plan for MuJoCo as files: a model of its robot (MJCF), and the tensions that play the plan in it, open-loop.
+
+Written without MuJoCo. The control file has the rows of `mujoco_motion.Played`: two a step, and one that repeats the
+time of the row before where steps end at a jump of the acceleration.
+"""
+
+import csv
+import io
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cspr_jax import __version__
+from cspr_jax.errors import one_line
+from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended
+from cspr_jax.plans.planning import Plan
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.publishing import publish
+
+KEYFRAME = "start"
+# Sizes of what is drawn, over the diagonal of the box around spools and path.
+MASS_RADIUS, SPOOL_RADIUS, POINT_RADIUS, CABLE_RADIUS, ROD_RADIUS = 0.012, 0.006, 0.004, 0.002, 0.003
+THINNEST = 1e-4  # cables of a known diameter are drawn thicker than this
+DARK, BLUE, ORANGE = (0.2, 0.2, 0.2, 1.0), (0.1, 0.3, 0.6, 1.0), (0.85, 0.45, 0.1, 1.0)
+
+
+def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: str = "", note: str = "") -> str:
+    """A model of a robot for MuJoCo.
+
+    Args:
+        body: the robot.
+        moved: its motion, whose first row is the keyframe.
+        step: of the integrator, s.
+        control_file: name of the control file, which the model mentions.
+        note: what a reader should know, for the comment.
+
+    Returns:
+        the text of an MJCF file.
+    """
+    root = ElementTree.Element("mujoco", model=one_line(body.name))
+    turned = "" if body.z_axis == "up" else ", turned by half a turn about x: (x, -y, -z) of the robot file"
+    words = f"World axes are those of the robot file{turned}; z is up. A control is the tension of a cable, N."
+    root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words}{note} "))
+    _add(root, "compiler", angle="radian", inertiafromgeom="false")
+    # A dense Jacobian of the tendons has one row a cable.
+    gravity = [0.0, 0.0, -body.gravity]
+    _add(root, "option", timestep=step, gravity=gravity, integrator="RK4", jacobian="dense")
+    if control_file:
+        _add(_add(root, "custom"), "text", name="control_file", data=control_file)
+    places = np.vstack([body.spools, moved.position])
+    low, high = places.min(0), places.max(0)
+    size = float(np.linalg.norm(high - low))
+    _add(root, "statistic", center=0.5 * (low + high), extent=size)
+    _add(_add(root, "visual"), "headlight", ambient=[0.4] * 3, diffuse=[0.5] * 3, specular=[0.1] * 3)
+    sky = {"type": "skybox", "builtin": "gradient", "width": "64", "height": "64"}
+    _add(_add(root, "asset"), "texture", **sky, rgb1=[1.0] * 3, rgb2=[0.8, 0.85, 0.9])
+    _world(_add(root, "worldbody"), body, moved, size)
+    _cables(_add(root, "tendon"), body, size)
+    _motors(_add(root, "actuator"), body, moved)
+    places, rates, _ = (rows[0] for rows in moved.coordinates(body.axes))
+    _add(_add(root, "keyframe"), "key", name=KEYFRAME, qpos=places, qvel=rates, ctrl=moved.tension[0])
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _add(parent: ElementTree.Element, tag: str, **attributes) -> ElementTree.Element:
+    # Words as they are, numbers with all their digits; no -0.
+    text = {
+        name: value if isinstance(value, str) else " ".join(repr(float(x) + 0.0) for x in np.ravel(value))
+        for name, value in attributes.items()
+    }
+    return ElementTree.SubElement(parent, tag, text)
+
+
+def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: float) -> None:
+    for k, spool in enumerate(body.spools, 1):
+        _add(world, "site", name=f"spool_{k}", pos=spool, size=SPOOL_RADIUS * size, rgba=DARK)
+    start = moved.position[0]
+    if body.axes:
+        effector = _add(world, "body", name="effector", pos=start)
+        for axis in body.axes:  # coordinates are places, not ways from the start
+            _add(effector, "joint", name="xyz"[axis], type="slide", axis=np.eye(3)[axis], ref=start[axis])
+    else:
+        effector = _add(world, "body", name="effector", pos=start, quat=moved.coordinates(())[0][0, 3:])
+        _add(effector, "freejoint", name="pose")
+    radius = MASS_RADIUS * size
+    # What does not turn may have any inertia but none.
+    moments, axes = _principal(0.4 * body.mass * radius**2 * np.eye(3) if body.inertia is None else body.inertia)
+    quaternion = np.roll(axes.as_quat(), 1)
+    _add(effector, "inertial", pos=np.zeros(3), mass=body.mass, diaginertia=moments, quat=quaternion)
+    # What is drawn has neither weight nor contacts.
+    drawn = {"rgba": ORANGE, "contype": "0", "conaffinity": "0"}
+    _add(effector, "geom", type="sphere", size=radius, **drawn)
+    for point in np.unique(body.points, axis=0):
+        if np.linalg.norm(point) > radius:
+            rod = np.concatenate([np.zeros(3), point])
+            _add(effector, "geom", type="capsule", fromto=rod, size=ROD_RADIUS * size, **drawn)
+    for k, point in enumerate(body.points, 1):
+        _add(effector, "site", name=f"point_{k}", pos=point, size=POINT_RADIUS * size, rgba=ORANGE)
+
+
+def _principal(inertia: np.ndarray) -> tuple[np.ndarray, Rotation]:
+    # MuJoCo finds the axes of a full tensor to 6e-7 only, and refuses a body whose largest moment is above the sum of
+    # the others, be it by rounding.
+    moments, axes = np.linalg.eigh(inertia)
+    moments[2] = min(moments[2], moments[0] + moments[1])
+    return moments, Rotation.from_matrix(axes * np.linalg.det(axes))
+
+
+def _cables(tendons: ElementTree.Element, body: Suspended, size: float) -> None:
+    known = body.cable_diameter
+    radius = CABLE_RADIUS * size if known is None else max(0.5 * known, THINNEST * size)
+    for k in range(1, len(body.spools) + 1):
+        cable = _add(tendons, "spatial", name=f"cable_{k}", width=radius, rgba=BLUE)
+        _add(cable, "site", site=f"spool_{k}")
+        _add(cable, "site", site=f"point_{k}")
+
+
+def _motors(actuators: ElementTree.Element, body: Suspended, moved: Played) -> None:
+    # A positive control shortens the cable; no cable pushes. Without a limit there is room for a controller.
+    most = np.maximum(moved.tension.max(0), 0.0)
+    largest = np.maximum(np.where(np.isfinite(body.tension_max), body.tension_max, 2.0 * most.max()), most)
+    for k, tension in enumerate(largest.tolist(), 1):
+        limits = {"ctrllimited": "true", "ctrlrange": [0.0, tension]}
+        _add(actuators, "motor", name=f"tension_{k}", tendon=f"cable_{k}", gear=-1.0, **limits)
+
+
+def control_file_of(path: Path) -> Path:
+    """Control file beside a model.
+
+    Args:
+        path: of the model, NAME.xml.
+
+    Returns:
+        NAME_control.csv.
+    """
+    return path.with_name(f"{path.stem}_control.csv")
+
+
+def write_mjcf(plan: Plan, path: Path, step: float = STEP) -> None:
+    """Write a model of a plan's robot, and beside it the control file that plays the plan.
+
+    Args:
+        plan: the plan.
+        path: of the model, NAME.xml.
+        step: the longest step, s.
+
+    Raises:
+        ConfigError: a step that is no number > 0 or gives too many rows, or a plan without a finite motion.
+        StoreError: the disk or the folder refuses.
+    """
+    moved, beside = played(plan, step), control_file_of(path)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["t", *(f"tension_{k + 1}" for k in range(moved.tension.shape[1]))])
+    writer.writerows([map(repr, row) for row in np.column_stack([moved.time, moved.tension]).tolist()])
+    note = "" if plan.feasible else " The plan is NOT PROVED FEASIBLE; no cable of the model pushes."
+    # The model names the other one, which is there before it.
+    publish(Disk(), beside, text.getvalue().encode())
+    publish(Disk(), path, model_xml(suspended(plan), moved, step, beside.name, note).encode())

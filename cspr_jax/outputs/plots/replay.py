@@ -1,0 +1,87 @@
+"""A plan beside what MuJoCo makes of it: both paths, and over time how far paths and tensions are apart."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from cspr_jax.outputs.plots.labels import COLOURS, STYLES
+from cspr_jax.outputs.replay import Replay
+
+# Share of the length of the path that typed digits may leave across a plane.
+ONE_PLANE = 1e-9
+BOUNDARIES = 200  # of longer plans the lines would hide the rest
+WINDOWS = 250  # of time, each with its largest deviation
+
+
+def replay_figure(replay: Replay) -> Figure:
+    """Planned and played path, and deviations of path and tensions.
+
+    Args:
+        replay: what MuJoCo made of a plan.
+
+    Returns:
+        the figure.
+    """
+    is_planar = np.ptp(replay.position[:, 1]) <= ONE_PLANE * np.ptp(replay.position[:, 0])
+    places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["path", "path"], ["tension", "tension"]]
+    figure = Figure(figsize=(10.0, 8.5), layout="constrained")
+    drawn = figure.subplot_mosaic(places, height_ratios=[1.2, 0.9, 0.9])
+    for name, j in (("xy", 1), ("xz", 2)):
+        if name in drawn:
+            _paths(drawn[name], replay, j)
+    if replay.z_axis == "down":
+        drawn["xz"].invert_yaxis()
+    ways = {"each segment from its start": replay.path_deviation, "all in one go": replay.through_deviation}
+    _deviations(drawn["path"], replay, ways)
+    drawn["path"].set_ylabel("path off the plan (m)")
+    cables = {f"cable {k + 1}": values for k, values in enumerate(np.abs(replay.tension_deviation).T)}
+    _deviations(drawn["tension"], replay, cables)
+    drawn["tension"].set_ylabel("tension off MuJoCo's (N)")
+    path, tension = replay.path_deviation.max(), np.abs(replay.tension_deviation).max()
+    figure.suptitle(
+        f"{replay.robot}: played in MuJoCo {replay.mujoco}, each segment from its start; z axis {replay.z_axis}"
+        f"\npath within {path:.1e} m, tensions within {tension:.1e} N"
+    )
+    return figure
+
+
+def _paths(panel: Axes, replay: Replay, j: int) -> None:
+    ways: tuple[tuple[str, np.ndarray, dict[str, Any]], ...] = (
+        ("planned", replay.position, {"color": "black", "linewidth": 2.2, "alpha": 0.35}),
+        ("played", replay.played.position, {"color": COLOURS[1], "linewidth": 1.0, "linestyle": "--"}),
+    )
+    for name, way, look in ways:
+        panel.plot(way[:, 0], way[:, j], label=name, **look)
+    panel.set_xlabel("x (m)")
+    panel.set_ylabel(f"{'xyz'[j]} (m)")
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.grid(alpha=0.3)
+    panel.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+
+
+def _deviations(panel: Axes, replay: Replay, values: dict[str, np.ndarray]) -> None:
+    # The largest of each window: rounding is noise, which would fill the panel.
+    starts = np.unique(np.linspace(0.0, len(replay.time), WINDOWS, endpoint=False).astype(int))
+    time = replay.time[starts]
+    for k, (name, some) in enumerate(values.items()):
+        style, colour = STYLES[(k + k // len(COLOURS)) % len(STYLES)], COLOURS[k % len(COLOURS)]
+        panel.plot(time, _largest(some, starts), linestyle=style, color=colour, linewidth=1.0, label=name)
+    panel.set_yscale("log")
+    panel.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:.0e}"))
+    panel.yaxis.set_minor_formatter(NullFormatter())
+    panel.set_xlabel("time (s)")
+    panel.margins(x=0.01)
+    panel.grid(alpha=0.3)
+    panel.legend(ncols=len(values), loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    ends = np.flatnonzero(np.diff(replay.segment))
+    for end in replay.time[ends][:BOUNDARIES]:
+        panel.axvline(end, color="black", linewidth=0.8, alpha=0.35)
+
+
+def _largest(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    # Of each window; what is exactly 0 leaves a gap.
+    found = np.maximum.reduceat(values, starts)
+    return np.where(found > 0.0, found, np.nan)

@@ -1,0 +1,267 @@
+"""A plan played in MuJoCo: where its tensions take the model, and which tensions MuJoCo asks for along its path."""
+
+import contextlib
+import dataclasses
+import threading
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cspr_jax.errors import ConfigError
+from cspr_jax.outputs.mjcf import model_xml
+from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended, upward
+from cspr_jax.plans.planning import Plan
+
+_LENT = threading.Lock()
+
+
+class Way(NamedTuple):
+    """Where MuJoCo goes.
+
+    Fields:
+        position: (n, 3) of the mass centre, m.
+        turned: (n,) angle from the planned orientation, rad; 0 of what does not turn.
+    """
+
+    position: np.ndarray
+    turned: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Replay:
+    """A plan beside what MuJoCo makes of it, at the ends of its steps; in the axes of the robot file.
+
+    Fields:
+        robot: its name.
+        z_axis: where its z points, "down" or "up".
+        mujoco: version of MuJoCo.
+        steps: their number.
+        time: (n,) since the start of the plan, s; twice where segments meet or the acceleration may jump.
+        segment: (n,) number of the segment, from 1 on.
+        position: (n, 3) of the plan, m.
+        played: where the tensions take MuJoCo's robot, each segment from its start as planned.
+        through: the same for all segments in one go, from the start of the plan alone.
+        tension: (n, n_cables) of the plan, N; of parallel pairs those of all six cables.
+        tension_deviation: (n, n_cables) the least change, in the sum of squares, with which these tensions supply what
+            MuJoCo's inverse dynamics asks for along the plan's path, N; on as many cables as degrees of freedom that is
+            the difference of the two programs' tensions.
+    """
+
+    robot: str
+    z_axis: str
+    mujoco: str
+    steps: int
+    time: np.ndarray
+    segment: np.ndarray
+    position: np.ndarray
+    played: Way
+    through: Way
+    tension: np.ndarray
+    tension_deviation: np.ndarray
+
+    @property
+    def path_deviation(self) -> np.ndarray:
+        """Distance from the plan where each segment is played from its start, (n,) m."""
+        return np.linalg.norm(self.played.position - self.position, axis=1)
+
+    @property
+    def through_deviation(self) -> np.ndarray:
+        """Distance from the plan where all segments are played in one go, (n,) m."""
+        return np.linalg.norm(self.through.position - self.position, axis=1)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The largest deviations, and where they are.
+
+        Returns:
+            plain values, as `cspr replay --json` prints them.
+        """
+        cable = np.abs(self.tension_deviation).argmax(1)
+        of_cables = np.abs(self.tension_deviation).max(1)
+        found = {
+            "path": self._largest(self.path_deviation, "m"),
+            "path_in_one_go": self._largest(self.through_deviation, "m"),
+            "turn": self._largest(self.played.turned, "rad"),
+            "turn_in_one_go": self._largest(self.through.turned, "rad"),
+            "tension": self._largest(of_cables, "N") | {"cable": int(cable[of_cables.argmax()]) + 1},
+        }
+        whole = {"robot": self.robot, "mujoco": self.mujoco, "duration": float(self.time[-1]), "steps": self.steps}
+        return whole | {"largest_deviation": found}
+
+    def _largest(self, values: np.ndarray, units: str) -> dict[str, Any]:
+        row = int(values.argmax())
+        place = {"t": float(self.time[row]), "segment": int(self.segment[row])}
+        return {"value": float(values[row]), "units": units, **place}
+
+    def lines(self) -> list[str]:
+        """The largest deviations for people.
+
+        Returns:
+            a line each.
+        """
+        found = self.to_dict()["largest_deviation"]
+        text = [f"{self.robot}: {self.time[-1]:.2f} s in {self.steps} steps of MuJoCo {self.mujoco}"]
+        for name, how in (("", "each segment from its start"), ("_in_one_go", "all in one go")):
+            far, turn = found[f"path{name}"], found[f"turn{name}"]
+            angle = f" and {turn['value']:.1e} rad" if self.played.turned.any() else ""
+            text.append(f"path, {how}: at most {far['value']:.1e} m{angle} off the plan, {_place(far)}")
+        most = found["tension"]
+        text.append(f"tensions: at most {most['value']:.1e} N off, cable {most['cable']}, {_place(most)}")
+        return text
+
+
+def _place(found: dict[str, Any]) -> str:
+    return f"at {found['t']:.2f} s in segment {found['segment']}"
+
+
+def need_mujoco() -> Any:
+    """MuJoCo, an optional dependency.
+
+    Returns:
+        the module.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ConfigError("mujoco", "is not installed: pip install 'cspr_jax[sim]'") from error
+    return mujoco
+
+
+def replay(plan: Plan, step: float = STEP) -> Replay:
+    """Play a plan in MuJoCo.
+
+    Args:
+        plan: the plan; of one that is not feasible, no cable of MuJoCo's pushes.
+        step: the longest step, s.
+
+    Returns:
+        what came of it.
+
+    Raises:
+        ConfigError: MuJoCo is not installed, a step that is no number > 0 or gives too many rows, or a plan without a
+            finite motion.
+    """
+    mujoco = need_mujoco()
+    body, moved = suspended(plan), played(plan, step)
+    rows, world = ends_of_steps(moved), upward(plan.spec.z_axis)
+    ways = [way_of(body, moved, step, by_segment=by_segment) for by_segment in (True, False)]
+    own, through = (way._replace(position=world.turned(way.position)) for way in ways)
+    return Replay(
+        robot=plan.spec.name,
+        z_axis=plan.spec.z_axis,
+        mujoco=mujoco.__version__,
+        steps=len(rows) - len(moved.runs()),
+        time=moved.time[rows],
+        segment=moved.segment[rows],
+        position=world.turned(moved.position[rows]),
+        played=own,
+        through=through,
+        tension=moved.tension[rows],
+        tension_deviation=tension_deviation(body, moved),
+    )
+
+
+def ends_of_steps(moved: Played) -> np.ndarray:
+    """Rows of a motion at which steps start or end.
+
+    Args:
+        moved: the motion.
+
+    Returns:
+        (n,) numbers of rows.
+    """
+    return np.concatenate([np.asarray(run[::2]) for run in moved.runs()])
+
+
+def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> Way:
+    """Where the tensions of a motion take MuJoCo's robot, by its own integrator.
+
+    Args:
+        body: the robot.
+        moved: the motion.
+        step: the longest step, s.
+        by_segment: whether each segment starts as planned, and not only the first.
+
+    Returns:
+        the way at the ends of the steps.
+
+    Raises:
+        ConfigError: MuJoCo is not installed.
+    """
+    mujoco = need_mujoco()
+    places, rates, _ = moved.coordinates(body.axes)
+    found, row = [], 0
+
+    def pull(model: Any, data: Any) -> None:
+        # RK4 asks at the start of a step, twice in its middle, and at its end.
+        data.ctrl[:] = moved.tension[row + round(2.0 * (data.time - moved.time[row]) / model.opt.timestep)]
+
+    with _callback_lent(mujoco):
+        model = mujoco.MjModel.from_xml_string(model_xml(body, moved, step))
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.set_mjcb_control(pull)
+        for run in moved.runs():
+            if by_segment and moved.segment[run.start] != moved.segment[run.start - 1]:
+                data.qpos[:], data.qvel[:] = places[run.start], rates[run.start]
+            found.append(data.qpos.copy())
+            for row in run[:-1:2]:
+                data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
+                mujoco.mj_step(model, data)
+                found.append(data.qpos.copy())
+    return _way(moved, np.array(found), body.axes)
+
+
+@contextlib.contextmanager
+def _callback_lent(mujoco: Any) -> Iterator[None]:
+    # A process has one control callback, which MuJoCo calls when it compiles a model, too.
+    with _LENT:
+        before = mujoco.get_mjcb_control()
+        mujoco.set_mjcb_control(None)
+        try:
+            yield
+        finally:
+            mujoco.set_mjcb_control(before)
+
+
+def _way(moved: Played, found: np.ndarray, axes: Sequence[int]) -> Way:
+    rows = ends_of_steps(moved)
+    position, turned = moved.position[rows], np.zeros(len(rows))
+    if moved.rotation is None:
+        position[:, list(axes)] = found
+    else:
+        position[:] = found[:, :3]
+        turned = (moved.rotation[rows].inv() * Rotation.from_quat(np.roll(found[:, 3:], -1, axis=1))).magnitude()
+    return Way(position, turned)
+
+
+def tension_deviation(body: Suspended, moved: Played) -> np.ndarray:
+    """How far the tensions of a motion are from those that MuJoCo's inverse dynamics asks for along its path.
+
+    Args:
+        body: the robot.
+        moved: the motion.
+
+    Returns:
+        (n, n_cables) at the ends of the steps, N: the least change, in the sum of squares, that supplies the forces.
+
+    Raises:
+        ConfigError: MuJoCo is not installed.
+    """
+    mujoco = need_mujoco()
+    with _callback_lent(mujoco):
+        model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
+    rows = ends_of_steps(moved)
+    data, (places, rates, accelerations) = mujoco.MjData(model), moved.coordinates(body.axes)
+    pulls, asked = np.empty((len(rows), model.nv, model.ntendon)), np.empty((len(rows), model.nv))
+    for i, row in enumerate(rows.tolist()):
+        data.qpos[:], data.qvel[:], data.qacc[:] = places[row], rates[row], accelerations[row]
+        mujoco.mj_inverse(model, data)
+        # A cable that shortens pulls.
+        pulls[i], asked[i] = -np.reshape(data.ten_J, (model.ntendon, model.nv)).T, data.qfrc_inverse
+    missing = asked - np.einsum("nij,nj->ni", pulls, moved.tension[rows])
+    return np.einsum("nji,ni->nj", np.linalg.pinv(pulls), missing)
