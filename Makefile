@@ -6,7 +6,12 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TESTS := $(VENV)/.installed-tests
 
-.PHONY: demo test soak check bench docs images clean
+# What another folder, or another version, is tried in: environments of their own, made anew.
+WHEEL := build/wheel
+LOWEST := build/lowest
+BEGIN := tests/test_templates.py tests/test_config.py tests/test_outputs.py tests/test_cell_plans.py tests/test_python.py
+
+.PHONY: demo test soak check bench docs images wheel lowest clean
 
 demo: $(STAMP)
 	$(BIN)/cspr table 2.1
@@ -24,6 +29,23 @@ check: $(TESTS)
 	$(BIN)/ruff format --check cspr_jax tests benchmarks hatch_build.py
 	$(BIN)/ruff check cspr_jax tests benchmarks hatch_build.py
 	$(BIN)/mypy
+
+wheel: $(STAMP)
+	rm -rf dist $(WHEEL)
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	$(PYTHON) -m venv $(WHEEL)
+	$(WHEEL)/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	cd $(WHEEL) && bin/cspr --version && bin/cspr robots && bin/cspr examples table_2_1 && \
+	  bin/cspr plan table_2_1.toml -o motion.h5 && bin/cspr plot motion.h5 && \
+	  bin/cspr new sweep sweep.toml && bin/cspr run sweep.toml -o run && bin/cspr verify run
+
+# Versions of the bounds in pyproject.toml; old ones warn of newer neighbours.
+lowest:
+	rm -rf $(LOWEST)
+	$(PYTHON) -m venv $(LOWEST)
+	$(PYTHON) tests/lowest.py > $(LOWEST)/bounds.txt
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check -c $(LOWEST)/bounds.txt --editable '.[test]'
+	$(LOWEST)/bin/python -m pytest -m "not soak" -n 2 -W ignore::DeprecationWarning $(BEGIN)
 
 bench: $(TESTS)
 	$(BIN)/cspr bench
@@ -55,4 +77,4 @@ $(TESTS): $(STAMP)
 	touch $(TESTS)
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis results/demo
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis results/demo build dist

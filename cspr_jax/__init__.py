@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from cspr_jax.api.sweeps import run as run
     from cspr_jax.api.tables import table as table
     from cspr_jax.api.tables import table_names as table_names
+    from cspr_jax.api.templates import new_file as new_file
     from cspr_jax.api.volumes import WorkspaceVolume as WorkspaceVolume
     from cspr_jax.api.volumes import workspace_volume as workspace_volume
     from cspr_jax.api.workspaces import workspace as workspace
@@ -98,6 +99,7 @@ _PUBLIC = {
     "minimum_arcs": ("cspr_jax.api.searches", "minimum_arcs"),
     "minimum_oscillations": ("cspr_jax.api.searches", "minimum_oscillations"),
     "minimum_pose_arcs": ("cspr_jax.api.platform_searches", "minimum_pose_arcs"),
+    "new_file": ("cspr_jax.api.templates", "new_file"),
     "open_result": ("cspr_jax.store.result", "open_result"),
     "parallel_pair_robot": ("cspr_jax.api.robots", "parallel_pair_robot"),
     "plan": ("cspr_jax.api.plans", "plan"),
@@ -156,6 +158,7 @@ __all__ = [  # as `_PUBLIC`, for those that read it without running it
     "minimum_arcs",
     "minimum_oscillations",
     "minimum_pose_arcs",
+    "new_file",
     "open_result",
     "parallel_pair_robot",
     "plan",

@@ -12,6 +12,7 @@ from typing import NoReturn
 
 from cspr_jax import __version__
 from cspr_jax.cli import listings, pictures, plans, runs, tables
+from cspr_jax.cli.command import Command
 from cspr_jax.errors import ConfigError, CsprError, ExitCode
 from cspr_jax.runtime import compile_cache
 from cspr_jax.sweep.signals import Prompt, prompt_end
@@ -89,11 +90,23 @@ def _mend_streams() -> None:
         sys.stdout.reconfigure(errors="surrogateescape")  # a path is printed as it is
 
 
+def _add_completion(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("shell", choices=("bash", "zsh", "tcsh"))
+
+
+def _completion(options: argparse.Namespace) -> int:
+    from cspr_jax.api.completions import completion
+
+    sys.stdout.write(completion(options.shell, _parser()))
+    return ExitCode.DONE
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="cspr", description="Reach of cable-suspended parallel robots in motion.", epilog=EPILOGUE)
     parser.add_argument("--version", action="version", version=f"cspr {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
-    for row in COMMANDS:
+    last = Command("completion", "print a script for a shell that completes commands", _add_completion, _completion)
+    for row in (*COMMANDS, last):
         sub = commands.add_parser(
             row.name, help=row.text, description=row.text, epilog="files: docs/reference.md has every key"
         )

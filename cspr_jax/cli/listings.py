@@ -1,4 +1,4 @@
-"""Commands about files to start from, and what there is: import, robots, quantities, examples."""
+"""Commands about files to start from, and what there is: new, import, robots, quantities, examples."""
 
 import argparse
 import sys
@@ -72,7 +72,27 @@ def _examples(options: argparse.Namespace) -> int:
     return ExitCode.DONE
 
 
+def _add_new(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", choices=("robot", "sweep", "plan"))
+    parser.add_argument("path", type=Path, help="file to write, .toml; nothing is overwritten")
+    parser.add_argument(
+        "--like", default="prototype", metavar="ROBOT", help="robot: values of this one (`cspr robots`)"
+    )
+    parser.add_argument("--map", default="minimum-arcs", metavar="KIND", help="sweep: kind of map")
+    parser.add_argument("--family", default="hypocycloid-standard", metavar="NAME", help="plan: trajectory family")
+
+
+def _new(options: argparse.Namespace) -> int:
+    from cspr_jax.api.templates import new_file
+
+    names = ("like", "map", "family")
+    path = new_file(options.what, options.path, **{name: getattr(options, name) for name in names})
+    sys.stdout.write(f"{path}\n")
+    return ExitCode.DONE
+
+
 COMMANDS = (
+    Command("new", "write a robot, sweep or plan file to begin with, every key explained", _add_new, _new),
     Command("import", "read a robot of CASPR, cdpyr or WireX as a robot file", _add_import, _import),
     Command("robots", "list the catalogue of robots", _add_list, _robots),
     Command("quantities", "list the quantities that a result can hold", _add_list, _quantities),

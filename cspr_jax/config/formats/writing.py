@@ -21,14 +21,24 @@ def robot_text(keys: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
     lines = []
     if any(cable_names):
         lines.append("# cables: " + ", ".join(one_line(name) for name in cable_names))
-    return "\n".join([*lines, *(f"{key} = {_text(value)}" for key, value in keys.items())]) + "\n"
+    return "\n".join([*lines, *(f"{key} = {value_text(value)}" for key, value in keys.items())]) + "\n"
 
 
-def _text(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """Text of a value.
+
+    Args:
+        value: a number, a word, a list, or a table.
+
+    Returns:
+        TOML; tables inline.
+    """
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {value_text(own)}" for key, own in value.items()) + " }"
     if isinstance(value, list) and value and isinstance(value[0], list):
-        return "[\n" + "".join(f"    {_text(row)},\n" for row in value) + "]"
+        return "[\n" + "".join(f"    {value_text(row)},\n" for row in value) + "]"
     if isinstance(value, list):
-        return f"[{', '.join(map(_text, value))}]"
+        return f"[{', '.join(map(value_text, value))}]"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, bool):

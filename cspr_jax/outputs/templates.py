@@ -1,0 +1,191 @@
+"""Templates of robot, sweep and plan files: an example's values, and every other key as a comment.
+
+Keys, their order, defaults and meanings are the schema's own, so that no template is out of date.
+"""
+
+import textwrap
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic.fields import FieldInfo
+
+from cspr_jax.config.formats.writing import value_text
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.reading import Table
+from cspr_jax.config.robot import CATALOGUE, RobotFile, catalogue_names
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import InputError, RefusedError, StoreError, one_line
+from cspr_jax.outputs.example_files import folder
+from cspr_jax.schema.families import FAMILIES
+from cspr_jax.schema.map_kinds import MAP_KINDS
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.publishing import make_folders
+
+# Keys that are tables of their own; one of them is an array of tables.
+TABLES = ("axes", "trajectory", "orientations", "launch", "workspace", "limits", "run", "pose")
+MANY = "pose"
+WIDTH = 100
+# Keys of families that others of the same kind refuse.
+OWN = {"rule": ("s-curve",)}
+
+
+def robot_template(like: str) -> str:
+    """A robot file with the values of one of the catalogue.
+
+    Args:
+        like: name of that robot.
+
+    Returns:
+        TOML.
+
+    Raises:
+        InputError: no such robot.
+    """
+    if like not in catalogue_names():
+        raise InputError("--like", like, "one of " + ", ".join(catalogue_names()))
+    values = tomllib.loads((CATALOGUE / f"{like}.toml").read_text("utf-8"))
+    values |= {"name": "my robot", "source": ""}
+    head = "A robot; change what stands here, and take off the # of what you need."
+    return f"# {head}\n" + _section("", RobotFile, values, frozenset())
+
+
+def sweep_template(kind: str) -> str:
+    """A sweep file of a kind of map, with the values of an example.
+
+    Args:
+        kind: name of the kind.
+
+    Returns:
+        TOML.
+
+    Raises:
+        InputError: no such kind.
+    """
+    if kind not in MAP_KINDS:
+        raise InputError("--map", kind, "one of " + ", ".join(MAP_KINDS))
+    row = MAP_KINDS[kind]
+    every = _examples("map")
+    alike = (name for name, other in MAP_KINDS.items() if name in every and other.families == row.families)
+    values = dict(every[kind if kind in every else next(alike)], map=kind)
+    # What only other kinds have is refused.
+    refused = frozenset(key for other in MAP_KINDS.values() for key in other.keys) - frozenset(row.keys)
+    for key in refused:
+        table, _, name = key.partition(".")
+        if not name:
+            values.pop(table, None)
+        elif isinstance(values.get(table), dict):
+            values[table] = {own: value for own, value in values[table].items() if own != name}
+    head = f"{row.description[:1].upper()}{row.description[1:]}."
+    return f"# {head}\n" + _section("", SweepFile, values, refused)
+
+
+def plan_template(family: str) -> str:
+    """A plan file of a trajectory family, with the values of an example.
+
+    Args:
+        family: name of the family.
+
+    Returns:
+        TOML.
+
+    Raises:
+        InputError: no such family.
+    """
+    if family not in FAMILIES:
+        raise InputError("--family", family, "one of " + ", ".join(FAMILIES))
+    every = _examples("family")
+    alike = (name for name, other in FAMILIES.items() if name in every and other.legs == FAMILIES[family].legs)
+    values = dict(every[family if family in every else next(alike)], family=family)
+    refused = frozenset(key for key, families in OWN.items() if family not in families)
+    values = {key: value for key, value in values.items() if key not in refused}
+    head = f"A plan: {FAMILIES[family].description}."
+    return f"# {head}\n" + _section("", PlanFile, values, refused)
+
+
+def write_new(path: Path, text: str) -> Path:
+    """Write a template; nothing is overwritten.
+
+    Args:
+        path: the file, .toml.
+        text: the template.
+
+    Returns:
+        the path.
+
+    Raises:
+        InputError: another ending.
+        RefusedError: a file of that name is there.
+        StoreError: the folder or the disk refuses.
+    """
+    if path.suffix != ".toml":
+        raise InputError("file", str(path), "a name that ends in .toml")
+    make_folders(Disk(), path.parent)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        raise RefusedError(one_line(f"{path}: is there already: remove it, or choose another name")) from error
+    except OSError as error:
+        raise StoreError(one_line(f"{path}: {error.strerror}")) from error
+    return path
+
+
+def _examples(key: str) -> dict[str, dict[str, Any]]:
+    # By map or family, the first of each; those of one family and a few keys first.
+    files = [tomllib.loads(path.read_text("utf-8")) for path in sorted(folder().glob("*.toml"))]
+    kind = [values for values in files if key in values and ("pose" in values) == (key == "family")]
+    found: dict[str, dict[str, Any]] = {}
+    for values in sorted(kind, key=lambda values: len(str(values))):
+        found.setdefault(values[key], values)
+    return found
+
+
+def _section(at: str, model: type[Table], values: Mapping[str, Any], refused: frozenset[str]) -> str:
+    # Plain keys first: behind the head of a table they would be its own.
+    plain, tables = [], []
+    for name, field in model.model_fields.items():
+        key = field.alias or name
+        if (f"{at}.{key}" if at else key) in refused:
+            continue
+        if not at and key in TABLES and (inner := _model(field.annotation)) is not None:
+            tables.append(_tables(key, field, inner, values.get(key), refused))
+        else:
+            plain.append(_key(key, field, values.get(key)))
+    return "\n".join([*plain, *tables])
+
+
+def _tables(key: str, field: FieldInfo, model: type[Table], value: Any, refused: frozenset[str]) -> str:
+    if key == MANY:
+        each = value or [{}]
+        first = f"\n[[{key}]]\n{_section(key, model, each[0], refused)}"
+        rest = [f"\n[[{key}]]\n" + "".join(f"{k} = {value_text(v)}\n" for k, v in own.items()) for own in each[1:]]
+        return first + "".join(rest)
+    head = f"[{key}]" if value else f"# [{key}]"
+    return f"\n{head}  # {_default(field)}\n{_section(key, model, value or {}, refused)}"
+
+
+def _key(key: str, field: FieldInfo, value: Any) -> str:
+    comment = textwrap.fill(
+        field.description or "", WIDTH, initial_indent="# ", subsequent_indent="# ", break_long_words=False
+    )
+    if value is not None:
+        return f"{comment}\n{key} = {value_text(value)}\n"
+    shown = value_text(field.default) if _has_default(field) else "..."
+    return f"{comment}\n# {key} = {shown}\n"
+
+
+def _has_default(field: FieldInfo) -> bool:
+    return not field.is_required() and isinstance(field.default, str | bool | int | float | list)
+
+
+def _default(field: FieldInfo) -> str:
+    return "required" if field.is_required() else "may be absent"
+
+
+def _model(annotation: Any) -> type[Table] | None:
+    # The table that a key holds: itself, or among the choices.
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        return annotation
+    return next((found for own in get_args(annotation) if (found := _model(own)) is not None), None)
