@@ -72,6 +72,10 @@ _POINT_MASSES = (
     "test_transition",
     "test_bench",
     "test_hypocycloid",
+    "test_pages",
+    "test_films",
+    "test_cell_plans",
+    "test_uncertainty_of_point_masses",
 )
 _PLATFORMS = (
     "test_pose_plans",

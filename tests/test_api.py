@@ -106,11 +106,14 @@ def test_every_command_has_its_function():
     for name in FUNCTIONS:
         parser = commands()[name]
         functions = [getattr(cspr_jax, function) for function in FUNCTIONS[name]]
-        functions += [plans.Plan.save, plans.Plan.save_mjcf] if name == "plan" else []
+        functions += [plans.Plan.save, plans.Plan.save_mjcf, plans.Plan.animate] if name == "plan" else []
         functions += [cspr_jax.Replay.plot] if name == "replay" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
-        own = NAMES | {"run": {"output": "directory"}, "plan": {"output": "path", "mjcf": "path"}}.get(name, {})
+        own = NAMES | {
+            "run": {"output": "directory"},
+            "plan": {"output": "path", "mjcf": "path", "animate": "path"},
+        }.get(name, {})
         own |= {"name": "names", "output": "folder"} if name == "examples" else {}
         own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}
         own |= {"result": "given", "cell": "cells"} if name == "report" else {}

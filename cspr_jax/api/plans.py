@@ -10,7 +10,7 @@ import numpy as np
 from cspr_jax.api.given import plain, text_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.plan import plan_keys
-from cspr_jax.errors import ConfigError
+from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import motion_files, plan_report
 from cspr_jax.outputs.mjcf import write_mjcf
 from cspr_jax.outputs.mujoco_motion import STEP
@@ -18,6 +18,8 @@ from cspr_jax.plans import planning
 from cspr_jax.plans.released import scattered
 from cspr_jax.schema import labelled
 from cspr_jax.search.landings import LaunchErrors, Scatter
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.publishing import publish
 
 if TYPE_CHECKING:
     import xarray
@@ -93,6 +95,41 @@ class Plan(planning.Plan):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
         with double_precision():
             write_mjcf(self, path, step)
+        return path
+
+    def animate(self, path: str | Path, speed: float = 1.0, anyway: bool = False) -> Path:
+        """Write a film of the motion: the robot in space, its cables coloured by tension, and its tensions.
+
+        Args:
+            path: of a .gif, .mp4 or .html file, which is replaced if it is there.
+            speed: times real time.
+            anyway: whether to show a plan that is not feasible, too; the film says so.
+
+        Returns:
+            the path.
+
+        Raises:
+            ConfigError: another ending, a speed that is no number > 0, a plan that is not feasible or has no finite
+                motion, or no encoder for .mp4.
+            StoreError: the disk or the folder refuses.
+        """
+        from cspr_jax.outputs.plots.film import RATES, film
+        from cspr_jax.outputs.plots.style import Style, in_style
+
+        path, length = Path(path), float(np.sum(self.answers.duration))
+        if not (self.feasible or anyway):
+            raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
+        if not np.isfinite(length):
+            raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
+        title = f"{self.spec.name}: {length:.4g} s" + ("" if self.feasible else ", NOT PROVED FEASIBLE")
+        try:
+            with double_precision():
+                columns = motion_files.rows(self, rate=max(2.0 * RATES[0], 400.0 / length))
+            with in_style(Style()):
+                data = film(path.suffix, title, columns, self.spec, self.keys, speed)
+        except InputError as error:
+            raise ConfigError(path, str(error)) from error
+        publish(Disk(), path, data)
         return path
 
     def to_dict(self) -> dict[str, Any]:

@@ -36,6 +36,8 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
         help="write a model for MuJoCo, and beside it FILE_control.csv, the tensions that play the plan in it",
     )
     parser.add_argument("--step", type=float, metavar="S", help=f"--mjcf: {_STEP}")
+    parser.add_argument("--animate", type=Path, metavar="FILE", help="write a film: .gif, .mp4 or .html")
+    parser.add_argument("--speed", type=float, metavar="X", help="--animate: times real time (default 1)")
     add_all_errors(parser)
     add_device(parser)
 
@@ -49,11 +51,17 @@ def _check_plan(options: argparse.Namespace) -> None:
         raise ConfigError("--mjcf", f"{options.mjcf}: must end in .xml")
     if options.mjcf is not None and options.output == options.mjcf.with_name(f"{options.mjcf.stem}_control.csv"):
         raise ConfigError("-o", f"{options.output}: must be another name: --mjcf writes the control file there")
+    if options.animate is not None and options.animate.suffix not in (".gif", ".mp4", ".html"):
+        raise ConfigError("--animate", f"{options.animate}: must end in .gif, .mp4 or .html")
+    if options.speed is not None and options.animate is None:
+        raise ConfigError("--speed", "must be absent without --animate")
+    if options.speed is not None and not 0.0 < options.speed < float("inf"):
+        raise ConfigError("--speed", f"{options.speed}: must be a number > 0")
     if options.step is not None and options.mjcf is None:
         raise ConfigError("--step", "must be absent without --mjcf")
     _check_step(options)
-    if options.anyway and options.output is None and options.mjcf is None:
-        raise ConfigError("--anyway", "must be absent without -o or --mjcf")
+    if options.anyway and options.output is None and options.mjcf is None and options.animate is None:
+        raise ConfigError("--anyway", "must be absent without -o, --mjcf or --animate")
 
 
 def _check_step(options: argparse.Namespace) -> None:
@@ -86,6 +94,7 @@ def _plan(options: argparse.Namespace) -> int:
     for path, save in (
         (options.output, lambda path: plan.save(path, options.rate, anyway=True)),
         (options.mjcf, lambda path: plan.save_mjcf(path, anyway=True, **of_mjcf)),
+        (options.animate, lambda path: plan.animate(path, options.speed or 1.0, anyway=True)),
     ):
         if path is None:
             continue

@@ -7,10 +7,9 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.moving import limits_of, moving
 from cspr_jax.outputs.plots.pages.packing import packed
-from cspr_jax.outputs.plots.posed import hull_of
 from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
-from cspr_jax.robots.shapes import rotation_matrix
 from cspr_jax.schema.verdicts import Verdict
 
 # Rows of a motion in a page, at most.
@@ -37,28 +36,21 @@ def motion_content(
         plain values, for JSON.
     """
     rows = _chosen(np.asarray(columns["t"]))
-    position, tension = (np.asarray(columns[name])[rows] for name in ("position", "tension"))
-    quaternion = np.asarray(columns["quaternion"])[rows] if "quaternion" in columns else None
-    base = np.asarray(spec.base_points, float)
-    own = np.zeros_like(base) if spec.platform_points is None else np.asarray(spec.platform_points, float)
-    edges = hull_of(own)[1] if quaternion is not None else np.empty((0, 2, 3))
-    turn = np.array([np.eye(3)] if quaternion is None else [rotation_matrix(x) for x in quaternion])
-    # What turns with the platform, at each row.
-    attached, corners = (position[:, None] + np.einsum("rij,kj->rki", turn, x) for x in (own, edges.reshape(-1, 3)))
+    robot, tension = moving(columns, spec, rows), np.asarray(columns["tension"])[rows]
     return {
         "title": title,
         "isDown": spec.z_axis == "down",
         "count": len(rows),
-        "cables": len(base),
-        "base": np.round(base, 9).tolist(),
+        "cables": len(robot.base),
+        "base": np.round(robot.base, 9).tolist(),
         "t": packed(np.asarray(columns["t"])[rows]),
-        "path": packed(position),
-        "attached": packed(attached),
-        "corners": packed(corners),
-        "edges": len(edges),
+        "path": packed(robot.position),
+        "attached": packed(robot.attached),
+        "corners": packed(robot.corners),
+        "edges": robot.corners.shape[1] // 2,
         "tension": packed(tension),
         "flight": np.asarray(columns["flight_position"]).tolist() if "flight_position" in columns else None,
-        "limits": _limits(spec, keys),
+        "limits": [{"words": words, "value": value} for words, value in limits_of(spec, keys)],
         "segments": _segments(segments),
     }
 
@@ -68,16 +60,6 @@ def _chosen(time: np.ndarray) -> np.ndarray:
     count = min(len(time), MOST_ROWS)
     wanted = np.linspace(time[0], time[-1], count)
     return np.unique(np.clip(np.searchsorted(time, wanted - 1e-12), 0, len(time) - 1))
-
-
-def _limits(spec: RobotFile, keys: PlanFile) -> list[dict[str, Any]]:
-    found = []
-    for name, words in (("tension_min", "smallest allowed"), ("tension_max", "largest allowed")):
-        own = getattr(keys, name)
-        given = getattr(spec, name) if own is None else own
-        values = np.unique(np.atleast_1d(np.array([] if given is None else given, float)))
-        found += [{"words": words, "value": value} for value in values[np.isfinite(values) & (values > 0.0)].tolist()]
-    return found
 
 
 def _segments(segments: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:

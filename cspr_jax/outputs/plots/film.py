@@ -1,0 +1,195 @@
+"""Films of a motion: the robot in space with its cables coloured by tension, and its tensions over time."""
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, HTMLWriter, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.labels import COLOURS, STYLES
+from cspr_jax.outputs.plots.moving import Moving, limits_of, moving
+from cspr_jax.runtime.stages import stage
+
+ENDINGS = (".gif", ".mp4", ".html")
+# Pictures a second: as many as give a film no more pictures than the second numbers, else the last. The delays of a GIF
+# are whole hundredths of a second. The pictures of a page are whole ones each.
+RATES, MOST, OF_PAGES = (20, 10, 5, 2, 1), 600, 150
+SIZE, DPI = (10.0, 5.6), 90
+# Pages of more than so many MB are none that one opens.
+LARGEST = 100.0
+MARK = "#D55E00"
+FAR = 3.0
+
+
+def film(
+    ending: str,
+    title: str,
+    columns: Mapping[str, np.ndarray],
+    spec: RobotFile,
+    keys: PlanFile,
+    speed: float = 1.0,
+) -> bytes:
+    """A film of a motion.
+
+    Args:
+        ending: of its file, one of `ENDINGS`.
+        title: of the motion.
+        columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, in the axes of the robot file.
+        spec: the robot whose cables have these tensions.
+        keys: the plan, for the limits.
+        speed: times real time, positive.
+
+    Returns:
+        the content of the file.
+
+    Raises:
+        InputError: another ending, or a speed that is none; no encoder for .mp4.
+    """
+    if ending not in ENDINGS:
+        raise InputError("--animate", ending or "no ending", f"a file that ends in {', '.join(ENDINGS)}")
+    if not 0.0 < speed < np.inf:
+        raise InputError("--speed", speed, "a number > 0")
+    time = np.asarray(columns["t"], float)
+    seconds = float(time[-1] - time[0]) / speed
+    most = OF_PAGES if ending == ".html" else MOST
+    rate = next((rate for rate in RATES if seconds * rate <= most), RATES[-1])
+    # The end is seen, if a part of a picture later.
+    count = int(np.ceil(seconds * rate - 1e-9)) + 1
+    wanted = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])
+    rows = np.clip(np.searchsorted(time, wanted - 1e-9), 0, len(time) - 1)
+    writer = _writer(ending, rate)
+    stage("film")
+    picture = _Picture(title, columns, spec, keys, rows)
+    with tempfile.TemporaryDirectory() as folder, matplotlib.rc_context(rc=_settings(ending)):
+        path = Path(folder) / f"film{ending}"
+        with writer.saving(picture.figure, str(path), DPI):
+            for number in range(count):
+                picture.show(number)
+                writer.grab_frame()
+        return path.read_bytes()
+
+
+def _settings(ending: str) -> Any:
+    settings = {"animation.embed_limit": LARGEST, "savefig.bbox": "standard"}
+    if ending == ".mp4":
+        settings["animation.ffmpeg_path"] = _encoder()
+    return settings
+
+
+def _encoder() -> str:
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise InputError("imageio-ffmpeg", "absent", 'installed: pip install "cspr_jax[film]"') from error
+    return str(imageio_ffmpeg.get_ffmpeg_exe())
+
+
+def _writer(ending: str, rate: int) -> AbstractMovieWriter:
+    if ending == ".gif":
+        return PillowWriter(fps=rate)
+    if ending == ".html":
+        return HTMLWriter(fps=rate, embed_frames=True, default_mode="loop")
+    _encoder()
+    # What every player knows.
+    return FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
+
+
+class _Picture:
+    # A figure whose artists are moved from row to row.
+
+    def __init__(
+        self, title: str, columns: Mapping[str, np.ndarray], spec: RobotFile, keys: PlanFile, rows: np.ndarray
+    ) -> None:
+        every = np.arange(len(columns["t"]))
+        self.robot, self._path = moving(columns, spec, rows), moving(columns, spec, every).position
+        self._rows, self._time = rows, np.asarray(columns["t"], float)
+        self.tension = np.asarray(columns["tension"], float)
+        finite = self.tension[np.isfinite(self.tension)]
+        self._largest = float(finite.max(initial=0.0)) or 1.0
+        self._norm = Normalize(0.0, self._largest)
+        # Without the end that is too light on white.
+        self._colours = ListedColormap(matplotlib.colormaps["plasma"](np.linspace(0.0, 0.88, 256)))
+        self.figure = Figure(figsize=SIZE, layout="constrained")
+        FigureCanvasAgg(self.figure)
+        grid = self.figure.add_gridspec(1, 2, width_ratios=[1.0, 1.05])
+        self._space: Any = self.figure.add_subplot(grid[0], projection="3d", computed_zorder=False)
+        self._draw_space(is_down=spec.z_axis == "down")
+        self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(spec, keys))
+        self.figure.suptitle(title)
+        # Once: places of axes do not change. A figure with any layout is drawn twice for each picture.
+        self.show(0)
+        self.figure.canvas.draw()
+        self.figure.set_layout_engine(None)
+
+    def _draw_space(self, *, is_down: bool) -> None:
+        space, robot = self._space, self.robot
+        flight = np.concatenate([robot.base, robot.attached.reshape(-1, 3), self._path])
+        low, high = flight.min(0), flight.max(0)
+        size = np.maximum(high - low, 0.1 * (high - low).max())
+        middle = 0.5 * (low + high)
+        # Where z points down y is turned too, so that nothing is mirrored.
+        signs = (1.0, -1.0, -1.0) if is_down else (1.0, 1.0, 1.0)
+        for k, name in enumerate("xyz"):
+            ends = middle[k] - 0.54 * signs[k] * size[k], middle[k] + 0.54 * signs[k] * size[k]
+            space.set(**{f"{name}lim": ends, f"{name}label": f"{name} (m)"})
+            getattr(space, f"{name}axis").set_major_locator(matplotlib.ticker.MaxNLocator(4))
+        space.set_box_aspect(tuple(size), zoom=0.9)
+        space.view_init(elev=18.0, azim=-62.0)
+        space.plot(*self._path.T, color="0.7", linewidth=0.8)
+        self._behind = space.plot([], [], [], color="black", linewidth=1.1)[0]
+        space.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35")
+        self.cables = [space.plot([], [], [], linewidth=2.0)[0] for _ in robot.base]
+        self._edges = [space.plot([], [], [], color="black", linewidth=2.0)[0] for _ in range(self._edge_count)]
+        self._mass = space.plot([], [], [], linestyle="", marker="o", markersize=6, color="black")[0]
+        self._mass.set_visible(not self._edge_count)
+        bar = ScalarMappable(self._norm, self._colours)
+        self.figure.colorbar(bar, ax=space, label="tension (N)", shrink=0.7, location="left", pad=0.02)
+
+    @property
+    def _edge_count(self) -> int:
+        return self.robot.corners.shape[1] // 2
+
+    def _draw_tensions(self, panel: Any, limits: list[tuple[str, float]]) -> None:
+        for k, values in enumerate(self.tension.T):
+            style, colour = STYLES[(k + k // len(COLOURS)) % len(STYLES)], COLOURS[k % len(COLOURS)]
+            panel.plot(self._time, values, linestyle=style, color=colour, linewidth=1.2, label=f"cable {k + 1}")
+        for words, value in limits:
+            if value < FAR * self._largest:
+                panel.axhline(value, color="black", linewidth=0.8, linestyle="--")
+                panel.annotate(f"{words} {value:.4g} N", (0.01, value), xycoords=("axes fraction", "data"), va="bottom")
+        self._mark = panel.axvline(self._time[0], color=MARK, linewidth=1.8)
+        panel.set(xlabel="time (s)", ylabel="tension (N)")
+        panel.margins(x=0.01)
+        panel.set_ylim(bottom=min(0.0, float(np.nanmin(self.tension))))
+        columns = min(4, self.tension.shape[1])
+        panel.legend(ncols=columns, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+        self._clock = panel.annotate("", (0.99, 0.98), xycoords="axes fraction", ha="right", va="top")
+
+    def show(self, number: int) -> None:
+        """Move everything to a row.
+
+        Args:
+            number: of the picture.
+        """
+        row = self._rows[number]
+        robot: Moving = self.robot
+        for k, cable in enumerate(self.cables):
+            cable.set_data_3d(*np.stack([robot.base[k], robot.attached[number, k]], axis=1))
+            cable.set_color(self._colours(self._norm(self.tension[row, k])))
+        for k, edge in enumerate(self._edges):
+            edge.set_data_3d(*robot.corners[number, 2 * k : 2 * k + 2].T)
+        self._mass.set_data_3d(*robot.position[number][:, None])
+        self._behind.set_data_3d(*self._path[: row + 1].T)
+        now = float(self._time[row])
+        self._mark.set_xdata([now, now])
+        self._clock.set_text(f"t = {now:.2f} s")

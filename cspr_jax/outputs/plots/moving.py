@@ -1,0 +1,67 @@
+"""The robot of a motion at its rows: where its cables are attached, and the edges of its platform."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.posed import hull_of
+from cspr_jax.robots.shapes import rotation_matrix
+
+
+class Moving(NamedTuple):
+    """A robot on its way, in the axes of its file.
+
+    Fields:
+        base: (n_cables, 3) where the cables leave, m.
+        position: (n, 3) of the effector at each row, m.
+        attached: (n, n_cables, 3) where the cables are attached, m.
+        corners: (n, 2 n_edges, 3) ends of the platform's edges, one after the other, m; none of a point mass.
+    """
+
+    base: np.ndarray
+    position: np.ndarray
+    attached: np.ndarray
+    corners: np.ndarray
+
+
+def moving(columns: Mapping[str, np.ndarray], spec: RobotFile, rows: np.ndarray) -> Moving:
+    """The robot at some rows of its motion.
+
+    Args:
+        columns: by the names of `schema.motion_quantities.TRAJECTORY`.
+        spec: the robot whose cables have these tensions.
+        rows: (n,) which.
+
+    Returns:
+        the robot.
+    """
+    position, quaternion = np.asarray(columns["position"])[rows], columns.get("quaternion")
+    base = np.asarray(spec.base_points, float)
+    own = np.zeros_like(base) if spec.platform_points is None else np.asarray(spec.platform_points, float)
+    edges, turn = np.empty((0, 2, 3)), np.eye(3)[None]
+    if quaternion is not None:
+        edges, turn = hull_of(own)[1], np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
+    # What turns with the platform, at each row.
+    attached, corners = (position[:, None] + np.einsum("rij,kj->rki", turn, x) for x in (own, edges.reshape(-1, 3)))
+    return Moving(base, position, attached, corners)
+
+
+def limits_of(spec: RobotFile, asked: object) -> list[tuple[str, float]]:
+    """Limits of tensions, to be drawn beside these.
+
+    Args:
+        spec: the robot.
+        asked: the plan, whose limits go before the robot's.
+
+    Returns:
+        words and values, N.
+    """
+    found = []
+    for name, words in (("tension_min", "smallest allowed"), ("tension_max", "largest allowed")):
+        own = getattr(asked, name)
+        given = getattr(spec, name) if own is None else own
+        values = np.unique(np.atleast_1d(np.array([] if given is None else given, float)))
+        found += [(words, value) for value in values[np.isfinite(values) & (values > 0.0)].tolist()]
+    return found

@@ -1,0 +1,107 @@
+"""Films of plans: as long as their motions, with the robot where it is."""
+
+import io
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import cspr_jax
+from cspr_jax.cli import main
+from cspr_jax.errors import ConfigError
+from cspr_jax.outputs.plots import film as films
+from cspr_jax.outputs.plots.style import Style, in_style
+
+PLAN = """
+schema = 1
+robot = "prototype"
+family = "transition"
+z0 = 1.2
+tension_max = 3.0
+[[pose]]
+rest = true
+[[pose]]
+position = [0.3, 0.1, 1.2]
+arcs = 6
+"""
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    path = tmp_path_factory.mktemp("films") / "plan.toml"
+    path.write_text(PLAN, "utf-8")
+    return cspr_jax.plan(path)
+
+
+def test_a_film_is_as_long_as_its_motion(plan, tmp_path, capsys):
+    """By the delays of its pictures, which a GIF has in hundredths of a second."""
+    file = tmp_path / "plan.toml"
+    file.write_text(PLAN, "utf-8")
+    assert main(["plan", str(file), "--animate", str(tmp_path / "film.gif"), "--speed", "8"]) == 0
+    length = plan.to_dict()["segments"][0]["duration"] / 8.0
+    with Image.open(tmp_path / "film.gif") as picture:
+        delays = []
+        for number in range(picture.n_frames):
+            picture.seek(number)
+            delays.append(picture.info["duration"] / 1000.0)
+    assert 0.0 <= sum(delays[:-1]) - length <= 0.05 + 1e-9
+    assert (tmp_path / "film.gif").read_bytes() == plan.animate(tmp_path / "again.gif", speed=8.0).read_bytes()
+
+
+def test_cables_are_where_the_plan_has_them(plan):
+    columns = plan.rows(200.0)
+    rows = np.array([0, len(columns["t"]) // 3, len(columns["t"]) - 1])
+    with in_style(Style()):
+        picture = films._Picture("film", columns, plan.spec, plan.keys, rows)
+        for number, row in enumerate(rows):
+            picture.show(number)
+            for k, cable in enumerate(picture.cables):
+                start, end = np.transpose(cable.get_data_3d())
+                assert start == pytest.approx(plan.spec.base_points[k])
+                assert end == pytest.approx(columns["position"][row])
+                assert np.linalg.norm(end - start) == pytest.approx(columns["length"][row, k])
+
+
+def test_other_kinds_of_films(plan, tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    assert plan.animate(tmp_path / "film.mp4", speed=16.0).read_bytes()[4:8] == b"ftyp"
+    page = plan.animate(tmp_path / "film.html", speed=16.0).read_text("utf-8")
+    assert "data:image/png;base64" in page and "http://" not in page
+
+
+def test_long_films_have_fewer_pictures(plan, monkeypatch):
+    monkeypatch.setattr(films, "MOST", 7)
+    columns = plan.rows(200.0)
+    with in_style(Style()):
+        data = films.film(".gif", "film", columns, plan.spec, plan.keys, speed=2.0)
+    with Image.open(io.BytesIO(data)) as picture:
+        assert picture.info["duration"] in (200, 500, 1000)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--animate", "film.avi"), "must end in .gif, .mp4 or .html"),
+        (("--animate", "film.gif", "--speed", "0"), "--speed: 0.0: must be a number > 0"),
+        (("--speed", "2"), "--speed: must be absent without --animate"),
+    ],
+)
+def test_no_film_is_written(tmp_path, monkeypatch, capsys, words, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "plan.toml").write_text(PLAN, "utf-8")
+    assert main(["plan", "plan.toml", *words]) == 2
+    assert said in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
+
+
+def test_what_is_not_feasible_is_shown_anyway_only(tmp_path):
+    infeasible = cspr_jax.plan(
+        {"schema": 1, "robot": "prototype", "family": "transition", "z0": 1.2}
+        | {"pose": [{"rest": True}, {"position": [0.9, 0.1, 1.2], "arcs": 2}]}
+    )
+    with pytest.raises(ConfigError, match="not proved feasible"):
+        infeasible.animate(tmp_path / "film.gif")
+    assert not list(tmp_path.iterdir())
+    for speed in (0.0, -1.0, float("nan")):
+        with pytest.raises(ConfigError, match="must be a number > 0"):
+            infeasible.animate(tmp_path / "film.gif", speed=speed, anyway=True)
