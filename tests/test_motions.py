@@ -92,7 +92,7 @@ def test_rows_of_a_motion_that_is_not_feasible(tmp_path):
     assert {row[-1] for row in rows if float(row[0]) < end} == {"1"}
     assert {row[-1] for row in rows if float(row[0]) >= end} == {"0"}
     code, _, err = plan(tmp_path, SHORT, "--anyway")
-    assert code == 2 and err == "cspr: --anyway: must be absent without -o\n"
+    assert code == 2 and err == "cspr: --anyway: must be absent without -o, --mjcf or --animate\n"
     assert plan(tmp_path, SHORT, "-o", str(output), "--anyway", "--rate", "20")[::2] == (0, "")
     assert output.read_text("utf-8").splitlines()[0].endswith("tension_3")
 

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from support.browsers import opened
 
 import cspr_jax
+from cspr_jax.cli import main
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
@@ -182,7 +183,7 @@ def test_a_large_map_is_a_page_below_twenty_megabytes(result):
         ({"output": "page.pdf"}, "must end in .html"),
         ({"trajectories": -1}, "--trajectories: -1: must be an integer from 0 to"),
         ({"quantity": "speed"}, 'quantity = "speed": must be one of arcs'),
-        ({"cells": [{"q": 1.0}]}, '--at = "q": must be one of'),
+        ({"cells": [{"q": 1.0}]}, '--cell = "q": must be one of'),
         ({"cells": [{"x": 9.0}]}, "must be x in"),
     ],
 )
@@ -191,6 +192,16 @@ def test_what_a_page_cannot_show_is_refused(result, folder, choices, said):
     with pytest.raises(ConfigError, match=re.escape(said)):
         cspr_jax.report(result, output, **choices)
     assert not output.exists()
+
+
+def test_the_command_writes_beside_the_result(result, folder, monkeypatch, capsys):
+    """From the run's own folder, too; mistakes are one line."""
+    monkeypatch.chdir(folder / "run")
+    assert main(["report", ".", "--trajectories", "0"]) == 0
+    assert capsys.readouterr().out == "sweep.html\n"
+    assert (folder / "run" / "sweep.html").exists()
+    assert main(["report", ".", "--cell", "x"]) == 2
+    assert capsys.readouterr().err == 'cspr: --cell: "x": must be AXIS=VALUE, such as z=1.7\n'
 
 
 def test_cells_of_places_have_no_motions(folder, capsys):

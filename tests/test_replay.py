@@ -156,7 +156,7 @@ def test_a_plan_that_is_not_feasible(folder, capsys):
             "--step: 1e-09 s: must give at most 20000000 rows",
         ),
         (("plan", "plan.toml", "--mjcf", "m.xml", "-o", "m_control.csv"), "-o: m_control.csv: must be another name"),
-        (("plan", "plan.toml", "--anyway"), "--anyway: must be absent without -o or --mjcf"),
+        (("plan", "plan.toml", "--anyway"), "--anyway: must be absent without -o, --mjcf or --animate"),
         (("replay", "plan.toml", "--step", "nan"), "--step: nan: must be a number > 0, in s"),
         (("replay", "plan.toml", "-o", "picture"), "-o: picture: must end in .png"),
         (("replay", "plan.toml", "-o", "a.bmp2", "--step", "0.01"), "a.bmp2: Format"),

@@ -155,7 +155,7 @@ def _rank(points: np.ndarray, chosen: np.ndarray, place: int) -> int:
 
 def _places(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
     for axis, own in cell.items():
-        nearest(result, axis, own)  # refuses axes that there are not
+        nearest(result, axis, own, "--cell")  # refuses axes that there are not
     return {axis: float(cell.get(axis, points[0])) for axis, points in result.axes.items()}
 
 

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from cspr_jax.cli.command import Command, add_device, add_output, prepare_jax, warn
+from cspr_jax.cli.command import Command, add_all_errors, add_device, add_output, prepare_jax, warn
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.options import ACCELERATION, add_plot
 from cspr_jax.runtime.progress import waiting
@@ -38,21 +38,21 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cell", action="append", default=[], metavar="AXIS=VALUE,...", help="the motion of this cell, too"
     )
+    add_all_errors(parser)
     add_device(parser)
 
 
 def _report(options: argparse.Namespace) -> int:
     from cspr_jax.outputs.plots import selection
 
-    cells = [selection.places(words.split(",")) for words in options.cell]
-    output = options.output or options.result.with_suffix(".html")
+    cells = [selection.places(words.split(","), "--cell") for words in options.cell]
+    given = options.result if options.result.suffix == ".toml" else selection.result_at(options.result)
+    output = options.output or given.with_suffix(".html")
     with waiting():
         prepare_jax(options)
         from cspr_jax.api.reports import report
 
-        warnings = report(
-            options.result, output, trajectories=options.trajectories, cells=cells, quantity=options.quantity
-        )
+        warnings = report(given, output, trajectories=options.trajectories, cells=cells, quantity=options.quantity)
     for line in warnings:
         warn(line)
     sys.stdout.write(f"{output}\n")

@@ -32,11 +32,12 @@ def result_at(path: Path) -> Path:
     return result_in(path)
 
 
-def places(words: list[str]) -> dict[str, float]:
+def places(words: list[str], option: str = "--at") -> dict[str, float]:
     """Values of axes as the command line gives them.
 
     Args:
         words: such as "z=1.7".
+        option: that gave them, for errors.
 
     Returns:
         the values by axis.
@@ -50,19 +51,20 @@ def places(words: list[str]) -> dict[str, float]:
         try:
             at[axis] = float(number)
         except ValueError as error:
-            raise ConfigError("--at", f"{shown(text)}: must be AXIS=VALUE, such as z=1.7") from error
+            raise ConfigError(option, f"{shown(text)}: must be AXIS=VALUE, such as z=1.7") from error
         if not math.isfinite(at[axis]):
-            raise ConfigError("--at", f"{shown(text)}: must be a finite number")
+            raise ConfigError(option, f"{shown(text)}: must be a finite number")
     return at
 
 
-def nearest(result: Result, axis: str, wanted: float) -> tuple[int, str]:
+def nearest(result: Result, axis: str, wanted: float, option: str = "--at") -> tuple[int, str]:
     """The point of an axis that is drawn where a value is asked for.
 
     Args:
         result: a map.
         axis: its name.
         wanted: the value.
+        option: that gave it, for errors.
 
     Returns:
         the index of the point, and how the picture says it: with the value where that is another one.
@@ -71,13 +73,13 @@ def nearest(result: Result, axis: str, wanted: float) -> tuple[int, str]:
         InputError: no such axis, or a value out of its range.
     """
     if axis not in result.axes:
-        raise InputError("--at", axis, "one of " + ", ".join(result.axes))
+        raise InputError(option, axis, "one of " + ", ".join(result.axes))
     points = result.axes[axis]
     low, high = float(points.min()), float(points.max())
     rounding = SAME * max(abs(low), abs(high))
     if not low - rounding <= wanted <= high + rounding:
         allowed = f"{axis} in [{low:.6g}, {high:.6g}]" if high > low else f"{axis} = {low:.6g}, its one point"
-        raise InputError("--at", f"{axis}={wanted:.6g}", allowed)
+        raise InputError(option, f"{axis}={wanted:.6g}", allowed)
     place = int(np.argmin(np.abs(points - wanted)))
     words = value(result, axis, points[place])
     if abs(points[place] - wanted) > rounding:
