@@ -86,9 +86,13 @@ Its picture says NOT PROVED FEASIBLE and for which segments; its HDF5 file has `
 segments; its CSV file has a last column `feasible`, 1 in the rows of feasible segments and 0 in the others. CSV files
 of feasible plans do not have that column.
 
-`cspr plot FILE.h5` draws path and tensions over time. With `--quantity acceleration` (point masses) it draws all
-accelerations that the cables can give at one instant, `--at t=1.2` or that of the smallest margin, and the motion's
-among them; with `--quantity path_acceleration` (straight lines) that column over the way, between its bounds.
+`cspr plot FILE.h5` draws path and tensions over time. With `--quantity trajectory` it draws the path in space, with the
+robot where segments begin and end and its cables coloured by tension; with `--quantity tensions` the band of tensions
+over time and the limits; with `--quantity summary` all that on one page, with a table of the segments. With `--quantity
+acceleration` (point masses) it draws all accelerations that the cables can give at one instant, `--at t=1.2` or that of
+the smallest margin, and the motion's among them; with `--quantity path_acceleration` (straight lines) that column over
+the way, between its bounds; with `--quantity landing` the landings of a sample of throws. Several motions, such as
+those of families on the same targets, are drawn in one picture: paths, smallest tensions and largest cable speeds.
 
 `cspr plan --mjcf NAME.xml` writes a model for MuJoCo, and `NAME_control.csv` with `t`, s, and `tension_1`, ..., N: two
 rows a step of at most `--step` seconds, and one more where steps end at a jump

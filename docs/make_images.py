@@ -56,6 +56,27 @@ IMAGES = {
         ("figure_1_9_a1", "figure_1_9_a2", "figure_1_9_a3", "figure_1_9_effective"),
     ),
     "table_2_1": Image("The motion of Table 2.1: path and tensions.", 12, command="plan"),
+    "trajectory": Image(
+        "A platform on eight cables in space, where segments begin and end; its cables coloured by tension.",
+        15,
+        "--quantity trajectory",
+        ("cogiro",),
+        "plan",
+    ),
+    "tensions": Image(
+        "Tensions of the eight cables over time: the band that they fill, and the limits.",
+        15,
+        "--quantity tensions",
+        ("cogiro",),
+        "plan",
+    ),
+    "summary": Image(
+        "The launch on a page: space, tensions, speeds of the cables, and a table of its segments.",
+        20,
+        "--quantity summary",
+        ("launch",),
+        "plan",
+    ),
     "straight_line": Image(
         "Boralugoda's test case: path, tensions as far from zero as can be, accelerations, tension couples.",
         10,

@@ -197,8 +197,15 @@ def test_acceleration_over_the_way(capsys, tmp_path, figures):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--quantity", "tension"], ["--quantity", '"tension"', "one of acceleration for this motion, or absent"]),
-        (["--quantity", "path_acceleration"], ["one of acceleration for this motion"]),
+        (
+            ["--quantity", "tension"],
+            [
+                "--quantity",
+                '"tension"',
+                "one of trajectory, tensions, summary, acceleration for this motion, or absent",
+            ],
+        ),
+        (["--quantity", "path_acceleration"], ["one of trajectory, tensions, summary, acceleration for this motion"]),
         (["--quantity", "acceleration", "--at", "x=1"], ["--at", '"x"', "one of t"]),
         (["--quantity", "acceleration", "--at", "t=9"], ["--at", "t=9", "t in [0, 1]"]),
         (["--at", "t=0"], ["--at", "absent for a motion but with --quantity acceleration"]),

@@ -224,7 +224,10 @@ def test_files_hold_residuals_and_pictures_limits(example, tmp_path):
     figure = cspr_jax.plot(path)
     panel = next(axes for axes in figure.axes if axes.get_ylabel().startswith("tension (N)"))
     assert panel.get_ylabel() == "tension (N)\ncentred"
-    assert {text.get_text() for text in panel.texts} == {"smallest 100 N", "largest 5000 N, above the picture"}
+    assert {text.get_text() for text in panel.texts} == {
+        "smallest allowed 100 N",
+        "largest allowed 5000 N, above the picture",
+    }
     assert any(np.allclose(line.get_ydata(), LOW) for line in panel.lines)
 
 

@@ -28,13 +28,14 @@ def plot(  # noqa: PLR0913
     font_size: float | None = None,
     output: str | Path | None = None,
 ) -> Figure:
-    """Draw one result, or several maps in one picture: as lines, of workspaces as outlines.
+    """Draw one result, or several in one picture: maps as lines, workspaces as outlines, motions over time.
 
     Args:
-        results: of `open_result`, or the path of a result, a run directory or a motion file; or several maps.
-        quantity: which one of a map; None: "arcs", or the first there is. Of a motion "acceleration", beside all that
-            are feasible at the instant `at` (None: that of the smallest margin), or "path_acceleration", over the way
-            along straight lines; None: path and tensions over time.
+        results: of `open_result`, or the path of a result, a run directory or a motion file; several maps or motions.
+        quantity: which one of a map; None: "arcs", or the first there is. Of a motion "trajectory", in space;
+            "tensions", with their limits; "summary", on a page; "acceleration", beside all that are feasible at the
+            instant `at` (None: that of the smallest margin); "path_acceleration", over the way along straight lines;
+            or "landing", of throws; None: path and tensions over time.
         at: fixed values of axes, within their ranges; the nearest point is taken. Of a motion t, s.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.

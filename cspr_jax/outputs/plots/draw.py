@@ -9,13 +9,11 @@ from matplotlib.figure import Figure
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
+from cspr_jax.outputs.plots.families import families_figure
 from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, value, values
-from cspr_jax.outputs.plots.landings import landing_figure
 from cspr_jax.outputs.plots.lines import Line, line_figure, lines_of, names_of, overlaid
-from cspr_jax.outputs.plots.motion import motion_figure
+from cspr_jax.outputs.plots.motion_pictures import motion_picture
 from cspr_jax.outputs.plots.notes import notes
-from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION
-from cspr_jax.outputs.plots.path_accelerations import path_figure
 from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.sections import POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
@@ -58,10 +56,10 @@ def drawn(
     """The picture of one result, or of several maps as lines or outlines; made inside `style.in_style`.
 
     Args:
-        results: of `cspr run`, or one motion of `cspr plan -o`.
+        results: of `cspr run`, or motions of `cspr plan -o`.
         names: of their files.
-        quantity: which one of a map; None: the one that its kind of map is about. Of a motion `options` names those
-            that have a picture; None: its path and tensions.
+        quantity: which one of a map; None: the one that its kind of map is about. Of a motion
+            `motion_pictures` has those there are; None: its path and tensions.
         at: fixed values of axes, within their ranges; the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
@@ -88,20 +86,7 @@ def drawn(
 def _motion_figure(result: Result, name: str, quantity: str | None, at: dict[str, float], lines: str | None) -> Figure:
     if lines is not None:
         raise InputError("--lines", lines, "absent for a motion")
-    if at and quantity != ACCELERATION:
-        raise InputError("--at", at, f"absent for a motion but with --quantity {ACCELERATION}")
-    if quantity == ACCELERATION:
-        from cspr_jax.outputs.plots.accelerations import acceleration_figure  # it needs jax, as no other picture does
-
-        return acceleration_figure(result, name, at)
-    if quantity == PATH_ACCELERATION and PATH_ACCELERATION in result.data:
-        return path_figure(result, name)
-    if quantity == LANDING and LANDING in result.data:
-        return landing_figure(result)
-    if quantity is not None:
-        pictured = [ACCELERATION, *(name for name in (PATH_ACCELERATION, LANDING) if name in result.data)]
-        raise InputError("--quantity", quantity, f"one of {', '.join(pictured)} for this motion, or absent")
-    return motion_figure(result)
+    return motion_picture(result, name, quantity, at)
 
 
 def _envelope(results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None) -> Figure:
@@ -169,6 +154,9 @@ def _overlay(
     constant: list[list[str]] = []
     if lines is not None:
         raise InputError("--lines", lines, "absent where several results are drawn")
+    if not any(result.is_map for result in results):
+        _refuse("several motions", {"--quantity": quantity, "--at": bool(at)})
+        return families_figure(results, [str(path) for path in paths])
     if quantity in (None, "verdict") and all(_is_workspace(one) and len(_varying(one, at)) > 1 for one in results):
         return _comparison([str(path) for path in paths], results, at)
     for path, result in zip(paths, results, strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, HTMLWriter, PillowWriter
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from cspr_jax.config.plan import PlanFile
@@ -18,6 +18,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.labels import COLOURS, STYLES
 from cspr_jax.outputs.plots.moving import Moving, limits_of, moving
+from cspr_jax.outputs.plots.scene import colours_of_tension, set_space
 from cspr_jax.runtime.stages import stage
 
 ENDINGS = (".gif", ".mp4", ".html")
@@ -117,8 +118,7 @@ class _Picture:
         finite = self.tension[np.isfinite(self.tension)]
         self._largest = float(finite.max(initial=0.0)) or 1.0
         self._norm = Normalize(0.0, self._largest)
-        # Without the end that is too light on white.
-        self._colours = ListedColormap(matplotlib.colormaps["plasma"](np.linspace(0.0, 0.88, 256)))
+        self._colours = colours_of_tension()
         self.figure = Figure(figsize=SIZE, layout="constrained")
         FigureCanvasAgg(self.figure)
         grid = self.figure.add_gridspec(1, 2, width_ratios=[1.0, 1.05])
@@ -134,17 +134,7 @@ class _Picture:
     def _draw_space(self, *, is_down: bool) -> None:
         space, robot = self._space, self.robot
         flight = np.concatenate([robot.base, robot.attached.reshape(-1, 3), self._path])
-        low, high = flight.min(0), flight.max(0)
-        size = np.maximum(high - low, 0.1 * (high - low).max())
-        middle = 0.5 * (low + high)
-        # Where z points down y is turned too, so that nothing is mirrored.
-        signs = (1.0, -1.0, -1.0) if is_down else (1.0, 1.0, 1.0)
-        for k, name in enumerate("xyz"):
-            ends = middle[k] - 0.54 * signs[k] * size[k], middle[k] + 0.54 * signs[k] * size[k]
-            space.set(**{f"{name}lim": ends, f"{name}label": f"{name} (m)"})
-            getattr(space, f"{name}axis").set_major_locator(matplotlib.ticker.MaxNLocator(4))
-        space.set_box_aspect(tuple(size), zoom=0.9)
-        space.view_init(elev=18.0, azim=-62.0)
+        set_space(space, flight, is_down=is_down)
         space.plot(*self._path.T, color="0.7", linewidth=0.8)
         self._behind = space.plot([], [], [], color="black", linewidth=1.1)[0]
         space.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35")

@@ -10,6 +10,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.labels import COLOURS, STYLES, robot_name
+from cspr_jax.outputs.plots.moving import limits_of
 from cspr_jax.schema.motion_quantities import PARTS
 from cspr_jax.store.result import Result
 
@@ -82,14 +83,19 @@ def motion_figure(result: Result) -> Figure:
         _lines(drawn["acceleration"], time, np.c_[acceleration, sizes], ["x", "y", "z", "size"])
         drawn["acceleration"].set_ylabel("acceleration (m/s²)")
     for name in {"orientation", "tension", *more} & drawn.keys():
-        _boundaries(drawn[name], result)
+        boundaries(drawn[name], result)
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
     figure.suptitle(f"{robot_name(result)}: {place}z axis {result.attributes.get('z_axis', 'down')}{doubt(result)}")
     return figure
 
 
-def _boundaries(panel: Axes, result: Result) -> None:
-    # Between segments; motions of earlier versions do not say where.
+def boundaries(panel: Axes, result: Result) -> None:
+    """Lines between the segments of a motion; files of earlier versions do not say where these are.
+
+    Args:
+        panel: over time.
+        result: the motion.
+    """
     for time in result.data.get("segment_end", np.empty(0))[:-1][:BOUNDARIES]:
         panel.axvline(time, color="black", linewidth=0.8, alpha=0.35)
 
@@ -137,18 +143,14 @@ def _limits(panel: Axes, tension: np.ndarray, spec: RobotFile, keys: PlanFile) -
     # The rule by which redundant cables share the load, and the limits that it heeds.
     panel.set_ylabel(f"tension (N)\n{keys.tension_rule}")
     beyond = []
-    for name, word in (("tension_min", "smallest"), ("tension_max", "largest")):
-        own = getattr(keys, name)
-        given = getattr(spec, name) if own is None else own
-        values = np.unique(np.atleast_1d([] if given is None else given))
-        for value in values[np.isfinite(values) & (values > 0.0)].tolist():
-            if value > FAR * np.nanmax(tension, initial=0.0):
-                beyond.append(f"{value:.4g}")
-                continue
-            panel.axhline(value, color="black", linewidth=0.8, linestyle="--")
-            panel.annotate(f"{word} {value:.4g} N", (0.01, value), xycoords=BESIDE, va="bottom", fontsize="small")
+    for words, value in limits_of(spec, keys):
+        if value > FAR * np.nanmax(tension, initial=0.0):
+            beyond.append(f"{value:.4g}")
+            continue
+        panel.axhline(value, color="black", linewidth=0.8, linestyle="--")
+        panel.annotate(f"{words} {value:.4g} N", (0.01, value), xycoords=BESIDE, va="bottom", fontsize="small")
     if beyond:
-        text = f"largest {beyond[0]}{' .. ' + beyond[-1] if len(beyond) > 1 else ''} N, above the picture"
+        text = f"largest allowed {beyond[0]}{' .. ' + beyond[-1] if len(beyond) > 1 else ''} N, above the picture"
         panel.annotate(text, (0.01, 0.97), xycoords="axes fraction", va="top", fontsize="small")
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.posed import hull_of
 from cspr_jax.robots.shapes import rotation_matrix
@@ -48,7 +49,7 @@ def moving(columns: Mapping[str, np.ndarray], spec: RobotFile, rows: np.ndarray)
     return Moving(base, position, attached, corners)
 
 
-def limits_of(spec: RobotFile, asked: object) -> list[tuple[str, float]]:
+def limits_of(spec: RobotFile, asked: PlanFile) -> list[tuple[str, float]]:
     """Limits of tensions, to be drawn beside these.
 
     Args:

@@ -17,8 +17,9 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
     parser.add_argument(
         "--quantity",
-        help="quantity of a map (default arcs or oscillations; see `cspr quantities`); of a motion acceleration, "
-        "beside all that are feasible at an instant, or path_acceleration, over the way",
+        help="quantity of a map (default arcs or oscillations; see `cspr quantities`); of a motion trajectory, in "
+        "space; tensions, with their limits; summary, on a page; acceleration, beside all that are feasible at an "
+        "instant; path_acceleration, over the way; or landing",
     )
     parser.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
     parser.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')

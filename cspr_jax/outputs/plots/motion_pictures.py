@@ -1,0 +1,73 @@
+"""Pictures of a motion by the names that `--quantity` takes: a row each."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.landings import landing_figure
+from cspr_jax.outputs.plots.motion import motion_figure
+from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION
+from cspr_jax.outputs.plots.path_accelerations import path_figure
+from cspr_jax.outputs.plots.summary import SUMMARY, summary_figure
+from cspr_jax.outputs.plots.tensions import TENSIONS, tensions_figure
+from cspr_jax.outputs.plots.trajectory import TRAJECTORY, trajectory_figure
+from cspr_jax.store.result import Result
+
+
+class MotionPicture(NamedTuple):
+    """A picture of a motion.
+
+    Fields:
+        draw: makes it, of the motion, the name of its file, and the instant asked for.
+        needs: quantity of the file without which there is none; empty for none.
+        at_instant: whether it is of an instant, "t".
+    """
+
+    draw: Callable[[Result, str, dict[str, float]], Figure]
+    needs: str = ""
+    at_instant: bool = False
+
+
+def _acceleration(result: Result, file: str, at: dict[str, float]) -> Figure:
+    from cspr_jax.outputs.plots.accelerations import acceleration_figure  # it needs jax, as no other picture does
+
+    return acceleration_figure(result, file, at)
+
+
+MOTION_PICTURES = {
+    TRAJECTORY: MotionPicture(lambda result, file, _: trajectory_figure(result, file)),
+    TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, file)),
+    SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, file)),
+    ACCELERATION: MotionPicture(_acceleration, at_instant=True),
+    PATH_ACCELERATION: MotionPicture(lambda result, file, _: path_figure(result, file), needs=PATH_ACCELERATION),
+    LANDING: MotionPicture(lambda result, *_: landing_figure(result), needs=LANDING),
+}
+
+
+def motion_picture(result: Result, file: str, quantity: str | None, at: dict[str, float]) -> Figure:
+    """The picture of a motion that is asked for.
+
+    Args:
+        result: the motion.
+        file: its name, for errors.
+        quantity: a name of `MOTION_PICTURES`; None: path and tensions.
+        at: the instant, as "t", of a picture that is of one.
+
+    Returns:
+        the figure.
+
+    Raises:
+        InputError: no such picture of this motion, or no such instant.
+        ConfigError: a mistake in the plan that the file keeps.
+    """
+    instants = [name for name, row in MOTION_PICTURES.items() if row.at_instant]
+    if at and quantity not in instants:
+        raise InputError("--at", at, f"absent for a motion but with --quantity {', '.join(instants)}")
+    if quantity is None:
+        return motion_figure(result)
+    known = [name for name, row in MOTION_PICTURES.items() if not row.needs or row.needs in result.data]
+    if quantity not in known:
+        raise InputError("--quantity", quantity, f"one of {', '.join(known)} for this motion, or absent")
+    return MOTION_PICTURES[quantity].draw(result, file, at)

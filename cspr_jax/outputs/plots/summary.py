@@ -1,0 +1,79 @@
+"""One page about a plan for a paper: the motion in space, tensions, rates of the cables, and a table of segments."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cspr_jax.outputs.plots.kept import kept
+from cspr_jax.outputs.plots.labels import COLOURS, STYLES, robot_name
+from cspr_jax.outputs.plots.motion import boundaries, doubt
+from cspr_jax.outputs.plots.moving import limits_of
+from cspr_jax.outputs.plots.reasons import reasons
+from cspr_jax.outputs.plots.tensions import draw_tensions, extremes
+from cspr_jax.outputs.plots.trajectory import draw_trajectory
+from cspr_jax.store.result import Result
+
+# Of the name that `--quantity` takes.
+SUMMARY = "summary"
+# Lines of the table; of a longer plan the first ones.
+SEGMENTS = 8
+HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
+
+
+def summary_figure(result: Result, file: str) -> Figure:
+    """The plan on a page.
+
+    Args:
+        result: its motion.
+        file: its name, for errors.
+
+    Returns:
+        the figure.
+
+    Raises:
+        InputError: the file keeps no robot.
+        ConfigError: a mistake in the plan that it keeps.
+    """
+    spec, keys = kept(result, file, SUMMARY)
+    cells = _cells(result)
+    figure = Figure(figsize=(7.2, 8.2 + 0.22 * len(cells)), layout="constrained")
+    parts = figure.add_gridspec(4, 1, height_ratios=[4.4, 2.0, 1.6, 0.3 + 0.22 * len(cells)])
+    space = figure.add_subplot(parts[0], projection="3d", computed_zorder=False)
+    draw_trajectory(figure, space, result, spec)
+    over_time = figure.add_subplot(parts[1])
+    draw_tensions(over_time, result, limits_of(spec, keys))
+    over_time.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    _rates(figure.add_subplot(parts[2], sharex=over_time), result)
+    table = figure.add_subplot(parts[3])
+    table.axis("off")
+    drawn = table.table(cells, colLabels=HEADS, loc="center", cellLoc="center", edges="horizontal")
+    drawn.auto_set_column_width(list(range(len(HEADS))))
+    drawn.auto_set_font_size(False)
+    drawn.scale(1.0, 1.15)
+    figure.suptitle(f"{robot_name(result)}: {result.axes['t'][-1]:.4g} s\n{extremes(result)}{doubt(result)}")
+    return figure
+
+
+def _rates(panel: Axes, result: Result) -> None:
+    for k, values in enumerate(result.data["rate"].T):
+        style, colour = STYLES[(k + k // len(COLOURS)) % len(STYLES)], COLOURS[k % len(COLOURS)]
+        panel.plot(result.axes["t"], values, linestyle=style, color=colour, linewidth=1.0, label=f"cable {k + 1}")
+    panel.axhline(0.0, color="black", linewidth=0.8)
+    boundaries(panel, result)
+    panel.set(xlabel="time (s)", ylabel="cable speed (m/s)")
+    panel.legend(ncols=min(4, result.data["rate"].shape[1]), loc="lower right", bbox_to_anchor=(1.0, 1.0))
+
+
+def _cells(result: Result) -> list[list[str]]:
+    data = result.data
+    count = len(data.get("segment_end", ()))
+    cells = []
+    for k in range(min(count, SEGMENTS)):
+        numbers, words, _ = reasons(data["segment_verdict"][k : k + 1], "verdict")
+        arcs, duration = int(data["segment_arcs"][k]), data["segment_end"][k] - data["segment_start"][k]
+        margin = f"{data['segment_margin'][k]:.4g}" if np.isfinite(data["segment_margin"][k]) else "none"
+        number = f"{k + 1}" if count <= SEGMENTS else f"{k + 1} of {count}"
+        # Straight lines and Bezier segments have no arcs; a segment that is not feasible has none that will do.
+        told = f"{arcs}" if arcs else "none" if data["segment_verdict"][k] else "-"
+        cells.append([number, told, f"{duration:.4g}", margin, words[int(numbers[0])]])
+    return cells

@@ -1,0 +1,117 @@
+"""A motion in space: its path, the spools, and the robot at some instants with its cables coloured by tension."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.kept import kept
+from cspr_jax.outputs.plots.labels import COLOURS, robot_name
+from cspr_jax.outputs.plots.motion import doubt
+from cspr_jax.outputs.plots.moving import moving
+from cspr_jax.outputs.plots.scene import colours_of_tension, set_space
+from cspr_jax.store.result import Result
+
+# Of the name that `--quantity` takes.
+TRAJECTORY = "trajectory"
+# The robot is drawn where segments begin and end, at most so often.
+SHOWN = 6
+# Heights of the picture of a flat robot and of a tall one, inches.
+LOW, HIGH = 4.4, 6.8
+
+
+def trajectory_figure(result: Result, file: str) -> Figure:
+    """The motion in space.
+
+    Args:
+        result: the motion.
+        file: its name, for errors.
+
+    Returns:
+        the figure.
+
+    Raises:
+        InputError: the file keeps no robot.
+        ConfigError: a mistake in the plan that it keeps.
+    """
+    spec, _ = kept(result, file, TRAJECTORY)
+    points = np.concatenate([result.data["position"], np.asarray(spec.base_points, float)])
+    sizes = np.ptp(points, axis=0)
+    tall = min(1.0, sizes[2] / max(sizes[0], sizes[1]))
+    height = LOW + (HIGH - LOW) * tall
+    figure = Figure(figsize=(7.2, height), layout="constrained")
+    panel = figure.add_subplot(projection="3d", computed_zorder=False)
+    draw_trajectory(figure, panel, result, spec, zoom=1.25 - 0.35 * tall)
+    figure.legend(*_legend(result), loc="outside lower center", ncols=5)
+    figure.suptitle(f"{robot_name(result)}: trajectory, {result.axes['t'][-1]:.4g} s{doubt(result)}")
+    return figure
+
+
+def draw_trajectory(figure: Figure, panel: Any, result: Result, spec: RobotFile, *, zoom: float = 0.9) -> None:
+    """Path, spools, flight of a released object, and the robot where segments begin and end.
+
+    Args:
+        figure: for the colour bar.
+        panel: axes in three dimensions, without computed z order.
+        result: the motion.
+        spec: the robot whose cables have these tensions.
+        zoom: of the box; 1 fills the panel if it is a cube.
+    """
+    rows = _instants(result)
+    robot, path = moving(result.data, spec, rows), result.data["position"]
+    flight = result.data.get("flight_position", np.empty((0, 3)))
+    set_space(
+        panel,
+        np.concatenate([robot.base, robot.attached.reshape(-1, 3), path, flight]),
+        is_down=result.attributes.get("z_axis", "down") == "down",
+        zoom=zoom,
+    )
+    tension = result.data["tension"]
+    norm = Normalize(0.0, float(tension[np.isfinite(tension)].max(initial=0.0)) or 1.0)
+    colours = colours_of_tension()
+    panel.plot(*path.T, color="black", linewidth=1.2, zorder=3.0)
+    if len(flight):
+        panel.plot(*flight.T, color=COLOURS[2], linewidth=1.4, linestyle="--", zorder=3.0)
+    spools = panel.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35", zorder=2.0)[0]
+    # A flat box is larger than its panel, which is a square.
+    spools.set(clip_on=False, in_layout=False)
+    for row, attached, corners in zip(rows, robot.attached, robot.corners, strict=True):
+        lines = np.stack([robot.base, attached], axis=1)
+        cables = Line3DCollection(lines, colors=colours(norm(tension[row])), linewidths=1.6, zorder=2.5)
+        panel.add_collection3d(cables)
+        cables.set(clip_on=False, in_layout=False)
+        if len(corners):
+            edges = corners.reshape(-1, 2, 3)
+            panel.add_collection3d(Line3DCollection(edges, colors="black", linewidths=1.2, zorder=4.0))
+    ends = path[rows[[0, -1]]]
+    for place, marker in zip(ends, ("o", "D"), strict=True):
+        panel.plot(*place[:, None], marker=marker, markersize=6, color="black", markerfacecolor="white", zorder=5.0)
+    if not robot.corners.shape[1]:
+        panel.plot(*path[rows[1:-1]].T, linestyle="", marker=".", markersize=8, color="black", zorder=4.0)
+    figure.colorbar(ScalarMappable(norm, colours), ax=panel, label="tension (N)", shrink=0.6, location="left", pad=0.04)
+
+
+def _instants(result: Result) -> np.ndarray:
+    # Rows at the ends of segments, evenly chosen if there are many.
+    time = result.axes["t"]
+    ends = np.concatenate([time[:1], result.data.get("segment_end", time[-1:])])
+    rows = np.clip(np.searchsorted(time, ends - 1e-9 * max(time[-1], 1.0)), 0, len(time) - 1)
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(SHOWN, len(rows))).round().astype(int))]
+
+
+def _legend(result: Result) -> tuple[list[Line2D], list[str]]:
+    hollow: dict[str, Any] = {"linestyle": "", "color": "black", "markerfacecolor": "white"}
+    every = {
+        "path": Line2D([], [], color="black", linewidth=1.2),
+        "start": Line2D([], [], marker="o", **hollow),
+        "end": Line2D([], [], marker="D", **hollow),
+        "spools": Line2D([], [], linestyle="", marker="s", color="0.35"),
+    }
+    if "flight_position" in result.data:
+        every["flight"] = Line2D([], [], color=COLOURS[2], linewidth=1.4, linestyle="--")
+    return list(every.values()), list(every)
