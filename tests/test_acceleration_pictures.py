@@ -189,9 +189,9 @@ def test_acceleration_over_the_way(capsys, tmp_path, figures):
         np.testing.assert_allclose(largest.get_ydata(), bounds[k][2] / length)
         assert panel.get_xlabel() == "part of the way s"
     assert every[0].get_ylabel() == "acceleration s'' (1/s²)"
-    assert {line.get_ydata()[0] for line in every[0].lines if line.get_label() == "max_acceleration"} == {0.7, -0.7}
+    assert {line.get_ydata()[0] for line in every[0].lines if line.get_label() == "largest allowed"} == {0.7, -0.7}
     words = [text.get_text() for text in figures[0].legends[0].get_texts()]
-    assert words == ["feasible", "least feasible", "largest feasible", "of the motion", "max_acceleration"]
+    assert words == ["feasible", "least feasible", "largest feasible", "of the motion", "largest allowed"]
 
 
 @pytest.mark.parametrize(

@@ -121,7 +121,7 @@ def _draw(panel: Axes, way: Way, max_acceleration: float | None) -> None:
     for sign in (1.0, -1.0):
         level = np.nan if max_acceleration is None else sign * max_acceleration / way.length
         if bottom < level < top:
-            panel.axhline(level, color=COLOURS[3], linewidth=1.2, linestyle=":", label="max_acceleration")
+            panel.axhline(level, color=COLOURS[3], linewidth=1.2, linestyle=":", label="largest allowed")
     panel.set(xlim=(0.0, 1.0), ylim=(bottom, top))
     panel.grid(alpha=0.3)
 
