@@ -10,6 +10,7 @@ from test_plan import SHORT
 
 import cspr_jax
 from cspr_jax.cli import main
+from cspr_jax.outputs.plots.labels import cable_names
 from cspr_jax.outputs.plots.motion_pictures import MOTION_PICTURES
 from cspr_jax.outputs.plots.scene import colours_of_tension
 
@@ -129,3 +130,10 @@ def test_each_row_is_offered_by_the_command_line(capsys):
         main(["plot", "--help"])
     shown = " ".join(capsys.readouterr().out.split())
     assert all(name in shown for name in MOTION_PICTURES)
+
+
+def test_pairs_of_cables_are_named_so():
+    """Where two cables share a winch, a column of tensions is a pair's."""
+    columns = {"tension": np.ones((4, 3))}
+    assert cable_names(columns) == ["cable 1", "cable 2", "cable 3"]
+    assert cable_names(columns | {"tension_each": np.ones((4, 6))}) == ["pair 1", "pair 2", "pair 3"]

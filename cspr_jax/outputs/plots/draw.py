@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
-from cspr_jax.outputs.plots.families import families_figure
 from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, value, values
 from cspr_jax.outputs.plots.lines import Line, line_figure, lines_of, names_of, overlaid
+from cspr_jax.outputs.plots.motion_comparison import motion_comparison_figure
 from cspr_jax.outputs.plots.motion_pictures import motion_picture
 from cspr_jax.outputs.plots.notes import notes
 from cspr_jax.outputs.plots.planes import in_order
@@ -58,8 +58,8 @@ def drawn(
     Args:
         results: of `cspr run`, or motions of `cspr plan -o`.
         names: of their files.
-        quantity: which one of a map; None: the one that its kind of map is about. Of a motion
-            `motion_pictures` has those there are; None: its path and tensions.
+        quantity: which one of a map; None: the one that its kind of map is about. Of a motion a
+            name of `motion_pictures.MOTION_PICTURES`; None: its path and tensions.
         at: fixed values of axes, within their ranges; the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
@@ -156,7 +156,7 @@ def _overlay(
         raise InputError("--lines", lines, "absent where several results are drawn")
     if not any(result.is_map for result in results):
         _refuse("several motions", {"--quantity": quantity, "--at": bool(at)})
-        return families_figure(results, [str(path) for path in paths])
+        return motion_comparison_figure(results, [str(path) for path in paths])
     if quantity in (None, "verdict") and all(_is_workspace(one) and len(_varying(one, at)) > 1 for one in results):
         return _comparison([str(path) for path in paths], results, at)
     for path, result in zip(paths, results, strict=True):

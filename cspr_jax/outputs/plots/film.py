@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.labels import COLOURS, STYLES
+from cspr_jax.outputs.plots.labels import cable_names, line_look
 from cspr_jax.outputs.plots.moving import Moving, limits_of, moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, set_space
 from cspr_jax.runtime.stages import stage
@@ -115,6 +115,7 @@ class _Picture:
         self.robot, self._path = moving(columns, spec, rows), moving(columns, spec, every).position
         self._rows, self._time = rows, np.asarray(columns["t"], float)
         self.tension = np.asarray(columns["tension"], float)
+        self._names = cable_names(columns)
         finite = self.tension[np.isfinite(self.tension)]
         self._largest = float(finite.max(initial=0.0)) or 1.0
         self._norm = Normalize(0.0, self._largest)
@@ -151,8 +152,7 @@ class _Picture:
 
     def _draw_tensions(self, panel: Any, limits: list[tuple[str, float]]) -> None:
         for k, values in enumerate(self.tension.T):
-            style, colour = STYLES[(k + k // len(COLOURS)) % len(STYLES)], COLOURS[k % len(COLOURS)]
-            panel.plot(self._time, values, linestyle=style, color=colour, linewidth=1.2, label=f"cable {k + 1}")
+            panel.plot(self._time, values, linewidth=1.2, label=self._names[k], **line_look(k))
         for words, value in limits:
             if value < FAR * self._largest:
                 panel.axhline(value, color="black", linewidth=0.8, linestyle="--")

@@ -1,5 +1,8 @@
 """Words and colours that all pictures share: names, units, numbers."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from cspr_jax.outputs.plots.fitting import shortened
@@ -24,6 +27,32 @@ WRITTEN = {
     **{"m m-1": "m/m", "rad m-1": "rad/m"},
 }
 STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)))
+
+
+def line_look(number: int) -> dict[str, Any]:
+    """Colour and style of one line of many.
+
+    Args:
+        number: of the line, from 0 on.
+
+    Returns:
+        arguments of `plot`; behind the last colour another style begins.
+    """
+    style = STYLES[(number + number // len(COLOURS)) % len(STYLES)]
+    return {"color": COLOURS[number % len(COLOURS)], "linestyle": style}
+
+
+def cable_names(columns: Mapping[str, np.ndarray]) -> list[str]:
+    """Names of the columns of a motion's tensions.
+
+    Args:
+        columns: of the motion; "tension_each" is there where two cables share a winch.
+
+    Returns:
+        "cable 1", ... or "pair 1", ...
+    """
+    word = "pair" if "tension_each" in columns else "cable"
+    return [f"{word} {k + 1}" for k in range(columns["tension"].shape[1])]
 
 
 def robot_name(result: Result) -> str:

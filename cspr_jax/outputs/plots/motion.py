@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.kept import kept
-from cspr_jax.outputs.plots.labels import COLOURS, STYLES, robot_name
+from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.moving import limits_of
 from cspr_jax.schema.motion_quantities import PARTS
 from cspr_jax.store.result import Result
@@ -64,9 +64,7 @@ def motion_figure(result: Result) -> Figure:
                 _flight(drawn[name], result.data["flight_position"], j)
     if result.attributes.get("z_axis", "down") == "down":
         drawn["xz"].invert_yaxis()
-    word = "pair" if "tension_each" in result.data else "cable"
-    names = [f"{word} {k + 1}" for k in range(tension.shape[1])]
-    _tensions(drawn["tension"], time, tension, names, result.attributes.get("mass"))
+    _tensions(drawn["tension"], time, tension, cable_names(result.data), result.attributes.get("mass"))
     if "tension_residual" in result.data:
         _limits(drawn["tension"], tension, *kept(result, "plan", "tension"))
     if "couple" in drawn:
@@ -156,9 +154,7 @@ def _limits(panel: Axes, tension: np.ndarray, spec: RobotFile, keys: PlanFile) -
 
 def _lines(panel: Axes, time: np.ndarray, values: np.ndarray, names: list[str], *, axis: bool = True) -> None:
     for k, name in enumerate(names):
-        # Behind the last colour another style begins.
-        style, colour = STYLES[(k + k // len(COLOURS)) % len(STYLES)], COLOURS[k % len(COLOURS)]
-        panel.plot(time, values[:, k], linestyle=style, color=colour, linewidth=1.0, label=name)
+        panel.plot(time, values[:, k], linewidth=1.0, label=name, **line_look(k))
     if axis:
         panel.axhline(0.0, color="black", linewidth=0.8)
     panel.set_xlabel("time (s)")

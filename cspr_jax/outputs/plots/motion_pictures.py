@@ -6,13 +6,14 @@ from typing import NamedTuple
 from matplotlib.figure import Figure
 
 from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.landings import landing_figure
 from cspr_jax.outputs.plots.motion import motion_figure
-from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION
+from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION, SUMMARY, TENSIONS, TRAJECTORY
 from cspr_jax.outputs.plots.path_accelerations import path_figure
-from cspr_jax.outputs.plots.summary import SUMMARY, summary_figure
-from cspr_jax.outputs.plots.tensions import TENSIONS, tensions_figure
-from cspr_jax.outputs.plots.trajectory import TRAJECTORY, trajectory_figure
+from cspr_jax.outputs.plots.summary import summary_figure
+from cspr_jax.outputs.plots.tensions import tensions_figure
+from cspr_jax.outputs.plots.trajectory import trajectory_figure
 from cspr_jax.store.result import Result
 
 
@@ -37,9 +38,9 @@ def _acceleration(result: Result, file: str, at: dict[str, float]) -> Figure:
 
 
 MOTION_PICTURES = {
-    TRAJECTORY: MotionPicture(lambda result, file, _: trajectory_figure(result, file)),
-    TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, file)),
-    SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, file)),
+    TRAJECTORY: MotionPicture(lambda result, file, _: trajectory_figure(result, kept(result, file, TRAJECTORY)[0])),
+    TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, *kept(result, file, TENSIONS))),
+    SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *kept(result, file, SUMMARY))),
     ACCELERATION: MotionPicture(_acceleration, at_instant=True),
     PATH_ACCELERATION: MotionPicture(lambda result, file, _: path_figure(result, file), needs=PATH_ACCELERATION),
     LANDING: MotionPicture(lambda result, *_: landing_figure(result), needs=LANDING),

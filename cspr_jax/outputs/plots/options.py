@@ -3,8 +3,9 @@
 import argparse
 from pathlib import Path
 
-# Quantities of motions that have a picture of their own.
+# Names that `--quantity` takes of motions.
 ACCELERATION, PATH_ACCELERATION, LANDING = "acceleration", "path_acceleration", "landing"
+TRAJECTORY, TENSIONS, SUMMARY = "trajectory", "tensions", "summary"
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from cspr_jax.outputs.plots.labels import COLOURS, STYLES
+from cspr_jax.outputs.plots.labels import COLOURS, line_look
 from cspr_jax.outputs.replay import Replay
 
 # Share of the length of the path that typed digits may leave across a plane.
@@ -67,8 +67,7 @@ def _deviations(panel: Axes, replay: Replay, values: dict[str, np.ndarray]) -> N
     starts = np.unique(np.linspace(0.0, len(replay.time), WINDOWS, endpoint=False).astype(int))
     time = replay.time[starts]
     for k, (name, some) in enumerate(values.items()):
-        style, colour = STYLES[(k + k // len(COLOURS)) % len(STYLES)], COLOURS[k % len(COLOURS)]
-        panel.plot(time, _largest(some, starts), linestyle=style, color=colour, linewidth=1.0, label=name)
+        panel.plot(time, _largest(some, starts), linewidth=1.0, label=name, **line_look(k))
     panel.set_yscale("log")
     panel.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:.0e}"))
     panel.yaxis.set_minor_formatter(NullFormatter())

@@ -4,8 +4,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cspr_jax.outputs.plots.kept import kept
-from cspr_jax.outputs.plots.labels import COLOURS, STYLES, robot_name
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.labels import cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.motion import boundaries, doubt
 from cspr_jax.outputs.plots.moving import limits_of
 from cspr_jax.outputs.plots.reasons import reasons
@@ -13,28 +14,22 @@ from cspr_jax.outputs.plots.tensions import draw_tensions, extremes
 from cspr_jax.outputs.plots.trajectory import draw_trajectory
 from cspr_jax.store.result import Result
 
-# Of the name that `--quantity` takes.
-SUMMARY = "summary"
 # Lines of the table; of a longer plan the first ones.
 SEGMENTS = 8
 HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
 
 
-def summary_figure(result: Result, file: str) -> Figure:
+def summary_figure(result: Result, spec: RobotFile, keys: PlanFile) -> Figure:
     """The plan on a page.
 
     Args:
         result: its motion.
-        file: its name, for errors.
+        spec: the robot whose cables have these tensions.
+        keys: the plan, whose limits go before the robot's.
 
     Returns:
         the figure.
-
-    Raises:
-        InputError: the file keeps no robot.
-        ConfigError: a mistake in the plan that it keeps.
     """
-    spec, keys = kept(result, file, SUMMARY)
     cells = _cells(result)
     figure = Figure(figsize=(7.2, 8.2 + 0.22 * len(cells)), layout="constrained")
     parts = figure.add_gridspec(4, 1, height_ratios=[4.4, 2.0, 1.6, 0.3 + 0.22 * len(cells)])
@@ -55,13 +50,13 @@ def summary_figure(result: Result, file: str) -> Figure:
 
 
 def _rates(panel: Axes, result: Result) -> None:
+    names = cable_names(result.data)
     for k, values in enumerate(result.data["rate"].T):
-        style, colour = STYLES[(k + k // len(COLOURS)) % len(STYLES)], COLOURS[k % len(COLOURS)]
-        panel.plot(result.axes["t"], values, linestyle=style, color=colour, linewidth=1.0, label=f"cable {k + 1}")
+        panel.plot(result.axes["t"], values, linewidth=1.0, label=names[k], **line_look(k))
     panel.axhline(0.0, color="black", linewidth=0.8)
     boundaries(panel, result)
     panel.set(xlabel="time (s)", ylabel="cable speed (m/s)")
-    panel.legend(ncols=min(4, result.data["rate"].shape[1]), loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    panel.legend(ncols=min(4, len(names)), loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
 
 def _cells(result: Result) -> list[list[str]]:

@@ -4,34 +4,29 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cspr_jax.outputs.plots.kept import kept
-from cspr_jax.outputs.plots.labels import COLOURS, robot_name
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.labels import COLOURS, cable_names, robot_name
 from cspr_jax.outputs.plots.motion import boundaries, doubt
 from cspr_jax.outputs.plots.moving import limits_of
 from cspr_jax.store.result import Result
 
-# Of the name that `--quantity` takes.
-TENSIONS = "tensions"
 # Limits beyond this many times the largest tension are written and not drawn.
 FAR = 1.6
 LIMIT = COLOURS[1]
 
 
-def tensions_figure(result: Result, file: str) -> Figure:
+def tensions_figure(result: Result, spec: RobotFile, keys: PlanFile) -> Figure:
     """The band of tensions over time, with the limits.
 
     Args:
         result: the motion.
-        file: its name, for errors.
+        spec: the robot whose cables have these tensions.
+        keys: the plan, whose limits go before the robot's.
 
     Returns:
         the figure.
-
-    Raises:
-        InputError: the file keeps no robot.
-        ConfigError: a mistake in the plan that it keeps.
     """
-    spec, keys = kept(result, file, TENSIONS)
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     panel = figure.subplots()
     draw_tensions(panel, result, limits_of(spec, keys))
@@ -52,10 +47,10 @@ def extremes(result: Result) -> str:
     tension, time = result.data["tension"], result.axes["t"]
     if not np.isfinite(tension).any():
         return "no finite tension"
-    each = []
+    names, each = cable_names(result.data), []
     for words, place in (("smallest", np.nanargmin(tension)), ("largest", np.nanargmax(tension))):
         row, cable = np.unravel_index(place, tension.shape)
-        each.append(f"{words} {tension[row, cable]:.4g} N, cable {cable + 1}, t = {time[row]:.3g} s")
+        each.append(f"{words} {tension[row, cable]:.4g} N, {names[cable]}, t = {time[row]:.3g} s")
     return "; ".join(each)
 
 

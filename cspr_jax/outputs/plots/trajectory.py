@@ -10,36 +10,28 @@ from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.motion import doubt
 from cspr_jax.outputs.plots.moving import moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, set_space
 from cspr_jax.store.result import Result
 
-# Of the name that `--quantity` takes.
-TRAJECTORY = "trajectory"
 # The robot is drawn where segments begin and end, at most so often.
 SHOWN = 6
 # Heights of the picture of a flat robot and of a tall one, inches.
 LOW, HIGH = 4.4, 6.8
 
 
-def trajectory_figure(result: Result, file: str) -> Figure:
+def trajectory_figure(result: Result, spec: RobotFile) -> Figure:
     """The motion in space.
 
     Args:
         result: the motion.
-        file: its name, for errors.
+        spec: the robot whose cables have these tensions.
 
     Returns:
         the figure.
-
-    Raises:
-        InputError: the file keeps no robot.
-        ConfigError: a mistake in the plan that it keeps.
     """
-    spec, _ = kept(result, file, TRAJECTORY)
     points = np.concatenate([result.data["position"], np.asarray(spec.base_points, float)])
     sizes = np.ptp(points, axis=0)
     tall = min(1.0, sizes[2] / max(sizes[0], sizes[1]))

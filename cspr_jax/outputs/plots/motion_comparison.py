@@ -14,7 +14,7 @@ from cspr_jax.outputs.plots.motion import doubt
 from cspr_jax.store.result import Result
 
 
-def families_figure(results: list[Result], files: list[str]) -> Figure:
+def motion_comparison_figure(results: list[Result], files: list[str]) -> Figure:
     """Paths from the side and from above; over time the smallest tension and the largest speed of a cable.
 
     Args:
