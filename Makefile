@@ -11,7 +11,7 @@ WHEEL := build/wheel
 LOWEST := build/lowest
 BEGIN := tests/test_templates.py tests/test_config.py tests/test_outputs.py tests/test_cell_plans.py tests/test_python.py
 
-.PHONY: demo test soak check bench docs images wheel lowest clean
+.PHONY: demo test soak check bench docs images gallery wheel lowest clean
 
 demo: $(STAMP)
 	$(BIN)/cspr table 2.1
@@ -26,8 +26,8 @@ soak: $(TESTS)
 	$(BIN)/python -m pytest -m soak
 
 check: $(TESTS)
-	$(BIN)/ruff format --check cspr_jax tests benchmarks hatch_build.py
-	$(BIN)/ruff check cspr_jax tests benchmarks hatch_build.py
+	$(BIN)/ruff format --check cspr_jax tests benchmarks docs/gallery hatch_build.py
+	$(BIN)/ruff check cspr_jax tests benchmarks docs/gallery hatch_build.py
 	$(BIN)/mypy
 
 wheel: $(STAMP)
@@ -38,6 +38,10 @@ wheel: $(STAMP)
 	cd $(WHEEL) && bin/cspr --version && bin/cspr robots && bin/cspr examples table_2_1 && \
 	  bin/cspr plan table_2_1.toml -o motion.h5 && bin/cspr plot motion.h5 && \
 	  bin/cspr new sweep sweep.toml && bin/cspr run sweep.toml -o run && bin/cspr verify run
+
+# Notebooks from their beginning, compared with what they show.
+gallery: $(TESTS)
+	$(BIN)/python docs/gallery/run.py
 
 # Versions of the bounds in pyproject.toml; old ones warn of newer neighbours.
 lowest:

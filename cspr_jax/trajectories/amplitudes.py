@@ -52,6 +52,18 @@ class Amplitude:
     highest: Array
     name: str = ""
 
+    def at(self, tau, order: int = 0) -> Array:
+        """Value of A, or of a derivative of it with respect to tau.
+
+        Args:
+            tau: (...) normalised time in [0, 1].
+            order: of the derivative, at most 5; 0: A itself.
+
+        Returns:
+            (...) in the precision that jax is set to.
+        """
+        return derivatives(self, jnp.asarray(tau, float), order=order)[order]
+
 
 # The name stays outside: compiled functions do not see it, and are not compiled again for another one.
 _FIELDS = [field.name for field in dataclasses.fields(Amplitude)]
