@@ -11,7 +11,7 @@ WHEEL := build/wheel
 LOWEST := build/lowest
 BEGIN := tests/test_templates.py tests/test_config.py tests/test_outputs.py tests/test_cell_plans.py tests/test_python.py
 
-.PHONY: demo test soak check bench docs images gallery wheel lowest clean
+.PHONY: demo test soak check bench docs images gallery site wheel lowest clean
 
 demo: $(STAMP)
 	$(BIN)/cspr table 2.1
@@ -43,6 +43,10 @@ wheel: $(STAMP)
 gallery: $(TESTS)
 	$(BIN)/python docs/gallery/run.py
 
+# The documents as a site; what leads nowhere fails.
+site: $(TESTS)
+	$(BIN)/python -m sphinx -q -W -n --keep-going -d build/doctrees docs build/site
+
 # Versions of the bounds in pyproject.toml; old ones warn of newer neighbours.
 lowest:
 	rm -rf $(LOWEST)
@@ -63,6 +67,9 @@ bench: $(TESTS)
 
 docs: $(STAMP)
 	$(BIN)/python docs/generate_reference.py
+	$(BIN)/python docs/generate_maps.py
+	$(BIN)/python docs/generate_command_line.py
+	$(BIN)/python docs/generate_api.py
 	$(BIN)/python docs/make_images.py --page
 
 # Sweeps and plans first, some two minutes; their results stay in results/images.

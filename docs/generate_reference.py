@@ -113,10 +113,10 @@ def reference_text() -> str:
             parts.append((f"`{place}`: " if place else "") + (model.__doc__ or "").split("\n")[0] + "\n")
             parts.append(_keys(model))
     parts.append(MAPS)
-    parts += [_kind(kind) for kind in MAP_KINDS.values()]
-    parts.append("## Quantities of a result\n\n" + _quantities(QUANTITIES) + "\nAxes:\n\n" + _quantities(AXES))
+    parts += [kind_text(kind) for kind in MAP_KINDS.values()]
+    parts.append("## Quantities of a result\n\n" + quantities_text(QUANTITIES) + "\nAxes:\n\n" + quantities_text(AXES))
     parts.append(MOTION)
-    parts.append(_quantities(TRAJECTORY) + "\nOf each segment, in HDF5 files:\n\n" + _quantities(SEGMENTS))
+    parts.append(quantities_text(TRAJECTORY) + "\nOf each segment, in HDF5 files:\n\n" + quantities_text(SEGMENTS))
     rows = "".join(f"| {flag.value} | `{flag.text}` | {text} |\n" for flag, text in SENTENCES.items())
     parts.append(f"## Verdicts\n\nBit flags; 0 is feasible.\n\n| bit | name | meaning |\n|---|---|---|\n{rows}")
     rows = "".join(f"| {code.value} | {text} |\n" for code, text in EXITS.items())
@@ -132,7 +132,15 @@ def _keys(model: type[BaseModel]) -> str:
     return f"| key | default | meaning |\n|---|---|---|\n{rows}"
 
 
-def _kind(kind: MapKind) -> str:
+def kind_text(kind: MapKind) -> str:
+    """What a kind of map asks of its sweep file, and what it gives.
+
+    Args:
+        kind: its row.
+
+    Returns:
+        a sentence and a list, Markdown.
+    """
     asked = {
         "trajectory.family": " or ".join(f"`{name}`" for name in kind.families),
         "starts from": STARTS[kind.start] if {*kind.quantities} > {*kind.motionless} else "",
@@ -160,7 +168,15 @@ def _cell(text: str) -> str:
     return text.replace("|", "\\|")
 
 
-def _quantities(table: dict) -> str:
+def quantities_text(table: dict) -> str:
+    """Quantities with their units.
+
+    Args:
+        table: rows by name.
+
+    Returns:
+        a table, Markdown.
+    """
     rows = "".join(f"| `{q.name}` | {q.units} | {_cell(q.description)} |\n" for q in table.values())
     return f"| name | units | meaning |\n|---|---|---|\n{rows}"
 

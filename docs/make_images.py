@@ -115,6 +115,12 @@ IMAGES = {
         "--quantity active_up",
         ("least_time",),
     ),
+    "orientation_workspace": Image("How far the MSSM can be tilted at places 1.7 m below its spools.", 10),
+    "attainable": Image(
+        "Part of the accessible orientations that a motion from rest attains, on a coarse grid of them.",
+        130,
+        "--quantity attainable_fraction",
+    ),
     "feasible_acceleration": Image("Margin of rest with tensions from 1 to 300 N: positive where it can rest.", 10),
     "bezier_sequence": Image(
         "Bezier segments through places outside the footprint, the least total time.", 10, command="plan"

@@ -4,16 +4,19 @@ import importlib.util
 import re
 import shlex
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
 
+import cspr_jax
 from cspr_jax import cli
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import ConfigError
 from cspr_jax.published import tables
+from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.sweep.definition import read_sweep
 
@@ -23,7 +26,7 @@ PAGES = [
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
 COLUMNS = 120
-FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^```([^\n`]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def blocks(page: Path, *languages: str) -> list[str]:
@@ -52,13 +55,14 @@ def test_fences_are_seen():
     for page in PAGES:
         text = page.read_text("utf-8")
         assert len(re.findall(r"^\s*```", text, re.MULTILINE)) == 2 * len(FENCE.findall(text)), page
-    assert blocks(ROOT / "README.md", "python") and len(commands(ROOT / "README.md")) >= 6
+    assert blocks(ROOT / "README.md", "python") and len(commands(ROOT / "docs" / "usage.md")) >= 6
 
 
-def test_python_of_the_readme_runs(checkout, capsys):
-    namespace: dict[str, object] = {"__name__": "readme"}
-    for text in blocks(ROOT / "README.md", "python"):
-        exec(compile(text, "README.md", "exec"), namespace)
+@pytest.mark.parametrize("name", ["README.md", "docs/usage.md", "docs/get_started.md"])
+def test_python_of_the_first_pages_runs(name, checkout, capsys):
+    namespace: dict[str, object] = {"__name__": "first"}
+    for text in blocks(ROOT / name, "python"):
+        exec(compile(text, name, "exec"), namespace)
     assert capsys.readouterr().out.strip()
 
 
@@ -135,10 +139,40 @@ def test_files_in_sweeps_are_read():
 
 def script(name: str):
     """A program of docs, as a module."""
+    sys.path.insert(0, str(ROOT / "docs"))  # some of them import others
     spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.pop(0)
     return module
+
+
+@pytest.mark.parametrize("name", ["command_line", "api"])
+def test_pages_of_commands_and_functions_are_generated(name):
+    text = (ROOT / "docs" / f"{name}.md").read_text("utf-8")
+    assert script(f"generate_{name}").page_text() == text, "call `make docs`"
+    wanted = {"command_line": [f"## cspr {row.name}\n" for row in cli.COMMANDS], "api": cspr_jax.__all__}
+    assert all(one in text for one in wanted[name])
+
+
+def test_every_kind_of_map_has_its_page():
+    maps = script("generate_maps")
+    assert set(maps.PAGES) == set(MAP_KINDS) == {path.stem for path in (ROOT / "docs" / "maps").iterdir()}
+    for name in MAP_KINDS:
+        text = maps.page_text(name)
+        assert text == (ROOT / "docs" / "maps" / f"{name}.md").read_text("utf-8"), "call `make docs`"
+        assert f'map = "{name}"' in text
+
+
+@pytest.mark.parametrize("name", ["2.1", "4.1"])
+def test_the_page_of_accuracy_shows_what_is_computed(name):
+    text = (ROOT / "docs" / "accuracy.md").read_text("utf-8")
+    accuracy = script("generate_accuracy")
+    assert accuracy.section(name, cspr_jax.table(name)).strip() in text
+    assert re.findall(r"^## Table (\S+)$", text, re.MULTILINE) == list(accuracy.REASONS)
+    assert set(accuracy.REASONS) == set(tables.TABLES) - {"peers"}
 
 
 def test_the_reference_is_generated():
@@ -153,8 +187,8 @@ def test_every_picture_has_its_commands():
     images = script("make_images")
     assert images.page_text() == (ROOT / "docs" / "images.md").read_text("utf-8"), "call `make docs`"
     assert {path.name for path in (ROOT / "docs" / "images").iterdir()} == {f"{name}.png" for name in images.IMAGES}
-    text = (ROOT / "README.md").read_text("utf-8")
-    shown = re.findall(r"!\[[^]]*\]\(docs/images/(\w+)\.png\)\n\n\*(.*?)\*\n\n", text, re.DOTALL)
+    text = "\n".join((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/usage.md"))
+    shown = re.findall(r"!\[[^]]*\]\((?:docs/)?images/(\w+)\.png\)\n\n\*(.*?)\*\n\n", text, re.DOTALL)
     assert len(shown) >= 4
     for name, caption in shown:
         image = images.IMAGES[name]
@@ -197,7 +231,8 @@ def test_links_lead_somewhere(page):
 
 
 def test_what_the_readme_names_is_there():
-    text = (ROOT / "README.md").read_text("utf-8")
-    named = re.findall(r"\b(?:tests|docs|sweeps|benchmarks)/[\w/]+(?:\.\w+)?", text)
+    names = ("README.md", "docs/usage.md", "docs/comparisons.md", "docs/limits_of_the_program.md")
+    text = "\n".join((ROOT / name).read_text("utf-8") for name in names)
+    named = re.findall(r"\b(?:tests|docs|sweeps|benchmarks)/[\w/-]+(?:\.\w+)?", text)
     assert len(named) > 5 and all((ROOT / name).exists() for name in named)
     assert not re.search(r"@[A-Z0-9]+@", text), "a number that was never filled in"

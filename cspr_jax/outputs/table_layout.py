@@ -94,11 +94,20 @@ def _block(cells: list[Cell], transposed: bool) -> Any:
 
 
 def _text(cell: Cell, cells: list[Cell]) -> str:
-    text = f"{cell.printed or UNKNOWN} / {_computed(cell, cells)}"
+    text = f"{cell.printed or UNKNOWN} / {computed_text(cell, cells)}"
     return f"[bold red]{text} {MISMATCH}[/]" if cell.differs else text
 
 
-def _computed(cell: Cell, cells: list[Cell]) -> str:
+def computed_text(cell: Cell, cells: list[Cell]) -> str:
+    """The computed number with the digits of the printed one, or of its column.
+
+    Args:
+        cell: to write.
+        cells: of the same block.
+
+    Returns:
+        text; `NOTHING` where nothing was found.
+    """
     if cell.computed is None:
         return NOTHING
     printed = [other.printed for other in cells if other.column == cell.column and other.printed]
