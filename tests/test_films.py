@@ -67,6 +67,7 @@ def test_other_kinds_of_films(plan, tmp_path):
     assert plan.animate(tmp_path / "film.mp4", speed=16.0).read_bytes()[4:8] == b"ftyp"
     page = plan.animate(tmp_path / "film.html", speed=16.0).read_text("utf-8")
     assert "data:image/png;base64" in page and "http://" not in page
+    assert plan.animate(tmp_path / "again.html", speed=16.0).read_text("utf-8") == page
 
 
 def test_long_films_have_fewer_pictures(plan, monkeypatch):

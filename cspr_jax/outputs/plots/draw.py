@@ -161,7 +161,7 @@ def _overlay(
         return _comparison([str(path) for path in paths], results, at)
     for path, result in zip(paths, results, strict=True):
         if not result.is_map:
-            raise InputError("results", str(path), "maps, where several are drawn")
+            raise InputError("results", str(path), "all maps or all motions, where several are drawn")
         view = _view(result, quantity, at)
         if len(view.across) != 1:
             raise InputError("results", f"{path} over {view.across}", "maps over one axis; --at fixes the others")

@@ -1,5 +1,7 @@
 """Films of a motion: the robot in space with its cables coloured by tension, and its tensions over time."""
 
+import hashlib
+import re
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,6 +24,7 @@ from cspr_jax.outputs.plots.scene import colours_of_tension, set_space
 from cspr_jax.runtime.stages import stage
 
 ENDINGS = (".gif", ".mp4", ".html")
+RANDOM = re.compile(rb"_anim_img([0-9a-f]{32})")
 # Pictures a second: as many as give a film no more pictures than the second numbers, else the last. The delays of a GIF
 # are whole hundredths of a second. The pictures of a page are whole ones each.
 RATES, MOST, OF_PAGES = (20, 10, 5, 2, 1), 600, 150
@@ -77,7 +80,16 @@ def film(
             for number in range(count):
                 picture.show(number)
                 writer.grab_frame()
-        return path.read_bytes()
+        return _named_by_content(path.read_bytes()) if ending == ".html" else path.read_bytes()
+
+
+def _named_by_content(page: bytes) -> bytes:
+    # matplotlib names the parts of a page at random; the same film has the same bytes, two films different names.
+    found = RANDOM.search(page)
+    if found is None:
+        return page
+    content = hashlib.sha256(page.replace(found[1], b"")).hexdigest()[: len(found[1])]
+    return page.replace(found[1], content.encode())
 
 
 def _settings(ending: str) -> Any:
