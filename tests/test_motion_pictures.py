@@ -1,5 +1,7 @@
 """Pictures of motions: in space, tensions with their limits, a page, and several motions in one."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
@@ -137,3 +139,11 @@ def test_pairs_of_cables_are_named_so():
     columns = {"tension": np.ones((4, 3))}
     assert cable_names(columns) == ["cable 1", "cable 2", "cable 3"]
     assert cable_names(columns | {"tension_each": np.ones((4, 6))}) == ["pair 1", "pair 2", "pair 3"]
+
+
+def test_several_motions_of_a_planar_robot_have_no_view_from_above(tmp_path, figures, capsys):
+    file = str(tmp_path / "planar.h5")
+    assert main(["plan", str(Path(__file__).parents[1] / "sweeps" / "planar_lines.toml"), "-o", file]) == 0
+    figure = drawn(figures, file, file)
+    assert figure.axes[0].get_ylabel() == "z (m)" and len(figure.axes) == 3
+    assert len(figure.legends[0].get_texts()) == 2

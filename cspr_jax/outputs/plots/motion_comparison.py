@@ -33,15 +33,18 @@ def motion_comparison_figure(results: list[Result], files: list[str]) -> Figure:
     if len(set(axes)) > 1:
         raise InputError("results", " and ".join(axes), "motions whose z axes point the same way")
     figure = Figure(figsize=(9.0, 7.6), layout="constrained")
-    panels = figure.subplot_mosaic([["xy", "xz"], ["tension", "tension"], ["rate", "rate"]], height_ratios=[1.6, 1, 1])
+    # Planar robots have no view from above.
+    views = {"xz": 2} if not any(result.data["position"][:, 1].any() for result in results) else {"xy": 1, "xz": 2}
+    rows: list[Any] = [[*views] * (2 // len(views)), ["tension"] * 2, ["rate"] * 2]
+    panels = figure.subplot_mosaic(rows, height_ratios=[1.6, 1, 1])
     for k, (result, name) in enumerate(zip(results, _names(results, files), strict=True)):
         look: dict[str, Any] = {"color": COLOURS[k], "linestyle": STYLES[k], "linewidth": 1.4}
         time, position = result.axes["t"], result.data["position"]
-        for panel, j in (("xy", 1), ("xz", 2)):
-            panels[panel].plot(position[:, 0], position[:, j], label=name if j == 1 else "", **look)
-        panels["tension"].plot(time, result.data["tension"].min(1), **look)
+        for panel, j in views.items():
+            panels[panel].plot(position[:, 0], position[:, j], **look)
+        panels["tension"].plot(time, result.data["tension"].min(1), label=name, **look)
         panels["rate"].plot(time, np.abs(result.data["rate"]).max(1), **look)
-    for panel, j in (("xy", 1), ("xz", 2)):
+    for panel, j in views.items():
         _place(panels[panel], results, j)
     if axes[0] == "down":
         panels["xz"].invert_yaxis()
