@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from generate_reference import cell_text
+
 from cspr_jax.cli import COMMANDS
 
 HEAD = """# Command line
@@ -36,7 +38,7 @@ def _name(action: argparse.Action) -> str:
 
 
 def _cell(action: argparse.Action) -> str:
-    text = (action.help or "").replace("%%", "%").replace("|", "\\|")
+    text = cell_text((action.help or "").replace("%%", "%"))
     if action.choices:
         text += "; " * bool(text) + "one of " + ", ".join(f"`{choice}`" for choice in action.choices)
     return text

@@ -29,8 +29,8 @@ PAGES = {
     "minimum-arcs": MapPage(
         "minimum_arcs",
         "With how many arcs does a point mass on three cables come to a stop at each target, from rest or from another "
-        "target? Every number is proved feasible. Colours change along lines, since a few arcs more widen the reach by "
-        "bands. `margin` says how far the slackest cable is from going slack, `verdict` why a target is not reached.",
+        "target? Every number is proved feasible. "
+        "`margin` says how far the slackest cable is from going slack, `verdict` why a target is not reached.",
     ),
     "minimum-oscillations": MapPage(
         "transitions",

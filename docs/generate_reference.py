@@ -128,7 +128,7 @@ def _keys(model: type[BaseModel]) -> str:
     rows = ""
     for name, field in model.model_fields.items():
         required = "required" if field.is_required() else _default(field.default)
-        rows += f"| `{field.alias or name}` | {required} | {_cell(field.description or '')} |\n"
+        rows += f"| `{field.alias or name}` | {required} | {cell_text(field.description or '')} |\n"
     return f"| key | default | meaning |\n|---|---|---|\n{rows}"
 
 
@@ -164,7 +164,8 @@ def _default(value: object) -> str:
     return f"`{str(value).lower() if isinstance(value, bool) else value}`"
 
 
-def _cell(text: str) -> str:
+def cell_text(text: str) -> str:
+    """Text that may stand in a cell of a table."""
     return text.replace("|", "\\|")
 
 
@@ -177,7 +178,7 @@ def quantities_text(table: dict) -> str:
     Returns:
         a table, Markdown.
     """
-    rows = "".join(f"| `{q.name}` | {q.units} | {_cell(q.description)} |\n" for q in table.values())
+    rows = "".join(f"| `{q.name}` | {q.units} | {cell_text(q.description)} |\n" for q in table.values())
     return f"| name | units | meaning |\n|---|---|---|\n{rows}"
 
 

@@ -183,3 +183,11 @@ def test_unusable_names_are_refused(name, epsilon, key):
     with pytest.raises(InputError) as raised:
         amplitudes.named(name, epsilon)
     assert raised.value.key == key
+
+
+@pytest.mark.parametrize("order", range(6))
+def test_values_of_a_polynomial(order):
+    """A = 10 tau^3 - 15 tau^4 + 6 tau^5, and its derivatives by NumPy."""
+    tau = np.linspace(0.0, 1.0, 7).reshape(7, 1)
+    wanted = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0]).deriv(order)(tau)
+    np.testing.assert_allclose(amplitudes.named("quintic").at(tau, order), wanted, atol=1e-12 * 720.0)
