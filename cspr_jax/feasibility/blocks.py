@@ -6,8 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.trajectories.amplitudes import Amplitude
+
 # Of a part more that a piece between knots gets as little as this is not worth a block.
 SLIVER = 0.3
+INSTANTS = 257  # at which parts along a motion are told
 
 
 class Blocks(NamedTuple):
@@ -48,28 +51,56 @@ class Blocks(NamedTuple):
         )
 
 
-def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: int) -> Blocks:
-    """Parts of all arcs of motions, nearly equal.
+def growing(amplitude: Amplitude, ramp: tuple[tuple[float, float], tuple[float, float]]) -> np.ndarray:
+    """Parts of an arc along a motion from rest, more of them where it swings farther.
+
+    Args:
+        amplitude: A.
+        ramp: values of A, and how many parts an arc has there; in between linear, beyond as at the nearer one.
+
+    Returns:
+        (m,) as `parts_of_arcs` takes them.
+    """
+    tau = np.linspace(0.0, 1.0, INSTANTS)
+    piece = np.searchsorted(np.asarray(amplitude.knots), tau)
+    coefficients, origins = np.asarray(amplitude.coefficients)[piece], np.asarray(amplitude.origins)[piece]
+    values = np.polynomial.polynomial.polyval(tau - origins, coefficients.T, tensor=False)
+    return np.interp(values, *ramp)
+
+
+def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: float | np.ndarray) -> Blocks:
+    """Parts of all arcs of motions.
 
     Args:
         arcs: (n,) number of arcs of each motion, 1 or more.
         knots: of the amplitude function, inside ]0, 1[.
-        parts: how many an arc, or nearly.
+        parts: how many an arc, or nearly; or (m,) how many at instants tau from 0 to 1, equally far apart.
 
     Returns:
         the blocks, those of a motion side by side, in time.
     """
     pieces = list(itertools.pairwise([0.0, *knots.tolist(), 1.0]))
+    each = np.broadcast_to(np.asarray(parts, float), max(np.size(parts), 2))
+    tau = np.linspace(0.0, 1.0, len(each))
+    # How many of an arc's parts lie before an instant, if the motion has one arc alone.
+    before = np.append(0.0, np.cumsum(0.5 * (each[1:] + each[:-1]) * np.diff(tau)))
 
     def edges_of(p: int) -> np.ndarray:
-        # Equal within each piece, so that no sliver is left beside a knot.
-        counts = [max(1, math.ceil(parts * p * (stop - start) - SLIVER)) for start, stop in pieces]
-        inside = [np.linspace(*piece, count + 1)[:-1] for piece, count in zip(pieces, counts, strict=True)]
+        inside = []
+        for start, stop in pieces:
+            first, last = np.interp([start, stop], tau, before)
+            # Equal within each piece, so that no sliver is left beside a knot.
+            count = max(1, math.ceil(p * (last - first) - SLIVER))
+            if np.ndim(parts) == 0:
+                edges = np.linspace(start, stop, count + 1)
+            else:
+                edges = np.interp(np.linspace(first, last, count + 1), before, tau)
+            inside += [[start], edges[1:-1]]
         return np.concatenate([*inside, [1.0]])
 
     edges = {p: edges_of(p) for p in np.unique(arcs).tolist()}
-    each = [edges[int(p)] for p in arcs]
-    row = np.repeat(np.arange(len(arcs)), [len(x) - 1 for x in each])
+    own = [edges[int(p)] for p in arcs]
+    row = np.repeat(np.arange(len(arcs)), [len(x) - 1 for x in own])
     nothing = np.zeros(0)
-    start, stop = (np.concatenate([nothing, *(x[part] for x in each)]) for part in (slice(-1), slice(1, None)))
+    start, stop = (np.concatenate([nothing, *(x[part] for x in own)]) for part in (slice(-1), slice(1, None)))
     return Blocks(row, start, stop)

@@ -18,7 +18,7 @@ from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.robots.symmetries import folded, symmetries
 from cspr_jax.runtime.stages import within
 from cspr_jax.search import attainable
-from cspr_jax.search.accessible import DEFINITIONS, accessible
+from cspr_jax.search.accessible import DEFINITIONS, Accessible, accessible
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import Kind
 
@@ -116,26 +116,25 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
         for definition in choice.definitions:
             places = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in PLACES.values()]
             with within(f"{amplitude}, {definition}"):
-                both = [_cells(checker, places, definition, divisions) for divisions in steps]
-            for row, fine, coarse in zip(PLACES, *both, strict=True):
+                # All at once: full batches.
+                sets = [accessible(checker.problem.robot, place, definition, n) for n in steps for place in places]
+                asked = [(place, inside.angles) for place, inside in zip(places * len(steps), sets, strict=True)]
+                masks = attained(checker, asked)
+            every = [_cells(inside, good) for inside, good in zip(sets, masks, strict=True)]
+            for row, fine, coarse in zip(PLACES, every[: len(places)], every[len(places) :], strict=True):
                 errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
                 cells |= {(row, column, variant(definition, amplitude)): x for column, x in (fine | errors).items()}
     return cells
 
 
-def _cells(checker: PoseChecker, places: list[np.ndarray], definition: str, divisions: int) -> list[dict[str, float]]:
-    sets = [accessible(checker.problem.robot, place, definition, divisions) for place in places]
-    masks = attained(checker, [(place, inside.angles) for place, inside in zip(places, sets, strict=True)])
-    return [
-        {
-            "accessible": float(len(good)),
-            "attainable": float(good.sum()),
-            "proportion": 100.0 * good.mean(),
-            "accessible volume": 100.0 * inside.volume.sum(),
-            "attainable volume": 100.0 * inside.volume[good].sum() / inside.volume.sum(),
-        }
-        for good, inside in zip(masks, sets, strict=True)
-    ]
+def _cells(inside: Accessible, good: np.ndarray) -> dict[str, float]:
+    return {
+        "accessible": float(len(good)),
+        "attainable": float(good.sum()),
+        "proportion": 100.0 * good.mean(),
+        "accessible volume": 100.0 * inside.volume.sum(),
+        "attainable volume": 100.0 * inside.volume[good].sum() / inside.volume.sum(),
+    }
 
 
 def table_3_4(choice: Choice) -> dict[Key, float | None]:

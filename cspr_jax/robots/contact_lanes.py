@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.lanes import Matrix, Vector, dot, turned_back
+from cspr_jax.arithmetic.lanes import Matrix, Vector, cross, dot, turned_back
 from cspr_jax.robots.interference import PARALLEL
 from cspr_jax.robots.wrench_lanes import Cables
 
@@ -21,20 +21,62 @@ def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: Cables) ->
     Returns:
         one vector a pair, from its first cable to its second, m.
     """
-    squares = [dot(ray, ray) for ray in wires.rays]
-    vectors: list[Vector] = []
+    vectors = []
     for i, j in pairs:
-        u, v, uu, vv = wires.rays[i], wires.rays[j], squares[i], squares[j]
         apart = [base_points[j, k] - base_points[i, k] for k in range(3)]
-        uv, au, av = dot(u, v), dot(apart, u), dot(apart, v)
-        denominator = uu * vv - uv * uv
-        is_parallel = denominator <= PARALLEL * uu * vv
-        s = (au * vv - av * uv) / jnp.where(is_parallel, 1.0, denominator)
-        s = jnp.clip(jnp.where(is_parallel, 0.0, s), 0.0, 1.0)
-        t = jnp.clip((s * uv - av) / vv, 0.0, 1.0)
-        s = jnp.clip((au + t * uv) / uu, 0.0, 1.0)
-        vectors.append(tuple(apart[k] + t * v[k] - s * u[k] for k in range(3)))
+        vectors.append(gap(apart, wires.rays[i], wires.rays[j]))
     return vectors
+
+
+def gap(apart: Vector, u: Vector, v: Vector) -> Vector:
+    """The shortest vector between two segments; `interference.between` in lanes.
+
+    Args:
+        apart: from where the first one starts to where the second one does, m.
+        u: along the first one.
+        v: along the second one.
+
+    Returns:
+        from the first to the second, m.
+    """
+    uu, uv, vv = dot(u, u), dot(u, v), dot(v, v)
+    au, av = dot(apart, u), dot(apart, v)
+    denominator = uu * vv - uv * uv
+    is_parallel = denominator <= PARALLEL * uu * vv
+    s = (au * vv - av * uv) / jnp.where(is_parallel, 1.0, denominator)
+    s = jnp.clip(jnp.where(is_parallel, 0.0, s), 0.0, 1.0)
+    t = jnp.clip((s * uv - av) / vv, 0.0, 1.0)
+    s = jnp.clip((au + t * uv) / uu, 0.0, 1.0)
+    return tuple(apart[k] + t * v[k] - s * u[k] for k in range(3))
+
+
+def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vector:
+    """What is left of a cable after its projection onto the sector of its corner.
+
+    Args:
+        sides: from the corner, platform axes.
+        normal: unit normal of the platform's plane.
+        seen: the cable from the platform, platform axes, m.
+
+    Returns:
+        normal to the projection, and as long as the distance of the cable's end from the sector, m.
+    """
+    height = dot(normal, seen)
+    up = tuple(height * n for n in normal)
+    flat = tuple(v - w for v, w in zip(seen, up, strict=True))
+
+    def area(a: Vector, b: Vector) -> Array:
+        return dot(cross(a, b), normal)
+
+    one, two = sides
+    across = area(one, two)
+    inside = (area(flat, two) * across >= 0.0) & (area(one, flat) * across >= 0.0)
+    left = []
+    for side in sides:
+        share = jnp.maximum(dot(seen, side) / dot(side, side), 0.0)
+        left.append(tuple(v - share * w for v, w in zip(seen, side, strict=True)))
+    is_first = dot(left[0], left[0]) <= dot(left[1], left[1])
+    return tuple(jnp.where(inside, w, jnp.where(is_first, a, b)) for w, a, b in zip(up, *left, strict=True))
 
 
 def cable_directions(wires: Cables, turn: Matrix) -> list[Vector]:

@@ -105,8 +105,8 @@ def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind, one: Arra
         arcs: () or (n,) number of arcs, a float.
         now: of these arcs.
         kind: of the motions.
-        one: () the number 1 as an argument of what is compiled, where all of the state is to be stored; see
-            `arithmetic.lanes.stored`.
+        one: () the number 1 as an argument of what is compiled, where the sine and cosine of a turn about one axis are
+            to be stored; see `arithmetic.lanes.stored`.
 
     Returns:
         the state.
@@ -119,7 +119,7 @@ def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind, one: Arra
         rotation = _exponential(*_half_vector(segment, now, _beat(segment, arcs, now, kind)))
     hub = tuple(segment.hub[:, i] for i in range(3))
     position = tuple(h + c for h, c in zip(hub, place[0], strict=True))
-    return stored(State(position, place[1], place[2], *rotation), one)
+    return State(position, place[1], place[2], *rotation)
 
 
 def _straight(segment: PoseSegment, arcs: Array, now: Instant, *, variable: bool) -> tuple[Vector, ...]:

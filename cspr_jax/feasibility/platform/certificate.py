@@ -19,9 +19,15 @@ import numpy as np
 
 from cspr_jax.arithmetic import chebyshev
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.blocks import Blocks, parts_of_arcs
+from cspr_jax.feasibility.blocks import Blocks, growing, parts_of_arcs
 from cspr_jax.feasibility.platform.motions import rows
-from cspr_jax.feasibility.platform.tension_blocks import BlockBounds, of_motion, tension_blocks, tension_ranges
+from cspr_jax.feasibility.platform.tension_blocks import (
+    BlockBounds,
+    TensionRange,
+    of_motion,
+    tension_blocks,
+    tension_ranges,
+)
 from cspr_jax.feasibility.platform.work_list import TOLERANCE, Looked, WorkList
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
@@ -31,8 +37,11 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 # Parts of an arc that are looked at first: an orientation that goes from one pose to another turns faster.
 FROM_REST, BETWEEN = 3, 8
+# The same from rest where verdicts alone are wanted, and no instants to narrow margins down from: by the amplitude.
+GROWING = (0.3, 0.8), (1.0, 5.0)
 # Orders of the cables that are tried, one after the other, where rounding keeps a block open.
 ORDERS = 6
+MATTERS = 0.1  # part of all that is allowed for
 BASIC = 2  # criteria that are no limits
 
 
@@ -81,6 +90,7 @@ class Certifier:
         self._kind, self._batch, self._count = kind, batch, count_instants
         self._knots, self._orders = np.asarray(problem.amplitude.knots), _orders(problem)
         self._limits = np.arange(BASIC + len(of_motion(problem))) >= BASIC
+        self._usual, self._growing = FROM_REST if kind.from_rest else BETWEEN, growing(problem.amplitude, GROWING)
 
     def prove(
         self, segments: PoseSegment, arcs: np.ndarray, *, near: float = 0.0, margins: bool = False
@@ -96,7 +106,8 @@ class Certifier:
         Returns:
             the proofs.
         """
-        blocks = parts_of_arcs(arcs, self._knots, FROM_REST if self._kind.from_rest else BETWEEN)
+        parts = self._growing if not margins and self._kind.from_rest else self._usual
+        blocks = parts_of_arcs(arcs, self._knots, parts)
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
 
         def look(some: Blocks, _: int) -> Looked:
@@ -114,13 +125,14 @@ class Certifier:
         found = self.bounds(0, blocks, motions, margins=margins)
         for k in range(1, len(self._orders)):
             # What is not proved because the first three cables lie nearly in one plane.
-            open_ones = np.flatnonzero((found.rounding > 0.25 * TOLERANCE) & ~(found.bound > TOLERANCE).all(0))
+            open_ones = np.flatnonzero(_rounding_matters(found) & ~(found.bound > TOLERANCE).all(0))
             open_ones = open_ones[(found.nodes[:, :, open_ones] > -TOLERANCE).all((0, 1))]
             if not len(open_ones):
                 break
             better = self.bounds(k, blocks.some(open_ones), motions, margins=margins)
             found.bound[:, open_ones] = np.maximum(found.bound[:, open_ones], better.bound)
             found.rounding[open_ones] = np.minimum(found.rounding[open_ones], better.rounding)
+            found.allowed[open_ones] = np.minimum(found.allowed[open_ones], better.allowed)
         return found
 
     def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool) -> BlockBounds:
@@ -169,10 +181,16 @@ class Certifier:
             own = np.ix_(which, np.array(order.cables))
             low[own], high[own] = np.fmax(low[own], found.low.T), np.fmin(high[own], found.high.T)
             # As in `_looked_at`, where the first three cables lie nearly in one plane.
-            which = which[found.rounding > 0.25 * TOLERANCE]
+            which = which[_rounding_matters(found)]
             if not len(which):
                 break
         return low, high
+
+
+def _rounding_matters(found: BlockBounds | TensionRange) -> np.ndarray:
+    # Elsewhere no other order of the cables gives better bounds: only shorter blocks do.
+    rounding, allowed = np.asarray(found.rounding), np.asarray(found.allowed)
+    return (rounding > 0.25 * TOLERANCE) & (rounding >= MATTERS * allowed)
 
 
 def _orders(problem: Problem) -> list[_Order]:

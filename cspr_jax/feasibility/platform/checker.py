@@ -34,7 +34,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
 
 # Blocks of a call at most; so many arcs are held at a time.
-BLOCKS, ARCS = 1024, 8 * MANY
+BLOCKS, ARCS = 1024, 32 * MANY
 # Where margins are asked for no bound is less than this part of what is attained.
 NEAR = 0.5
 

@@ -17,10 +17,10 @@ from cspr_jax.feasibility.blocks import Blocks, parts_of_arcs
 from cspr_jax.feasibility.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves, unit_vectors
 from cspr_jax.feasibility.platform.certificate import Certifier
 from cspr_jax.feasibility.platform.motions import rows
-from cspr_jax.feasibility.platform.place_blocks import residuals
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.tolerances import Tolerated, tolerated
 from cspr_jax.feasibility.uncertainty import requirements_of
+from cspr_jax.robots.contact_lanes import residual
 from cspr_jax.robots.interference import between, contacts, nearest
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
@@ -63,7 +63,9 @@ def _moving(problem: Problem, one: Array, items, *, kind: Kind) -> _Moving:
 def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Array, Array, Array]:
     # Where pairs of cables are nearest (n, n_pairs, 2), the shortest vectors (n, n_pairs, 3), and what projections of
     # cables onto the sectors of their corners leave (n, 6, 3).
-    left = residuals(platform, -rays)
+    sides, normal = platform
+    one, two = ([sides[:, which, k] for k in range(3)] for which in range(2))
+    left = jax.vmap(lambda ray: jnp.stack(residual((one, two), normal, -ray.T), axis=1))(rays)
     if not pairs:
         return jnp.zeros((len(rays), 0, 2)), jnp.zeros((len(rays), 0, 3)), left
     i, j = (np.array([pair[k] for pair in pairs]) for k in range(2))

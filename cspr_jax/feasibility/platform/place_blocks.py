@@ -15,11 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.arithmetic.lanes import Vector, dot, largest, smallest, stored
+from cspr_jax.arithmetic.lanes import Vector, dot, largest, smallest, stored, turned_back
 from cspr_jax.feasibility.limits import given, scales
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import contact_lanes
-from cspr_jax.robots.interference import between
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import CABLES, Cables, cables
@@ -95,7 +94,7 @@ def place_blocks(
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
 
     def at(off):
-        here = state(segments, arcs, instant_beside(middle, segments.sense, arcs, off * half), kind)
+        here = state(segments, arcs, instant_beside(middle, segments.sense, arcs, off * half), kind, one)
         return here, cables(problem.robot, here.position, here.turn)
 
     bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
@@ -137,50 +136,26 @@ def place_blocks(
 
 
 def _separators(robot: PlatformRobot, platform, pairs: tuple, middle) -> tuple[list[Vector], list[Vector]]:
-    # Unit vectors between cables, one a pair, and off the sectors, one a cable. As arrays: once a block, little code.
+    # Unit vectors between cables, one a pair, and off the sectors, one a cable. Of all pairs, or cables, at a time:
+    # components (m, n), lanes last, which XLA writes with vectors, and in little code.
     wires, turn = middle
-    rays, seen = contact_lanes.as_arrays(wires.rays, contact_lanes.cable_directions(wires, turn))
-    left = _lanes(residuals(platform, seen))
+    rays = [jnp.stack([ray[k] for ray in wires.rays]) for k in range(3)]
+    seen = turned_back([[x[None] for x in row] for row in turn], [-x for x in rays])
+    sides, normal = platform
+    one, two = ([sides[:, which, k, None] for k in range(3)] for which in range(2))
+    left = _units(contact_lanes.residual((one, two), [normal[k] for k in range(3)], seen))
     if not pairs:
         return [], left
     i, j = (np.array([pair[k] for pair in pairs]) for k in range(2))
-    base = robot.base_points
-    return _lanes(between(base[i][None], rays[:, i], base[j][None], rays[:, j])), left
+    apart = [(robot.base_points[j, k] - robot.base_points[i, k])[:, None] for k in range(3)]
+    return _units(contact_lanes.gap(apart, [x[i] for x in rays], [x[j] for x in rays])), left
 
 
-def _lanes(vectors: Array) -> list[Vector]:
-    # Unit vectors (n, m, 3) as m of (n,) numbers each.
-    scale = 1.0 / jnp.sqrt(jnp.maximum(jnp.sum(vectors * vectors, axis=2, keepdims=True), TINY))
-    columns = jnp.moveaxis(vectors * scale, 0, 2)
-    return [tuple(columns[k, i] for i in range(3)) for k in range(columns.shape[0])]
-
-
-def residuals(platform, seen: Array) -> Array:
-    """What is left of cables after their projection onto the sectors of their corners.
-
-    Args:
-        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
-        seen: (n, n_cables, 3) from the platform, platform axes, m.
-
-    Returns:
-        (n, n_cables, 3) m; they are normal to the projections, and as long as the distances.
-    """
-    sides, normal = platform
-    height = jnp.sum(seen * normal[None, None], axis=2, keepdims=True)
-    up = height * normal[None, None]
-    flat, one, two = seen - up, sides[None, :, 0], sides[None, :, 1]
-
-    def area(a, b):
-        return jnp.sum(jnp.cross(a, b) * normal[None, None], axis=2, keepdims=True)
-
-    across = area(one, two)
-    inside = (area(flat, two) * across >= 0.0) & (area(one, flat) * across >= 0.0)
-    left = []
-    for side in (one, two):
-        share = jnp.sum(seen * side, axis=2, keepdims=True) / jnp.sum(side * side, axis=2, keepdims=True)
-        left.append(seen - jnp.maximum(share, 0.0) * side)
-    squares = [jnp.sum(x * x, axis=2, keepdims=True) for x in left]
-    return jnp.where(inside, up, jnp.where(squares[0] <= squares[1], left[0], left[1]))
+def _units(vectors: Vector) -> list[Vector]:
+    # Unit vectors along vectors with components (m, n), one after the other.
+    scale = 1.0 / jnp.sqrt(jnp.maximum(dot(vectors, vectors), TINY))
+    columns = [x * scale for x in vectors]
+    return [tuple(x[k] for x in columns) for k in range(columns[0].shape[0])]
 
 
 def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: Cables, bends: _Bends) -> Array:

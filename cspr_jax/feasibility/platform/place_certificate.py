@@ -13,7 +13,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.blocks import Blocks, parts_of_arcs
+from cspr_jax.feasibility.blocks import Blocks, growing, parts_of_arcs
 from cspr_jax.feasibility.platform.meetings import Cables, cables_hit, cables_meet
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.feasibility.platform.place_blocks import STEPS, PlaceBounds, of_pose, place_blocks
@@ -28,6 +28,7 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 # Parts of an arc that are looked at first; nearer than this part of the platform's size is undecided.
 PARTS, TOUCH = 4, 1e-9
+GROWING = (0.25, 0.8), (0.5, 8.0)  # as in `certificate`
 # From so many halvings on meetings are looked for. Instants of a block, from -1 to 1, and those halfway between.
 NEAR_CONTACT, PLACES = 3, np.linspace(-1.0, 1.0, STEPS + 1)
 MIDDLES = 0.5 * (PLACES[1:] + PLACES[:-1])
@@ -101,6 +102,7 @@ class PlaceCertifier:
         self._near, self._arms = near, np.linalg.norm(points, axis=1)
         self._knots = np.asarray(problem.amplitude.knots)
         self._limits = np.arange(1 + len(of_pose(problem))) >= 1
+        self._growing = growing(problem.amplitude, GROWING)
 
     def prove(self, segments: PoseSegment, arcs: np.ndarray, *, margins: bool = False) -> PlaceProof:
         """Prove motions clear, or that something meets or is broken.
@@ -113,7 +115,8 @@ class PlaceCertifier:
         Returns:
             the proofs.
         """
-        blocks, work = parts_of_arcs(arcs, self._knots, PARTS), WorkList(arcs, self._limits)
+        parts = self._growing if not margins and self._kind.from_rest else PARTS
+        blocks, work = parts_of_arcs(arcs, self._knots, parts), WorkList(arcs, self._limits)
         met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
 
         def look(some: Blocks, level: int) -> Looked:

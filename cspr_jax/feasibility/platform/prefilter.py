@@ -189,7 +189,7 @@ class Prefilter(NamedTuple):
             return np.zeros(0)
         self.count_instants(len(when))
         kernel = partial(_tensions_at, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
-        return in_batches(kernel, (segments, when), size=self.size // FEWER)
+        return in_batches(kernel, (segments, when), size=self.size)
 
 
 def _chunks(tau: np.ndarray) -> np.ndarray:

@@ -55,11 +55,13 @@ class BlockBounds(NamedTuple):
             `wrench_lanes.normalised_determinant` over its value at rest in P0, where margins are asked for.
         bound: (n_criteria, n) proved lower bounds.
         rounding: (n,) largest allowance for rounding in those of taut cables, before these are divided by D.
+        allowed: (n,) largest allowance in all: also for what the polynomials leave out.
     """
 
     nodes: Array
     bound: Array
     rounding: Array
+    allowed: Array
 
 
 class _Block(NamedTuple):
@@ -103,7 +105,7 @@ def tension_blocks(problem: Problem, one: Array, items, *, kind: Kind, margins: 
     nodes, bound = _bounds(problem, found.block, found.values[:, :count], found.rests)
     if margins:
         nodes[1] = found.values[:, count]
-    return BlockBounds(jnp.stack(nodes, axis=1), jnp.stack(bound), jnp.max(found.rounding[:CABLES], axis=0))
+    return BlockBounds(jnp.stack(nodes, axis=1), jnp.stack(bound), *_allowances(found))
 
 
 class TensionRange(NamedTuple):
@@ -113,11 +115,13 @@ class TensionRange(NamedTuple):
         low: (n_cables, n) proved lower bounds.
         high: (n_cables, n) proved upper bounds; infinite where the determinant may vanish.
         rounding: (n,) as in `BlockBounds`.
+        allowed: (n,) likewise.
     """
 
     low: Array
     high: Array
     rounding: Array
+    allowed: Array
 
 
 @partial(jax.jit, static_argnames="kind")
@@ -138,13 +142,17 @@ def tension_ranges(problem: Problem, one: Array, items, *, kind: Kind) -> Tensio
     low, high = (_coefficients(found.values) + sign * found.rests[None] for sign in (-1.0, 1.0))
     regular = low[:, REGULAR, None], high[:, REGULAR, None]
     least, most = ratio(low[:, :CABLES], regular), ratio(-high[:, :CABLES], regular)
-    return TensionRange(jnp.min(least, axis=0), -jnp.min(most, axis=0), jnp.max(found.rounding[:CABLES], axis=0))
+    return TensionRange(jnp.min(least, axis=0), -jnp.min(most, axis=0), *_allowances(found))
 
 
 def _coefficients(values: Array) -> Array:
     # Bernstein coefficients of polynomials through values (m, n_values, n) at the nodes.
     matrix = jnp.asarray(chebyshev.bernstein())
     return (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
+
+
+def _allowances(found: "_Taken") -> tuple[Array, Array]:
+    return jnp.max(found.rounding[:CABLES], axis=0), jnp.max(found.rests[:CABLES], axis=0)
 
 
 class _Taken(NamedTuple):
@@ -161,20 +169,20 @@ def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool) ->
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
     block = _Block(segments, squared_duration(segments, arcs), regular, problem.robot.gravity / segments.rate)
 
-    def at(off, kept):
+    def at(off):
         now = instant_beside(middle, segments.sense, arcs, off * half)
-        return state(segments, arcs, stored(now, kept), kind)
+        return state(segments, arcs, stored(now, one), kind, one)
 
     def pairs_at(node):
-        return tuple(lax.complex(*pair) for pair in _values(problem, block, at(node, one), margins=margins))
+        return tuple(lax.complex(*pair) for pair in _values(problem, block, at(node), margins=margins))
 
     pairs = lax.map(pairs_at, chebyshev.nodes())
     values = jnp.stack([part(x) for x in pairs for part in (jnp.real, jnp.imag)], axis=1)
-    lengths = _lengths(problem.robot, at(0.0, None))
+    lengths = stored(_lengths(problem.robot, at(0.0)), one)
 
     def on(ellipse):
         (along, aside), factor = ellipse
-        bounds = reach(segments, arcs, middle, (along * half, aside * half), kind)
+        bounds = stored(reach(segments, arcs, middle, (along * half, aside * half), kind), one)
         found = _sizes(problem, block, bounds, along * half, lengths)
         return tuple(jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in found)
 

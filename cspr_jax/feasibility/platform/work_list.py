@@ -89,7 +89,7 @@ class WorkList:
     def _told(self, blocks: Blocks, found: Looked, *, last: bool) -> np.ndarray:
         # Takes in what was found of blocks; which of them are to be halved.
         least, low = found.nodes.min(0).T, found.bound.T
-        np.minimum.at(self.attained, blocks.row, least)
+        _lower(self.attained, blocks.row, least)
         slack = least[:, : low.shape[1]]
         # NaN refutes nothing, and proves nothing.
         self._note_instants(blocks, found)
@@ -100,7 +100,7 @@ class WorkList:
             is_known = ((slack - low <= 0.5 * TOLERANCE) & ~is_above).any(1)
         is_done = is_proved | is_known | last | np.isnan(least).any(1)
         self.is_stuck[blocks.row[is_done & ~is_proved]] = True
-        np.minimum.at(self.bound, blocks.row[is_done], low[is_done])
+        _lower(self.bound, blocks.row[is_done], low[is_done])
         return ~is_done & ~(self.is_refuted | self.is_stuck)[blocks.row]
 
     def _note_instants(self, blocks: Blocks, found: Looked) -> None:
@@ -110,6 +110,13 @@ class WorkList:
         breaks = np.flatnonzero(value < self._worst[blocks.row])
         breaks = breaks[np.argsort(-value[breaks], kind="stable")]  # the worst of a motion is written last
         self._worst[blocks.row[breaks]], self.instant[blocks.row[breaks]] = value[breaks], tau[breaks]
+
+
+def _lower(values: np.ndarray, row: np.ndarray, others: np.ndarray) -> None:
+    # Takes values of rows, which stand side by side, into the smallest ones.
+    if len(row):
+        first = np.flatnonzero(np.diff(row, prepend=-1))
+        values[row[first]] = np.minimum(values[row[first]], np.minimum.reduceat(others, first))
 
 
 def allowance(limits: np.ndarray) -> np.ndarray:
