@@ -72,6 +72,17 @@ def test_settings_of_the_user_win(tmp_path):
     assert nothing == {"XLA_FLAGS": None, "JAX_COMPILATION_CACHE_DIR": None, "JAX_PLATFORMS": "cpu"}
 
 
+def test_plans_compile_in_less_time_and_flags_of_the_user_are_not_set_twice(tmp_path):
+    """A flag that the user names is left to them, whatever its value."""
+    code = SEEN.format(device="quick=True")
+    ours = json.loads(told(with_known_flags(tmp_path), code))["XLA_FLAGS"].split()
+    assert [flag for flag in ours if flag != xla.WIDE] == list(xla.QUICK)
+    theirs = "--xla_backend_optimization_level=3"
+    given = json.loads(told(tmp_path, code, XLA_FLAGS=theirs))["XLA_FLAGS"].split()
+    assert given[-1] == theirs and sum("optimization_level" in flag for flag in given) == 1
+    assert set(given) - {theirs, xla.WIDE} == set(xla.QUICK[1:])
+
+
 def test_a_flag_is_tried_once_and_refused_ones_are_left_out(tmp_path, monkeypatch):
     """XLA ends the process that names a flag it does not know; the record saves the second try."""
     tries = []

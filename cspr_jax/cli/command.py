@@ -63,11 +63,12 @@ def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> N
     parser.add_argument("-o", "--output", type=Path, help=text, **settings)
 
 
-def prepare_jax(options: argparse.Namespace) -> None:
+def prepare_jax(options: argparse.Namespace, *, quick: bool = False) -> None:
     """Set up jax as the options want it; from here on it says when it compiles.
 
     Args:
         options: of the command.
+        quick: whether little is computed; see `xla.prepare`.
 
     Raises:
         InputError: no such device.
@@ -75,7 +76,7 @@ def prepare_jax(options: argparse.Namespace) -> None:
     from cspr_jax.runtime import xla
 
     if getattr(options, "scheduler", None) is None:  # its workers have settings of their own
-        xla.prepare(options.device, warn)
+        xla.prepare(options.device, warn, quick=quick)
     xla.check_device(options.device)
     xla.tell_compiling()
 

@@ -49,7 +49,7 @@ def _report(options: argparse.Namespace) -> int:
     given = options.result if options.result.suffix == ".toml" else selection.result_at(options.result)
     output = options.output or given.with_suffix(".html")
     with waiting():
-        prepare_jax(options)
+        prepare_jax(options, quick=True)
         from cspr_jax.api.reports import report
 
         warnings = report(given, output, trajectories=options.trajectories, cells=cells, quantity=options.quantity)

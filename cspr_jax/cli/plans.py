@@ -73,7 +73,7 @@ def _planned(options: argparse.Namespace) -> Any:
     from cspr_jax.config.hints import plan_hints, robot_hints
 
     with waiting():
-        prepare_jax(options)
+        prepare_jax(options, quick=True)
         from cspr_jax.api import plans
 
         plan = plans.plan(options.plan)

@@ -24,6 +24,12 @@ from cspr_jax.runtime import compile_cache, stages
 
 # Twice as fast where the processor has it; XLA's own choice is half of it.
 WIDE, NEEDS = "--xla_cpu_prefer_vector_width=512", "avx512f"
+# Half of the time for compiling, for code that is slower: plans move a few robots, once.
+QUICK = (
+    "--xla_backend_optimization_level=1",
+    "--xla_cpu_use_fusion_emitters=false",
+    "--xla_cpu_parallel_codegen_split_count=1",
+)
 PROBE_SECONDS = 120
 # glibc gives each thread memory of its own, and XLA has many threads: what one frees, the others cannot use. With four
 # arenas a long sweep needs half the memory; with one, threads that compile would wait for each other. The last number
@@ -48,12 +54,13 @@ _KEPT = {
 _VALUES = {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": 0.05, "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": -1}
 
 
-def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line: None) -> None:
+def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line: None, *, quick: bool = False) -> None:
     """Set what jax reads when it is imported; nothing if it has been.
 
     Args:
         device: "cpu"; "gpu" and None leave the choice to jax.
         warn: called with a line for people where compiled code cannot be kept.
+        quick: whether little is computed, so that compiling in less time is worth more than faster code.
     """
     if "jax" in sys.modules:
         return
@@ -65,7 +72,7 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
     folder = _folder()
     if folder is None:
         return
-    os.environ["XLA_FLAGS"] = _flags(folder, os.environ.get("XLA_FLAGS", ""))
+    os.environ["XLA_FLAGS"] = _flags(folder, os.environ.get("XLA_FLAGS", ""), quick=quick)
     if CACHE not in os.environ:
         _keep(folder, warn)
 
@@ -181,11 +188,14 @@ def _processor() -> tuple[str, ...]:
     return tuple(sorted(next((line for line in lines if line.startswith(("flags", "Features"))), "").split()))
 
 
-def _flags(folder: Path, given: str) -> str:
-    # Of two settings of one flag XLA takes the last.
-    if NEEDS not in _processor() or not _is_known(folder, WIDE):
-        return given
-    return f"{WIDE} {given}".strip()
+def _flags(folder: Path, given: str, *, quick: bool = False) -> str:
+    # Of two settings of one flag XLA takes the last: those of the user. They are not set twice, since all of the words
+    # are part of what compiled code is known by.
+    ours = [WIDE] if NEEDS in _processor() else []
+    named = [word.partition("=")[0] for word in given.split()]
+    ours = [flag for flag in (*ours, *(QUICK if quick else ())) if flag.partition("=")[0] not in named]
+    wanted = " ".join(ours)
+    return f"{wanted} {given}".strip() if ours and _is_known(folder, wanted) else given
 
 
 def _is_known(folder: Path, flag: str) -> bool:
@@ -195,7 +205,8 @@ def _is_known(folder: Path, flag: str) -> bool:
         known = json.loads(record.read_text("utf-8"))
     except (OSError, ValueError):
         known = {}
-    if isinstance(known, dict) and isinstance(known.get(flag), bool):
+    known = known if isinstance(known, dict) else {}
+    if isinstance(known.get(flag), bool):
         return known[flag]
     settings = os.environ | {"XLA_FLAGS": flag, "JAX_PLATFORMS": "cpu"}
     # -P: nothing that lies in the working folder is executed. A session of its own: Ctrl-C is for us, not an answer.
@@ -210,7 +221,7 @@ def _is_known(folder: Path, flag: str) -> bool:
         return False
     partial = record.with_suffix(f".{os.getpid()}")
     try:
-        partial.write_text(json.dumps({flag: done.returncode == 0}), "utf-8")
+        partial.write_text(json.dumps(known | {flag: done.returncode == 0}), "utf-8")
         partial.replace(record)
     except OSError:
         return False
