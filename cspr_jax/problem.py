@@ -123,7 +123,7 @@ def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
         reference: a catalogue name, or the path of a robot file.
 
     Returns:
-        the robot; with six cables, a platform.
+        the robot: a point mass or a platform.
 
     Raises:
         ConfigError: no such robot, or a mistake in its file.

@@ -65,7 +65,7 @@ parts of an inertia tensor to 1e18, angles to 100 rad.
 MAPS = """## Kinds of maps
 
 All take x and y, or radius and azimuth, and z of the targets; keys that only other kinds name here are refused.
-Of its quantities those in **bold** are stored where `run.store` does not say.
+Quantities in **bold** are stored by default; `run.store` chooses others.
 """
 STARTS = {
     "rest": "P0, at rest",
@@ -75,11 +75,11 @@ STARTS = {
 
 MOTION = """## Columns of a motion
 
-`cspr plan -o FILE.csv` writes `t`, then `_x _y _z`, `_w _x _y _z` or `_1 _2 _3` of each, `samples` rows a segment; with
-`--rate HZ` a row every 1/HZ s and one at the end itself. `FILE.h5` has the same as datasets, with the attributes
+`cspr plan -o FILE.csv` writes `t`, then `_x _y _z`, `_w _x _y _z` or `_1 _2 _3` of each, `samples` rows per segment;
+with `--rate HZ` a row every 1/HZ s and one at the end itself. `FILE.h5` has the same as datasets, with the attributes
 `software`, `schema`, `plan` (the text of the plan file; from Python, a dictionary's JSON), `robot_settings` (the robot,
-as JSON), `base_points` (the spools), `mass`, `z_axis`, `z0`, `family`, and `feasible`, 1 or 0. It is sealed like a
-result: `cspr verify FILE.h5` and `cspr plot FILE.h5` notice every changed byte.
+as JSON), `base_points` (the spools), `mass`, `z_axis`, `z0`, `family`, and `feasible`, 1 or 0. It carries a checksum
+like a result: `cspr verify FILE.h5` and `cspr plot FILE.h5` detect any changed byte.
 
 An infeasible or undecided plan is written only with `--anyway`, with the best candidate's motion for each such segment.
 Its picture says NOT PROVED FEASIBLE and for which segments; its HDF5 file has `feasible = 0` and the verdicts of its

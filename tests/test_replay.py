@@ -137,7 +137,9 @@ def test_a_plan_that_is_not_feasible(folder, capsys):
     with pytest.raises(ConfigError, match="not played"):
         cspr_jax.replay(plan)
     assert set(folder.iterdir()) == before
-    assert "says so itself" in cspr(capsys, "plan", "plan.toml", "--mjcf", "m.xml", "--anyway", "--step", 0.01, code=1)
+    assert "the file says so" in cspr(
+        capsys, "plan", "plan.toml", "--mjcf", "m.xml", "--anyway", "--step", 0.01, code=1
+    )
     assert "NOT PROVED FEASIBLE" in Path("m.xml").read_text()
     found = cspr_jax.replay(plan, anyway=True, step=0.01)
     assert found.tension.min() < 0.0 and found.path_deviation.max() > 0.01

@@ -36,7 +36,7 @@ class Plan(planning.Plan):
         """The motion as rows over time.
 
         Args:
-            rate: rows a second over the whole plan, Hz, and one at its end; None: `samples` rows a segment.
+            rate: rows per second over the whole plan, Hz, and one at its end; None: `samples` rows per segment.
 
         Returns:
             "t" (n,) s, and by the names of `schema.quantities.TRAJECTORY` (n, 3), (n, 4) or (n, n_cables) each, in the

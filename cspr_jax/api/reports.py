@@ -45,13 +45,13 @@ def report(
         given: a result of `cspr run` or its run directory, a motion of `cspr plan -o`, a plan file; or one of these
             that is loaded.
         output: page to write, .html.
-        trajectories: cells of a map whose motions it computes, besides `cells`: the most telling ones.
+        trajectories: cells of a map whose motions it computes, besides `cells`: the most informative ones.
         cells: of these the motions are computed, too: coordinates by axis, the nearest point is taken; axes that are
             missing are at their first point.
-        quantity: of a map, that is shown first; None: the one that its kind of map is about.
+        quantity: of a map, to show first; None: the one that its kind of map is about.
 
     Returns:
-        what its reader should know, one line each.
+        warnings, one line each.
 
     Raises:
         ConfigError: a mistake in a file or an argument, or plotly is not installed.
@@ -103,7 +103,7 @@ def _of_motion(given: Result | Plan, name: str) -> tuple[str, dict[str, Any], li
         "motions": [content],
         "cells": {},
     }
-    return page["title"], page, ["not proved feasible; the page says so itself"] if doubt else []
+    return page["title"], page, ["not proved feasible; the page says so"] if doubt else []
 
 
 def _planned(planned: Plan, title: str) -> dict[str, Any]:

@@ -60,8 +60,8 @@ def sensitivity(robot: PointMassRobot | PlatformRobot, positions, orientations=N
         the sensitivities.
 
     Raises:
-        InputError: more cables than degrees of freedom, shapes that do not fit, values that are not finite, quaternions
-            that are not of unit length, or orientations of a point mass.
+        InputError: more cables than degrees of freedom, pulleys, or another pattern of motion; shapes that do not fit,
+            values that are not finite, quaternions that are not of unit length, or orientations of a point mass.
     """
     if not isinstance(robot, PointMassRobot | PlatformRobot):
         raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")

@@ -147,7 +147,7 @@ def run(
         workers: processes on this machine; above 1, a script calls it under `if __name__ == "__main__":`.
         scheduler: address of a dask.distributed scheduler, whose workers compute instead.
         prune: whether to remove the shards once the result is complete.
-        accept_environment_change: whether to go on with another version, machine or library than began.
+        accept_environment_change: whether to resume despite another version, machine or library.
         on_tile: called with cells done and cells in all, after each tile.
 
     Returns:
@@ -171,7 +171,7 @@ def run(
 
 
 def compute(given: str | Path | Mapping[str, Any]) -> "xarray.Dataset":
-    """Compute a small sweep and keep no file; `run` is for those that take long, for it goes on after a stop.
+    """Compute a small sweep and keep no file; `run` is for those that take long, since it can resume.
 
     Args:
         given: as for `run`.

@@ -24,8 +24,6 @@ EPILOGUE = (
 
 # Of a process that is ours: Python's passes over the many objects of jax take a tenth of what a command takes.
 FEWER_COLLECTIONS = (200_000, 20, 50)
-# In the order of the help. A new command is a row of one of these modules.
-COMMANDS = (*runs.COMMANDS, *plans.COMMANDS, *pictures.COMMANDS, *tables.COMMANDS, *listings.COMMANDS)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -91,7 +89,7 @@ def _mend_streams() -> None:
 
 
 def _add_completion(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("shell", choices=("bash", "zsh", "tcsh"))
+    parser.add_argument("shell", choices=("bash", "zsh", "tcsh"), help="your shell")
 
 
 def _completion(options: argparse.Namespace) -> int:
@@ -101,12 +99,18 @@ def _completion(options: argparse.Namespace) -> int:
     return ExitCode.DONE
 
 
+# In the order of the help. A new command is a row of one of these modules.
+COMMANDS = (
+    *(*runs.COMMANDS, *plans.COMMANDS, *pictures.COMMANDS, *tables.COMMANDS, *listings.COMMANDS),
+    Command("completion", "print a script for a shell that completes commands", _add_completion, _completion),
+)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="cspr", description="Reach of cable-suspended parallel robots in motion.", epilog=EPILOGUE)
     parser.add_argument("--version", action="version", version=f"cspr {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
-    last = Command("completion", "print a script for a shell that completes commands", _add_completion, _completion)
-    for row in (*COMMANDS, last):
+    for row in COMMANDS:
         sub = commands.add_parser(
             row.name, help=row.text, description=row.text, epilog="files: docs/reference.md has every key"
         )

@@ -49,7 +49,7 @@ def add_all_errors(parser: argparse.ArgumentParser) -> None:
     Args:
         parser: of a command that reads a file of keys.
     """
-    parser.add_argument("--all-errors", action="store_true", help="print every mistake of a file, one a line")
+    parser.add_argument("--all-errors", action="store_true", help="print all mistakes in a file, one per line")
 
 
 def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> None:

@@ -31,12 +31,16 @@ def _plot(options: argparse.Namespace) -> int:
 def _add_report(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", type=Path, help="result or run directory, motion of `cspr plan -o`, or plan file")
     add_output(parser, "page: .html (default: beside)", metavar="FILE")
-    parser.add_argument("--quantity", help="of a map, that is shown first")
+    parser.add_argument("--quantity", help="quantity of a map to show first")
     parser.add_argument(
-        "--trajectories", type=int, default=50, metavar="K", help="motions of so many telling cells (default 50)"
+        "--trajectories",
+        type=int,
+        default=50,
+        metavar="K",
+        help="number of cells whose motions are included, the most informative ones (default 50)",
     )
     parser.add_argument(
-        "--cell", action="append", default=[], metavar="AXIS=VALUE,...", help="the motion of this cell, too"
+        "--cell", action="append", default=[], metavar="AXIS=VALUE,...", help="also include the motion of this cell"
     )
     add_all_errors(parser)
     add_device(parser)

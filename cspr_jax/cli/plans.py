@@ -28,7 +28,9 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
     add_output(parser, "write the motion to FILE.csv or FILE.h5", metavar="FILE")
     parser.add_argument("--anyway", action="store_true", help="write the best candidate's motion if it is not feasible")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="rows a second (default: `samples` rows a segment)")
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ", help="rows per second (default: `samples` rows per segment)"
+    )
     parser.add_argument(
         "--mjcf",
         type=Path,
@@ -37,7 +39,9 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--step", type=float, metavar="S", help=f"--mjcf: {_STEP}")
     parser.add_argument("--animate", type=Path, metavar="FILE", help="write a film: .gif, .mp4 or .html")
-    parser.add_argument("--speed", type=float, metavar="X", help="--animate: times real time (default 1)")
+    parser.add_argument(
+        "--speed", type=float, metavar="X", help="--animate: playback speed relative to real time (default 1)"
+    )
     add_all_errors(parser)
     add_device(parser)
 
@@ -102,7 +106,7 @@ def _plan(options: argparse.Namespace) -> int:
             with waiting():
                 save(path)
             if not plan.feasible:
-                warn(f"{path}: is not proved feasible; it says so itself")
+                warn(f"{path}: not proved feasible; the file says so")
         else:
             warn(f"{path}: not written, since a segment is not proved feasible (--anyway writes it)")
     return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
@@ -148,6 +152,9 @@ def _replay(options: argparse.Namespace) -> int:
 COMMANDS = (
     Command("plan", "plan a sequence of poses", _add_plan, _plan),
     Command(
-        "replay", "play a plan in MuJoCo, and say how far path and tensions are from the planned", _add_replay, _replay
+        "replay",
+        "play a plan in MuJoCo, and say how far path and tensions are from the planned ones",
+        _add_replay,
+        _replay,
     ),
 )

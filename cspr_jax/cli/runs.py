@@ -27,7 +27,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes on this machine (default 1)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="dask.distributed scheduler, such as tcp://host:8786")
     parser.add_argument(
-        "--accept-environment-change", action="store_true", help="go on with another version, machine or library"
+        "--accept-environment-change", action="store_true", help="resume despite another version, machine or library"
     )
     parser.add_argument("--prune", action="store_true", help="remove the shards once the result is complete")
     add_all_errors(parser)
@@ -117,10 +117,10 @@ def _volume(options: argparse.Namespace) -> int:
 COMMANDS = (
     Command("run", "compute a sweep file into an HDF5 result; its path is the last line printed", _add_run, _run),
     Command("status", "say how far a run has come, without touching it", _add_status, _status),
-    Command("verify", "read again everything of a run, or a result or motion file, and check it", _add_verify, _verify),
+    Command("verify", "reread and check a run, or a result or motion file", _add_verify, _verify),
     Command(
         "volume",
-        "say how large the workspace of a map is, with the error that its grid leaves",
+        "print the size of a map's workspace, and its error due to the grid",
         _add_volume,
         _volume,
     ),

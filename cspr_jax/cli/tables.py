@@ -43,7 +43,7 @@ def _table(options: argparse.Namespace) -> int:
 def _add_bench(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
     parser.add_argument(
-        "--kernels", type=Path, metavar="DIR", help="beside C++ kernels of this folder, such as benchmarks"
+        "--kernels", type=Path, metavar="DIR", help="also measure the C++ kernels in this folder, such as benchmarks"
     )
     add_device(parser)
 
@@ -62,6 +62,6 @@ def _bench(options: argparse.Namespace) -> int:
 
 
 COMMANDS = (
-    Command("table", "compute a published table again, beside the printed numbers", _add_table, _table),
+    Command("table", "recompute a published table and compare it with the printed numbers", _add_table, _table),
     Command("bench", "measure checks per second beside a NumPy version of the same check", _add_bench, _bench),
 )

@@ -75,7 +75,7 @@ def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
         if row.per_cable == per_cable:
             kind = (NotNegativePerCable if row.from_zero else PerCable) if per_cable else Coordinate
             kind = TensionPerCable if row.name == "tension_max" else kind
-            text = f"{row.description}{', one number or one a cable' * per_cable}, {row.unit}"
+            text = f"{row.description}{', one number, or one per cable' * per_cable}, {row.unit}"
             keys[row.name] = (kind | None, Field(None, description=text))
     return keys
 
@@ -116,7 +116,8 @@ class LimitTable(_Heights):
     """Limits of all motions of the file."""
 
     uncertainty: UncertaintyTable | None = Field(
-        None, description="hypocycloids and transitions: feasible means so for every robot within this"
+        None,
+        description="hypocycloids and transitions: feasible means feasible for every robot within this uncertainty",
     )
 
     if TYPE_CHECKING:

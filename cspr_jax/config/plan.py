@@ -81,8 +81,8 @@ class PlanFile(TrajectoryKeys, LimitTable):
     )
     least: Literal["each", "total"] | None = Field(
         None,
-        description='bezier: what durations "least" minimise: "each", the default, their own, one segment after the '
-        'other, those before it as they are; "total" their sum, by search',
+        description='bezier: what durations "least" minimise: "each", the default, each segment\'s own, given the '
+        'segments before it; "total" their sum, by search',
     )
     tensions: Annotated[str, name_of(lambda: TENSION_RULES)] | None = Field(
         None,
@@ -90,9 +90,9 @@ class PlanFile(TrajectoryKeys, LimitTable):
         + "; ".join(f'"{name}", {row.sentence}' for name, row in TENSION_RULES.items())
         + f' (here 4, about the middles of their ranges); absent: "{CENTRED}"',
     )
-    samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output a segment")
+    samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output per segment")
     limits: LimitTable | None = Field(
-        None, description="[limits], as in a sweep: the same keys as here, each in one of the two places"
+        None, description="[limits], as in a sweep: the same keys as here; give each key in only one of the two places"
     )
     launch: LaunchTable | None = Field(None, description="bezier: [launch], an object that is released on the way")
     pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(

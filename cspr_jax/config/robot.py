@@ -64,7 +64,7 @@ class RobotFile(LimitKeys):
     translation_only: bool | None = Field(
         None,
         description="rigid platform on six cables in three parallel pairs, each with one winch: true: it only "
-        "translates, and is planned and swept as the point mass on three cables that it is then",
+        "translates, and is planned and swept as the equivalent point mass on three cables",
     )
     mass: Positive = Field(description="mass of the effector, kg, at most 1e9")
     gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
@@ -76,12 +76,13 @@ class RobotFile(LimitKeys):
         None, description="diameter of the cables, for their distances, m (default 0)"
     )
     pulley_radius: NotNegativePerCable | None = Field(
-        None, description="radius of swivelling pulleys, one number or one a cable, m; absent: cables leave from points"
+        None,
+        description="radius of swivelling pulleys, one number, or one per cable, m; absent: cables leave from points",
     )
     pulley_axes: PerCableDirection | None = Field(
         None,
         description="axes about which pulleys swivel, in the direction in which the cables enter them: one vector "
-        "[x, y, z] or one a cable (default: straight up)",
+        "[x, y, z], or one per cable (default: straight up)",
     )
     _notes: tuple[str, ...] = PrivateAttr(())  # of what a file of another program says besides
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')

@@ -72,8 +72,7 @@ class TrajectoryKeys(Table):
 
     family: FamilyName = Field(
         "hypocycloid-standard",
-        description='trajectory family: "hypocycloid-standard" (thesis chapter 2), "transition" (1), or "hypocycloid" '
-        "of variable amplitude (3), for platforms",
+        description="trajectory family: " + "; ".join(f'"{row.name}", {row.description}' for row in FAMILIES.values()),
     )
     amplitude: AmplitudeKey = Field(
         "quintic",

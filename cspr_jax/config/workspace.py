@@ -49,8 +49,8 @@ class PoseConditions(Table):
     )
     prove: bool | None = Field(
         None,
-        description="true: prove of whole cells, boxes half-way to the next points, that they lie inside or outside; "
-        "of one orientation",
+        description="true: prove that whole cells, boxes half-way to the next points, lie inside or outside; "
+        "only for one orientation",
     )
     wrenches: Annotated[list[list[Component]], Field(min_length=1, max_length=64)] | None = Field(
         None,

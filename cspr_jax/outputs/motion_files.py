@@ -75,7 +75,8 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
 
     Args:
         plan: the plan.
-        rate: rows a second over the whole plan, Hz, and one at its end; None: `samples` rows a segment, ends included.
+        rate: rows per second over the whole plan, Hz, and one at its end; None: `samples` rows per segment, ends
+            included.
 
     Returns:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
@@ -150,7 +151,7 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
     Args:
         plan: the plan.
         path: its ending says which.
-        rate: rows a second, Hz, or None.
+        rate: rows per second, Hz, or None.
 
     Raises:
         ConfigError: too many rows, or a best candidate that is not finite.

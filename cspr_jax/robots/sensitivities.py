@@ -39,7 +39,7 @@ class Sensitivities(NamedTuple):
 
 
 def sensitivities(robot: Robot, position: Array, rotation: Array | None = None) -> Sensitivities:
-    """Sensitivities of any robot with as many cables as degrees of freedom, errors of all of them independent.
+    """Sensitivities of a robot with as many cables as degrees of freedom, errors of all of them independent.
 
     Args:
         robot: the robot.
@@ -50,7 +50,7 @@ def sensitivities(robot: Robot, position: Array, rotation: Array | None = None) 
         the sensitivities.
 
     Raises:
-        InputError: more cables than degrees of freedom.
+        InputError: what `check_determined` refuses.
     """
     check_determined(robot)
     turn = jnp.eye(_TRANSLATIONS) if rotation is None else rotation

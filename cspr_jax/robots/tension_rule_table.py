@@ -29,7 +29,7 @@ TENSION_RULES = {
         TensionRule("closed-form", "the nearest to the middles of their ranges, whatever the limits", True, False),
         TensionRule(
             "improved-closed-form",
-            "the closed form, with the worst cable held at its limit, again and again",
+            "the closed form, repeatedly fixing at its limit the cable that violates it most",
             True,
             False,
         ),

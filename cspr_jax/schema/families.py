@@ -65,14 +65,14 @@ _ROWS = (
     ),
     Family(
         "transition",
-        "from rest to a target, swings at it, and back to rest (1)",
+        "from rest to a target, swings at it, and back to rest (thesis chapter 1)",
         {"2T": _LEGS.format("transitions:Transitions"), "3T": _LEGS.format("transitions:Transitions")},
         free_end=True,
         knows_uncertainty=True,
     ),
     Family(
         "hypocycloid",
-        "hypocycloids of variable amplitude (3), for platforms",
+        "hypocycloids of variable amplitude, for platforms (thesis chapter 3)",
         {"3R3T": _LEGS.format("platform_poses:VariablePoses")},
         any_cables=("3R3T",),
         knows_uncertainty=True,

@@ -165,7 +165,7 @@ MAP_KINDS: dict[str, MapKind] = {
         MapKind(
             name="transition-envelopes",
             title="Envelopes of the pseudotensions along transitions",
-            description="what each instant of a transition from rest to each target asks for",
+            description="oscillations that each instant of a transition from rest to each target requires",
             implementation="cspr_jax.maps.envelopes:TransitionEnvelopesMap",
             quantities=_OF_INSTANTS,
             stored=_OF_INSTANTS,

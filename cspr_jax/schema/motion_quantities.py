@@ -3,11 +3,11 @@
 from cspr_jax.schema.quantity import Quantity
 
 # What verdicts rest on, and what they are about.
-HOW = ", proved; only sampled on more than six cables"
+HOW = ", proved, but sampled for platforms on more than six cables"
 MARGIN = (
     "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
     "or depth below the spools over z0; platforms on more cables: how far all tensions can keep from their limits, "
-    "over the weight a cable."
+    "divided by the weight per cable."
 )
 TRAJECTORY = {
     q.name: q
@@ -32,8 +32,8 @@ TRAJECTORY = {
             "tension_residual",
             "1",
             "residual of the tensions",
-            "Of redundant cables: size of the difference between the wrench of the tensions and that which the motion "
-            "asks for, over 1 N and the size of the latter; moments over the platform's size.",
+            "Of redundant cables: |W t - w| / (1 N + |w|), with W t the wrench that the tensions give and w the one "
+            "that the motion requires; moments divided by the platform's size.",
         ),
         Quantity(
             "tension_each",

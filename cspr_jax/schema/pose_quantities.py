@@ -23,7 +23,7 @@ POSES = (
         "clearance",
         "m",
         "clearance",
-        "Smallest distance of all that is looked at: of cables without a common point, and of cables and platform "
+        "Smallest distance of all checked pairs: of cables without a common point, and of cables and platform "
         "from obstacles and of cables from the platform where the sweep has these; less the cables' thickness.",
         signed=True,
     ),
@@ -55,8 +55,8 @@ POSES = (
         "nearest_bodies",
         "1",
         "what is nearest",
-        "Of what `clearance` is the distance: 1: two cables; 2: a cable and an obstacle; 3: a cable and the "
-        "platform; 4: the platform and an obstacle; 0: nothing can meet, or nobody asks.",
+        "Which pair `clearance` belongs to: 1: two cables; 2: a cable and an obstacle; 3: a cable and the "
+        "platform; 4: the platform and an obstacle; 0: nothing can meet, or not requested.",
         "int16",
         meanings="nearest-bodies",
     ),
@@ -79,7 +79,7 @@ POSES = (
         "1",
         "side of the whole cell",
         "1: every position of the cell, the box half-way to the next points, is proved inside; 2: every one is "
-        "proved outside; 0: not decided, or nobody asks.",
+        "proved outside; 0: not decided, or not requested.",
         "int16",
         meanings="cell-sides",
     ),

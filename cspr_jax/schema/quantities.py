@@ -309,8 +309,8 @@ QUANTITIES = {
             "largest_margin",
             "1",
             "largest margin of the segments tried",
-            "Largest smallest slack, of taut cables, depth and limits, that a launch to the cell was found to have; "
-            "below 0 no launch was found, which is no proof that there is none.",
+            "Largest margin (smallest slack of taut cables, depth and limits) that a launch to the cell was found to "
+            "have; below 0 no launch was found, which is no proof that there is none.",
             signed=True,
         ),
         Quantity(

@@ -40,7 +40,7 @@ class Throw(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class LaunchErrors:
-    """Errors of a launch, independent of each other.
+    """Independent errors of a launch.
 
     Fields:
         release: standard deviation of the instant of release, s.

@@ -45,7 +45,7 @@ class SensitivitySearch:
         robot: centred; a platform in the axes of its file.
 
     Raises:
-        InputError: more cables than degrees of freedom.
+        InputError: what `check_determined` refuses.
     """
 
     def __init__(self, robot: PointMassRobot | PlatformRobot) -> None:
