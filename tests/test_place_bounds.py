@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from oracles import platform as oracle
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from support.platforms import FROM_REST, MSSM, USUAL, Z0, general, limits_of, stacked
 from support.random_motions import BATCH, ROBOTS, drawn, motions_of, problem_of, turned
@@ -15,7 +16,8 @@ from cspr_jax.feasibility.platform import meetings
 from cspr_jax.feasibility.platform.meetings import Cables
 from cspr_jax.feasibility.platform.place_blocks import STEPS, place_blocks
 from cspr_jax.feasibility.platform.place_certificate import PARTS, PlaceCertifier
-from cspr_jax.robots.interference import contacts
+from cspr_jax.robots.contact_lanes import residual
+from cspr_jax.robots.interference import contacts, platform_hit
 
 # Spools far from level: the plane through them rises by 80 degrees.
 STEEP = turned(dataclasses.replace(MSSM, base=MSSM.base @ Rotation.from_euler("x", 80, degrees=True).as_matrix().T))
@@ -49,12 +51,18 @@ def seen(robot, segment, p, beta, tau):
 
 
 def sector_distance(sides, normal, vectors):
-    """Distance of vectors (n, n_cables, 3) from the sectors of their corners, over many points of these."""
-    share = np.concatenate([np.linspace(0.0, 1.0, 41), [0.5]])
-    spokes = sides[None, :, 0] * share[:, None, None] + sides[None, :, 1] * (1.0 - share)[:, None, None]
-    spokes = spokes / np.linalg.norm(spokes, axis=2, keepdims=True)
-    along = np.maximum(np.einsum("nki,ski->nsk", vectors, spokes), 0.0)
-    rest = vectors[:, None] - along[..., None] * spokes[None]
+    """Distance of vectors (n, n_cables, 3) from the sectors of their corners, over many directions of these."""
+    one, two = sides[:, 0], sides[:, 1]
+    along = np.where(np.linalg.norm(two, axis=1, keepdims=True) > 0.0, two, np.linalg.svd(normal[None])[2][1])
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    across = np.cross(normal, along)
+    # Counterclockwise from the second side to the first, or all around.
+    turn = np.arctan2((one * across).sum(1), (one * along).sum(1))
+    turn = np.where((one == 0.0).all(1), 2.0 * np.pi, np.mod(turn, 2.0 * np.pi))
+    angle = turn[:, None] * np.linspace(0.0, 1.0, 81)
+    spokes = np.cos(angle)[..., None] * along[:, None] + np.sin(angle)[..., None] * across[:, None]
+    along = np.maximum(np.einsum("nki,ksi->nsk", vectors, spokes), 0.0)
+    rest = vectors[:, None] - along[..., None] * spokes.transpose(1, 0, 2)[None]
     return np.linalg.norm(rest, axis=3).min((1, 2))
 
 
@@ -182,7 +190,7 @@ def test_cables_in_wide_steps():
 
 def test_cables_on_the_platform():
     """A cable falls through its corner's sector; beside the sector it does not count."""
-    sides = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]] * 2)
+    sides = np.array([[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]] * 2)
     normal = np.array([0.0, 0.0, 1.0])
     high, low = np.array([[1.0, 0.5, 0.1]] * 2), np.array([[1.0, 0.5, -0.1]] * 2)
     beside = high * [-1.0, 1.0, 1.0], low * [-1.0, 1.0, 1.0]
@@ -196,9 +204,43 @@ def test_cables_on_the_platform():
 
 def test_what_touches_in_a_wide_step_stays_in_the_sector():
     """Straight from inside to inside: a chord of the sector; from inside to outside: nothing is known."""
-    sides = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
+    sides = np.array([[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]])
     normal = np.array([0.0, 0.0, 1.0])
     high, near, far = (np.array([[1.0, y, z]]) for y, z in ((0.9, 0.1), (0.7, -0.1), (-0.5, -0.1)))
     for last, hits in ((near, True), (far, False)):
         cables = cables_from(high, last, 0.0, steps=1)
         assert (meetings.cables_hit(sides, normal, cables) >= 0).tolist() == [hits]
+
+
+# Six points of a flat platform: one on an edge, one inside, two that coincide.
+FLAT_POINTS = np.array([[0.3, 0.0], [0.1, 0.3], [-0.3, 0.1], [-0.1, 0.2], [0.05, 0.15], [0.3, 0.0]])
+
+
+def test_sectors_are_those_of_the_convex_hull():
+    """Along which directions a point of the platform has the platform beside it, by another library's hull."""
+    rng, axes = np.random.default_rng(3), Rotation.from_rotvec([0.3, -0.5, 0.2]).as_matrix()
+    hull = ConvexHull(FLAT_POINTS).equations
+    robot = problem_of(turned(dataclasses.replace(MSSM, platform=np.c_[FLAT_POINTS, np.zeros(6)] @ axes.T))).robot
+    near, points = contacts(robot), np.asarray(robot.platform_points)
+    # In the robot's axes, which are others than those of the drawing.
+    plane = np.linalg.lstsq(FLAT_POINTS - FLAT_POINTS.mean(0), points - points.mean(0), rcond=None)[0]
+    for k in range(6):
+        for angle in rng.uniform(0.0, 2.0 * np.pi, 60):
+            flat = np.array([np.cos(angle), np.sin(angle)])
+            inside = bool(((FLAT_POINTS[k] + 1e-6 * flat) @ hull[:, :2].T + hull[:, 2] <= 1e-12).all())
+            direction = flat @ plane
+            sides = [[side[i] for i in range(3)] for side in near.sides[k]]
+            left = np.array(residual(sides, list(near.normal), list(direction)))
+            assert (np.linalg.norm(left) < 1e-9) == inside, (k, angle)
+            # A cable that falls through the plane in this direction.
+            steps = direction + np.array([[0.01], [-0.01]]) * near.normal
+            every = np.tile(near.normal, (2, 1, 6, 1))
+            every[:, 0, k] = steps
+            cables = Cables(np.zeros((2, 1, 6, 3)), every, np.zeros((1, 6)), np.zeros(1))
+            hits = bool(meetings.cables_hit(near.sides, near.normal, cables)[0] == 0)
+            crossed = bool(platform_hit(near.sides, near.normal, every[0, 0], every[1, 0])[k])
+            # What moves by 0.02 in between proves nothing beside the edges.
+            edges = [np.cross(side, direction) @ near.normal / np.linalg.norm(side) for side in near.sides[k] if k != 4]
+            assert crossed == inside and (hits == inside or np.abs(edges).min() < 0.02)
+    kinds = [np.linalg.norm(np.cross(*side)) > 1e-9 for side in near.sides]
+    assert kinds == [True, True, True, False, False, True] and not near.sides[4].any() and near.sides[3].any()

@@ -9,6 +9,8 @@ from cspr_jax.arithmetic.lanes import Matrix, Vector, cross, dot, turned_back
 from cspr_jax.robots.interference import PARALLEL
 from cspr_jax.robots.wrench_lanes import Cables
 
+TINY = 1e-30  # m^2
+
 
 def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: Cables) -> list[Vector]:
     """The shortest vectors between cables.
@@ -54,7 +56,7 @@ def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vect
     """What is left of a cable after its projection onto the sector of its corner.
 
     Args:
-        sides: from the corner, platform axes.
+        sides: of the sector, as in `interference.Contacts`.
         normal: unit normal of the platform's plane.
         seen: the cable from the platform, platform axes, m.
 
@@ -69,11 +71,11 @@ def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vect
         return dot(cross(a, b), normal)
 
     one, two = sides
-    across = area(one, two)
-    inside = (area(flat, two) * across >= 0.0) & (area(one, flat) * across >= 0.0)
+    inside = (area(two, flat) >= 0.0) & (area(flat, one) >= 0.0)
     left = []
     for side in sides:
-        share = jnp.maximum(dot(seen, side) / dot(side, side), 0.0)
+        # The sector of a point inside the platform has no sides.
+        share = jnp.maximum(dot(seen, side) / jnp.maximum(dot(side, side), TINY), 0.0)
         left.append(tuple(v - share * w for v, w in zip(seen, side, strict=True)))
     is_first = dot(left[0], left[0]) <= dot(left[1], left[1])
     return tuple(jnp.where(inside, w, jnp.where(is_first, a, b)) for w, a, b in zip(up, *left, strict=True))

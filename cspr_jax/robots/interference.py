@@ -14,12 +14,13 @@ PARALLEL = 1e-14
 
 
 class Contacts(NamedTuple):
-    """Cables and platform sides that can meet.
+    """Cables and sectors of the platform that can meet.
 
     Fields:
         pairs: (n_pairs, 2) indices of cables.
-        sides: (n_cables, 2, 3) from each platform point along both edges of the platform that leave it, platform
-            axes, m.
+        sides: (n_cables, 2, 3) along the edges of the sector of each platform point, platform axes, m: it extends from
+            the second to the first, counterclockwise about the normal, and is half of the plane for a point on an edge.
+            Both are zero where it is all of the plane, around a point inside.
         normal: (3,) of the platform, platform axes.
     """
 
@@ -29,7 +30,9 @@ class Contacts(NamedTuple):
 
 
 def contacts(robot: PlatformRobot) -> Contacts:
-    """Contacts possible on a robot: pairs of cables without a common point; the platform is the polygon of its points.
+    """Contacts possible on a robot: pairs of cables without a common point, and sectors of the platform.
+
+    The platform is the convex hull of its points, seen along its normal.
 
     Args:
         robot: the robot.
@@ -39,21 +42,25 @@ def contacts(robot: PlatformRobot) -> Contacts:
     """
     points = np.asarray(robot.platform_points)
     centred = points - points.mean(0)
-    first, second, normal = np.linalg.svd(centred)[2]
-    angle = np.arctan2(centred @ second, centred @ first)
-    # Corners in their order around the platform; cables that share a point share its corner.
-    size = np.linalg.norm(centred, axis=1).max()
-    order = np.argsort(angle)
-    corners = [order[0]]
-    for i in order[1:]:
-        if np.linalg.norm(points[i] - points[corners[-1]]) > SAME * size:
-            corners.append(i)
-    if len(corners) > 1 and np.linalg.norm(points[corners[-1]] - points[corners[0]]) <= SAME * size:
-        corners.pop()
-    ring = points[corners]
-    own = [int(np.argmin(np.linalg.norm(ring - point, axis=1))) for point in points]
-    sides = np.array([[ring[i - 1] - ring[i], ring[(i + 1) % len(ring)] - ring[i]] for i in own])
-    return Contacts(np.array(pairs_apart(robot), int).reshape(-1, 2), sides, normal)
+    first, second, _ = np.linalg.svd(centred)[2]
+    flat = np.stack([centred @ first, centred @ second], axis=1)
+    sides = np.array([_sector(points, flat, i) for i in range(len(points))])
+    return Contacts(np.array(pairs_apart(robot), int).reshape(-1, 2), sides, np.cross(first, second))
+
+
+def _sector(points: np.ndarray, flat: np.ndarray, corner: int) -> np.ndarray:
+    # Edges of the convex hull as one of its points sees it, (2, 3); cables that share a point share its sector.
+    away = flat - flat[corner]
+    others = np.flatnonzero(np.linalg.norm(away, axis=1) > SAME * np.linalg.norm(flat, axis=1).max())
+    angles = np.arctan2(away[others, 1], away[others, 0])
+    order = np.argsort(angles)
+    # The widest angle in which no other point lies is outside.
+    free = np.diff(angles[order], append=angles[order[0]] + 2.0 * np.pi)
+    widest = int(free.argmax())
+    if free[widest] < np.pi - SAME:
+        return np.zeros((2, 3))
+    ends = others[order[widest]], others[order[(widest + 1) % len(order)]]
+    return np.stack([points[end] - points[corner] for end in ends])
 
 
 def gaps(robot: PlatformRobot, pairs: Array, position: Array, rotation: Array) -> Array:
@@ -156,7 +163,6 @@ def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, afte
     through = high * low <= 0.0
     # The direction within the platform's plane: a combination of both directions with positive weights.
     weight = np.abs(low)[..., None] * before + np.abs(high)[..., None] * after
-    across = np.cross(sides[:, 0], sides[:, 1]) @ normal
-    first = np.cross(weight, sides[:, 1]) @ normal / across
-    second = np.cross(sides[:, 0], weight) @ normal / across
+    first = np.cross(sides[:, 1], weight) @ normal
+    second = np.cross(weight, sides[:, 0]) @ normal
     return through & (first >= 0.0) & (second >= 0.0)

@@ -95,10 +95,10 @@ def cables_hit(sides: np.ndarray, normal: np.ndarray, found: Cables) -> np.ndarr
     step, block, cable = _sign_changes(found.seen @ normal, _size(found.seen).max(0))
     seen = _within(found.seen, (step, block, cable), np.broadcast_to(found.seen_bent[:, None], found.seen.shape[1:3]))
     one, two = sides[cable, 0], sides[cable, 1]
-    turn = np.sign(np.cross(one, two) @ normal)
-    # A coordinate along one side, times the area that the sides span, changes by no more than the other's length.
-    inside = turn * (np.cross(seen.mean, two) @ normal) > _size(two) * seen.off
-    inside &= turn * (np.cross(one, seen.mean) @ normal) > _size(one) * seen.off
+    # The area that a vector spans with a side changes by no more than the side's length times how far the vector moves.
+    inside = np.cross(two, seen.mean) @ normal > _size(two) * seen.off
+    inside &= np.cross(seen.mean, one) @ normal > _size(one) * seen.off
+    inside |= (sides[cable] == 0.0).all((1, 2))  # the sector is all of the plane
     hits[block[inside]] = step[inside]
     return hits
 
