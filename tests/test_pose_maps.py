@@ -253,6 +253,7 @@ def test_beats_in_plans_and_maps(tmp_path, beat):
     assert code == 0 and (open_result(Path(out.split()[-1])).data["arcs"] > 0).any(), err
 
 
+@pytest.mark.thorough
 def test_chosen_depth_and_epsilon(tmp_path, monkeypatch):
     """The fastest z0 of few is no slower than others, nor the best epsilon of few; both are feasible."""
     monkeypatch.setattr(choices, "DEPTHS", 40)

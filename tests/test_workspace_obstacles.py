@@ -179,7 +179,7 @@ def distances(places, shape, base=BASE, obstacles=(0, 1, 2)):
         ("up", "box", KINDS),
         ("down", "box", KINDS),
         ("down", "none", KINDS),
-        ("down", "hull", ()),
+        pytest.param("down", "hull", (), marks=pytest.mark.thorough),
         pytest.param("up", "hull", KINDS, marks=pytest.mark.soak),
     ],
 )
