@@ -17,8 +17,8 @@ ROOT = Path(__file__).parent.parent
 
 FAULTS = {
     "a sign": (
-        "    return -jnp.sign(area) * (adjugate @ relative_acceleration(robot, acceleration))",
-        "    return jnp.sign(area) * (adjugate @ relative_acceleration(robot, acceleration))",
+        "per_length = adjugate @ relative_acceleration(robot, acceleration) / determinant",
+        "per_length = -adjugate @ relative_acceleration(robot, acceleration) / determinant",
         "test_tensions.py",
     ),
     "an index": (
@@ -65,7 +65,7 @@ FAULTS = {
     "spools that are displaced half as far": (
         "multiple * float(given.spool_positions),",
         "0.5 * multiple * float(given.spool_positions),",
-        "test_uncertainty.py",
+        "test_uncertainty_of_point_masses.py",
     ),
     "tolerances whose functional is not corrected": (
         "more, last = (moved + shifted) * (1.0 + SPARE)",
