@@ -62,6 +62,7 @@ def test_cables_are_where_the_plan_has_them(plan):
                 assert np.linalg.norm(end - start) == pytest.approx(columns["length"][row, k])
 
 
+@pytest.mark.thorough
 def test_other_kinds_of_films(plan, tmp_path):
     pytest.importorskip("imageio_ffmpeg")
     assert plan.animate(tmp_path / "film.mp4", speed=32.0).read_bytes()[4:8] == b"ftyp"

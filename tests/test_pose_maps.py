@@ -317,6 +317,7 @@ def test_mistakes_of_plans(tmp_path):
     assert code == 2 and "must be absent for a point mass" in err
 
 
+@pytest.mark.thorough
 def test_pictures(tmp_path):
     """Planes of positions, and polar sections of orientations, are drawn whatever the order of the axes."""
     _, out, _ = swept(tmp_path, change=("tilt = [0.6]", "tilt = [0.3, 0.6]"))

@@ -59,6 +59,7 @@ def started():
         process.communicate()
 
 
+@pytest.mark.thorough
 def test_ctrl_c_where_nothing_must_be_finished(started):
     process = started("robots")
     process.send_signal(signal.SIGINT)
