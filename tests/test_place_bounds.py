@@ -141,7 +141,7 @@ def verdict_breaks(count, seed, kind, robot, instants):
 )
 def test_proofs_agree_with_samples(kind):
     """What is proved to be clear is, what is proved to meet does, and nothing else happens."""
-    contradicted, undecided, meet, clear = verdict_breaks(40, 23, kind, ROBOTS["mssm"], 2001)
+    contradicted, undecided, meet, clear = verdict_breaks(32, 23, kind, ROBOTS["mssm"], 4001)
     assert contradicted == 0 and undecided <= 1 and meet > 3 and clear > 5
 
 
