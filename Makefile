@@ -11,7 +11,7 @@ WHEEL := build/wheel
 LOWEST := build/lowest
 BEGIN := tests/test_templates.py tests/test_config.py tests/test_outputs.py tests/test_cell_plans.py tests/test_python.py
 
-.PHONY: demo test soak check bench docs images gallery site wheel lowest clean
+.PHONY: demo test thorough soak check bench docs images gallery site wheel lowest clean
 
 demo: $(STAMP)
 	$(BIN)/cspr table 2.1
@@ -20,7 +20,11 @@ demo: $(STAMP)
 	@echo "Look at results/demo/demo.png; the data are in results/demo/demo.h5."
 
 test: $(TESTS)
-	$(BIN)/python -m pytest -m "not soak" -n 2 --dist loadscope --no-loadscope-reorder
+	$(BIN)/python -m pytest -m "not soak and not thorough" -n 2 --dist loadscope --no-loadscope-reorder
+
+# Longer cases of what the quick tests cover.
+thorough: $(TESTS)
+	$(BIN)/python -m pytest -m "thorough and not soak" -n 2 --dist loadscope --no-loadscope-reorder
 
 soak: $(TESTS)
 	$(BIN)/python -m pytest -m soak
@@ -53,7 +57,7 @@ lowest:
 	$(PYTHON) -m venv $(LOWEST)
 	$(PYTHON) tests/lowest.py > $(LOWEST)/bounds.txt
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check -c $(LOWEST)/bounds.txt --editable '.[test]'
-	$(LOWEST)/bin/python -m pytest -m "not soak" -n 2 -W ignore::DeprecationWarning $(BEGIN)
+	$(LOWEST)/bin/python -m pytest -m "not soak and not thorough" -n 2 -W ignore::DeprecationWarning $(BEGIN)
 
 bench: $(TESTS)
 	$(BIN)/cspr bench

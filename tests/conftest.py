@@ -16,6 +16,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from cspr_jax.arithmetic import batches, elementary
 from cspr_jax.robots import point_mass
+from cspr_jax.runtime import xla
 
 # Passes of Python's collector over the objects of jax take a tenth of the time.
 gc.set_threshold(200_000, 20, 50)
@@ -26,11 +27,7 @@ COMPILED = Path(os.environ.setdefault("CSPR_TESTS_COMPILED", f"{BESIDE}/cspr-tes
 LARGEST = 1_000_000_000  # bytes; beyond that all of it is taken away
 # Most of a test is compiling: these take half of the time for it, and the code is slower. Level 0 would take a third,
 # but moves a verdict. The soak runs with what users run with, and so does what test_xla starts.
-CHEAP = (
-    "--xla_backend_optimization_level=1",
-    "--xla_cpu_use_fusion_emitters=false",
-    "--xla_cpu_parallel_codegen_split_count=1",
-)
+CHEAP = xla.QUICK
 # Most quick tests ask for a handful of cases, and a batch is padded.
 LARGEST_BATCH = 64
 # Compiled code of finished files goes where a process has more than so many bytes.
@@ -109,7 +106,7 @@ def pytest_xdist_make_scheduler(config, log):
 
 def pytest_configure(config):
     """Before jax compiles anything. The soak takes batches and flags of users."""
-    if config.option.markexpr == "not soak":
+    if "not soak" in config.option.markexpr:
         # Workers find them set already. Twice, they would be other keys of compiled code than those of one process.
         given = os.environ.get("XLA_FLAGS", "").split()
         os.environ["XLA_FLAGS"] = " ".join([*(flag for flag in CHEAP if flag not in given), *given])

@@ -188,6 +188,7 @@ def test_labels_mass_and_axes_do_not_matter():
     assert flipped == pytest.approx(wanted, abs=1e-10)
 
 
+@pytest.mark.thorough
 def test_more_cables_never_take_an_acceleration_away():
     rng = np.random.default_rng(11)
     points, places = rng.uniform([-3, -3, 2], [3, 3, 4], (8, 3)), rng.uniform(-2, 1.5, (50, 3))
@@ -263,7 +264,9 @@ def reach_by_samples(robot, place, direction, low, high) -> float:
     return near
 
 
-@pytest.mark.parametrize("limits", ["", "[limits]\ntension_min = 0.5\ntension_max = 60\n"])
+@pytest.mark.parametrize(
+    "limits", [pytest.param("", marks=pytest.mark.thorough), "[limits]\ntension_min = 0.5\ntension_max = 60\n"]
+)
 def test_the_map(tmp_path, limits):
     path = tmp_path / "s.toml"
     path.write_text(SWEEP.replace("mass = 10", "mass = 2") + limits, "utf-8")

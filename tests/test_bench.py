@@ -18,10 +18,9 @@ ROOT = Path(__file__).parent.parent
 with_compiler = pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler")
 
 
-# Beside hand-written kernels, all that is measured without them is measured, too.
 @pytest.mark.parametrize(
     "kernels",
-    [pytest.param(None, marks=pytest.mark.soak), pytest.param(ROOT / "benchmarks", marks=with_compiler)],
+    [None, pytest.param(ROOT / "benchmarks", marks=[with_compiler, pytest.mark.thorough])],
 )
 def test_bench(capsys, small_bench, kernels):
     options = ["--kernels", str(kernels)] if kernels else []

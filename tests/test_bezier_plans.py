@@ -106,6 +106,7 @@ def test_the_least_total(tmp_path):
     assert given["segments"][1]["duration"] == 1.1 and given["total_duration"] > answer["total_duration"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("least", ["each", pytest.param("total", marks=pytest.mark.soak)])
 def test_slow_winches(tmp_path, least):
     """However slow the cables, there is a duration."""
@@ -121,6 +122,7 @@ def test_without_a_feasible_duration_the_nearest_is_shown(tmp_path):
     assert "slack_cable" in segment["verdict"] and segment["margin"] < 0.0
 
 
+@pytest.mark.thorough
 def test_it_joins_other_families(tmp_path):
     """A line ends without acceleration, and so a segment may start behind it; a segment ends with one."""
     body = text([None, None], places=[*PLACES[:2], [0.05, 0.02, -0.8]])

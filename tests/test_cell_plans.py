@@ -58,7 +58,11 @@ def cells_of(result):
 
 
 @pytest.mark.parametrize(
-    "sweep", [*(pytest.param(own, id=name) for name, own in SWEEPS.items()), pytest.param(POSES, id="poses")]
+    "sweep",
+    [
+        *(pytest.param(own, marks=[pytest.mark.thorough] * (name == "lines"), id=name) for name, own in SWEEPS.items()),
+        pytest.param(POSES, marks=pytest.mark.thorough, id="poses"),
+    ],
 )
 def test_the_plan_of_a_cell_has_its_numbers(sweep):
     result = compute({"schema": 1, **sweep})

@@ -145,7 +145,7 @@ def test_hulls(count=2_000):
     np.testing.assert_allclose(np.maximum(found, 0), np.maximum(boxes, 0), rtol=0, atol=EXACT)
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(st.lists(st.floats(-10, 10, width=16), min_size=12, max_size=12))
 def test_properties(numbers):
     """Of any numbers, zeros above all: finite, symmetric, not above the distance of ends, the same for moved ones."""
@@ -273,6 +273,7 @@ def test_float32_gives_the_same_verdicts():
     assert quick.is_open.sum() == 1 and (quick.clearance == exact.clearance).any()
 
 
+@pytest.mark.thorough
 def test_a_room_that_is_turned_and_moved():
     robot, (place, turns) = platform(), random_poses(300, 8)
     body = clearance.attachment_hull(robot)

@@ -66,6 +66,7 @@ def test_python_of_the_first_pages_runs(name, checkout, capsys):
     assert capsys.readouterr().out.strip()
 
 
+@pytest.mark.thorough
 def test_the_page_of_python_runs(checkout, capsys, small_bench):
     """One block after another; a block of text under one is what it prints."""
     page = ROOT / "docs" / "python.md"

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.amplitudes import of_one_shape
 from support.commands import cspr
@@ -131,6 +131,7 @@ def test_mistakes(tmp_path, change, words):
 A_IS_TAU = of_one_shape(named("ideal"))
 
 
+@settings(max_examples=40)
 @given(st.floats(0.05, 6.0), st.floats(0.0, 1.0), st.sampled_from([-1.0, 1.0]), st.floats(-0.95, 0.95))
 def test_closed_forms_of_the_zero_tension_function(r, xi, sigma, v):
     """(1.115) to (1.118) as printed, and the search that knows nothing of them."""

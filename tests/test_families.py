@@ -122,6 +122,7 @@ def assert_continuous(plan) -> None:
                 np.testing.assert_allclose(a, b, atol=1e-9, err_msg=name)
 
 
+@pytest.mark.thorough
 def test_the_example_of_two_families(tmp_path):
     """Its verdicts, and no jump where the families meet."""
     plan = cspr_jax.plan(SWEEPS / "mixed_sequence.toml")

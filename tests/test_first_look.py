@@ -29,6 +29,7 @@ def candidates(robot, rng, count):
     return Candidates(rest, end, np.full(count, Z0), motion, beta_hats)
 
 
+@pytest.mark.thorough
 def test_the_search_is_the_full_search():
     """2,400 trajectories: smallest numbers of arcs, and what passes where each is checked in full."""
     check_search(60, EFFECTIVE)
@@ -62,7 +63,7 @@ def check_search(motions, amplitude):
     assert checker.done["motions"] < 0.2 * motions * BENDS * ARCS and work < 0.25 * brute
 
 
-@pytest.mark.parametrize("kind", [USUAL, FROM_REST])
+@pytest.mark.parametrize("kind", [USUAL, pytest.param(FROM_REST, marks=pytest.mark.thorough)])
 def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     """Instants of every kind; with a float32 that is wrong on purpose, less is refuted but never more."""
     checker, rng = checker_of(kind=kind, batch=64), np.random.default_rng(4)

@@ -60,6 +60,7 @@ def test_other_words_and_other_numbers_are_noticed(runner):
     assert not runner.alike("1 2", "1")
 
 
+@pytest.mark.thorough
 def test_a_notebook_that_prints_something_else_is_named(runner, tmp_path):
     cell = nbformat.v4.new_code_cell("print(2.0)")
     cell.outputs = [nbformat.v4.new_output("stream", name="stdout", text="3.0\n")]

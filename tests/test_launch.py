@@ -102,6 +102,7 @@ def thrown(motion, release):
     raise ValueError(release)
 
 
+@pytest.mark.thorough
 def test_the_least_energy(tmp_path):
     """By hand: of all flights over d the slowest release takes sqrt(2 |d| / g), where a segment can do it."""
     launch = {key: value for key, value in LAUNCH.items() if key != "time"} | {"choose": '"energy"'}
@@ -141,6 +142,7 @@ def test_the_least_energy_and_the_earliest_landing(tmp_path):
     assert feasible.sum() > 200 and (at * time + flight)[feasible].min() > landing["time"] * (1.0 - 1e-6)
 
 
+@pytest.mark.thorough
 def test_a_launch_before_the_last_segment(tmp_path):
     """The motion goes on to another place, with the acceleration with which the launching segment ends."""
     body = text(LAUNCH | {"segment": "1"}, places=PLACES[:2], duration="")
@@ -156,6 +158,7 @@ def test_a_launch_before_the_last_segment(tmp_path):
     assert answer["launch"]["control_points"] == answer["segments"][1]["control_points"] and answer["feasible"]
 
 
+@pytest.mark.thorough
 def test_a_velocity_at_the_target(tmp_path):
     launch = {"segment": "3", "target": "[0.15, 0.05, -1.675]", "velocity": "[0.3, 0.4, -4.2]", "time": "0.45"}
     answer = planned(tmp_path, alone(launch, duration="duration = 1.5\n"))["launch"]
@@ -170,6 +173,7 @@ def test_a_velocity_at_the_target(tmp_path):
     np.testing.assert_allclose(again["launch"]["control_points"], answer["control_points"], atol=1e-8)
 
 
+@pytest.mark.thorough
 def test_the_quintic_of_the_text_is_no_match(tmp_path):
     """(35), (36): without acceleration at its ends no duration is feasible outside the footprint."""
     code, out, err = cspr("plan", "sweeps/launch_baseline.toml")

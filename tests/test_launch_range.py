@@ -196,6 +196,7 @@ def test_bad_arguments(given, words):
         cspr_jax.launch_range(asked.pop("robot"), asked.pop("targets"), **asked)
 
 
+@pytest.mark.thorough
 def test_two_cables_in_a_plane(tmp_path):
     found = mapped(tmp_path / "planar", robot="transition-planar", x=[0.2, 0.9], y=[0.0], z=2.0, start=0.8)
     assert found.data["verdict"].ravel()[0] == 0 and not np.nanmax(np.abs(found.data["release_y"]))

@@ -129,7 +129,7 @@ def test_rest_that_breaks_a_limit_says_which():
             assert least(spools, [1, 20, 7], [15, 28, 3], **limits).verdict[0] == flag
 
 
-@pytest.mark.parametrize("limits", [{}, {"cable_acceleration_max": 5.0}])
+@pytest.mark.parametrize("limits", [pytest.param({}, marks=pytest.mark.thorough), {"cable_acceleration_max": 5.0}])
 def test_a_line_through_a_spool_is_singular(limits):
     spools = [*RECTANGLE, [20, 15, 10]]
     for start, end in (([15, 15, 9], [25, 15, 11]), ([20, 15, 5], [20, 15, 15]), ([20, 15, 5], [20, 15, 10])):

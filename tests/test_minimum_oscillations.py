@@ -40,7 +40,7 @@ def smallest_pull(base, target, z0, n, samples=20_001):
     return balance(base, hub + swing[:, None] * u, bend[:, None] * u).min()
 
 
-@pytest.mark.parametrize("robot", [SPATIAL, PLANAR])
+@pytest.mark.parametrize("robot", [SPATIAL, pytest.param(PLANAR, marks=pytest.mark.thorough)])
 def test_whole_oscillations_against_the_force_balance(robot):
     """The number found is taut, one fewer is not; the envelopes never allow fewer than that."""
     rng = np.random.default_rng(4)

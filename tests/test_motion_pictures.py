@@ -1,7 +1,5 @@
 """Pictures of motions: in space, tensions with their limits, a page, and several motions in one."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
@@ -9,6 +7,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from support.commands import plan
 from test_outputs import panels
 from test_plan import SHORT
+from test_transition_plans import text as transition_text
 
 import cspr_jax
 from cspr_jax.cli import main
@@ -119,7 +118,9 @@ def test_a_wrong_picture_names_those_there_are(motions, capsys):
     assert "absent for a motion but with --quantity acceleration" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+@pytest.mark.parametrize(
+    "ending", [pytest.param("png", marks=pytest.mark.thorough), "svg", pytest.param("pdf", marks=pytest.mark.thorough)]
+)
 def test_the_same_motion_gives_the_same_bytes(motions, tmp_path, capsys, ending):
     files = [tmp_path / f"{k}.{ending}" for k in range(2)]
     for file in files:
@@ -142,8 +143,8 @@ def test_pairs_of_cables_are_named_so():
 
 
 def test_several_motions_of_a_planar_robot_have_no_view_from_above(tmp_path, figures, capsys):
-    file = str(tmp_path / "planar.h5")
-    assert main(["plan", str(Path(__file__).parents[1] / "sweeps" / "planar_lines.toml"), "-o", file]) == 0
+    file = str(tmp_path / "motion.h5")
+    assert plan(tmp_path, transition_text("transition-planar"), "-o", file)[0] == 0
     figure = drawn(figures, file, file)
     assert figure.axes[0].get_ylabel() == "z (m)" and len(figure.axes) == 3
     assert len(figure.legends[0].get_texts()) == 2

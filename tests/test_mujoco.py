@@ -75,7 +75,7 @@ def asymmetrical(_):
     return scene
 
 
-@pytest.fixture(scope="module", params=[planned, asymmetrical])
+@pytest.fixture(scope="module", params=[pytest.param(planned, marks=pytest.mark.thorough), asymmetrical])
 def scene(request, tmp_path_factory):
     return request.param(tmp_path_factory.mktemp("plan"))
 

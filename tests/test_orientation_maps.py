@@ -18,6 +18,7 @@ from cspr_jax.store.result import open_result
 NEAR = ("x = 1.5b", "y = 1.5b")
 
 
+@pytest.mark.thorough
 def test_tables_of_orientations(monkeypatch):
     """Cells of two places, with a coarse step and few arcs; options that do not belong are refused."""
     monkeypatch.setattr(chapter_3, "MAX_ARCS", 8)

@@ -127,6 +127,7 @@ def test_definitions_agree():
             assert a == pytest.approx(b, rel=0.06), found
 
 
+@pytest.mark.thorough
 def test_no_way_leads_through_touching_cables():
     """Steps of pi / 12 and pi / 24 have orientations where cables just touch, with gaps of rounding errors."""
     robot, there = ours(MSSM), place(1.5, 0.0)
@@ -195,6 +196,7 @@ def test_symmetries_of_robots():
     np.testing.assert_allclose(folded(found, azimuths), np.radians(10.0), atol=1e-9)
 
 
+@pytest.mark.thorough
 def test_orientations_that_a_mirror_joins():
     """Each stands for itself or for its mirror image, half of them for all; what is attained is the same."""
     robot, there, mirror = ours(MSSM), place(1.5, math.pi / 2.0), np.diag([-1.0, 1.0, 1.0])
@@ -219,6 +221,7 @@ def test_orientations_that_a_mirror_joins():
     np.testing.assert_allclose(once.margin[once.arcs > 0], twice.margin[once.arcs > 0], atol=1e-6)
 
 
+@pytest.mark.thorough
 def test_a_dip_beside_a_singularity():
     """A tension that is negative for a thousandth of the motion, near a nearly singular end: four arcs are too few."""
     there, angles = place(1.5, math.pi / 2.0), np.array([[0.67737013, 0.40312747, -1.6689711]])

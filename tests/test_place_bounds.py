@@ -92,13 +92,16 @@ def block_breaks(count, seed, kind, robot):
     return broken, float((found.clear > 0.0).mean())
 
 
-@pytest.mark.parametrize("kind", [USUAL, FROM_REST], ids=["between", "from rest"])
+@pytest.mark.parametrize(
+    "kind", [USUAL, pytest.param(FROM_REST, marks=pytest.mark.thorough)], ids=["between", "from rest"]
+)
 def test_bounds_on_blocks_hold(kind):
     """Distances, depths and lengths between the instants; most blocks are seen to be clear."""
     broken, clear = block_breaks(64, 21, kind, ROBOTS["mssm"])
     assert not broken and clear > 0.3
 
 
+@pytest.mark.thorough
 def test_bounds_of_depth_hold_below_steep_spools():
     """Depth is along the vertical, to a plane whose normal is longer than 1 where its vertical part is 1."""
     assert not block_breaks(192, 21, FROM_REST, STEEP)[0]
@@ -141,11 +144,13 @@ def verdict_breaks(count, seed, kind, robot, instants):
     return contradicted, int(undecided.sum()), int((proof.met | proof.hit).sum()), int(proof.is_proved.sum())
 
 
-@pytest.mark.parametrize("kind", [USUAL, FROM_REST], ids=["between", "from rest"])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(USUAL, marks=pytest.mark.thorough), FROM_REST], ids=["between", "from rest"]
+)
 def test_proofs_agree_with_samples(kind):
     """What is proved to be clear is, what is proved to meet does, and nothing else happens."""
-    contradicted, undecided, meet, clear = verdict_breaks(48, 23, kind, ROBOTS["mssm"], 4001)
-    assert contradicted == 0 and undecided <= 1 and meet > 3 and clear > 10
+    contradicted, undecided, meet, clear = verdict_breaks(32, 23, kind, ROBOTS["mssm"], 4001)
+    assert contradicted == 0 and undecided <= 1 and meet > 3 and clear > 5
 
 
 @pytest.mark.soak

@@ -143,6 +143,18 @@ def test_z0_that_is_chosen(tmp_path, free):
     assert found["fastest"]["total_duration"] < 0.99 * found["mean"]["total_duration"]
 
 
+BEST = ONE.replace('"quintic"', '{ name = "effective", epsilon = "best" }')
+
+
+def test_a_better_epsilon_makes_a_plan_shorter(tmp_path, monkeypatch):
+    durations = []
+    for candidates in ((0.2, 0.05), (0.2, 0.1, 0.05)):
+        monkeypatch.setattr(choices, "EPSILONS", np.array(candidates))
+        durations.append(planned(tmp_path, BEST)["segments"][0]["duration"])
+    assert durations[1] < durations[0] - 1.0
+
+
+@pytest.mark.thorough
 def test_the_best_epsilon(tmp_path, monkeypatch):
     """The shortest plan of all epsilons, with the largest margin among equals; nothing is compiled for one of them."""
     plain, compiled = ONE.replace('"quintic"', '{ name = "effective", epsilon = EPS }'), []

@@ -17,8 +17,8 @@ ROOT = Path(__file__).parent.parent
 
 FAULTS = {
     "a sign": (
-        "    return -jnp.sign(area) * (adjugate @ relative_acceleration(robot, acceleration))",
-        "    return jnp.sign(area) * (adjugate @ relative_acceleration(robot, acceleration))",
+        "per_length = adjugate @ relative_acceleration(robot, acceleration) / determinant",
+        "per_length = -adjugate @ relative_acceleration(robot, acceleration) / determinant",
         "test_tensions.py",
     ),
     "an index": (
@@ -65,7 +65,7 @@ FAULTS = {
     "spools that are displaced half as far": (
         "multiple * float(given.spool_positions),",
         "0.5 * multiple * float(given.spool_positions),",
-        "test_uncertainty.py",
+        "test_uncertainty_of_point_masses.py",
     ),
     "tolerances whose functional is not corrected": (
         "more, last = (moved + shifted) * (1.0 + SPARE)",
@@ -94,7 +94,7 @@ def planted(package: Path, old: str, new: str) -> None:
 
 def outcome(folder: Path, *names: str) -> int:
     """Exit status of quick tests of a copy, which comes first on the path: 0 all pass, 1 some fail."""
-    command = [sys.executable, "-m", "pytest", "-m", "not soak", "-x", "-p", "no:cacheprovider"]
+    command = [sys.executable, "-m", "pytest", "-m", "not soak and not thorough", "-x", "-p", "no:cacheprovider"]
     here = os.environ | {"PYTHONPATH": str(folder)}
     here.pop("XLA_FLAGS", None)
     done = subprocess.run([*command, *(f"tests/{name}" for name in names)], cwd=folder, env=here, capture_output=True)

@@ -309,7 +309,7 @@ KINDS = [USUAL, STANDARD, Kind(plain=True), FROM_REST]
     ("robot", "name", "kind"),
     [
         (MSSM, "effective-c3", USUAL),
-        (MSSM, "effective-c3", OTHERS),
+        pytest.param(MSSM, "effective-c3", OTHERS, marks=pytest.mark.thorough),
         (general(2), "effective-c3", FROM_REST),
         *(soak(MSSM, "quintic", kind) for kind in KINDS),
         *(soak(general(2), "effective-c3", kind) for kind in KINDS[:3]),

@@ -253,6 +253,7 @@ def test_beats_in_plans_and_maps(tmp_path, beat):
     assert code == 0 and (open_result(Path(out.split()[-1])).data["arcs"] > 0).any(), err
 
 
+@pytest.mark.thorough
 def test_chosen_depth_and_epsilon(tmp_path, monkeypatch):
     """The fastest z0 of few is no slower than others, nor the best epsilon of few; both are feasible."""
     monkeypatch.setattr(choices, "DEPTHS", 40)
@@ -316,6 +317,7 @@ def test_mistakes_of_plans(tmp_path):
     assert code == 2 and "must be absent for a point mass" in err
 
 
+@pytest.mark.thorough
 def test_pictures(tmp_path):
     """Planes of positions, and polar sections of orientations, are drawn whatever the order of the axes."""
     _, out, _ = swept(tmp_path, change=("tilt = [0.6]", "tilt = [0.3, 0.6]"))

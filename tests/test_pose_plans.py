@@ -214,6 +214,7 @@ def test_symmetries_of_the_mssm():
         np.testing.assert_allclose(other.gap[regular], plain.gap[regular], atol=1e-7)
 
 
+@pytest.mark.thorough
 def test_limits_of_a_platform():
     """Each limit, set to just beyond and just within what a motion asks for, the others loose but there."""
     rng = np.random.default_rng(14)
@@ -314,6 +315,7 @@ def cells_of_table_3_2():
     return json.loads(out)["cells"]
 
 
+@pytest.mark.thorough
 def test_table_3_2(monkeypatch):
     """Every printed row, with the function that has no jumps; pose 2 as printed has none."""
     monkeypatch.setattr(table_3_2, "_AMPLITUDES", {"effective-c3 0.1": {"name": "effective-c3", "epsilon": 0.1}})
@@ -387,6 +389,7 @@ def test_the_motion(tmp_path):
         assert table[name][399] == pytest.approx(table[name][400], abs=1e-8), name
 
 
+@pytest.mark.thorough
 def test_margins_beside_samples(tmp_path):
     """Of a segment from Python: its samples do not lie below the refined margin, and come near it."""
     (tmp_path / "plan.toml").write_text(SHORT)

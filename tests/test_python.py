@@ -113,6 +113,7 @@ def test_rest_is_recognised_by_meaning():
     assert not np.array_equal(beside.duration, rest.duration)
 
 
+@pytest.mark.thorough
 def test_a_loaded_robot_keeps_its_limits(tmp_path, capsys):
     """A target that the file's largest tension forbids is forbidden in Python too; limits that are given go first."""
     robot, target = cspr_jax.load_robot("laval-large"), [[6.0, 2.0, 5.5]]

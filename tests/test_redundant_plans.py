@@ -239,6 +239,7 @@ def by_rule(example, rule, high=HIGH):
         return motion_files.rows(dataclasses.replace(example, keys=keys, problem=problem))
 
 
+@pytest.mark.thorough
 def test_closed_form_is_the_nearest_to_the_middles(robot, example):
     """Another rule: the projection of the middles; where that leaves the limits, those of least norm."""
     high, is_within = 700.0, []

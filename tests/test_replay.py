@@ -67,7 +67,9 @@ def checked(path, **choices):
     return plan, found
 
 
-@pytest.mark.parametrize("name", ["docs/examples/hall_plan.toml", "sweeps/planar_lines.toml"])
+@pytest.mark.parametrize(
+    "name", ["docs/examples/hall_plan.toml", pytest.param("sweeps/planar_lines.toml", marks=pytest.mark.thorough)]
+)
 def test_plans_in_mujoco(name, tmp_path):
     """A point mass, z up, and one in a plane on redundant cables, z down; platforms are in test_mujoco."""
     plan, found = checked(ROOT / name, step=0.002)
@@ -88,6 +90,7 @@ def test_plans_in_mujoco(name, tmp_path):
     assert (model.tendon_width > 0).all() and model.nbody == 2 and mujoco.get_mjcb_control() is None
 
 
+@pytest.mark.thorough
 def test_another_robot_is_seen(folder):
     """A mass, or a place of a spool, that is not the plan's."""
     with double_precision():

@@ -49,7 +49,7 @@ def sweep(tmp_path, monkeypatch):
     sys.modules.pop("spool_distances")
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.thorough)])
 def test_a_kind_of_map_from_file_to_picture(sweep, tmp_path, workers):
     code, out, err = cspr("run", sweep, "-o", tmp_path / "run", "--workers", workers)
     assert (code, err) == (0, "")

@@ -72,6 +72,7 @@ def test_poses_are_those_of_a_plan():
     assert plan.answers.det_margin[0] == pytest.approx(found.det_margin[i], rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_z_up_and_far_away():
     """The same robot with z up, a hundred metres off: the same answers, and motions in its own axes."""
     robot, signs, offset = cspr_jax.load_robot("laval-mssm"), np.array([1.0, -1.0, -1.0]), np.array([100.0, -30.0, 5.0])

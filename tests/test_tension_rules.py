@@ -11,7 +11,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.robots.tension_lanes import least_norms
 from cspr_jax.robots.tension_rules import RULES, distributions
 
-SHAPES = [(2, 4), (3, 5), (6, 8)]
+SHAPES = [(2, 4), pytest.param(3, 5, marks=pytest.mark.thorough), (6, 8)]
 COUNT = 48  # poses of a shape: one batch
 LOW, HIGH = 2.0, 40.0
 
@@ -74,6 +74,7 @@ def test_closed_forms(dof, count):
         assert found.residual.max() < 1e-12
 
 
+@pytest.mark.thorough
 def test_what_closed_forms_miss():
     """Of feasible poses the closed form misses most and the improved one few; none of what they find is false."""
     number = 400
@@ -91,8 +92,13 @@ def test_what_closed_forms_miss():
     assert improved.is_within.sum() > 0.97 * exact.is_within.sum()
 
 
-@pytest.mark.parametrize("dof", [2, 6])
-@pytest.mark.parametrize("exponent", [1.5, 2.0, 4.0, 12.0])
+@pytest.mark.parametrize(
+    ("exponent", "dof"),
+    [
+        *((exponent, 2) for exponent in (1.5, 2.0, 4.0, 12.0)),
+        *(pytest.param(exponent, 6, marks=pytest.mark.thorough) for exponent in (1.5, 2.0, 4.0, 12.0)),
+    ],
+)
 def test_p_norms(dof, exponent):
     """Against a minimiser that knows nothing of barriers, and where no step along the kernel makes it less."""
     count = dof + 2
@@ -139,6 +145,7 @@ def test_the_two_norm_about_zero_is_the_least_norm():
     np.testing.assert_allclose(found.tensions, exact.tensions, rtol=0, atol=1e-6 * np.abs(exact.tensions).max())
 
 
+@pytest.mark.thorough
 def test_a_large_p_is_nearly_the_largest_distance():
     """p to infinity: the least largest distance from the reference, a linear program."""
     matrices, wrenches = poses(3, 5, seed=6)
@@ -157,7 +164,10 @@ def test_a_large_p_is_nearly_the_largest_distance():
         assert answer.x[-1] - 1e-6 <= largest <= answer.x[-1] * 5.0 ** (1.0 / 60.0) + 1e-6
 
 
-@pytest.mark.parametrize(("dof", "count"), [(6, 8), pytest.param(6, 7, marks=pytest.mark.soak), (2, 4), (3, 4)])
+@pytest.mark.parametrize(
+    ("dof", "count"),
+    [(6, 8), pytest.param(6, 7, marks=pytest.mark.soak), (2, 4), pytest.param(3, 4, marks=pytest.mark.thorough)],
+)
 def test_lanes_find_the_same(dof, count):
     """The fast form beside the readable one: bounded cables, unbounded ones, one of both kinds, a narrow range."""
     matrices, wrenches = poses(dof, count, seed=7)
@@ -192,13 +202,13 @@ def test_lanes_leave_singular_poses_open():
 @given(st.integers(0, 2**32 - 1), st.sampled_from(list(RULES)), st.floats(0.25, 4.0))
 def test_properties(seed, rule, factor):
     """In any units and any order of cables the same tensions; within limits, they are, and give the wrench."""
-    matrices, wrenches = poses(3, 5, seed=seed, number=COUNT)
+    matrices, wrenches = poses(2, 4, seed=seed)
     found = distributions(matrices, wrenches, LOW, HIGH, rule=rule)
     off = np.einsum("nij,nj->ni", matrices, found.tensions) - wrenches
     assert np.abs(off).max() < 1e-10 * np.abs(found.tensions).max()
     kept = found.tensions[found.is_within]
     assert (kept >= LOW - 1e-7).all() and (kept <= HIGH + 1e-7).all()
-    order = np.random.default_rng(seed).permutation(5)
+    order = np.random.default_rng(seed).permutation(4)
     turned = distributions(matrices[:, :, order], factor * wrenches, factor * LOW, factor * HIGH, rule=rule)
     assert np.array_equal(turned.is_within, found.is_within)
     size = np.abs(found.tensions).max(1, keepdims=True)

@@ -42,6 +42,7 @@ def test_the_plan_of_the_text(tmp_path):
         assert 0.0 < segment["margin_bound"] <= segment["margin"] < 1e-6
 
 
+@pytest.mark.thorough
 def test_a_plan_of_several_lines_and_its_rows(tmp_path):
     text = PLAN + '[[pose]]\nposition = [40.0, 4.0, 12.0]\nfamily = "quintic"\n[[pose]]\nposition = [9.0, 9.0, 9.0]\n'
     path = tmp_path / "motion.csv"
@@ -276,6 +277,7 @@ def test_bad_arguments(given, words):
         cspr_jax.least_time(cspr_jax.load_robot("laval-mssm"), [[1, 1, 1]], start=[2, 2, 2])
 
 
+@pytest.mark.thorough
 def test_what_a_reviewer_broke(tmp_path):
     """Spools as places, limits of the robot itself, floors of tilted planes, ends that are one place, fastest z0."""
     robot = cspr_jax.load_robot("boralugoda-rectangle")

@@ -246,6 +246,7 @@ def test_beyond_its_reach_no_number_of_oscillations_will_do():
                 assert (c**2 + s**2).max() > 1.0
 
 
+@pytest.mark.thorough
 def test_the_best_epsilon():
     """A smaller one as targets are farther; no epsilon of a scan needs less."""
     weights = [jnp.array([w, -w, 0.0]) for w in (2.0, 5.0 * math.sqrt(3.0), 40.0)]

@@ -106,6 +106,7 @@ def test_there_swings_and_back(tmp_path, robot, name):
         np.testing.assert_allclose(motion["tension"][end], motion["tension"][end + 1], atol=1e-9)
 
 
+@pytest.mark.thorough
 def test_a_swing_alone_is_not_tried_with_fewer(tmp_path):
     """Without `arcs` a swing is one oscillation; a fixed number stays, and too small a one is refuted."""
     free = planned(tmp_path, text().replace("arcs = 4\n", ""))
@@ -116,6 +117,7 @@ def test_a_swing_alone_is_not_tried_with_fewer(tmp_path):
     assert "slack_cable" in few["segments"][0]["verdict"]
 
 
+@pytest.mark.thorough
 def test_inclinations(tmp_path):
     """z0 follows from (1.31); the best inclination needs no more than any other, and its sign is against w_C."""
     target = [0.0, 1.0, 2.0]

@@ -52,8 +52,8 @@ MANY = [(robot, kind) for robot in ROBOTS for kind in (FROM_REST, BETWEEN)]
 @pytest.mark.parametrize(
     ("name", "kind", "count", "robots"),
     [
-        ("mssm", FROM_REST, 30, 2),
-        ("general", BETWEEN, 100, 2),
+        ("mssm", FROM_REST, 20, 2),
+        pytest.param("general", BETWEEN, 100, 2, marks=pytest.mark.thorough),
         # Hardly any motion between random poses is feasible.
         *(pytest.param(*own, 1000 if own[1].from_rest else 4000, 30, marks=SOAK) for own in MANY),
     ],
@@ -86,7 +86,7 @@ def test_no_robot_within_a_proved_multiple_of_the_uncertainty_fails(name, kind, 
 
 def test_a_robot_that_refutes_a_multiple_fails_in_the_oracle_too():
     robot, limits = ROBOTS["mssm"], Limits(uncertainty=BALLS)
-    drawn, segments, arcs = feasible_motions("mssm", FROM_REST, 30, limits)
+    drawn, segments, arcs = feasible_motions("mssm", FROM_REST, 20, limits)
     problem = problem_of(robot, limits)
     robustness = Robustness(problem, FROM_REST, batch=64, count_instants=lambda _: None)
     refuted, fails = robustness.tolerated(segments, arcs).refuted, []
@@ -115,8 +115,17 @@ def test_a_robot_that_refutes_a_multiple_fails_in_the_oracle_too():
     assert np.mean(fails) > 0.5
 
 
-@pytest.mark.parametrize(("spools", "centre"), [(0.004, 0.0), (0.0, 0.006), (0.004, 0.006)])
-@pytest.mark.parametrize(("name", "kind"), [("mssm", FROM_REST), ("general", BETWEEN)])
+@pytest.mark.parametrize(
+    ("spools", "centre"),
+    [
+        pytest.param(0.004, 0.0, marks=pytest.mark.thorough),
+        pytest.param(0.0, 0.006, marks=pytest.mark.thorough),
+        (0.004, 0.006),
+    ],
+)
+@pytest.mark.parametrize(
+    ("name", "kind"), [("mssm", FROM_REST), pytest.param("general", BETWEEN, marks=pytest.mark.thorough)]
+)
 def test_no_robot_deviates_more_than_is_bounded(name, kind, spools, centre):
     """At random instants of blocks, feasible motions or not; and the bounds are not far off."""
     robot, rng = ROBOTS[name], np.random.default_rng(4)
@@ -174,7 +183,7 @@ def test_no_robot_deviates_more_than_is_bounded(name, kind, spools, centre):
 
 def test_verdicts_are_those_of_the_multiples():
     limits = Limits(uncertainty=BALLS)
-    _, segments, arcs = feasible_motions("mssm", FROM_REST, 40, limits)
+    _, segments, arcs = feasible_motions("mssm", FROM_REST, 20, limits)
     robustness = Robustness(problem_of(ROBOTS["mssm"], limits), FROM_REST, batch=64, count_instants=lambda _: None)
     whole, short = robustness.tolerated(segments, arcs), robustness.tolerated(segments, arcs, whole=False)
     assert ((short.proved >= 1.0) | (whole.proved < 1.001)).all()

@@ -149,6 +149,7 @@ tilt_torsion = [0.3, 0.3, 0.1]
 """
 
 
+@pytest.mark.thorough
 def test_a_plan_of_poses_says_what_it_stands(tmp_path, capsys):
     file = tmp_path / "plan.toml"
     file.write_text(POSES, "utf-8")

@@ -190,13 +190,15 @@ def test_cells_near_meeting_cables_lengths_and_floors(tmp_path):
         side, x, z = file["cell_side"][...], file["x"][...], file["z"][...]
     robot, rng = cspr_jax.load_robot("kntu-planar"), np.random.default_rng(0)
     half = np.array([0.5 * (x[1] - x[0]), 0.0, 0.5 * (z[1] - z[0])])
-    for (i, _, k), value in np.ndenumerate(side):
-        tried = np.array([x[i], 0.0, z[k]]) + half * rng.uniform(-1.0, 1.0, (20, 3))
-        tried = np.r_[tried, [[x[i], 0.0, z[k]] + half * np.array([a, 0.0, b]) for a in (-1, 1) for b in (-1, 1)]]
-        rays = tried[:, None] + np.asarray(robot.platform_points) - np.asarray(robot.base_points)
-        is_short = (np.linalg.norm(rays, axis=2) <= 1.9).all(1)
-        inside = (cspr_jax.workspace(robot, tried).verdict == 0) & is_short & (tried[:, 2] >= -0.31)
-        assert value == 0 or (inside.all() if value == 1 else not inside.any())
+    tried = np.array([[x[i], 0.0, z[k]] for i, _, k in np.ndindex(side.shape)])[:, None]
+    corners = np.array([[a, 0.0, b] for a in (-1, 1) for b in (-1, 1)])
+    ways = np.concatenate([rng.uniform(-1.0, 1.0, (side.size, 20, 3)), np.tile(corners, (side.size, 1, 1))], axis=1)
+    tried = (tried + half * ways).reshape(-1, 3)
+    rays = tried[:, None] + np.asarray(robot.platform_points) - np.asarray(robot.base_points)
+    is_short = (np.linalg.norm(rays, axis=2) <= 1.9).all(1)
+    inside = (cspr_jax.workspace(robot, tried).verdict == 0) & is_short & (tried[:, 2] >= -0.31)
+    for value, own in zip(side.ravel(), inside.reshape(side.size, -1), strict=True):
+        assert value == 0 or (own.all() if value == 1 else not own.any())
     assert set(np.unique(side)) == {0, 1, 2}
 
 

@@ -179,7 +179,7 @@ def distances(places, shape, base=BASE, obstacles=(0, 1, 2)):
         ("up", "box", KINDS),
         ("down", "box", KINDS),
         ("down", "none", KINDS),
-        ("down", "hull", ()),
+        pytest.param("down", "hull", (), marks=pytest.mark.thorough),
         pytest.param("up", "hull", KINDS, marks=pytest.mark.soak),
     ],
 )
@@ -373,6 +373,7 @@ def test_sets_of_orientations_among_obstacles(tmp_path):
     assert {*better.ravel()} == {0, 1} and len(np.unique(data["nearest_bodies"])) >= 2
 
 
+@pytest.mark.thorough
 def test_results_with_obstacles_are_read_and_drawn(tmp_path):
     """Their settings hold tables in lists; words and reasons have colours."""
     data = swept(tmp_path, file_of("down", "none"))

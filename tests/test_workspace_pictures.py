@@ -330,6 +330,7 @@ def test_what_is_asked_is_said():
         assert text in cspr_jax.plot(given, solid=True).get_suptitle()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
 def test_the_same_data_give_the_same_bytes(tmp_path, ending):
     for name, given in (("solid", ball()), ("compared", list(SHAPES.values()))):

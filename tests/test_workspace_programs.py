@@ -18,7 +18,7 @@ REACH = {
     "kntu-planar": ([1.3, 0.0, 1.2], [0.0, 0.0, 0.0], 0.8),
     "four cables": ([2.5, 1.5, 1.5], [0.0, 0.0, 1.6], 0.0),
 }
-SOAK, QUICK = 20_000, 1_000
+SOAK, QUICK = 20_000, 400
 
 
 def robot_of(name):
@@ -68,8 +68,8 @@ def compare(name, count, **limits):
     return found
 
 
-@pytest.mark.parametrize("name", ["four cables", "kntu-planar"])
-def test_a_thousand_poses(name):
+@pytest.mark.parametrize("name", ["four cables", pytest.param("kntu-planar", marks=pytest.mark.thorough)])
+def test_some_poses(name):
     compare(name, QUICK)
 
 

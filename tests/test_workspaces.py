@@ -72,7 +72,7 @@ def compare(drawn, rng, count, condition):
     return inside, count
 
 
-QUICK = {("static", False), ("wrench-closure", False)}
+QUICK = {("static", False): pytest.mark.thorough, ("wrench-closure", False): ()}
 COUNTS = {"1T": (1, 2, 3), "2T": (3, 5), "3T": (3, 4, 6), "1R2T": (3, 4, 5), "3R": (4, 5), "2R3T": (6, 7)}
 COUNTS["3R3T"] = (6, 7, 8)
 # Each robot is compiled once more; test_cogiro has eight cables in space.
@@ -104,7 +104,7 @@ def test_margins_are_those_of_linear_programs(pattern, n, condition):
 @pytest.mark.parametrize(
     ("condition", "in_space"),
     [
-        pytest.param(condition, in_space, marks=() if (condition, in_space) in QUICK else pytest.mark.soak)
+        pytest.param(condition, in_space, marks=QUICK.get((condition, in_space), pytest.mark.soak))
         for condition in ("static", "wrench-feasible", "wrench-closure")
         for in_space in (False, True)
     ],

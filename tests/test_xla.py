@@ -107,6 +107,7 @@ def test_the_library_sets_nothing(tmp_path):
     assert told(tmp_path, code).strip() == "None" and not list(tmp_path.iterdir())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "words", [pytest.param(["run", "sweeps/demo.toml", "-o", "{}"], marks=pytest.mark.soak), ["table", "1.1"]]
 )
@@ -172,8 +173,14 @@ def test_a_disk_that_takes_no_entry_is_told_once(tmp_path):
     assert lines_told(tmp_path, KEEP.format(before="")) == (first, [])
 
 
-def test_python_users_keep_compiled_code(tmp_path):
-    """Before and after jax was imported and has compiled; another cache that is set stays."""
+LATE = "import jax; jax.jit(lambda x: x + 1.0)(1.0)"
+
+
+@pytest.mark.parametrize(
+    "first", [pytest.param("", marks=pytest.mark.thorough, id="before"), pytest.param(LATE, id="after")]
+)
+def test_python_users_keep_compiled_code(tmp_path, first):
+    """Before and after jax was imported and has compiled."""
     code = """
 {first}
 import cspr_jax
@@ -182,14 +189,21 @@ import jax, jax.numpy as jnp
 jax.jit(lambda x: jnp.sin(x @ x.T).sum())(jnp.ones((20, 20)))
 print(own is not None and jax.config.jax_compilation_cache_dir == str(own))
 """
-    late = "import jax; jax.jit(lambda x: x + 1.0)(1.0)"
-    for name, first in (("before", ""), ("after", late)):
-        place = str(with_known_flags(tmp_path / name))
-        assert told("", code.format(first=first, place=place), **EVERY) == "True\n"
-        (whole,) = (tmp_path / name).glob("*/whole")
-        assert list(whole.iterdir())
-    theirs = f"import jax; jax.config.update('jax_compilation_cache_dir', {str(tmp_path / 'theirs')!r})"
-    assert told("", code.format(first=theirs, place=str(tmp_path / "ours"))) == "False\n"
+    place = with_known_flags(tmp_path / "mine")
+    assert told("", code.format(first=first, place=str(place)), **EVERY) == "True\n"
+    (whole,) = place.glob("*/whole")
+    assert list(whole.iterdir())
+
+
+def test_another_cache_of_python_users_stays(tmp_path):
+    theirs, ours = str(tmp_path / "theirs"), str(tmp_path / "ours")
+    code = f"""
+import jax
+jax.config.update("jax_compilation_cache_dir", {theirs!r})
+import cspr_jax
+print(cspr_jax.keep_compiled_code({ours!r}), jax.config.jax_compilation_cache_dir)
+"""
+    assert told("", code) == f"None {theirs}\n"
 
 
 @pytest.mark.soak

@@ -93,6 +93,7 @@ def crash_twice(job, tmp_path, calls_between, step):
     return pairs
 
 
+@pytest.mark.thorough
 def test_crashes_while_going_on(short_job, tmp_path):
     assert crash_twice(short_job, tmp_path, 7, 19) > 5
 

@@ -292,8 +292,8 @@ def fuzz(folder, examples):
 
 
 def test_fuzzed_files(tmp_path):
-    outcomes = fuzz(tmp_path, 250)
-    assert outcomes["refused"] > 120 and outcomes["read"] > 5
+    outcomes = fuzz(tmp_path, 120)
+    assert outcomes["refused"] > 60 and outcomes["read"] > 0
 
 
 @pytest.mark.soak

@@ -328,6 +328,7 @@ def worst(hostile, tmp_path, commands_of):
     assert all(peak < 500_000 for peak in peaks)
 
 
+@pytest.mark.thorough
 def test_the_worst_take_little_time_and_memory(hostile, tmp_path):
     """Each is drawn or verified; test_hostile_files_are_refused does both with each, but not as a command."""
     worst(hostile, tmp_path, lambda i: [("plot", "verify")[i % 2]])
@@ -400,15 +401,20 @@ def test_a_process_that_fails_says_so(tmp_path, monkeypatch):
         cspr_jax.open_result(path)
 
 
-def test_the_limits_hold(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        pytest.param("while True: pass", "finds no end", marks=pytest.mark.thorough),
+        ("bytearray(1 << 32)", "more memory"),
+    ],
+)
+def test_the_limits_hold(tmp_path, monkeypatch, code, words):
     """Of time and of memory, were the checks of what a file holds to miss something."""
     path = forged(tmp_path / "map.h5", a_map)
-    for code, words in (("while True: pass", "finds no end"), ("bytearray(1 << 32)", "more memory")):
-        body = f"import cspr_jax.store.guard as g\ndef datasets(*a):\n    {code}\ng.datasets = datasets\n"
-        with monkeypatch.context() as patch:
-            patch.setattr(isolated, "_CODE", isolated._CODE.replace("serve()", body + "serve()"))
-            with pytest.raises(StoreError, match=words):
-                cspr_jax.open_result(path)
+    body = f"import cspr_jax.store.guard as g\ndef datasets(*a):\n    {code}\ng.datasets = datasets\n"
+    monkeypatch.setattr(isolated, "_CODE", isolated._CODE.replace("serve()", body + "serve()"))
+    with pytest.raises(StoreError, match=words):
+        cspr_jax.open_result(path)
 
 
 def test_motions_of_versions_with_narrower_verdicts(tmp_path):

@@ -194,7 +194,7 @@ def check(tmp_path_factory, examples, steps):
 
 
 def test_any_sequence(tmp_path_factory):
-    check(tmp_path_factory, 8, 15)
+    check(tmp_path_factory, 6, 12)
 
 
 @pytest.mark.soak

@@ -59,6 +59,7 @@ def started():
         process.communicate()
 
 
+@pytest.mark.thorough
 def test_ctrl_c_where_nothing_must_be_finished(started):
     process = started("robots")
     process.send_signal(signal.SIGINT)
@@ -66,7 +67,9 @@ def test_ctrl_c_where_nothing_must_be_finished(started):
     assert process.wait(timeout=5) == 130 and process.stderr.read() == ""
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.thorough)]
+)
 def test_a_run_says_at_once_that_it_finishes_its_tile(started, tmp_path, number, code):
     process = started("run", sweep_of(tmp_path, tiles=4).file, "-o", tmp_path / "run")
     process.send_signal(number)
