@@ -86,6 +86,7 @@ def test_the_least_duration_under_limits(tmp_path, limit):
     assert faster["segments"][0]["verdict"] != "feasible"
 
 
+@pytest.mark.thorough
 def test_the_least_total(tmp_path):
     """No sequence near it is shorter and taut; a duration that is given stays."""
     answer = planned(tmp_path, text([None] * 4, more='least = "total"\n'))

@@ -235,6 +235,7 @@ def expected(robot, body, place, turns, diameters, leave):
     return np.array(found, float)
 
 
+@pytest.mark.thorough
 def test_scenes():
     """All at once: which two bodies are the nearest, and of how far; a wrong index or a sign shows here."""
     robot, (place, turns) = platform(), random_poses(2_500, 6)

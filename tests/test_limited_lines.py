@@ -74,7 +74,9 @@ def names_at(answers):
     return answers.details(0)["active"]
 
 
-@pytest.mark.parametrize("in_plane", [pytest.param(True, marks=pytest.mark.soak), False])
+@pytest.mark.parametrize(
+    "in_plane", [pytest.param(True, marks=pytest.mark.soak), pytest.param(False, marks=pytest.mark.thorough)]
+)
 def test_durations_are_those_of_brute_force(in_plane):
     compared, bound = check(1, 3, in_plane=in_plane, every=True)
     assert compared == bound == 1

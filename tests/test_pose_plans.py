@@ -350,6 +350,7 @@ def check_table_3_2(cells):
     assert found[-7:] == [8, 9, 9, 12, 9, 7, 4]
 
 
+@pytest.mark.thorough
 def test_a_free_beta_hat_needs_no_more_arcs(tmp_path):
     free = "\n".join(line for line in SHORT.splitlines() if not line.startswith("beta_hat"))
     found = [json.loads(plan(tmp_path, text, "--json")[1]) for text in (SHORT, free)]

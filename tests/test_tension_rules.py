@@ -132,6 +132,7 @@ def test_p_norms(dof, exponent):
             np.testing.assert_allclose(found.tensions[i], answer.x, rtol=0, atol=1e-3 * HIGH)
 
 
+@pytest.mark.thorough
 def test_the_two_norm_about_zero_is_the_least_norm():
     matrices, wrenches = poses(6, 8, seed=5)
     exact = distributions(matrices, wrenches, LOW, HIGH)

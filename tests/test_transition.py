@@ -273,6 +273,7 @@ def test_table_1_1(capsys):
             )
 
 
+@pytest.mark.thorough
 def test_table_1_2(capsys):
     """Every printed cell to its digits, but for those that the errata explain."""
     cells = cells_of(capsys, "1.2")
