@@ -12,7 +12,7 @@ from cspr_jax.problem import motion_kind
 from cspr_jax.robots.symmetries import NONE, folded, symmetries
 from cspr_jax.schema.quantities import REFUSALS
 from cspr_jax.schema.verdicts import FLAGS, NO_REASON, SENTENCES, Verdict
-from cspr_jax.search.accessible import Accessible, accessible
+from cspr_jax.search.accessible import Accessible, accessible_sets
 from cspr_jax.search.attainable import VALUES, attainable
 from cspr_jax.search.platform_answers import PoseAnswers
 
@@ -50,7 +50,7 @@ class OrientationWorkspaceMap(PlatformMap):
 
     def _sets(self, places: np.ndarray, coarser: int) -> list[Accessible]:
         definition, divisions = self._orientations.definition or "scan", self._orientations.divisions
-        return [accessible(self._problem.robot, place, definition, divisions // coarser) for place in places]
+        return accessible_sets(self._problem.robot, [(place, divisions // coarser) for place in places], definition)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

@@ -18,7 +18,7 @@ from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.robots.symmetries import folded, symmetries
 from cspr_jax.runtime.stages import within
 from cspr_jax.search import attainable
-from cspr_jax.search.accessible import DEFINITIONS, Accessible, accessible
+from cspr_jax.search.accessible import DEFINITIONS, Accessible, accessible_sets
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import Kind
 
@@ -117,9 +117,10 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
             places = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in PLACES.values()]
             with within(f"{amplitude}, {definition}"):
                 # All at once: full batches.
-                sets = [accessible(checker.problem.robot, place, definition, n) for n in steps for place in places]
-                asked = [(place, inside.angles) for place, inside in zip(places * len(steps), sets, strict=True)]
-                masks = attained(checker, asked)
+                asked = [(place, n) for n in steps for place in places]
+                sets = accessible_sets(checker.problem.robot, asked, definition)
+                angles = [(place, inside.angles) for (place, _), inside in zip(asked, sets, strict=True)]
+                masks = attained(checker, angles)
             every = [_cells(inside, good) for inside, good in zip(sets, masks, strict=True)]
             for row, fine, coarse in zip(PLACES, every[: len(places)], every[len(places) :], strict=True):
                 errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
@@ -160,8 +161,9 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
                     for azimuth in azimuths
                 ]
                 with within(f"{amplitude}, {definition}, z = {depth:g}"):
-                    sets = [(place, accessible(robot, place, definition, divisions).angles) for place in places]
-                    smallest = min(good.mean() for good in attained(checker, sets))
+                    sets = accessible_sets(robot, [(place, divisions) for place in places], definition)
+                    angles = [(place, inside.angles) for place, inside in zip(places, sets, strict=True)]
+                    smallest = min(good.mean() for good in attained(checker, angles))
                 cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * float(smallest)
     return cells
 

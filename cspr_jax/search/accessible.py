@@ -7,13 +7,14 @@ volume of SO(3), the only one whose count is a fraction of something.
 
 import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from cspr_jax.arithmetic.batches import in_threads
 from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
 from cspr_jax.feasibility.platform.orientation_steps import OrientationSteps
 from cspr_jax.robots.platform import PlatformRobot
@@ -70,6 +71,20 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
     part = connected_components(links, directed=False)[1]
     inside = (part == part[grid.start]) & steps.regular(samples)
     return Accessible(grid.angles[inside], grid.volume[inside], float(inside.mean()))
+
+
+def accessible_sets(robot: PlatformRobot, asked: Sequence[tuple[np.ndarray, int]], definition: str) -> list[Accessible]:
+    """The accessible orientations of many places, by two threads.
+
+    Args:
+        robot: centred, in its reference axes.
+        asked: of each its place (3,), m, and its divisions of pi.
+        definition: one of `DEFINITIONS`.
+
+    Returns:
+        the orientations of each; see `accessible`.
+    """
+    return in_threads(lambda one: accessible(robot, one[0], definition, one[1]), asked)
 
 
 def _scan(steps: OrientationSteps, towards: np.ndarray, divisions: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -16,7 +16,7 @@ from cspr_jax.search.pose_ends import end_options
 # Values of beta-hat tried at the target.
 VALUES = 20
 # Motions of a part of a search that only asks whether; large ones fill their batches.
-PART = CANDIDATES // 4
+PART, MIXED = CANDIDATES // 4, 16
 
 
 def attainable(
@@ -95,7 +95,12 @@ def attained(
                 is_attained[piece[cell[arcs > 0]]] = True
         return is_attained
 
-    return np.concatenate(in_parts(part, len(some), PART))[own]
+    # Places differ in what they take: each part gets some of all.
+    mixed = np.argsort(np.arange(len(some)) % MIXED, kind="stable")
+    found = np.empty(len(some), bool)
+    some[:] = some[mixed]
+    found[mixed] = np.concatenate(in_parts(part, len(some), PART))
+    return found[own]
 
 
 def _once(checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
