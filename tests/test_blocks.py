@@ -1,0 +1,46 @@
+"""Blocks of motions: they cover all of time, are cut at the knots, and are shorter where motions swing farther."""
+
+import numpy as np
+import pytest
+
+from cspr_jax.feasibility.blocks import INSTANTS, growing, parts_of_arcs
+from cspr_jax.trajectories.amplitudes import from_polynomial, named
+
+AMPLITUDES = {
+    "quintic": named("quintic"),
+    "effective": named("effective", 0.07),
+    "overshoots": from_polynomial([0.0, 0.0, 0.0, 60.0, -165.0, 156.0, -50.0]),
+}
+RAMP = (0.3, 0.8), (1.0, 5.0)
+
+
+@pytest.mark.parametrize("name", AMPLITUDES)
+@pytest.mark.parametrize("how", ["equal", "growing", "few"])
+def test_blocks_cover_all_of_time(name, how):
+    """One after the other from 0 to 1, no knot inside, those of a motion side by side."""
+    amplitude = AMPLITUDES[name]
+    knots = np.asarray(amplitude.knots)
+    parts = {"equal": 3, "growing": growing(amplitude, RAMP), "few": growing(amplitude, ((0.2, 0.5), (0.01, 0.3)))}[how]
+    arcs = np.array([1, 7, 2, 30, 7])
+    blocks = parts_of_arcs(arcs, knots, parts)
+    assert (np.diff(blocks.row) >= 0).all() and set(blocks.row) == set(range(len(arcs)))
+    for row, p in enumerate(arcs):
+        own = blocks.some(blocks.row == row)
+        edges = np.append(own.start, own.stop[-1])
+        assert edges[0] == 0.0 and edges[-1] == 1.0 and (np.diff(edges) > 0.0).all()
+        np.testing.assert_array_equal(own.start[1:], own.stop[:-1])
+        assert np.isin(knots, edges).all()
+        wanted = p * np.mean(np.broadcast_to(parts, 257))
+        assert wanted - len(knots) - 1.0 <= len(own.row) <= wanted + 2.0 * (len(knots) + 1.0)
+
+
+def test_parts_grow_with_the_amplitude():
+    """The ramp at the values of A themselves, and blocks that are longer where fewer parts are asked for."""
+    amplitude = AMPLITUDES["effective"]
+    tau = np.linspace(0.0, 1.0, INSTANTS)
+    parts, values = growing(amplitude, RAMP), np.asarray(amplitude.at(tau))
+    np.testing.assert_allclose(parts, 1.0 + 4.0 * np.clip((values - 0.3) / 0.5, 0.0, 1.0), atol=1e-12)
+    blocks = parts_of_arcs(np.array([12]), np.asarray(amplitude.knots), parts)
+    lengths, middles = 12.0 * (blocks.stop - blocks.start), 0.5 * (blocks.start + blocks.stop)
+    early, late = lengths[middles < 0.25], lengths[(middles > 0.85) & (middles < 0.93)]
+    assert early.max() == pytest.approx(1.0, rel=0.2) and late.max() == pytest.approx(0.2, rel=0.2)
