@@ -275,7 +275,7 @@ def rounding_used(count, seed, kind, robot):
     start = rng.uniform(0.0, 0.9, count)
     blocks, problem = Blocks(np.arange(count), start, start + 0.2 / arcs), problem_of(robot)
     found = bounds_of(certifier_of(problem, kind), problem, segments, arcs, blocks)
-    tau, used = blocks.instants(x), []
+    tau, used = blocks.instants(x[:, None]), []
     for i, (segment, p, beta) in enumerate(zip(theirs, arcs, betas, strict=True)):
         kappa, share = precise(robot, segment, int(p), beta, tau[:, i])
         allowed = found.rounding[i] / chebyshev.LEBESGUE
@@ -326,7 +326,7 @@ def remainders_used(count, seed, kind, robot):
     far, used = np.linspace(-1.0, 1.0, 101), 0.0
     for i, (segment, p, beta) in enumerate(zip(theirs, arcs, betas, strict=True)):
         at_nodes, between = (
-            np.column_stack(precise(robot, segment, int(p), beta, blocks.instants(places)[:, i])).astype(float)
+            np.column_stack(precise(robot, segment, int(p), beta, blocks.instants(places[:, None])[:, i])).astype(float)
             for places in (x, far)
         )
         fit = np.polynomial.chebyshev.chebfit(x, at_nodes, chebyshev.DEGREE)

@@ -34,12 +34,12 @@ class Blocks(NamedTuple):
         """Instants at the same places of each block.
 
         Args:
-            places: (m,) from -1 at its start to 1 at its stop.
+            places: (m, 1), or (m, k) of each block's own, from -1 at its start to 1 at its stop.
 
         Returns:
             (m, k) tau.
         """
-        return 0.5 * (self.start + self.stop) + places[:, None] * (0.5 * (self.stop - self.start))
+        return 0.5 * (self.start + self.stop) + places * (0.5 * (self.stop - self.start))
 
     def halves(self) -> "Blocks":
         """Both halves of each block, (2 k,)."""

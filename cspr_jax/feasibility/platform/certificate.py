@@ -22,6 +22,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.blocks import Blocks, growing, parts_of_arcs
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.feasibility.platform.tension_blocks import (
+    BASIC,
     BlockBounds,
     TensionRange,
     of_motion,
@@ -42,7 +43,6 @@ GROWING = (0.3, 0.8), (1.0, 5.0)
 # Orders of the cables that are tried, one after the other, where rounding keeps a block open.
 ORDERS = 6
 MATTERS = 0.1  # part of all that is allowed for
-BASIC = 2  # criteria that are no limits
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Certifier:
 
         def look(some: Blocks, _: int) -> Looked:
             found = self._looked_at(some, motions, margins=margins)
-            tau = some.instants(chebyshev.nodes())
+            tau = some.instants(chebyshev.nodes()[:, None] if margins else np.asarray(found.place)[None])
             nodes, bound = np.asarray(found.nodes), np.asarray(found.bound)
             return Looked(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[some.row, 0], 0.0))
 
@@ -122,20 +122,20 @@ class Certifier:
         return TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.instant, blocks.row, first)
 
     def _looked_at(self, blocks: Blocks, motions, *, margins: bool) -> BlockBounds:
-        found = self.bounds(0, blocks, motions, margins=margins)
+        found = self.bounds(0, blocks, motions, margins=margins, least=not margins)
         for k in range(1, len(self._orders)):
             # What is not proved because the first three cables lie nearly in one plane.
             open_ones = np.flatnonzero(_rounding_matters(found) & ~(found.bound > TOLERANCE).all(0))
             open_ones = open_ones[(found.nodes[:, :, open_ones] > -TOLERANCE).all((0, 1))]
             if not len(open_ones):
                 break
-            better = self.bounds(k, blocks.some(open_ones), motions, margins=margins)
+            better = self.bounds(k, blocks.some(open_ones), motions, margins=margins, least=not margins)
             found.bound[:, open_ones] = np.maximum(found.bound[:, open_ones], better.bound)
             found.rounding[open_ones] = np.minimum(found.rounding[open_ones], better.rounding)
             found.allowed[open_ones] = np.minimum(found.allowed[open_ones], better.allowed)
         return found
 
-    def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool) -> BlockBounds:
+    def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool, least: bool = False) -> BlockBounds:
         """Bounds on blocks.
 
         Args:
@@ -143,12 +143,13 @@ class Certifier:
             blocks: k of them.
             motions: segments (leaves (n, ...)), arcs (n,), and det J(P0) (n,) by the first order.
             margins: whether the nodes of the normalised determinant are wanted.
+            least: whether of the nodes only the smallest values are.
 
         Returns:
             the bounds, NumPy arrays.
         """
         problem, items = self._items(order, blocks, motions)
-        kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins)
+        kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins, least=least)
         return in_batches(kernel, items, size=self._batch, axis=-1)
 
     def _items(self, order: int, blocks: Blocks, motions) -> tuple[Problem, tuple]:

@@ -17,6 +17,8 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.lanes import Vector, dot, largest, smallest, stored, turned_back
 from cspr_jax.feasibility.limits import given, scales
+from cspr_jax.feasibility.platform.least_nodes import least_nodes
+from cspr_jax.feasibility.platform.work_list import allowance
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import contact_lanes
 from cspr_jax.robots.platform import PlatformRobot
@@ -27,7 +29,9 @@ from cspr_jax.trajectories.platform_lanes import State, state
 from cspr_jax.trajectories.platform_reach import instant_beside, middle_of, reach
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
+# Steps of a block, and the instants between them.
 STEPS = 8
+PLACES = np.linspace(-1.0, 1.0, STEPS + 1)
 # Of coordinates of some size: what lengths and heights may be wrong by.
 ROUNDING = 1e-13
 TINY = 1e-30
@@ -41,7 +45,8 @@ class PlaceBounds(NamedTuple):
             of their corners, m.
         slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
         nodes: (n_instants, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between
-            cables, m.
+            cables, m. Where no margins are wanted, the least of each: (1, n_criteria + 1, n).
+        place: (n,) where the smallest of the least slacks is, from -1 to 1; 0 where margins are wanted.
         bends: (3, n) what may be missed between two instants, C h^2 / 8: of the mass centre, m; of a point of the
             platform beside it, over its distance; of vectors as the platform sees them, m.
     """
@@ -49,6 +54,7 @@ class PlaceBounds(NamedTuple):
     clear: Array
     slacks: Array
     nodes: Array
+    place: Array
     bends: Array
 
 
@@ -85,7 +91,7 @@ def place_blocks(
         items: segments (leaves (n, ...)), arcs (n,), and where blocks start (n,) and stop (n,), with no knot inside.
         pairs: of cables that can meet.
         kind: of the motions.
-        margins: whether distances between cables are wanted; else they are infinite.
+        margins: whether all instants and distances between cables are wanted; else these are infinite.
 
     Returns:
         the bounds.
@@ -121,16 +127,21 @@ def place_blocks(
         # Two numbers a loop.
         return lax.complex(clear, values[0]), *values[1:]
 
-    first, *others = lax.map(on, np.linspace(-1.0, 1.0, STEPS + 1))
+    first, *others = lax.map(on, PLACES)
     nodes = [jnp.imag(first), *others]
     if not (margins and pairs):
         nodes.append(jnp.full_like(nodes[0], jnp.inf))
     steps = _steps(problem, segments, bends)
+    if margins:
+        every, place = jnp.stack(nodes, axis=1), jnp.zeros_like(half)
+    else:
+        every, place = least_nodes(nodes, allowance(np.arange(len(nodes) - 1) >= 1), PLACES)
     size = jnp.max(jnp.abs(problem.robot.base_points)) + segments.hub[:, 2]
     return PlaceBounds(
         jnp.min(jnp.real(first), axis=0) - ROUNDING * size,
         jnp.stack([jnp.min(x, axis=0) - step - ROUNDING for x, step in zip(nodes[:-1], steps, strict=True)]),
-        jnp.stack(nodes, axis=1),
+        every,
+        place,
         jnp.stack(bends),
     )
 

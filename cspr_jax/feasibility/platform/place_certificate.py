@@ -16,7 +16,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.blocks import Blocks, growing, parts_of_arcs
 from cspr_jax.feasibility.platform.meetings import Cables, cables_hit, cables_meet
 from cspr_jax.feasibility.platform.motions import rows
-from cspr_jax.feasibility.platform.place_blocks import STEPS, PlaceBounds, of_pose, place_blocks
+from cspr_jax.feasibility.platform.place_blocks import PLACES, PlaceBounds, of_pose, place_blocks
 from cspr_jax.feasibility.platform.work_list import Looked, WorkList
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import contact_lanes
@@ -29,8 +29,8 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 # Parts of an arc that are looked at first; nearer than this part of the platform's size is undecided.
 PARTS, TOUCH = 4, 1e-9
 GROWING = (0.25, 0.8), (0.5, 8.0)  # as in `certificate`
-# From so many halvings on meetings are looked for. Instants of a block, from -1 to 1, and those halfway between.
-NEAR_CONTACT, PLACES = 3, np.linspace(-1.0, 1.0, STEPS + 1)
+# From so many halvings on meetings are looked for. Instants halfway between those of a block.
+NEAR_CONTACT = 3
 MIDDLES = 0.5 * (PLACES[1:] + PLACES[:-1])
 
 
@@ -126,7 +126,7 @@ class PlaceCertifier:
             if level >= NEAR_CONTACT and len(doubtful):
                 own = some.some(doubtful)
                 cables = self._cables(own, np.asarray(found.bends)[:, doubtful], (segments, arcs))
-                base, between = np.asarray(self._problem.robot.base_points), own.instants(MIDDLES)
+                base, between = np.asarray(self._problem.robot.base_points), own.instants(MIDDLES[:, None])
                 for flag, step in (
                     (met, cables_meet(base, self._near.pairs, cables)),
                     (hit, cables_hit(self._near.sides, self._near.normal, cables)),
@@ -135,7 +135,8 @@ class PlaceCertifier:
                     flag[own.row[which]] = True
                     work.refute(own.row[which], between[step[which], which])
             nodes, bound = np.asarray(found.nodes), np.asarray(found.slacks)
-            return Looked(nodes, bound, some.instants(PLACES), lambda _: is_clear)
+            tau = some.instants(PLACES[:, None] if margins else np.asarray(found.place)[None])
+            return Looked(nodes, bound, tau, lambda _: is_clear)
 
         first = work.work_off(blocks, look)
         is_proved = ~work.is_refuted & ~work.is_stuck
@@ -161,7 +162,7 @@ class PlaceCertifier:
         segments, arcs = motions
         own = np.tile(np.arange(len(blocks.row)), len(PLACES))
         row, middle = blocks.row[own], 0.5 * (blocks.start + blocks.stop)[own]
-        items = rows(segments, row), arcs[row].astype(float), middle, blocks.instants(PLACES).ravel() - middle
+        items = rows(segments, row), arcs[row].astype(float), middle, blocks.instants(PLACES[:, None]).ravel() - middle
         found = in_batches(partial(wires_beside, self._problem, kind=self._kind), items, size=self._batch)
         rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in found)
         centre, arm, platform = bends

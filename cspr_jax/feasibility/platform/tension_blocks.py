@@ -22,6 +22,7 @@ from jax import Array, lax
 from cspr_jax.arithmetic import chebyshev
 from cspr_jax.arithmetic.lanes import dot, stored
 from cspr_jax.feasibility.limits import given, scales
+from cspr_jax.feasibility.platform.least_nodes import least_nodes
 from cspr_jax.feasibility.platform.limit_blocks import (
     QUANTITIES,
     STRAIGHT,
@@ -32,6 +33,7 @@ from cspr_jax.feasibility.platform.limit_blocks import (
     quotient,
     ratio,
 )
+from cspr_jax.feasibility.platform.work_list import allowance
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES, balance, cables, inertial_wrench
@@ -45,6 +47,7 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 ROUNDING = 1e-13 * chebyshev.LEBESGUE
 COEFFICIENTS = 2.0 * np.finfo(float).eps * (chebyshev.DEGREE + 1) * float(np.abs(chebyshev.bernstein()).sum(1).max())
 REGULAR = CABLES  # the place of D among the values
+BASIC = 2  # criteria that are no limits
 
 
 class BlockBounds(NamedTuple):
@@ -52,13 +55,16 @@ class BlockBounds(NamedTuple):
 
     Fields:
         nodes: (n_nodes, n_criteria, n) smallest ones at the nodes; of the determinant that of
-            `wrench_lanes.normalised_determinant` over its value at rest in P0, where margins are asked for.
+            `wrench_lanes.normalised_determinant` over its value at rest in P0, where margins are asked for. Where only
+            the least are: (1, n_criteria, n).
+        place: (n,) where the smallest of the least is, from -1 to 1; 0 where all are asked for.
         bound: (n_criteria, n) proved lower bounds.
         rounding: (n,) largest allowance for rounding in those of taut cables, before these are divided by D.
         allowed: (n,) largest allowance in all: also for what the polynomials leave out.
     """
 
     nodes: Array
+    place: Array
     bound: Array
     rounding: Array
     allowed: Array
@@ -84,8 +90,10 @@ def of_motion(problem: Problem) -> list[Limit]:
     return [row for row in given(problem.limits) if row.of_motion]
 
 
-@partial(jax.jit, static_argnames=("kind", "margins"))
-def tension_blocks(problem: Problem, one: Array, items, *, kind: Kind, margins: bool) -> BlockBounds:
+@partial(jax.jit, static_argnames=("kind", "margins", "least"))
+def tension_blocks(
+    problem: Problem, one: Array, items, *, kind: Kind, margins: bool, least: bool = False
+) -> BlockBounds:
     """Bounds of slacks on blocks.
 
     Args:
@@ -95,6 +103,7 @@ def tension_blocks(problem: Problem, one: Array, items, *, kind: Kind, margins: 
             no knot inside.
         kind: of the motions.
         margins: whether the normalised determinant is wanted.
+        least: whether of the nodes only the smallest values are.
 
     Returns:
         the bounds.
@@ -105,7 +114,11 @@ def tension_blocks(problem: Problem, one: Array, items, *, kind: Kind, margins: 
     nodes, bound = _bounds(problem, found.block, found.values[:, :count], found.rests)
     if margins:
         nodes[1] = found.values[:, count]
-    return BlockBounds(jnp.stack(nodes, axis=1), jnp.stack(bound), *_allowances(found))
+    if least:
+        every, place = least_nodes(nodes, allowance(np.arange(len(nodes)) >= BASIC), chebyshev.nodes())
+    else:
+        every, place = jnp.stack(nodes, axis=1), jnp.zeros_like(bound[0])
+    return BlockBounds(every, place, jnp.stack(bound), *_allowances(found))
 
 
 class TensionRange(NamedTuple):
