@@ -224,6 +224,7 @@ def test_lists(capsys, tmp_path):
         cspr_jax.copy_examples("demo", tmp_path)
 
 
+@pytest.mark.thorough
 def test_the_benchmark(small_bench):
     with jax.enable_x64(False):
         found = cspr_jax.benchmark()

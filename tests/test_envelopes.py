@@ -131,6 +131,7 @@ def test_mistakes(tmp_path, change, words):
 A_IS_TAU = of_one_shape(named("ideal"))
 
 
+@pytest.mark.thorough
 @settings(max_examples=40)
 @given(st.floats(0.05, 6.0), st.floats(0.0, 1.0), st.sampled_from([-1.0, 1.0]), st.floats(-0.95, 0.95))
 def test_closed_forms_of_the_zero_tension_function(r, xi, sigma, v):

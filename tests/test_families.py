@@ -137,6 +137,7 @@ def test_the_example_of_two_families(tmp_path):
     assert [s["inclination"] is None for s in segments] == [False, False, True, True, False]
 
 
+@pytest.mark.thorough
 def test_each_segment_is_that_of_its_own_family(tmp_path):
     """Answers of a mixed sequence are those that the same pairs of poses have in plans of one family."""
     mixed = cspr_jax.plan(SWEEPS / "mixed_sequence.toml").answers

@@ -202,6 +202,7 @@ def test_two_cables_in_a_plane(tmp_path):
     assert found.data["verdict"].ravel()[0] == 0 and not np.nanmax(np.abs(found.data["release_y"]))
 
 
+@pytest.mark.thorough
 def test_bounds_of_the_release_are_kept(tmp_path):
     box = "release_x = [-0.1, 0.0]\nrelease_y = [0.05, 0.05]\nrelease_z = [-0.9, -0.7]\nmax_duration = 1.4"
     places, data = launches_of(mapped(tmp_path / "box", x=[0.2], y=[0.1, 0.3], more=box))

@@ -90,6 +90,7 @@ def test_a_plan_on_a_page(motions, figures, capsys):
     np.testing.assert_array_equal(rates.lines[1].get_ydata(), result.data["rate"][:, 1])
 
 
+@pytest.mark.thorough
 def test_several_motions_in_one_picture(motions, figures, capsys):
     files = [str(motions / f"{name}.h5") for name in ("first", "second")]
     figure = drawn(figures, *files)

@@ -182,6 +182,7 @@ def _turned_over():
     )
 
 
+@pytest.mark.thorough
 def test_pictures_of_every_orientation(whole_map, tmp_path):
     path, picture = whole_map, tmp_path / "picture.png"
     for options in (["--quantity", "verdict"], ["--envelope", "--at", f"x={THERE[0]}"]):

@@ -214,6 +214,7 @@ def test_cells_of_places_have_no_motions(folder, capsys):
         cspr_jax.report(path, folder / "no.html", cells=[{"x": 0.1}])
 
 
+@pytest.mark.thorough
 def test_a_motion_file_is_a_page_too(folder):
     plan = cspr_jax.plan(PLAN)
     file = plan.save(folder / "motion.h5")

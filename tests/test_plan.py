@@ -146,6 +146,7 @@ def test_z0_that_is_chosen(tmp_path, free):
 BEST = ONE.replace('"quintic"', '{ name = "effective", epsilon = "best" }')
 
 
+@pytest.mark.thorough
 def test_a_better_epsilon_makes_a_plan_shorter(tmp_path, monkeypatch):
     durations = []
     for candidates in ((0.2, 0.05), (0.2, 0.1, 0.05)):

@@ -91,6 +91,7 @@ def test_z_up_and_far_away():
     np.testing.assert_allclose(reached(there), PLACES * signs + offset, atol=1e-10)
 
 
+@pytest.mark.thorough
 def test_attainable_orientations_are_those_of_a_sweep(tmp_path):
     robot, place = cspr_jax.load_robot("laval-mssm"), [0.5, 0.3, 1.4]
     inside, answers = cspr_jax.attainable(robot, place, definition="grid", divisions=4, amplitude=EFFECTIVE)

@@ -239,6 +239,7 @@ def test_whole_cells_among_obstacles(tmp_path, shape):
     assert min((side == number).sum() for number in (0, 1, 2)) > 1
 
 
+@pytest.mark.thorough
 def test_cells_of_a_robot_with_pulleys(tmp_path):
     """Distances are those of where the cables leave; cells are proved though that moves."""
     wheel = "pulley_radius = 0.15"
