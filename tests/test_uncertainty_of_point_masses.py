@@ -34,7 +34,8 @@ def in_the_plane(swings):
     return problem, segments, answers
 
 
-@pytest.mark.parametrize("swings", [False, pytest.param(True, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("swings", [False, True])
 def test_no_robot_in_the_plane_within_a_proved_multiple_fails(swings):
     """A guide keeps the mass in the plane, wherever the spools are."""
     problem, segments, answers = in_the_plane(swings)

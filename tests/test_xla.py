@@ -140,6 +140,7 @@ def lines_told(folder, code, **settings):
     return first, lines
 
 
+@pytest.mark.thorough
 def test_damaged_entries_are_removed_with_one_line(tmp_path):
     """Cut, flipped and without a checksum: one line, the same answer, and they are made again.
 
