@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.batches import in_batches, in_threads
 from cspr_jax.feasibility.platform.certificate import Certifier, TensionProof
 from cspr_jax.feasibility.platform.enclosures import Robustness
 from cspr_jax.feasibility.platform.end_acceleration import endpoint
@@ -61,6 +61,7 @@ class PoseChecker(MotionChecker):
         """Find what can meet."""
         super().__init__(problem, kind, batch=batch)
         self._lock, self.done = threading.Lock(), {"prefilter": 0, "motions": 0, "checks": 0}
+        self._compiling, self._compiled = threading.Lock(), set[bool]()
         self.flags = flags(problem.limits)
         knots = np.asarray(problem.amplitude.knots)
         count, count_checks = partial(self._count, "prefilter"), partial(self._count, "checks")
@@ -97,6 +98,7 @@ class PoseChecker(MotionChecker):
 
     def _checked(self, motions: Motions, *, whole: bool, margins: bool) -> PoseChecks:
         checks = self.nothing(len(motions.arcs))
+        self._compile(motions, margins=margins)
         tensions = self._tensions.prove(*motions, near=NEAR if margins else 0.0, margins=margins)
         checks.verdict[:] = np.where(tensions.is_refuted, Verdict.SLACK_CABLE.value, Verdict.UNDECIDED.value)
         checks.instant[:] = np.where(tensions.is_refuted, tensions.instant, np.nan)
@@ -121,6 +123,14 @@ class PoseChecker(MotionChecker):
         checks.slack[some] = np.where(is_finite, least[:-1], np.nan).T
         checks.gap[some] = np.where(is_finite, least[-1], np.nan)
         return checks
+
+    def _compile(self, motions: Motions, *, margins: bool) -> None:
+        # Both proofs at once, before the first: XLA takes seconds for each, on one core. Other threads wait.
+        with self._compiling:
+            if margins not in self._compiled:
+                one = motions.rows(np.arange(1))
+                in_threads(lambda proofs: proofs.prove(*one, margins=margins), [self._tensions, self._places])
+                self._compiled.add(margins)
 
     def tolerated(self, segments: PoseSegment, arcs: np.ndarray) -> Tolerated:
         """Multiples of the uncertainty that motions stand; see `MotionChecker.tolerated`."""
