@@ -1,9 +1,11 @@
 """Blocks of motions: they cover all of time, are cut at the knots, and are shorter where motions swing farther."""
 
+import jax
 import numpy as np
 import pytest
 
 from cspr_jax.feasibility.blocks import INSTANTS, growing, parts_of_arcs
+from cspr_jax.feasibility.platform.least_nodes import least_nodes
 from cspr_jax.trajectories.amplitudes import from_polynomial, named
 
 AMPLITUDES = {
@@ -44,3 +46,17 @@ def test_parts_grow_with_the_amplitude():
     lengths, middles = 12.0 * (blocks.stop - blocks.start), 0.5 * (blocks.start + blocks.stop)
     early, late = lengths[middles < 0.25], lengths[(middles > 0.85) & (middles < 0.93)]
     assert early.max() == pytest.approx(1.0, rel=0.2) and late.max() == pytest.approx(0.2, rel=0.2)
+
+
+def test_least_values_and_where_the_worst_is():
+    """Of each criterion over all nodes, also of the last, which is no slack; a limit may be touched."""
+    rng, places = np.random.default_rng(0), np.array([-1.0, -0.2, 0.5, 1.0])
+    nodes, allowed = rng.normal(size=(3, 4, 200)), np.array([0.0, 0.3])
+    nodes[0, 2, 5] = np.nan
+    nodes[0, 1:3, 7] = -9.0  # the first of equal ones
+    least, place = jax.jit(lambda x: least_nodes(x, allowed, places))(list(nodes))
+    np.testing.assert_array_equal(least, nodes.min(1)[None])
+    worst = np.minimum(nodes[0], nodes[1] + 0.3)
+    wanted = np.where(np.isnan(worst).any(0), np.nan, places[worst.argmin(0)])
+    np.testing.assert_array_equal(place, wanted)
+    assert place[7] == -0.2 and np.isnan(place[5])
