@@ -58,7 +58,9 @@ def test_fences_are_seen():
     assert blocks(ROOT / "README.md", "python") and len(commands(ROOT / "docs" / "usage.md")) >= 6
 
 
-@pytest.mark.parametrize("name", ["README.md", "docs/usage.md", "docs/get_started.md"])
+@pytest.mark.parametrize(
+    "name", ["README.md", pytest.param("docs/usage.md", marks=pytest.mark.thorough), "docs/get_started.md"]
+)
 def test_python_of_the_first_pages_runs(name, checkout, capsys):
     namespace: dict[str, object] = {"__name__": "first"}
     for text in blocks(ROOT / name, "python"):

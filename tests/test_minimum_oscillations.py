@@ -136,6 +136,7 @@ inclination = "best"
 """
 
 
+@pytest.mark.thorough
 def test_a_sweep_with_the_best_inclination(tmp_path):
     path = tmp_path / "best.toml"
     path.write_text(SWEEP)

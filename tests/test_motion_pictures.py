@@ -143,6 +143,7 @@ def test_pairs_of_cables_are_named_so():
     assert cable_names(columns | {"tension_each": np.ones((4, 6))}) == ["pair 1", "pair 2", "pair 3"]
 
 
+@pytest.mark.thorough
 def test_several_motions_of_a_planar_robot_have_no_view_from_above(tmp_path, figures, capsys):
     file = str(tmp_path / "motion.h5")
     assert plan(tmp_path, transition_text("transition-planar"), "-o", file)[0] == 0

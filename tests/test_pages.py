@@ -288,6 +288,7 @@ def test_a_map_in_a_browser(result, page):
         assert told == []
 
 
+@pytest.mark.thorough
 @BROWSER
 def test_a_plan_in_a_browser(folder):
     """The time moves robot and tensions; both themes; it plays to its end."""

@@ -236,6 +236,7 @@ def test_a_plan_is_that_of_the_equivalent(tmp_path, family):
         np.testing.assert_allclose(found["segments"][0][name], wanted["segments"][0][name], rtol=1e-6)
 
 
+@pytest.mark.thorough
 def test_a_motion_file_has_the_tensions_of_all_six(tmp_path):
     """Those of the platform's own balance; of the three pairs beside them."""
     (tmp_path / "plan.toml").write_text(PLAN.format(robot='"launch-robot"', family="transition", limits=""))
