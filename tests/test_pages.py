@@ -237,6 +237,7 @@ PLACE = """([row, column]) => {
 BROWSER = pytest.mark.skipif(shutil.which("chromium") is None, reason="chromium is not installed")
 
 
+@pytest.mark.thorough
 @BROWSER
 def test_a_map_in_a_browser(result, page):
     """Nothing goes wrong; slider, hover, keys and clicks show what is stored."""
