@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.arithmetic import chebyshev
+from cspr_jax.arithmetic import chebyshev, packed
 from cspr_jax.arithmetic.lanes import dot, stored
 from cspr_jax.feasibility.limits import given, scales
 from cspr_jax.feasibility.platform.least_nodes import least_nodes
@@ -108,7 +108,7 @@ def tension_blocks(
     Returns:
         the bounds.
     """
-    found = _taken(problem, one, items, kind=kind, margins=margins)
+    found = _taken(problem, one, items, kind=kind, margins=margins, rough=least)
     # What margins alone need comes last, and is not bounded.
     count = found.rests.shape[0]
     nodes, bound = _bounds(problem, found.block, found.values[:, :count], found.rests)
@@ -177,7 +177,7 @@ class _Taken(NamedTuple):
     rounding: Array
 
 
-def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool) -> _Taken:
+def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool, rough: bool = False) -> _Taken:
     segments, arcs, regular, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
     block = _Block(segments, squared_duration(segments, arcs), regular, problem.robot.gravity / segments.rate)
@@ -186,26 +186,33 @@ def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool) ->
         now = instant_beside(middle, segments.sense, arcs, off * half)
         return state(segments, arcs, stored(now, one), kind, one)
 
-    def pairs_at(node):
-        return tuple(lax.complex(*pair) for pair in _values(problem, block, at(node), margins=margins))
+    def values_at(node):
+        return [x for pair in _values(problem, block, at(node), margins=margins) for x in pair]
 
-    pairs = lax.map(pairs_at, chebyshev.nodes())
-    values = jnp.stack([part(x) for x in pairs for part in (jnp.real, jnp.imag)], axis=1)
+    together, apart = (packed.packed, packed.unpacked) if rough else (packed.paired, packed.parts)
+    values = jnp.stack(apart(lax.map(lambda node: together(values_at(node)), chebyshev.nodes())), axis=1)
     lengths = stored(_lengths(problem.robot, at(0.0)), one)
-
-    def on(ellipse):
-        (along, aside), factor = ellipse
-        bounds = stored(reach(segments, arcs, middle, (along * half, aside * half), kind), one)
-        found = _sizes(problem, block, bounds, along * half, lengths)
-        return tuple(jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in found)
-
     radii = np.array(chebyshev.RADII)
-    ellipses = (np.vstack([chebyshev.semi_axes(radii), [1.0, 0.0]]), np.append(chebyshev.remainders(radii), ROUNDING))
-    sizes = jnp.stack(lax.map(on, ellipses), axis=1)
-    proved = values[:, : sizes.shape[1]]
+    axes = np.vstack([chebyshev.semi_axes(radii), [1.0, 0.0]])
+
+    def reach_on(ellipse):
+        along, aside = ellipse
+        return packed.paired(reach(segments, arcs, middle, (along * half, aside * half), kind))
+
+    def sizes_on(ellipse):
+        along, pairs, factor = ellipse
+        found = _sizes(problem, block, Reach(*packed.parts(pairs)), along * half, lengths)
+        return packed.paired([jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in found])
+
+    factors = np.append(chebyshev.remainders(radii), ROUNDING)
+    sizes = jnp.stack(packed.parts(lax.map(sizes_on, (axes[:, 0], lax.map(reach_on, axes), factors))))
     amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
-    rounding = sizes[-1] * amplified[None] + COEFFICIENTS * jnp.max(jnp.abs(proved), axis=0)
-    return _Taken(block, values, jnp.min(sizes[:-1], axis=0) + rounding, rounding)
+    largest = jnp.max(jnp.abs(values[:, : len(sizes)]), axis=0)
+    rounding = sizes[:, -1] * amplified[None] + COEFFICIENTS * largest
+    rests = jnp.min(sizes[:, :-1], axis=1) + rounding
+    if rough:
+        rests = rests + chebyshev.LEBESGUE * packed.ROUNDING * largest
+    return _Taken(block, values, rests, rounding)
 
 
 def _values(problem: Problem, block: _Block, here: State, *, margins: bool) -> list[Pair]:
@@ -294,8 +301,10 @@ def _bounds(problem: Problem, block: _Block, values: Array, rests: Array) -> tup
     every = _coefficients(values)
     low, high, share = every - rests[None], every + rests[None], values[:, REGULAR]
     regular = low[:, REGULAR, None], high[:, REGULAR, None]
-    nodes = [jnp.min(quotient(values[:, :CABLES], share), axis=1), share]
-    bound = [jnp.min(ratio(low[:, :CABLES], regular), axis=(0, 1)), jnp.min(low[:, REGULAR], axis=0)]
+    # Of quotients with one denominator the smallest has the smallest numerator.
+    kappa, least = (jnp.min(x[:, :CABLES], axis=1, keepdims=True) for x in (values, low))
+    nodes = [quotient(kappa, share)[:, 0], share]
+    bound = [jnp.min(ratio(least, regular), axis=(0, 1)), jnp.min(low[:, REGULAR], axis=0)]
     scale = scales(CABLES, problem.robot.mass * problem.robot.gravity, block.z0)
     part, found = slice(0, REGULAR + 2), {}
     for quantity, rows in _quantities(problem).items():

@@ -1,0 +1,81 @@
+"""Several numbers of one loop: XLA's CPU backend computes all that numbers share again for each array that it writes.
+
+An array of complex numbers holds two in float64, or four in float32.
+"""
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+# What rounding to float32 changes of a number, as a part of it; numbers above the largest become that.
+ROUNDING = 2.0**-24
+LARGEST = float(np.finfo(np.float32).max)
+WIDTH = 4
+_HALF = 32  # bits
+
+
+def paired(values: Sequence[Array]) -> tuple[Array, ...]:
+    """Two numbers a complex one.
+
+    Args:
+        values: an even number of float64 arrays of one shape.
+
+    Returns:
+        half as many.
+    """
+    return tuple(lax.complex(a, b) for a, b in zip(values[::2], values[1::2], strict=True))
+
+
+def parts(pairs: Sequence[Array]) -> list[Array]:
+    """What `paired` has put together.
+
+    Args:
+        pairs: complex arrays.
+
+    Returns:
+        twice as many.
+    """
+    return [part(x) for x in pairs for part in (jnp.real, jnp.imag)]
+
+
+def packed(values: Sequence[Array]) -> tuple[Array, ...]:
+    """Four numbers a complex one, rounded to float32.
+
+    Args:
+        values: float64 arrays of one shape.
+
+    Returns:
+        a fourth as many, or one more.
+    """
+    filled = [*values, *([jnp.zeros_like(values[0])] * (-len(values) % WIDTH))]
+    return paired([_joined(a, b) for a, b in zip(filled[::2], filled[1::2], strict=True)])
+
+
+def unpacked(fours: Sequence[Array]) -> list[Array]:
+    """What `packed` has put together.
+
+    Args:
+        fours: complex arrays.
+
+    Returns:
+        four times as many, float64.
+    """
+    return [x for both in parts(fours) for x in _halves(both)]
+
+
+def _joined(first: Array, last: Array) -> Array:
+    low, high = (
+        lax.bitcast_convert_type(jnp.clip(x, -LARGEST, LARGEST).astype(jnp.float32), jnp.uint32).astype(jnp.uint64)
+        for x in (first, last)
+    )
+    return lax.bitcast_convert_type(low | (high << _HALF), jnp.float64)
+
+
+def _halves(both: Array) -> list[Array]:
+    bits = lax.bitcast_convert_type(both, jnp.uint64)
+    return [
+        lax.bitcast_convert_type(half.astype(jnp.uint32), jnp.float32).astype(jnp.float64)
+        for half in (bits, bits >> _HALF)
+    ]
