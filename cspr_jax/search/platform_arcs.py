@@ -20,8 +20,10 @@ BATCH = 2048
 # So many candidates are held at a time.
 CANDIDATES = 262_144
 # Instants of the first look: in arcs before the end, those at which most motions fail, the most telling ones first;
-# then so many an arc, late ones first; and so many where only the best of bad candidates is looked for.
+# then in arcs from both ends, where the amplitude function may bend most, and so many an arc, late ones first; and so
+# many where only the best of bad candidates is looked for.
 TELLING = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
+BESIDE_ENDS = np.array([1, 2, 4, 6]) / 96.0
 COARSE, COARSEST = 12, 4
 
 
@@ -136,7 +138,7 @@ def smallest_arcs(
         # The first candidate of each motion, then all others of motions where it fails: few and large batches.
         for turn in (alive[first], np.delete(alive, first)):
             turn = turn[last[motion[turn]] >= arcs]
-            turn = _sieved(checker, segments, arcs, turn, np.linspace(1.0, 0.0, COARSE * arcs + 1))
+            turn = _sieved(checker, segments, arcs, turn, _finer(arcs))
             if not len(turn):
                 continue
             got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False, margins=margins)
@@ -146,6 +148,11 @@ def smallest_arcs(
             undecided[unsure] = np.where(undecided[unsure] > 0, undecided[unsure], arcs)
             last[motion[passed]] = np.minimum(last[motion[passed]], arcs + beyond)
     return Found(smallest, undecided, checks)
+
+
+def _finer(arcs: int) -> np.ndarray:
+    beside = BESIDE_ENDS / arcs
+    return np.concatenate([1.0 - beside, beside, np.linspace(1.0, 0.0, COARSE * arcs + 1)])
 
 
 def _sieved(checker: MotionChecker, segments: _Segments, arcs: int, alive: np.ndarray, tau: np.ndarray) -> np.ndarray:
