@@ -1,5 +1,6 @@
 """Work list of a proof: blocks of motions are closed, or halved until they are, or until their motion is refuted."""
 
+import itertools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -9,7 +10,10 @@ from cspr_jax.feasibility.blocks import Blocks
 
 TOLERANCE = 1e-6
 # So many times a block is halved at most, and so many of an arc may be open.
-HALVINGS, OPEN = 20, 64
+HALVINGS, OPEN = 21, 64
+# How many times at once, the first time, the second time, and then: few blocks are open by then, and a batch of them
+# costs as much as a full one.
+AT_ONCE = (1, 2, 3)
 
 
 class Looked(NamedTuple):
@@ -64,14 +68,18 @@ class WorkList:
         """
         first = found = look(blocks, 0)
         self.attained = np.full((len(self._arcs), found.nodes.shape[1]), np.inf)
-        for level in range(HALVINGS + 1):
-            is_open = self._told(blocks, found, last=level == HALVINGS)
+        halved = 0
+        for more in itertools.chain(AT_ONCE, itertools.repeat(AT_ONCE[-1])):
+            is_open = self._told(blocks, found, last=halved >= HALVINGS)
             self.is_stuck |= np.bincount(blocks.row[is_open], minlength=len(self._arcs)) > OPEN * self._arcs
             is_open &= ~self.is_stuck[blocks.row]
             if not is_open.any():
                 break
-            blocks = blocks.some(is_open).halves()
-            found = look(blocks, level + 1)
+            blocks = blocks.some(is_open)
+            for _ in range(more):
+                blocks = blocks.halves()
+            halved += more
+            found = look(blocks, halved)
         self.bound[self.is_refuted | self.is_stuck] = np.nan
         return first
 
