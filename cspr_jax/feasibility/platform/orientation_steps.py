@@ -17,7 +17,7 @@ from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular, normalised_determinant
 from cspr_jax.robots.wrench_lanes import cables
 
-BATCH = 4096
+BATCH = 512
 # Gaps between cables below this part of the platform's size are none. A cable that makes a smaller angle with the
 # platform lies in it, and counts as being where it is in the reference orientation: it has not yet passed over.
 TOUCHING = 1e-9
