@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from cspr_jax.feasibility.blocks import INSTANTS, growing, parts_of_arcs
+from cspr_jax.feasibility.blocks import INSTANTS, Parts, growing, parts_of_arcs
 from cspr_jax.feasibility.platform.least_nodes import least_nodes
 from cspr_jax.trajectories.amplitudes import from_polynomial, named
 
@@ -13,7 +13,7 @@ AMPLITUDES = {
     "effective": named("effective", 0.07),
     "overshoots": from_polynomial([0.0, 0.0, 0.0, 60.0, -165.0, 156.0, -50.0]),
 }
-RAMP = (0.3, 0.8), (1.0, 5.0)
+RAMPS = (1.0, 5.0), (2.0, 9.0)
 
 
 @pytest.mark.parametrize("name", AMPLITUDES)
@@ -22,7 +22,8 @@ def test_blocks_cover_all_of_time(name, how):
     """One after the other from 0 to 1, no knot inside, those of a motion side by side."""
     amplitude = AMPLITUDES[name]
     knots = np.asarray(amplitude.knots)
-    parts = {"equal": 3, "growing": growing(amplitude, RAMP), "few": growing(amplitude, ((0.2, 0.5), (0.01, 0.3)))}[how]
+    few = growing(amplitude, (0.5, 0.3), (0.01, 0.02))
+    parts = {"equal": 3, "growing": growing(amplitude, *RAMPS), "few": few}[how]
     arcs = np.array([1, 7, 2, 30, 7])
     blocks = parts_of_arcs(arcs, knots, parts)
     assert (np.diff(blocks.row) >= 0).all() and set(blocks.row) == set(range(len(arcs)))
@@ -32,20 +33,37 @@ def test_blocks_cover_all_of_time(name, how):
         assert edges[0] == 0.0 and edges[-1] == 1.0 and (np.diff(edges) > 0.0).all()
         np.testing.assert_array_equal(own.start[1:], own.stop[:-1])
         assert np.isin(knots, edges).all()
-        wanted = p * np.mean(np.broadcast_to(parts, 257))
+        wanted = p * (parts if how == "equal" else np.mean(parts.of(p)))
         assert wanted - len(knots) - 1.0 <= len(own.row) <= wanted + 2.0 * (len(knots) + 1.0)
 
 
 def test_parts_grow_with_the_amplitude():
-    """The ramp at the values of A themselves, and blocks that are longer where fewer parts are asked for."""
+    """The ramps at the values of A themselves, and blocks that are longer where fewer parts are asked for."""
     amplitude = AMPLITUDES["effective"]
     tau = np.linspace(0.0, 1.0, INSTANTS)
-    parts, values = growing(amplitude, RAMP), np.asarray(amplitude.at(tau))
-    np.testing.assert_allclose(parts, 1.0 + 4.0 * np.clip((values - 0.3) / 0.5, 0.0, 1.0), atol=1e-12)
+    parts, values = growing(amplitude, *RAMPS), np.asarray(amplitude.at(tau))
+    np.testing.assert_allclose(parts.at_cusps, 1.0 + 4.0 * values, atol=1e-12)
+    np.testing.assert_allclose(parts.at_middles, 2.0 + 7.0 * values, atol=1e-12)
     blocks = parts_of_arcs(np.array([12]), np.asarray(amplitude.knots), parts)
     lengths, middles = 12.0 * (blocks.stop - blocks.start), 0.5 * (blocks.start + blocks.stop)
-    early, late = lengths[middles < 0.25], lengths[(middles > 0.85) & (middles < 0.93)]
-    assert early.max() == pytest.approx(1.0, rel=0.2) and late.max() == pytest.approx(0.2, rel=0.2)
+    late = (middles > 0.75) & (middles < 0.93)
+    cusp = late & (np.abs(np.mod(12.0 * middles + 0.5, 1.0) - 0.5) < 0.1)
+    middle = late & (np.abs(np.mod(12.0 * middles, 1.0) - 0.5) < 0.1)
+    each = [np.interp(middles[which], tau, 1.0 / parts.of(12)) for which in (cusp, middle)]
+    for which, wanted in zip((cusp, middle), each, strict=True):
+        assert which.any()
+        np.testing.assert_allclose(lengths[which], wanted, rtol=0.25)
+    assert lengths[cusp].min() > 1.3 * lengths[middle].max()
+    assert lengths[middles < 0.1].max() > 2.0 * lengths[late].max()
+
+
+@pytest.mark.parametrize("arcs", [1, 2, 5, 20])
+def test_parts_of_an_arc_between_cusps(arcs):
+    """Cusps are where an arc ends: whole numbers of arcs, whether that is odd or even."""
+    parts = Parts(np.full(INSTANTS, 2.0), np.full(INSTANTS, 6.0)).of(arcs)
+    at = np.interp(np.arange(2 * arcs + 1) / (2.0 * arcs), np.linspace(0.0, 1.0, INSTANTS), parts)
+    np.testing.assert_allclose(at[::2], 2.0, atol=0.01)
+    np.testing.assert_allclose(at[1::2], 6.0, atol=0.01)
 
 
 def test_least_values_and_where_the_worst_is():

@@ -10,7 +10,7 @@ from cspr_jax.trajectories.amplitudes import Amplitude
 
 # Of a part more that a piece between knots gets as little as this is not worth a block.
 SLIVER = 0.3
-INSTANTS = 257  # at which parts along a motion are told
+INSTANTS = 1025  # at which parts along a motion are told
 
 
 class Blocks(NamedTuple):
@@ -51,56 +51,81 @@ class Blocks(NamedTuple):
         )
 
 
-def growing(amplitude: Amplitude, ramp: tuple[tuple[float, float], tuple[float, float]]) -> np.ndarray:
+class Parts(NamedTuple):
+    """How many parts an arc has, at instants tau from 0 to 1, equally far apart.
+
+    Fields:
+        at_cusps: (m,) if there is a cusp at the instant.
+        at_middles: (m,) if it is halfway between two. Elsewhere it is between, as the squared sine of the phase.
+    """
+
+    at_cusps: np.ndarray
+    at_middles: np.ndarray
+
+    def of(self, arcs: int) -> np.ndarray:
+        """Parts of arcs along a motion.
+
+        Args:
+            arcs: how many it has.
+
+        Returns:
+            (m,).
+        """
+        share = np.sin(math.pi * arcs * np.linspace(0.0, 1.0, len(self.at_cusps))) ** 2
+        return self.at_cusps + (self.at_middles - self.at_cusps) * share
+
+
+def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tuple[float, float]) -> Parts:
     """Parts of an arc along a motion from rest, more of them where it swings farther.
 
     Args:
         amplitude: A.
-        ramp: values of A, and how many parts an arc has there; in between linear, beyond as at the nearer one.
+        at_cusps: how many where A is 0, and where it is 1; in between linear, beyond as at the nearer one.
+        at_middles: likewise halfway between two cusps.
 
     Returns:
-        (m,) as `parts_of_arcs` takes them.
+        the parts.
     """
     tau = np.linspace(0.0, 1.0, INSTANTS)
     piece = np.searchsorted(np.asarray(amplitude.knots), tau)
     coefficients, origins = np.asarray(amplitude.coefficients)[piece], np.asarray(amplitude.origins)[piece]
     values = np.polynomial.polynomial.polyval(tau - origins, coefficients.T, tensor=False)
-    return np.interp(values, *ramp)
+    return Parts(*(np.interp(values, (0.0, 1.0), ramp) for ramp in (at_cusps, at_middles)))
 
 
-def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: float | np.ndarray) -> Blocks:
+def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: float | Parts) -> Blocks:
     """Parts of all arcs of motions.
 
     Args:
         arcs: (n,) number of arcs of each motion, 1 or more.
         knots: of the amplitude function, inside ]0, 1[.
-        parts: how many an arc, or nearly; or (m,) how many at instants tau from 0 to 1, equally far apart.
+        parts: how many an arc, or nearly.
 
     Returns:
         the blocks, those of a motion side by side, in time.
     """
-    pieces = list(itertools.pairwise([0.0, *knots.tolist(), 1.0]))
-    each = np.broadcast_to(np.asarray(parts, float), max(np.size(parts), 2))
-    tau = np.linspace(0.0, 1.0, len(each))
-    # How many of an arc's parts lie before an instant, if the motion has one arc alone.
-    before = np.append(0.0, np.cumsum(0.5 * (each[1:] + each[:-1]) * np.diff(tau)))
-
-    def edges_of(p: int) -> np.ndarray:
-        inside = []
-        for start, stop in pieces:
-            first, last = np.interp([start, stop], tau, before)
-            # Equal within each piece, so that no sliver is left beside a knot.
-            count = max(1, math.ceil(p * (last - first) - SLIVER))
-            if np.ndim(parts) == 0:
-                edges = np.linspace(start, stop, count + 1)
-            else:
-                edges = np.interp(np.linspace(first, last, count + 1), before, tau)
-            inside += [[start], edges[1:-1]]
-        return np.concatenate([*inside, [1.0]])
-
-    edges = {p: edges_of(p) for p in np.unique(arcs).tolist()}
+    edges = {p: _edges(p, [0.0, *knots.tolist(), 1.0], parts) for p in np.unique(arcs).tolist()}
     own = [edges[int(p)] for p in arcs]
     row = np.repeat(np.arange(len(arcs)), [len(x) - 1 for x in own])
     nothing = np.zeros(0)
     start, stop = (np.concatenate([nothing, *(x[part] for x in own)]) for part in (slice(-1), slice(1, None)))
     return Blocks(row, start, stop)
+
+
+def _edges(arcs: int, knots: list[float], parts: float | Parts) -> np.ndarray:
+    # Of the blocks of a motion, both ends among the knots.
+    each = parts.of(arcs) if isinstance(parts, Parts) else np.full(2, float(parts))
+    tau = np.linspace(0.0, 1.0, len(each))
+    # How many parts lie before an instant.
+    before = arcs * np.append(0.0, np.cumsum(0.5 * (each[1:] + each[:-1]) * np.diff(tau)))
+    inside = []
+    for start, stop in itertools.pairwise(knots):
+        first, last = np.interp([start, stop], tau, before)
+        # Equal within each piece, so that no sliver is left beside a knot.
+        count = max(1, math.ceil(last - first - SLIVER))
+        if isinstance(parts, Parts):
+            edges = np.interp(np.linspace(first, last, count + 1), before, tau)
+        else:
+            edges = np.linspace(start, stop, count + 1)
+        inside += [[start], edges[1:-1]]
+    return np.concatenate([*inside, [1.0]])

@@ -36,10 +36,10 @@ from cspr_jax.robots.wrench_lanes import CABLES
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
-# Parts of an arc that are looked at first: an orientation that goes from one pose to another turns faster.
-FROM_REST, BETWEEN = 3, 8
-# The same from rest where verdicts alone are wanted, and no instants to narrow margins down from: by the amplitude.
-GROWING = (0.3, 0.8), (1.0, 5.0)
+# Parts of an arc that are looked at first, from rest and between poses, where orientations turn faster. Where verdicts
+# alone are wanted, and no instants to narrow margins down from, they go from the first to the second number with the
+# amplitude; see `blocks.growing`.
+WITH_MARGINS, FROM_REST, BETWEEN = (3, 8), (1.0, 5.8), (7.0, 7.0)
 # Orders of the cables that are tried, one after the other, where rounding keeps a block open.
 ORDERS = 6
 MATTERS = 0.1  # part of all that is allowed for
@@ -90,7 +90,8 @@ class Certifier:
         self._kind, self._batch, self._count = kind, batch, count_instants
         self._knots, self._orders = np.asarray(problem.amplitude.knots), _orders(problem)
         self._limits = np.arange(BASIC + len(of_motion(problem))) >= BASIC
-        self._usual, self._growing = FROM_REST if kind.from_rest else BETWEEN, growing(problem.amplitude, GROWING)
+        ramp = FROM_REST if kind.from_rest else BETWEEN
+        self._parts = WITH_MARGINS[not kind.from_rest], growing(problem.amplitude, ramp, ramp)
 
     def prove(
         self, segments: PoseSegment, arcs: np.ndarray, *, near: float = 0.0, margins: bool = False
@@ -106,8 +107,7 @@ class Certifier:
         Returns:
             the proofs.
         """
-        parts = self._growing if not margins and self._kind.from_rest else self._usual
-        blocks = parts_of_arcs(arcs, self._knots, parts)
+        blocks = parts_of_arcs(arcs, self._knots, self._parts[not margins])
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
 
         def look(some: Blocks, _: int) -> Looked:

@@ -30,7 +30,7 @@ from cspr_jax.trajectories.platform_reach import instant_beside, middle_of, reac
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
 # Steps of a block, and the instants between them.
-STEPS = 8
+STEPS = 4
 PLACES = np.linspace(-1.0, 1.0, STEPS + 1)
 # Of coordinates of some size: what lengths and heights may be wrong by.
 ROUNDING = 1e-13
@@ -100,23 +100,24 @@ def place_blocks(
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
 
     def at(off):
-        here = state(segments, arcs, instant_beside(middle, segments.sense, arcs, off * half), kind, one)
-        return here, cables(problem.robot, here.position, here.turn)
+        return state(segments, arcs, instant_beside(middle, segments.sense, arcs, off * half), kind, one)
 
     bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
     share = (2.0 * half / STEPS) ** 2 / 8.0
     turning = bounds.spin + bounds.omega**2
-    here, wires = at(0.0)
+    now = stored(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
+    here = state(segments, arcs, now, kind, one)
+    position, turn = stored((here.position, here.turn), one)
     away = [
-        dot(x, x)
-        for x in ([here.position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
+        dot(x, x) for x in ([position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
     ]
     seen = turning * (jnp.sqrt(largest(away)) + half * bounds.speed) + bounds.bend + 2.0 * bounds.omega * bounds.speed
     bends = stored(_Bends(bounds.bend * share, turning * share, seen * share), one)
-    gaps, left = _separators(problem.robot, platform, pairs, stored((wires, here.turn), one))
+    gaps, left = _separators(problem.robot, platform, pairs, (position, turn), one)
 
     def on(place):
-        now, lines = at(place)
+        now = at(place)
+        lines = cables(problem.robot, now.position, now.turn)
         apart = _apart(problem.robot, pairs, gaps, lines, bends)
         away = zip(left, contact_lanes.cable_directions(lines, now.turn), strict=True)
         clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
@@ -146,19 +147,20 @@ def place_blocks(
     )
 
 
-def _separators(robot: PlatformRobot, platform, pairs: tuple, middle) -> tuple[list[Vector], list[Vector]]:
-    # Unit vectors between cables, one a pair, and off the sectors, one a cable. Of all pairs, or cables, at a time:
-    # components (m, n), lanes last, which XLA writes with vectors, and in little code.
-    wires, turn = middle
-    rays = [jnp.stack([ray[k] for ray in wires.rays]) for k in range(3)]
-    seen = turned_back([[x[None] for x in row] for row in turn], [-x for x in rays])
+def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array) -> tuple[list[Vector], list[Vector]]:
+    # Unit vectors between cables, one a pair, and off the sectors, one a cable, by position and turn in the middle.
+    # Of all pairs, or cables, at a time: components (m, n), lanes last, which XLA writes with vectors, in little code.
+    position, turn = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
+    points, base = ([x[:, k, None] for k in range(3)] for x in (robot.platform_points, robot.base_points))
+    rays = stored([position[k] + dot(turn[k], points) - base[k] for k in range(3)], one)
+    seen = turned_back(turn, [-x for x in rays])
     sides, normal = platform
-    one, two = ([sides[:, which, k, None] for k in range(3)] for which in range(2))
-    left = _units(contact_lanes.residual((one, two), [normal[k] for k in range(3)], seen))
+    first, last = ([sides[:, which, k, None] for k in range(3)] for which in range(2))
+    left = _units(contact_lanes.residual((first, last), [normal[k] for k in range(3)], seen))
     if not pairs:
         return [], left
     i, j = (np.array([pair[k] for pair in pairs]) for k in range(2))
-    apart = [(robot.base_points[j, k] - robot.base_points[i, k])[:, None] for k in range(3)]
+    apart = [x[j] - x[i] for x in base]
     return _units(contact_lanes.gap(apart, [x[i] for x in rays], [x[j] for x in rays])), left
 
 

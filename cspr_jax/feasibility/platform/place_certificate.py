@@ -26,11 +26,13 @@ from cspr_jax.trajectories.platform_lanes import state
 from cspr_jax.trajectories.platform_reach import instant_beside, middle_of
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
-# Parts of an arc that are looked at first; nearer than this part of the platform's size is undecided.
-PARTS, TOUCH = 4, 1e-9
-GROWING = (0.25, 0.8), (0.5, 8.0)  # as in `certificate`
+# Parts of an arc that are looked at first: where margins are wanted; else, as in `certificate`, at cusps and halfway
+# between two, where a platform moves fastest.
+PARTS = 8
+FROM_REST, BETWEEN = ((0.7, 3.7), (0.7, 15.7)), ((4.0, 4.0), (11.0, 11.0))
+TOUCH = 1e-9  # nearer than this part of the platform's size is undecided
 # From so many halvings on meetings are looked for. Instants halfway between those of a block.
-NEAR_CONTACT = 3
+NEAR_CONTACT = 5
 MIDDLES = 0.5 * (PLACES[1:] + PLACES[:-1])
 
 
@@ -102,7 +104,7 @@ class PlaceCertifier:
         self._near, self._arms = near, np.linalg.norm(points, axis=1)
         self._knots = np.asarray(problem.amplitude.knots)
         self._limits = np.arange(1 + len(of_pose(problem))) >= 1
-        self._growing = growing(problem.amplitude, GROWING)
+        self._parts = PARTS, growing(problem.amplitude, *(FROM_REST if kind.from_rest else BETWEEN))
 
     def prove(self, segments: PoseSegment, arcs: np.ndarray, *, margins: bool = False) -> PlaceProof:
         """Prove motions clear, or that something meets or is broken.
@@ -115,8 +117,7 @@ class PlaceCertifier:
         Returns:
             the proofs.
         """
-        parts = self._growing if not margins and self._kind.from_rest else PARTS
-        blocks, work = parts_of_arcs(arcs, self._knots, parts), WorkList(arcs, self._limits)
+        blocks, work = parts_of_arcs(arcs, self._knots, self._parts[not margins]), WorkList(arcs, self._limits)
         met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
 
         def look(some: Blocks, level: int) -> Looked:
