@@ -15,11 +15,11 @@ from fractions import Fraction
 
 import numpy as np
 
-DEGREE = 16
+DEGREE = 18
 # More than Lebesgue's constant of the nodes: by so much can an error of the values grow between them.
 LEBESGUE = 3.0
 # Sizes of the ellipse; the one with the smallest remainder counts.
-RADII = (1.7, 2.5, 3.6, 5.2, 8.5)
+RADII = (2.5, 6.0)
 
 
 @functools.cache
