@@ -39,7 +39,7 @@ from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 # Parts of an arc that are looked at first, from rest and between poses, where orientations turn faster. Where verdicts
 # alone are wanted, and no instants to narrow margins down from, they go from the first to the second number with the
 # amplitude; see `blocks.growing`.
-WITH_MARGINS, FROM_REST, BETWEEN = (3, 8), (1.0, 5.0), (6.0, 6.0)
+WITH_MARGINS, FROM_REST, BETWEEN = (3, 6), (1.0, 5.0), (6.0, 6.0)
 # Orders of the cables that are tried, one after the other, where rounding keeps a block open.
 ORDERS = 6
 MATTERS = 0.1  # part of all that is allowed for

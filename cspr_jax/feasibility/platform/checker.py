@@ -193,5 +193,6 @@ def _samples(which: np.ndarray, proof: TensionProof | PlaceProof, some: np.ndarr
     own = np.full(len(proof.is_proved), -1)
     own[some] = np.arange(len(some))
     row = own[proof.row]
-    is_here = row >= 0
-    return Samples(which, row[is_here], proof.first.tau[:, is_here], proof.first.nodes[:, :, is_here])
+    # Not by a mask as an index, which would leave blocks as the slowest axis in memory.
+    row, tau, nodes = (np.compress(row >= 0, x, axis=-1) for x in (row, proof.first.tau, proof.first.nodes))
+    return Samples(which, row, tau, nodes)
