@@ -75,14 +75,14 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     np.testing.assert_array_equal(checker.prefilter.refuted(segments, 6, tau), wanted)
     few = jax.tree.map(lambda x: x[:16], segments)
     np.testing.assert_array_equal(checker.prefilter.refuted(few, 6, tau), wanted[:16])
-    exact = prefilter.smallest_tensions
+    whole = prefilter._rough_and_certain
     for wrong in (lambda x: x - 0.3, lambda x: np.inf * x, lambda x: np.nan * x):
 
-        def spoiled(*given, rough, wrong=wrong, **options):
-            value, when = exact(*given, rough=rough, **options)
-            return (wrong(value), when) if rough else (value, when)
+        def spoiled(*given, wrong=wrong, **options):
+            rough, certain = whole(*given, **options)
+            return wrong(rough), certain
 
-        monkeypatch.setattr(prefilter, "smallest_tensions", spoiled)
+        monkeypatch.setattr(prefilter, "_rough_and_certain", spoiled)
         refuted = checker.prefilter.refuted(segments, 6, tau)
         assert not (refuted & ~wanted).any()
 

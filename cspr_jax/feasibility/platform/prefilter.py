@@ -1,7 +1,7 @@
 """The first look at many motions of a platform: instants that refute most of them.
 
-In float32, where a sample costs half; each refutation is then looked at again in float64, at its own instant. So the
-first look refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full anyway.
+In float32, where a sample costs half; the instant with the smallest tension is then looked at in float64. So the first
+look refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full anyway.
 """
 
 import dataclasses
@@ -110,12 +110,15 @@ def _from_rest(robot: PlatformRobot, segments: PoseSegment):
 
 
 @partial(jax.jit, static_argnames="kind")
-def _tensions_at(robot: PlatformRobot, amplitude: Amplitude, arcs: Array, tau: Array, items, *, kind: Kind) -> Array:
-    # Of segments, each at one of some instants.
-    segments, when = items
+def _rough_and_certain(
+    robot: PlatformRobot, amplitude: Amplitude, arcs: Array, tau: Array, segments: PoseSegment, *, kind: Kind
+) -> tuple[Array, Array]:
+    # As `smallest_tensions`, in float32; and in float64 at the instant of that, (n,) each.
+    lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, rough=True)
+    when = jnp.minimum(when, len(tau) - 1)  # there is none where all are NaN
     if kind.from_rest:
-        return _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
-    return lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau[when]), kind)
+        return lowest, _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
+    return lowest, lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau[when]), kind)
 
 
 class Prefilter(NamedTuple):
@@ -150,7 +153,7 @@ class Prefilter(NamedTuple):
         """
         lowest = np.full(len(segments.rate), np.inf)
         for chunk in _chunks(tau):
-            lowest = np.minimum(lowest, self._lowest(segments, arcs, chunk)[0])
+            lowest = np.minimum(lowest, self._lowest(segments, arcs, chunk))
         return np.where(np.isnan(lowest), -np.inf, lowest)
 
     def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
@@ -171,25 +174,19 @@ class Prefilter(NamedTuple):
                 break
             some = segments if len(alive) == len(is_refuted) else rows(segments, alive)
             if len(alive) <= room(self.size // FEWER):  # not worth two looks
-                is_refuted[alive] = ~(self._lowest(some, arcs, chunk)[0] > self.least)
+                is_refuted[alive] = ~(self._lowest(some, arcs, chunk) > self.least)
                 continue
-            lowest, when = self._lowest(some, arcs, chunk, rough=True)
-            doubtful = np.flatnonzero(lowest < 0.0)
-            is_refuted[alive[doubtful]] = ~(self._again(rows(some, doubtful), arcs, chunk, when[doubtful]) > self.least)
+            self.count_instants(len(alive) * (len(chunk) + 1))
+            kernel = partial(_rough_and_certain, self.robot, self.amplitude, float(arcs), chunk, kind=self.kind)
+            lowest, certain = in_batches(kernel, some, size=self.size)
+            is_refuted[alive] = (lowest < 0.0) & ~(certain > self.least)
         return is_refuted
 
-    def _lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, rough: bool = False):
-        # Many in float32, few in float64: two compilations.
+    def _lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        # Of few motions, in float64.
         self.count_instants(len(segments.rate) * len(tau))
-        kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind, rough=rough)
-        return in_batches(kernel, segments, size=self.size if rough else self.size // FEWER)
-
-    def _again(self, segments: PoseSegment, arcs: int, tau: np.ndarray, when: np.ndarray) -> np.ndarray:
-        if not len(when):
-            return np.zeros(0)
-        self.count_instants(len(when))
-        kernel = partial(_tensions_at, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
-        return in_batches(kernel, (segments, when), size=self.size)
+        kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
+        return in_batches(kernel, segments, size=self.size // FEWER)[0]
 
 
 def _chunks(tau: np.ndarray) -> np.ndarray:
