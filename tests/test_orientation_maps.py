@@ -48,6 +48,28 @@ def check_tables(monkeypatch):
         assert by[row, "proportion"]["computed"] == pytest.approx(by[row, "proportion"]["published"], abs=4.0)
 
 
+@pytest.mark.thorough
+def test_the_smallest_proportion_is_that_of_all(monkeypatch):
+    """Though not all values of beta-hat are tried at every place."""
+    monkeypatch.setattr(chapter_3, "MAX_ARCS", 8)
+    checker, asked = chapter_3.checker_of("effective-c3"), []
+    for radius, azimuth, tilt in ((1.5, 0.2, 0.6), (2.5, 0.0, 1.0), (2.5, 0.5, 1.0), (3.0, 0.1, 0.7), (1.5, 0.1, 0.0)):
+        place = np.array([radius * np.cos(azimuth), radius * np.sin(azimuth), 1.7]) * [0.86, 0.86, 1.0]
+        angles = np.random.default_rng(1).uniform([-np.pi, 0.0, -1.0], [np.pi, 1.0, 1.0], (60, 3)) * [1.0, tilt, tilt]
+        asked.append((place, angles))
+    every = [good.mean() for good in chapter_3.attained(checker, asked)]
+    assert chapter_3.smallest_proportion(checker, asked) == min(every) < max(every) == 1.0
+    preferred = [good.mean() for good in chapter_3.attained(checker, asked, values=1)]
+    assert np.argmin(every) != np.argmin(preferred)
+    tried = []
+    whole = chapter_3.attained
+    monkeypatch.setattr(chapter_3, "attained", lambda *given, **how: tried.append(given[1]) or whole(*given, **how))
+    chapter_3.smallest_proportion(checker, asked)
+    left = sum((~good).sum() for good in whole(checker, asked, values=1))
+    assert 0 < sum(len(angles) for sets in tried[1:] for _, angles in sets) < left
+    assert chapter_3.smallest_proportion(checker, asked[-1:]) == 1.0
+
+
 SWEEP = """schema = 1
 map = "attainability"
 robot = "laval-mssm"

@@ -80,13 +80,16 @@ def checker_of(amplitude: str) -> PoseChecker:
     return PoseChecker(problem, Kind(from_rest=True), batch=MANY)
 
 
-def attained(checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+def attained(
+    checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]], *, values: int = attainable.VALUES
+) -> list[np.ndarray]:
     """Orientations that horizontal transitions attain; the centroid of the spools is the origin.
 
     Args:
         checker: of `checker_of`.
         sets: of each set its place (3,), m, and its orientations (n, 3): tilt and torsion in the cylindrical frame,
             rad.
+        values: of beta-hat tried for each, the preferred one first.
 
     Returns:
         (n,) of each.
@@ -95,8 +98,34 @@ def attained(checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]]) ->
     places = np.repeat([place for place, _ in sets], sizes, axis=0)
     symmetry = symmetries(checker.problem.robot)
     every = np.concatenate([angles for _, angles in sets])
-    good = attainable.attained(checker, places, every, places[:, 2], max_arcs=MAX_ARCS, symmetry=symmetry)
+    z0 = places[:, 2]
+    good = attainable.attained(checker, places, every, z0, max_arcs=MAX_ARCS, values=values, symmetry=symmetry)
     return np.split(good, np.cumsum(sizes)[:-1])
+
+
+def smallest_proportion(checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]]) -> float:
+    """Smallest part of the orientations of a place that horizontal transitions attain.
+
+    Other values of beta-hat than the preferred one are tried only at places that could have the smallest one.
+
+    Args:
+        checker: of `checker_of`.
+        sets: as for `attained`.
+
+    Returns:
+        the part.
+    """
+    first = attained(checker, sets, values=1)
+    shares = np.array([good.mean() for good in first])
+    smallest = 1.0
+    # The place with the smallest share so far, then those that still have less than is attained there.
+    for which in (np.argsort(shares)[:1], np.argsort(shares)[1:]):
+        which = which[shares[which] < smallest]
+        if len(which):
+            others = attained(checker, [(sets[k][0], sets[k][1][~first[k]]) for k in which])
+            parts = [(first[k].sum() + good.sum()) / len(first[k]) for k, good in zip(which, others, strict=True)]
+            smallest = min(smallest, *map(float, parts))
+    return smallest
 
 
 def table_3_3(choice: Choice) -> dict[Key, float | None]:
@@ -163,8 +192,8 @@ def table_3_4(choice: Choice) -> dict[Key, float | None]:
                 with within(f"{amplitude}, {definition}, z = {depth:g}"):
                     sets = accessible_sets(robot, [(place, divisions) for place in places], definition)
                     angles = [(place, inside.angles) for place, inside in zip(places, sets, strict=True)]
-                    smallest = min(good.mean() for good in attained(checker, angles))
-                cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * float(smallest)
+                    smallest = smallest_proportion(checker, angles)
+                cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * smallest
     return cells
 
 
