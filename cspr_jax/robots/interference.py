@@ -144,7 +144,7 @@ def cables_cross(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     Returns:
         (..., n_pairs).
     """
-    return (before * after).sum(-1) <= 0.0
+    return np.einsum("...k,...k->...", before, after) <= 0.0
 
 
 def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -163,6 +163,5 @@ def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, afte
     through = high * low <= 0.0
     # The direction within the platform's plane: a combination of both directions with positive weights.
     weight = np.abs(low)[..., None] * before + np.abs(high)[..., None] * after
-    first = np.cross(sides[:, 1], weight) @ normal
-    second = np.cross(weight, sides[:, 0]) @ normal
-    return through & (first >= 0.0) & (second >= 0.0)
+    first, second = (np.einsum("...jk,jk->...j", weight, np.cross(normal, sides[:, k])) for k in (1, 0))
+    return through & (first >= 0.0) & (second <= 0.0)

@@ -105,9 +105,9 @@ class OrientationSteps:
         )
         share, gaps, directions = sampled
         # Cables that touch have a gap of rounding errors, whose direction means nothing.
-        gaps[np.linalg.norm(gaps, axis=2) < TOUCHING * self._size] = 0.0
+        gaps[_squares(gaps) < (TOUCHING * self._size) ** 2] = 0.0
         # So has the height of cables that lie in the platform: they are put on one side of it.
-        height, least = directions @ self._contacts.normal, TOUCHING * np.linalg.norm(directions, axis=2)
+        height, least = directions @ self._contacts.normal, TOUCHING * np.sqrt(_squares(directions))
         height = np.where(np.abs(height) < least, 2.0 * least * self._side - height, 0.0)
         return OrientationSamples(share / self._reference, gaps, directions + height[..., None] * self._contacts.normal)
 
@@ -143,3 +143,8 @@ class OrientationSteps:
             hit = platform_hit(self._contacts.sides, self._contacts.normal, directions[one], directions[two])
             free[some] = ~met & ~hit.any(1)
         return free
+
+
+def _squares(vectors: np.ndarray) -> np.ndarray:
+    # Of lengths; three components are too few for a reduction along the last axis to be fast.
+    return np.einsum("...k,...k->...", vectors, vectors)
