@@ -81,7 +81,7 @@ def checker_of(amplitude: str) -> PoseChecker:
 
 
 def attained(
-    checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]], *, values: int = attainable.VALUES
+    checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]], *, tried: np.ndarray | None = None
 ) -> list[np.ndarray]:
     """Orientations that horizontal transitions attain; the centroid of the spools is the origin.
 
@@ -89,7 +89,7 @@ def attained(
         checker: of `checker_of`.
         sets: of each set its place (3,), m, and its orientations (n, 3): tilt and torsion in the cylindrical frame,
             rad.
-        values: of beta-hat tried for each, the preferred one first.
+        tried: which values of beta-hat, as for `search.attainable.attained`.
 
     Returns:
         (n,) of each.
@@ -99,7 +99,7 @@ def attained(
     symmetry = symmetries(checker.problem.robot)
     every = np.concatenate([angles for _, angles in sets])
     z0 = places[:, 2]
-    good = attainable.attained(checker, places, every, z0, max_arcs=MAX_ARCS, values=values, symmetry=symmetry)
+    good = attainable.attained(checker, places, every, z0, max_arcs=MAX_ARCS, tried=tried, symmetry=symmetry)
     return np.split(good, np.cumsum(sizes)[:-1])
 
 
@@ -115,16 +115,21 @@ def smallest_proportion(checker: PoseChecker, sets: list[tuple[np.ndarray, np.nd
     Returns:
         the part.
     """
-    first = attained(checker, sets, values=1)
-    shares = np.array([good.mean() for good in first])
+    preferred, some, rest = attainable.turns()
+    good = attained(checker, sets, tried=preferred)
+    shares = np.array([own.mean() for own in good])
     smallest = 1.0
-    # The place with the smallest share so far, then those that still have less than is attained there.
-    for which in (np.argsort(shares)[:1], np.argsort(shares)[1:]):
-        which = which[shares[which] < smallest]
-        if len(which):
-            others = attained(checker, [(sets[k][0], sets[k][1][~first[k]]) for k in which])
-            parts = [(first[k].sum() + good.sum()) / len(first[k]) for k, good in zip(which, others, strict=True)]
-            smallest = min(smallest, *map(float, parts))
+    # All values at the place with the smallest share so far; then, turn by turn, where less is attained than there.
+    every, only = list(range(len(sets))), [int(shares.argmin())]
+    for which, tried in ((only, some), (only, rest), (every, some), (every, rest)):
+        left = [k for k in which if shares[k] < smallest]
+        if left:
+            found = attained(checker, [(sets[k][0], sets[k][1][~good[k]]) for k in left], tried=tried)
+            for k, own in zip(left, found, strict=True):
+                good[k][~good[k]] = own
+                shares[k] = good[k].mean()
+        if tried is rest:
+            smallest = min(smallest, float(shares[which].min()))
     return smallest
 
 

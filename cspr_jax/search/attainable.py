@@ -15,6 +15,8 @@ from cspr_jax.search.pose_ends import end_options
 
 # Values of beta-hat tried at the target.
 VALUES = 20
+# Of other values than the preferred one, one in so many is tried before the rest.
+FEWER = 5
 # Motions of a part of a search that only asks whether; large ones fill their batches.
 PART, MIXED = CANDIDATES // 4, 16
 
@@ -61,6 +63,7 @@ def attained(
     *,
     max_arcs: int,
     values: int = VALUES,
+    tried: np.ndarray | None = None,
     symmetry: Symmetries = NONE,
 ) -> np.ndarray:
     """Orientations of places that some number of arcs and some value of beta-hat attains.
@@ -74,20 +77,21 @@ def attained(
         z0: (n,) m.
         max_arcs: largest number tried.
         values: of beta-hat, the preferred one first.
+        tried: which of these, (k,) numbers from 0 on; None: all, in `turns`.
         symmetry: symmetries of the robot; orientations that they join are computed once.
 
     Returns:
         (n,).
     """
     some, own = _once(checker, places, angles, z0, symmetry)
+    each = turns(values) if tried is None else (tried,)
 
     def part(which):
         which = some[which]
         motions, beta_hats = _motions(checker, places[which], angles[which], z0[which], values)
         is_attained = np.zeros(len(which), bool)
-        # The preferred value with every number of arcs, then the others where it fails.
-        for options in (beta_hats[:, :1], beta_hats[:, 1:]):
-            left = np.flatnonzero(~is_attained)
+        for turn in each:
+            left, options = np.flatnonzero(~is_attained), beta_hats[:, turn]
             size = max(CANDIDATES // max(options.shape[1], 1), 1)
             for piece in (left[k : k + size] for k in range(0, len(left), size)):
                 cell, trial = trials(motions.motions(piece), options[piece])
@@ -101,6 +105,19 @@ def attained(
     some[:] = some[mixed]
     found[mixed] = np.concatenate(in_parts(part, len(some), PART))
     return found[own]
+
+
+def turns(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Turns in which values of beta-hat are tried, each with every number of arcs, where the one before fails.
+
+    Args:
+        values: how many there are, the preferred one first.
+
+    Returns:
+        numbers of values from 0 on: the preferred one; some of the others; the rest.
+    """
+    every = np.arange(1, values)
+    return np.array([0]), every[every % FEWER == 0], every[every % FEWER != 0]
 
 
 def _once(checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
