@@ -16,7 +16,7 @@ from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.platform.orientation_steps import OrientationSteps
 from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
 from cspr_jax.search.accessible import DEFINITIONS, accessible
-from cspr_jax.search.attainable import attainable, attained
+from cspr_jax.search.attainable import attainable, attained, turns
 from cspr_jax.search.orientation_grids import equal_volume_grid, tilt_torsion_grid
 from cspr_jax.search.pose_ends import end_options
 
@@ -219,6 +219,14 @@ def test_orientations_that_a_mirror_joins():
     whether = attained(checker, many, angles, z0, max_arcs=8, values=4, symmetry=symmetries(robot))
     assert (whether == (once.arcs > 0)).all() and whether.any() and not whether.all()
     np.testing.assert_allclose(once.margin[once.arcs > 0], twice.margin[once.arcs > 0], atol=1e-6)
+
+
+@pytest.mark.parametrize("values", [1, 2, 6, 20])
+def test_turns_try_every_value_once(values):
+    """The preferred one first."""
+    each = turns(values)
+    assert each[0].tolist() == [0]
+    assert sorted(np.concatenate(each).tolist()) == list(range(values))
 
 
 @pytest.mark.thorough

@@ -13,7 +13,7 @@ from oracles import platform as oracle
 from support.platforms import FROM_REST, Z0, limits_of, stacked
 from support.random_motions import BATCH, QUINTIC, ROBOTS, drawn, jets, motions_of, problem_of
 
-from cspr_jax.arithmetic import chebyshev
+from cspr_jax.arithmetic import chebyshev, packed
 from cspr_jax.feasibility.blocks import Blocks
 from cspr_jax.feasibility.platform import certificate, tension_blocks
 from cspr_jax.feasibility.platform.certificate import Certifier, determinant_at_rest
@@ -154,6 +154,22 @@ def test_bounds_on_blocks_hold(kind):
     broken, gaps = block_breaks(128, 3, kind, ROBOTS["general"], TIGHT)
     assert not broken
     assert np.median(gaps[:, 1][np.isfinite(gaps[:, 1])]) < 0.1
+
+
+def test_rounding_of_values_is_allowed_for():
+    """Where verdicts alone are wanted: at least what float32 can change of the smallest of kappa."""
+    rng, robot, count = np.random.default_rng(8), ROBOTS["general"], 128
+    segments, _, arcs, _ = drawn(rng, robot, FROM_REST, count)
+    problem, start = problem_of(robot, limits_of(**TIGHT)), rng.uniform(0.0, 0.9, count)
+    blocks = Blocks(np.arange(count), start, start + 0.1 / arcs)
+    whole, rough = (
+        bounds_of(certifier_of(problem, FROM_REST), problem, segments, arcs, blocks, least=x) for x in (False, True)
+    )
+    kappa = (whole.nodes[:, 0] * whole.nodes[:, 1]).max(0)
+    more = rough.allowed - whole.allowed
+    known = (whole.nodes[:, 1] > 0.0).all(0) & (kappa > 0.05) & (whole.allowed < 1e-3)
+    assert known.sum() > 20 and (more[known] > 2.9 * packed.ROUNDING * kappa[known]).all()
+    np.testing.assert_array_equal(whole.rounding[known] < 1e-6, rough.rounding[known] < 1e-6)
 
 
 @pytest.mark.soak
