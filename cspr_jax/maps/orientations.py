@@ -32,7 +32,7 @@ class OrientationsMap(AttainabilityMap):
         every |= {"arcs": np.zeros(count, int), "tried_arcs": np.zeros(count, int)}
         every["verdict"] = np.full(count, Verdict.NOT_ACCESSIBLE.value, FLAGS)
         if len(some):
-            answers = self._attainable(places[some], angles[some], z0[some])
+            answers = self._attainable(places[some], angles[some], z0[some], margins=True)
             columns = vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
             for name, values in every.items():
                 values[some] = columns[name]

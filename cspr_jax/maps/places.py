@@ -70,10 +70,13 @@ class AttainabilityMap(OrientationWorkspaceMap):
         kind = motion_kind(keys.trajectory, from_rest=True)
         self._checker = PoseChecker(self._problem, kind, batch=MANY)
 
-    def _attainable(self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray) -> PoseAnswers:
+    def _attainable(self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, *, margins: bool) -> PoseAnswers:
         # Of (n, 3) angles at (n, 3) places, both in the kernels' axes.
         values, most = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
-        return attainable(self._checker, places, angles, z0, max_arcs=most, values=values, symmetry=self._alike)
+        alike = self._alike
+        return attainable(
+            self._checker, places, angles, z0, max_arcs=most, values=values, symmetry=alike, margins=margins
+        )
 
     def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
         fine, coarse = (self._sets(places, k) for k in (1, 2))
@@ -86,7 +89,7 @@ class AttainabilityMap(OrientationWorkspaceMap):
         some = np.flatnonzero(own >= 0)
         if len(some):
             angles = np.concatenate([inside.angles for inside in every])[some]
-            answers = self._attainable(places[own[some]], angles, z0[own[some]])
+            answers = self._attainable(places[own[some]], angles, z0[own[some]], margins=False)
             verdicts[some], arcs[some] = answers.verdict, answers.arcs
         stops = np.cumsum(counts)[:-1]
         pieces = zip(every, np.split(arcs, stops), np.split(verdicts, stops), strict=True)

@@ -30,6 +30,7 @@ def attainable(
     max_arcs: int,
     values: int = VALUES,
     symmetry: Symmetries = NONE,
+    margins: bool = True,
 ) -> PoseAnswers:
     """Smallest numbers of arcs from rest to orientations of places.
 
@@ -41,6 +42,7 @@ def attainable(
         max_arcs: largest number tried.
         values: of beta-hat, the preferred one first.
         symmetry: symmetries of the robot; orientations that they join are computed once.
+        margins: whether those of orientations that are attained are wanted.
 
     Returns:
         the answers.
@@ -50,7 +52,7 @@ def attainable(
     def part(which):
         which = some[which]
         motions, beta_hats = _motions(checker, places[which], angles[which], z0[which], values)
-        return reached(checker, motions, beta_hats, max_arcs=max_arcs)
+        return reached(checker, motions, beta_hats, max_arcs=max_arcs, margins=margins)
 
     return joined(in_parts(part, len(some), CANDIDATES // values)).rows(own)
 

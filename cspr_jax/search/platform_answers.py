@@ -122,7 +122,13 @@ def trials(motions: Candidates, values: np.ndarray, *, same: bool = False) -> tu
 
 
 def reached(
-    checker: MotionChecker, motions: Candidates, values: np.ndarray, *, max_arcs: int, same: bool = False
+    checker: MotionChecker,
+    motions: Candidates,
+    values: np.ndarray,
+    *,
+    max_arcs: int,
+    same: bool = False,
+    margins: bool = True,
 ) -> PoseAnswers:
     """Smallest numbers of arcs of motions, each with several values of beta-hat at its end.
 
@@ -132,12 +138,13 @@ def reached(
         values: (n, n_values) in the order in which they are tried; NaN for none.
         max_arcs: largest number tried.
         same: whether the value at the end holds at the start too.
+        margins: whether those of motions that are found are wanted.
 
     Returns:
         the answers; where there is none, those of the first value, or of that at rest.
     """
     cell, trial = trials(motions, values, same=same)
-    of_trials = smallest_arcs(checker, trial, max_arcs=max_arcs)
+    of_trials = smallest_arcs(checker, trial, max_arcs=max_arcs, margins=margins)
     arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
     beta_hats = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
     # Several values of one motion may have passed: the one tried first is last here.
