@@ -126,10 +126,13 @@ class Certifier:
         for k in range(1, len(self._orders)):
             # What is not proved because the first three cables lie nearly in one plane.
             open_ones = np.flatnonzero(_rounding_matters(found) & ~(found.bound > TOLERANCE).all(0))
-            open_ones = open_ones[(found.nodes[:, :, open_ones] > -TOLERANCE).all((0, 1))]
             if not len(open_ones):
                 break
             better = self.bounds(k, blocks.some(open_ones), motions, margins=margins, least=not margins)
+            # Values of nodes too: where such cables are in one plane they are rounding, and could refute.
+            surer = better.rounding < found.rounding[open_ones]
+            found.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
+            found.place[open_ones[surer]] = better.place[surer]
             found.bound[:, open_ones] = np.maximum(found.bound[:, open_ones], better.bound)
             found.rounding[open_ones] = np.minimum(found.rounding[open_ones], better.rounding)
             found.allowed[open_ones] = np.minimum(found.allowed[open_ones], better.allowed)
