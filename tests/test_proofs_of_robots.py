@@ -132,3 +132,14 @@ def test_no_sample_contradicts_a_proof(name, kind):
     """5,000 motions of each robot and kind; less than 0.5 % undecided."""
     found = against_samples(name, kind, 5000)
     assert found["wrong"] == 0 and found["undecided"] < 25 and found["proved"] > 20, found
+
+
+@pytest.mark.thorough
+def test_no_motion_is_refuted_where_its_tensions_are_rounding():
+    """At a node at 0.766 three cables lie nearly in one plane; a cable is slack elsewhere, and that is named."""
+    robot = robot_of("laval-mssm")
+    problem = Problem(robot, Limits(), named("quintic"))
+    motions = drawn(robot, FROM_REST, 400, 9).rows(np.array([107]))
+    checks = PoseChecker(problem, FROM_REST, batch=64).check(*motions, margins=False)
+    assert checks.verdict[0] == Verdict.SLACK_CABLE.value
+    assert Samples(problem, FROM_REST).slack(motions, np.array([0]), checks.instant)[0] < -0.01

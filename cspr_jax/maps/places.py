@@ -73,10 +73,8 @@ class AttainabilityMap(OrientationWorkspaceMap):
     def _attainable(self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, *, margins: bool) -> PoseAnswers:
         # Of (n, 3) angles at (n, 3) places, both in the kernels' axes.
         values, most = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
-        alike = self._alike
-        return attainable(
-            self._checker, places, angles, z0, max_arcs=most, values=values, symmetry=alike, margins=margins
-        )
+        asked = self._checker, places, angles, z0
+        return attainable(*asked, max_arcs=most, values=values, symmetry=self._alike, margins=margins)
 
     def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
         fine, coarse = (self._sets(places, k) for k in (1, 2))
