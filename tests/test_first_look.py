@@ -10,6 +10,8 @@ from oracles import platform as oracle
 from support.platforms import EFFECTIVE, FROM_REST, MSSM, Z0, checker_of, made, ours
 
 from cspr_jax.feasibility.platform import prefilter
+from cspr_jax.feasibility.platform.slack_lanes import certain_tension
+from cspr_jax.robots.wrench_lanes import Cables, balance
 from cspr_jax.search.platform_arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.trajectories.amplitudes import named
 from cspr_jax.trajectories.platform_segment import USUAL
@@ -130,3 +132,23 @@ def test_the_size_of_the_robot_changes_nothing(scale):
         )
         assert not np.isnan(rough).any() and (np.asarray(rough) < 0.0).sum() > 20
     np.testing.assert_array_equal(*sizes)
+
+
+def test_a_tension_is_right_or_unknown():
+    """Three cables in one plane but for a billionth or more, of systems that NumPy solves to ten digits."""
+    rng, n = np.random.default_rng(6), 2000
+    arms, rays = rng.normal(size=(6, n, 3)), rng.normal(size=(6, n, 3))
+    across = np.cross(rays[0], rays[2])
+    out = 10.0 ** rng.uniform(-9.0, 0.0, n)
+    part = rng.uniform(-2.0, 2.0, (2, n, 1))
+    rays[4] = part[0] * rays[0] + part[1] * rays[2] + out[:, None] * across / np.linalg.norm(across, axis=1)[:, None]
+    force, moment = rng.normal(size=(2, n, 3))
+    columns = -np.concatenate([rays, np.cross(arms, rays)], axis=2).transpose(1, 2, 0)
+    is_good = np.linalg.cond(columns) < 100.0
+    true = 6.0 * np.linalg.solve(columns, np.concatenate([force, moment], axis=1)[:, :, None])[:, :, 0].min(1)
+    wires = Cables(*([tuple(x.T) for x in vectors] for vectors in (arms, rays)))
+    found = balance(wires, tuple(force.T), tuple(moment.T))
+    mine = np.asarray(certain_tension(np.ones(n), np.sign(found.signed), wires, found))
+    is_known = np.isfinite(mine) & is_good
+    assert np.abs(mine - true)[is_known].max() < 1e-7
+    assert is_known[is_good & (out > 0.1)].all() and not is_known[out < 1e-4].any()

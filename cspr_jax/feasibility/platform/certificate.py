@@ -133,7 +133,7 @@ class Certifier:
             surer = better.rounding < found.rounding[open_ones]
             found.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
             found.place[open_ones[surer]] = better.place[surer]
-            found.bound[:, open_ones] = np.maximum(found.bound[:, open_ones], better.bound)
+            found.bound[:, open_ones] = np.fmax(found.bound[:, open_ones], better.bound)
             found.rounding[open_ones] = np.minimum(found.rounding[open_ones], better.rounding)
             found.allowed[open_ones] = np.minimum(found.allowed[open_ones], better.allowed)
         return found

@@ -26,8 +26,8 @@ def slacks_at(problem: Problem, items, *, pairs: tuple, kind: Kind) -> tuple[Arr
         kind: of the motions.
 
     Returns:
-        n_criteria + 1 times (n,): slacks in the order of `slacks.flags`, infinite where the fast balance has no digits;
-        the smallest distance between cables, m.
+        n_criteria + 1 times (n,): slacks in the order of `slacks.flags`, infinite where the fast balance has too few
+        digits; the smallest distance between cables, m.
     """
     segments, arcs, tau = items
     now = instant(problem.amplitude, segments.sense, arcs, tau)

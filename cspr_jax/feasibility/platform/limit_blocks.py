@@ -63,21 +63,19 @@ class Sizes(NamedTuple):
 
 
 class Enclosed(NamedTuple):
-    """A quantity on n blocks.
+    """A quantity on n blocks, and at their nodes, (m, n_cables, n) each; of D (m, 1, n).
 
     Fields:
-        low: (m, n_cables, n) Bernstein coefficients less what the polynomials leave out.
-        high: (m, n_cables, n) these and that.
-        nodes: (m, n_cables, n) values at the nodes.
-        regular: low and high of D, (m, 1, n) each.
-        share: (m, n) D at the nodes.
+        coefficients: Bernstein's, less and more what the polynomials leave out.
+        nodes: values there, less and more what may be rounding.
+        regular: coefficients of D.
+        share: D at the nodes.
     """
 
-    low: Array
-    high: Array
-    nodes: Array
+    coefficients: Pair
+    nodes: Pair
     regular: Pair
-    share: Array
+    share: Pair
 
 
 class Quantity(NamedTuple):
@@ -88,7 +86,7 @@ class Quantity(NamedTuple):
         values: from an instant and the limit, (n_cables,), values in pairs of (n,).
         sizes: from sizes and the limit, as many bounds of them as values.
         slacks: of limits at least and at most so large, from what is enclosed and the limit over the scale of slacks:
-            smallest ones at the nodes (m, n), and a lower bound (n,).
+            upper bounds of the smallest ones at the nodes (m, n), and a lower bound of all (n,).
     """
 
     width: int
@@ -112,18 +110,17 @@ def ratio(top: Array, regular: Pair) -> Array:
     return jnp.where(bottom > 0.0, top / jnp.where(bottom > 0.0, bottom, 1.0), -jnp.inf)
 
 
-def quotient(top: Array, share: Array) -> Array:
-    """Quotients at nodes.
+def at_most(top: Array, regular: Pair) -> Array:
+    """Upper bounds of quotients where the denominator is positive.
 
     Args:
-        top: (m, n_cables, n).
-        share: (m, n) D.
+        top: (...) those of the numerator.
+        regular: lower and upper bounds of the denominator, (...) each.
 
     Returns:
-        (m, n_cables, n); -inf where D is not positive.
+        (...); infinite where the denominator is not positive for certain, nor the numerator negative.
     """
-    is_positive = (share > 0.0)[:, None]
-    return jnp.where(is_positive, top / jnp.where(is_positive, share[:, None], 1.0), -jnp.inf)
+    return -ratio(-top, regular)
 
 
 def _paired(values: Sequence[Array]) -> list[Pair]:
@@ -141,11 +138,12 @@ def _tension_sizes(sizes: Sizes, _: Array) -> list[Array]:
 
 
 def _tension_slacks(found: Enclosed, limit: Array, is_least: bool) -> Pair:
-    limit, here = limit[None, :, None], quotient(found.nodes, found.share)
+    limit, (low, high), (under, over) = limit[None, :, None], found.coefficients, found.nodes
     if is_least:
-        return jnp.min(here - limit, axis=1), jnp.min(ratio(found.low, found.regular) - limit, axis=(0, 1))
-    over = jnp.where((found.share > 0.0)[:, None], limit - here, -jnp.inf)
-    return jnp.min(over, axis=1), jnp.min(limit + ratio(-found.high, found.regular), axis=(0, 1))
+        here, bound = at_most(over, found.share) - limit, ratio(low, found.regular) - limit
+    else:
+        here, bound = limit + at_most(-under, found.share), limit + ratio(-high, found.regular)
+    return jnp.min(here, axis=1), jnp.min(bound, axis=(0, 1))
 
 
 def _rates(here: Here) -> list[tuple[Array, Array, Array]]:
@@ -170,7 +168,7 @@ def _speed_sizes(sizes: Sizes, limit: Array) -> list[Array]:
 
 
 def _speed_slacks(found: Enclosed, _: Array, __: bool) -> Pair:
-    return jnp.min(found.nodes, axis=1), jnp.min(found.low, axis=(0, 1))
+    return jnp.min(found.nodes[1], axis=1), jnp.min(found.coefficients[0], axis=(0, 1))
 
 
 def _accelerations(here: Here, limit: Array) -> list[Pair]:
@@ -190,9 +188,11 @@ def _acceleration_sizes(sizes: Sizes, limit: Array) -> list[Array]:
 
 
 def _acceleration_slacks(found: Enclosed, _: Array, __: bool) -> Pair:
-    worst = jnp.maximum(jnp.abs(found.low[:, 1::2]), jnp.abs(found.high[:, 1::2]))
-    nodes = found.nodes[:, ::2] - jnp.abs(found.nodes[:, 1::2])
-    return jnp.min(nodes, axis=1), jnp.min(found.low[:, ::2] - worst, axis=(0, 1))
+    (low, high), (under, over) = found.coefficients, found.nodes
+    worst = jnp.maximum(jnp.abs(low[:, 1::2]), jnp.abs(high[:, 1::2]))
+    # As near to zero as rounding lets it be.
+    bends = jnp.maximum(jnp.maximum(under[:, 1::2], -over[:, 1::2]), 0.0)
+    return jnp.min(over[:, ::2] - bends, axis=1), jnp.min(low[:, ::2] - worst, axis=(0, 1))
 
 
 # By the name that rows of `schema.limits` call them.

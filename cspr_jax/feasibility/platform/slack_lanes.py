@@ -23,8 +23,9 @@ from cspr_jax.schema.limits import Limit
 from cspr_jax.trajectories.platform_lanes import Instant, State, squared_duration, state
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
-# Where three of the cables are nearly in one plane the fast balance has no digits, whatever the platform does.
-FLAT = 1e-7
+# Where three of the cables are so nearly in one plane the fast balance loses digits, whatever the platform does: as the
+# third power of this, so that what refutes a motion is no rounding.
+FLAT = 1e-3
 
 
 def _balanced(robot: PlatformRobot, now: State, wires: Cables, squared: Array) -> Balance:
@@ -59,7 +60,7 @@ def certain_tension(rate: Array, regular: Array, wires: Cables, balance: Balance
 
     Returns:
         (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign, infinite
-        where the fast balance has no digits.
+        where the fast balance has too few digits.
     """
     lowest = jnp.where(balance.signed * regular > 0.0, _smallest_tension(rate, balance), -jnp.inf)
     return jnp.where(_is_flat(wires, balance), jnp.inf, lowest)
@@ -95,7 +96,8 @@ def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Inst
         kind: of the motions.
 
     Returns:
-        (n,) each: the taut cables', then those of limits on the motion; infinite where the fast balance has no digits.
+        (n,) each: the taut cables', then those of limits on the motion; infinite where the fast balance has too few
+        digits.
     """
     robot, limits = problem.robot, problem.limits
     here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)

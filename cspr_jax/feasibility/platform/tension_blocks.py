@@ -30,7 +30,7 @@ from cspr_jax.feasibility.platform.limit_blocks import (
     Here,
     Pair,
     Sizes,
-    quotient,
+    at_most,
     ratio,
 )
 from cspr_jax.feasibility.platform.work_list import allowance
@@ -54,7 +54,8 @@ class BlockBounds(NamedTuple):
     """Slacks on n blocks: of taut cables, of the determinant (D), of the limits on the motion that are given.
 
     Fields:
-        nodes: (n_nodes, n_criteria, n) smallest ones at the nodes; of the determinant that of
+        nodes: (n_nodes, n_criteria, n) smallest ones at the nodes, and what may be rounding: no lower than they truly
+            are. Infinite where D is not positive for certain. Of the determinant that of
             `wrench_lanes.normalised_determinant` over its value at rest in P0, where margins are asked for. Where only
             the least are: (1, n_criteria, n).
         place: (n,) where the smallest of the least is, from -1 to 1; 0 where all are asked for.
@@ -110,10 +111,9 @@ def tension_blocks(
     """
     found = _taken(problem, one, items, kind=kind, margins=margins, rough=least)
     # What margins alone need comes last, and is not bounded.
-    count = found.rests.shape[0]
-    nodes, bound = _bounds(problem, found.block, found.values[:, :count], found.rests)
+    nodes, bound = _bounds(problem, found)
     if margins:
-        nodes[1] = found.values[:, count]
+        nodes[1] = nodes[1] * found.values[:, len(found.rests)]
     if least:
         every, place = least_nodes(nodes, allowance(np.arange(len(nodes)) >= BASIC), chebyshev.nodes())
     else:
@@ -208,6 +208,7 @@ def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool, ro
     sizes = jnp.stack(packed.parts(lax.map(sizes_on, (axes[:, 0], lax.map(reach_on, axes), factors))))
     amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
     largest = jnp.max(jnp.abs(values[:, : len(sizes)]), axis=0)
+    largest = jnp.where(jnp.isnan(largest), jnp.inf, largest)  # of three cables in one plane
     rounding = sizes[:, -1] * amplified[None] + COEFFICIENTS * largest
     rests = jnp.min(sizes[:, :-1], axis=1) + rounding
     if rough:
@@ -217,7 +218,7 @@ def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool, ro
 
 def _values(problem: Problem, block: _Block, here: State, *, margins: bool) -> list[Pair]:
     # At one node, two at a time, which XLA then computes in one loop: kappa and D, what rounding is multiplied with,
-    # what the limits need, and the normalised determinant.
+    # what the limits need, and what makes of D the normalised determinant.
     robot = problem.robot
     wires = cables(robot, here.position, here.turn)
 
@@ -240,7 +241,8 @@ def _values(problem: Problem, block: _Block, here: State, *, margins: bool) -> l
         standing = cables(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
         rest = [dot(ray, ray) for ray in standing.rays]
         lengths = [jnp.sqrt(a / b) for a, b in zip(rest, squares, strict=True)]
-        pairs.append((regular * math.prod(lengths[1:], start=lengths[0]), regular))
+        share = math.prod(lengths[1:], start=lengths[0])
+        pairs.append((share, share))
     return pairs
 
 
@@ -295,26 +297,33 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     return every
 
 
-def _bounds(problem: Problem, block: _Block, values: Array, rests: Array) -> tuple[list[Array], list[Array]]:
-    # Smallest slacks at the nodes, (m, n) each, and their lower bounds, (n,) each; `values` (m, n_values, n), `rests`
-    # (n_values, n).
+def _bounds(problem: Problem, found: _Taken) -> tuple[list[Array], list[Array]]:
+    # Smallest slacks at the nodes, (m, n) each, as large as rounding lets them be; and their lower bounds, (n,) each.
+    rests, block = found.rests, found.block
+    values = found.values[:, : len(rests)]
     every = _coefficients(values)
-    low, high, share = every - rests[None], every + rests[None], values[:, REGULAR]
-    regular = low[:, REGULAR, None], high[:, REGULAR, None]
+
+    def around(middle, off, part):
+        return middle[:, part] - off[None, part], middle[:, part] + off[None, part]
+
+    one = slice(REGULAR, REGULAR + 1)
+    regular, share = around(every, rests, one), around(values, found.rounding, one)
     # Of quotients with one denominator the smallest has the smallest numerator.
-    kappa, least = (jnp.min(x[:, :CABLES], axis=1, keepdims=True) for x in (values, low))
-    nodes = [quotient(kappa, share)[:, 0], share]
-    bound = [jnp.min(ratio(least, regular), axis=(0, 1)), jnp.min(low[:, REGULAR], axis=0)]
+    least = jnp.min(every[:, :CABLES] - rests[None, :CABLES], axis=1, keepdims=True)
+    doubt = jnp.max(found.rounding[None, :CABLES], axis=1, keepdims=True)
+    kappa = jnp.min(values[:, :CABLES], axis=1, keepdims=True) + doubt
+    nodes = [at_most(kappa, share)[:, 0], share[1][:, 0]]
+    bound = [jnp.min(ratio(least, regular), axis=(0, 1)), jnp.min(regular[0], axis=(0, 1))]
     scale = scales(CABLES, problem.robot.mass * problem.robot.gravity, block.z0)
-    part, found = slice(0, REGULAR + 2), {}
+    part, slacks = slice(0, REGULAR + 2), {}
     for quantity, rows in _quantities(problem).items():
         factor, size = scale.get(quantity, (1.0, jnp.ones(())))
         part = slice(part.stop, part.stop + QUANTITIES[quantity].width)
-        enclosed = Enclosed(low[:, part], high[:, part], values[:, part], regular, share)
+        enclosed = Enclosed(around(every, rests, part), around(values, found.rounding, part), regular, share)
         for row in rows:
             limit = getattr(problem.limits, row.name) * (factor / size)
-            found[row.name] = QUANTITIES[quantity].slacks(enclosed, limit, row.sense == "least")
+            slacks[row.name] = QUANTITIES[quantity].slacks(enclosed, limit, row.sense == "least")
     for row in of_motion(problem):
-        nodes.append(found[row.name][0])
-        bound.append(found[row.name][1])
+        nodes.append(slacks[row.name][0])
+        bound.append(slacks[row.name][1])
     return nodes, bound
