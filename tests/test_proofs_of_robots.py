@@ -4,6 +4,7 @@ Samples are those of the readable functions where a motion is refuted, and of la
 where one is proved: 20,001 instants.
 """
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from support.platforms import FROM_REST, general, ours
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.feasibility.platform import redundant_kernels
+from cspr_jax.feasibility.platform import certificate, redundant_kernels
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.crossings import passed_over
 from cspr_jax.feasibility.platform.kernels import slacks_at
@@ -86,6 +87,16 @@ class Samples:
 
         return in_batches(kernel, (*motions.items(row), tau), size=BATCH)
 
+    def tension(self, motions, row, tau):
+        """Smallest slack of taut cables, (k,), in other orders of these, of which one has digits everywhere."""
+        orders = [order.problem for order in certificate._orders(self._problem)[1:3]]
+
+        def kernel(problem, items):
+            return slacks_at(problem, items, pairs=(), kind=self._kind)[0]
+
+        items = (*motions.items(row), tau)
+        return np.min([in_batches(partial(kernel, problem), items, size=BATCH) for problem in orders], axis=0)
+
     def touches(self, motions, row, ends):
         """Motions in whose steps something meets, (n,)."""
 
@@ -114,7 +125,9 @@ def against_samples(name, kind, count, seed=1):
         wrong += bool(samples.touches(own, row[1:], (tau[:-1], tau[1:])).any())
     refuted = np.flatnonzero(~is_proved & ~is_unsure)
     at = checks.instant[refuted]
-    breaks = ~(samples.slack(motions, refuted, at) > 0.0) if len(refuted) else np.zeros(0, bool)
+    breaks = np.zeros(len(refuted), bool)
+    for values in (samples.slack, samples.tension) if len(refuted) else ():
+        breaks |= ~(values(motions, refuted, at) > 0.0)
     # Contacts lie within a step of the blocks in which they are looked for.
     rest = refuted[~breaks]
     step = 1.0 / (PARTS * STEPS * motions.arcs[rest])
