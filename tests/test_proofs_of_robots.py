@@ -156,3 +156,15 @@ def test_no_motion_is_refuted_where_its_tensions_are_rounding():
     checks = PoseChecker(problem, FROM_REST, batch=64).check(*motions, margins=False)
     assert checks.verdict[0] == Verdict.SLACK_CABLE.value
     assert Samples(problem, FROM_REST).slack(motions, np.array([0]), checks.instant)[0] < -0.01
+
+
+@pytest.mark.thorough
+def test_flags_are_the_same_with_margins_beside_a_singularity():
+    """Beyond one a slack has no meaning, before it a cable may be slack: the flags say the same without margins."""
+    robot = robot_of("laval-mssm")
+    problem = Problem(robot, Limits(), named("quintic"))
+    motions = drawn(robot, FROM_REST, 400, 9).rows(np.array([6, 170, 249, 251, 356, 363]))
+    checker = PoseChecker(problem, FROM_REST, batch=64)
+    with_margins, without = (checker.check(*motions, margins=x).verdict for x in (True, False))
+    np.testing.assert_array_equal(with_margins, without)
+    assert (without & Verdict.SINGULAR.value).all()

@@ -23,8 +23,8 @@ from cspr_jax.schema.limits import Limit
 from cspr_jax.trajectories.platform_lanes import Instant, State, squared_duration, state
 from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
 
-# Where three of the cables are so nearly in one plane the fast balance loses digits, whatever the platform does: as the
-# third power of this, so that what refutes a motion is no rounding.
+# The volume of three of the cables over the product of their lengths below which no tension is told: they are nearly in
+# one plane, and the rounding of the fast balance grows with the third power of the inverse. It must refute nothing.
 FLAT = 1e-3
 
 

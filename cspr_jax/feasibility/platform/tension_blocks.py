@@ -241,8 +241,8 @@ def _values(problem: Problem, block: _Block, here: State, *, margins: bool) -> l
         standing = cables(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
         rest = [dot(ray, ray) for ray in standing.rays]
         lengths = [jnp.sqrt(a / b) for a, b in zip(rest, squares, strict=True)]
-        share = math.prod(lengths[1:], start=lengths[0])
-        pairs.append((share, share))
+        shortened = math.prod(lengths[1:], start=lengths[0])
+        pairs.append((shortened, shortened))
     return pairs
 
 
