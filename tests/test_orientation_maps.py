@@ -10,6 +10,7 @@ from support.platforms import FROM_REST, LOOSE, MSSM, checker_of, ours, place
 
 from cspr_jax.outputs.plots.reasons import reasons
 from cspr_jax.published import chapter_3
+from cspr_jax.published.table_3_4 import smallest_proportion
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.accessible import accessible
 from cspr_jax.search.attainable import attainable
@@ -58,16 +59,18 @@ def test_the_smallest_proportion_is_that_of_all(monkeypatch):
         angles = np.random.default_rng(1).uniform([-np.pi, 0.0, -1.0], [np.pi, 1.0, 1.0], (60, 3)) * [1.0, tilt, tilt]
         asked.append((place, angles))
     every = [good.mean() for good in chapter_3.attained(checker, asked)]
-    assert chapter_3.smallest_proportion(checker, asked) == min(every) < max(every) == 1.0
-    preferred = [good.mean() for good in chapter_3.attained(checker, asked, tried=np.array([0]))]
-    assert np.argmin(every) != np.argmin(preferred)
     tried = []
-    whole = chapter_3.attained
-    monkeypatch.setattr(chapter_3, "attained", lambda *given, **how: tried.append(given[1]) or whole(*given, **how))
-    chapter_3.smallest_proportion(checker, asked)
+
+    def attained(sets, values):
+        tried.append(sets)
+        return chapter_3.attained(checker, sets, tried=values)
+
+    assert smallest_proportion(attained, asked) == min(every) < max(every) == 1.0
     finished = {tuple(place) for sets in tried[1:] for place, _ in sets}
     assert finished == {tuple(asked[k][0]) for k in (1, 2)}
-    assert chapter_3.smallest_proportion(checker, asked[-1:]) == 1.0
+    preferred = [good.mean() for good in attained(asked, np.array([0]))]
+    assert np.argmin(every) != np.argmin(preferred)
+    assert smallest_proportion(attained, asked[-1:]) == 1.0
 
 
 SWEEP = """schema = 1

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from cspr_jax.api.given import plain, text_of
 from cspr_jax.config.hints import robot_hints
 from cspr_jax.errors import ConfigError
+from cspr_jax.runtime.processes import check_count
 from cspr_jax.schema import labelled
 from cspr_jax.store.result import open_result
 from cspr_jax.sweep import engine
@@ -22,7 +23,6 @@ from cspr_jax.sweep.work import Executor
 if TYPE_CHECKING:
     import xarray
 
-LARGEST_WORKERS = 256
 # What errors and files are named after where there is no sweep file; paths are relative to the current folder.
 NAME = Path("sweep")
 
@@ -36,7 +36,7 @@ class Job:
         directory: of the run.
         options: how it goes on.
         hooks: what it tells and asks.
-        workers: processes on this machine.
+        workers: processes on this machine; None: as many as are usual for its kind of map.
         scheduler: address of a dask.distributed scheduler, whose workers compute instead; None: none.
     """
 
@@ -44,14 +44,13 @@ class Job:
     directory: Path
     options: engine.Options
     hooks: engine.Hooks
-    workers: int = 1
+    workers: int | None = 1
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
         """Refuse workers that cannot be."""
-        if not isinstance(self.workers, int) or not 1 <= self.workers <= LARGEST_WORKERS:
-            raise ConfigError("--workers", f"{self.workers}: must be an integer from 1 to {LARGEST_WORKERS}")
-        if self.scheduler is not None and self.workers != 1:
+        check_count(self.workers)
+        if self.scheduler is not None and self.workers not in (1, None):
             raise ConfigError("--workers", f"{self.workers}: must be absent beside --scheduler")
 
     @functools.cached_property
@@ -104,10 +103,9 @@ def _executor(job: Job, prepare: Callable[[], None]) -> Iterator[Executor]:
             yield workers
         finally:
             workers.close()
-    elif job.workers > 1:
-        yield executors.Processes(job.sweep, job.workers)
-    else:
-        yield executors.ThisProcess(tile_map)
+        return
+    count = executors.usual_workers(job.sweep) if job.workers is None else job.workers
+    yield executors.ThisProcess(tile_map) if count == 1 else executors.Processes(job.sweep, count)
 
 
 def sweep_given(given: str | Path | Mapping[str, Any]) -> Sweep:

@@ -4,6 +4,7 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.table_layout import Cell
 from cspr_jax.published import tables
+from cspr_jax.runtime.processes import LARGEST, check_count, usual_count
 
 
 def table_names() -> dict[str, str]:
@@ -15,7 +16,14 @@ def table_names() -> dict[str, str]:
     return {name: source.title for name, source in tables.TABLES.items()}
 
 
-def table(name: str, *, definition: str | None = None, amplitude: str | None = None, fine: bool = False) -> list[Cell]:
+def table(
+    name: str,
+    *,
+    definition: str | None = None,
+    amplitude: str | None = None,
+    fine: bool = False,
+    workers: int | None = 1,
+) -> list[Cell]:
     """Compute a published table again.
 
     Args:
@@ -24,15 +32,22 @@ def table(name: str, *, definition: str | None = None, amplitude: str | None = N
             usual one.
         amplitude: in these: "quintic", "effective", "effective-c3" or "all"; None: the usual one.
         fine: in these: whether the step is pi/64 instead of pi/32.
+        workers: in these: processes on this machine; above 1, a script calls it under `if __name__ == "__main__":`.
+            None: as many as are usual.
 
     Returns:
         its cells, each with `row`, `column`, `computed`, `published`, `variant` and `differs`.
 
     Raises:
         ConfigError: no such table, or a choice that it does not have.
+        ResourceError: a worker died.
     """
     if name not in tables.TABLES:
         raise ConfigError("table", f"{shown(name)}: must be one of {', '.join(tables.TABLES)}")
-    choice = tables.chosen(name, {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None})
+    check_count(workers)
+    given = {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None}
+    choice = tables.chosen(name, given | {"--workers": None if workers == 1 else workers})
+    if workers is None:
+        workers = usual_count(LARGEST) if tables.TABLES[name].by_processes else 1
     with double_precision():
-        return tables.table_cells(name, choice)
+        return tables.table_cells(name, choice, workers)

@@ -12,18 +12,22 @@ from typing import TypeVar
 import jax
 import numpy as np
 
+from cspr_jax.arithmetic.cores import cores
 from cspr_jax.arithmetic.elementary import double_precision
 
 # How many times as large a batch is elsewhere than on a CPU, whose caches it has to fit.
 LARGER = {"gpu": 16, "tpu": 16}
 # No batch is larger. Tests, which ask for few cases at a time, set it lower.
 LARGEST = 1 << 20
+# Cases are divided for so many threads, whatever the number of cores: results keep their bits.
 THREADS = 2
 Found = TypeVar("Found")
 
 
 def in_threads(function: Callable, items: Sequence) -> list:
     """Results of a function, in order, by two threads: what XLA does on one core goes beside another's.
+
+    One thread does it all in a process that computes on one core.
 
     Args:
         function: called from several threads.
@@ -40,6 +44,8 @@ def in_threads(function: Callable, items: Sequence) -> list:
         with double_precision(), jax.default_device(device):
             return function(item)
 
+    if cores() == 1:
+        return [one(item) for item in items]
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(one, items))
 

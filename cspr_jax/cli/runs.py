@@ -24,7 +24,12 @@ VERIFIED = ("tiles", "shards", "missing", "cells", "cells_near_zero", "proved", 
 def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("sweep", type=Path, help="sweep file (TOML)")
     add_output(parser, "run directory (default results/...)", metavar="DIR")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes on this machine (default 1)")
+    parser.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="processes on this machine (default 1; for maps of platforms' poses one a core, at most 8)",
+    )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="dask.distributed scheduler, such as tcp://host:8786")
     parser.add_argument(
         "--accept-environment-change", action="store_true", help="resume despite another version, machine or library"

@@ -104,12 +104,15 @@ def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: float | Parts) -> 
     Returns:
         the blocks, those of a motion side by side, in time.
     """
-    edges = {p: _edges(p, [0.0, *knots.tolist(), 1.0], parts) for p in np.unique(arcs).tolist()}
-    own = [edges[int(p)] for p in arcs]
-    row = np.repeat(np.arange(len(arcs)), [len(x) - 1 for x in own])
-    nothing = np.zeros(0)
-    start, stop = (np.concatenate([nothing, *(x[part] for x in own)]) for part in (slice(-1), slice(1, None)))
-    return Blocks(row, start, stop)
+    numbers, own = np.unique(arcs, return_inverse=True)
+    edges = [_edges(int(p), [0.0, *knots.tolist(), 1.0], parts) for p in numbers]
+    lengths = np.array([len(x) for x in edges], int)
+    # All edges in one row: where those of each motion begin, and which of them each block begins with.
+    begins, counts = (np.cumsum(lengths) - lengths)[own], (lengths - 1)[own]
+    row = np.repeat(np.arange(len(arcs)), counts)
+    first = np.arange(len(row)) + np.repeat(begins - (np.cumsum(counts) - counts), counts)
+    every = np.concatenate([np.zeros(0), *edges])
+    return Blocks(row, every[first], every[first + 1])
 
 
 def _edges(arcs: int, knots: list[float], parts: float | Parts) -> np.ndarray:

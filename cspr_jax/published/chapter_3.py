@@ -1,11 +1,17 @@
-"""Tables 3.3 and 3.4 of the thesis: accessible orientations of a place, and how many of them are attainable."""
+"""Table 3.3 of the thesis: accessible orientations of a place, and how many of them are attainable.
+
+Sets of orientations are found and tried by one process or by several; Table 3.4 (`table_3_4`) asks for them too.
+"""
 
 import dataclasses
-import math
+import functools
+import itertools
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility.platform.checker import PoseChecker
@@ -15,7 +21,8 @@ from cspr_jax.problem import kernel_robot
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.robots.symmetries import folded, symmetries
+from cspr_jax.robots.symmetries import symmetries
+from cspr_jax.runtime.processes import Spread
 from cspr_jax.runtime.stages import within
 from cspr_jax.search import attainable
 from cspr_jax.search.accessible import DEFINITIONS, Accessible, accessible_sets
@@ -32,8 +39,6 @@ AMPLITUDES: dict[str, tuple[str, float | None]] = {
 }
 PLACES = {"x = 1.5b": (1.5, 0.0), "x = 3b": (3.0, 0.0), "y = 1.5b": (0.0, 1.5), "y = 3b": (0.0, 3.0)}
 DEPTH = 1.7
-_DEPTHS = (1.0, 1.4, 1.7, 2.0, 2.4)
-_RADII, _AZIMUTHS = (1.5, 2.0, 2.5, 3.0), np.radians(np.arange(0.0, 61.0, 10.0))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,6 +70,7 @@ def variant(definition: str, amplitude: str) -> str:
     return f"amplitude = {amplitude}{f' {epsilon:g}' if epsilon else ''}; definition = {definition}"
 
 
+@functools.lru_cache(maxsize=len(AMPLITUDES))
 def checker_of(amplitude: str) -> PoseChecker:
     """Checker of the tables' motions.
 
@@ -103,41 +109,56 @@ def attained(
     return np.split(good, np.cumsum(sizes)[:-1])
 
 
-def smallest_proportion(checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]]) -> float:
-    """Smallest part of the orientations of a place that horizontal transitions attain.
-
-    Other values of beta-hat than the preferred one are tried only at places that could have the smallest one.
+def accessible_there(amplitude: str, definition: str, asked: list[tuple[np.ndarray, int]]) -> list[Accessible]:
+    """Accessible orientations of places, in whichever process.
 
     Args:
-        checker: of `checker_of`.
+        amplitude: key of `AMPLITUDES`.
+        definition: of `search.accessible.DEFINITIONS`.
+        asked: of each its place (3,), m, and its divisions of pi.
+
+    Returns:
+        the orientations of each.
+    """
+    with double_precision():
+        return accessible_sets(checker_of(amplitude).problem.robot, asked, definition)
+
+
+def attained_there(
+    amplitude: str, tried: np.ndarray | None, sets: list[tuple[np.ndarray, np.ndarray]]
+) -> list[np.ndarray]:
+    """Orientations that horizontal transitions attain, in whichever process.
+
+    Args:
+        amplitude: key of `AMPLITUDES`.
+        tried: as for `attained`.
+        sets: likewise.
+
+    Returns:
+        (n,) of each.
+    """
+    with double_precision():
+        return attained(checker_of(amplitude), sets, tried=tried)
+
+
+def sizes(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
+    """Numbers of orientations, by which work on sets is spread.
+
+    Args:
         sets: as for `attained`.
 
     Returns:
-        the part.
+        one number a set.
     """
-    preferred, some, rest = attainable.turns()
-    good = attained(checker, sets, tried=preferred)
-    shares = np.array([own.mean() for own in good])
-    smallest = 1.0
-    # All values at the place with the smallest share so far; then, turn by turn, where less is attained than there.
-    every, only = list(range(len(sets))), [int(shares.argmin())]
-    for which, tried in ((only, some), (only, rest), (every, some), (every, rest)):
-        left = [k for k in which if shares[k] < smallest]
-        if left:
-            found = attained(checker, [(sets[k][0], sets[k][1][~good[k]]) for k in left], tried=tried)
-            for k, own in zip(left, found, strict=True):
-                good[k][~good[k]] = own
-                shares[k] = good[k].mean()
-        if tried is rest:
-            smallest = min(smallest, float(shares[which].min()))
-    return smallest
+    return [len(angles) for _, angles in sets]
 
 
-def table_3_3(choice: Choice) -> dict[Key, float | None]:
+def table_3_3(choice: Choice, workers: int = 1) -> dict[Key, float | None]:
     """Counts and proportions at four places; errors are differences from twice the step.
 
     Args:
         choice: definitions, amplitude functions, step.
+        workers: processes.
 
     Returns:
         cells; proportions, volumes (accessible of SO(3), attainable of that) and errors in percent.
@@ -145,16 +166,15 @@ def table_3_3(choice: Choice) -> dict[Key, float | None]:
     cells: dict[Key, float | None] = {}
     # The step of the table, and twice that for the errors.
     steps = [DIVISIONS * choice.finer, DIVISIONS * choice.finer // 2]
-    for amplitude in choice.amplitudes:
-        checker = checker_of(amplitude)
-        for definition in choice.definitions:
-            places = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in PLACES.values()]
+    places = [np.array([x * RADIUS, y * RADIUS, DEPTH]) for x, y in PLACES.values()]
+    with Spread(workers) as spread:
+        for amplitude, definition in itertools.product(choice.amplitudes, choice.definitions):
             with within(f"{amplitude}, {definition}"):
                 # All at once: full batches.
                 asked = [(place, n) for n in steps for place in places]
-                sets = accessible_sets(checker.problem.robot, asked, definition)
+                sets = spread(partial(accessible_there, amplitude, definition), asked, [n**3 for _, n in asked])
                 angles = [(place, inside.angles) for (place, _), inside in zip(asked, sets, strict=True)]
-                masks = attained(checker, angles)
+                masks = spread(partial(attained_there, amplitude, None), angles, sizes(angles))
             every = [_cells(inside, good) for inside, good in zip(sets, masks, strict=True)]
             for row, fine, coarse in zip(PLACES, every[: len(places)], every[len(places) :], strict=True):
                 errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
@@ -172,50 +192,16 @@ def _cells(inside: Accessible, good: np.ndarray) -> dict[str, float]:
     }
 
 
-def table_3_4(choice: Choice) -> dict[Key, float | None]:
-    """Smallest proportions in an annulus, at five heights.
-
-    Args:
-        choice: definitions, amplitude functions, step.
-
-    Returns:
-        cells, in percent.
-    """
-    cells: dict[Key, float | None] = {}
-    for amplitude in choice.amplitudes:
-        checker = checker_of(amplitude)
-        robot = checker.problem.robot
-        azimuths = np.unique(np.round(folded(symmetries(robot), _AZIMUTHS), 9))
-        divisions = DIVISIONS * choice.finer
-        for definition in choice.definitions:
-            for depth in _DEPTHS:
-                places = [
-                    np.array([RADIUS * radius * math.cos(azimuth), RADIUS * radius * math.sin(azimuth), depth])
-                    for radius in _RADII
-                    for azimuth in azimuths
-                ]
-                with within(f"{amplitude}, {definition}, z = {depth:g}"):
-                    sets = accessible_sets(robot, [(place, divisions) for place in places], definition)
-                    angles = [(place, inside.angles) for place, inside in zip(places, sets, strict=True)]
-                    smallest = smallest_proportion(checker, angles)
-                cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * smallest
-    return cells
-
-
 _PRINTED = {
     "x = 1.5b": ("27610", "26816", "97.1"),
     "x = 3b": ("32141", "29375", "91.4"),
     "y = 1.5b": ("25788", "25482", "98.8"),
     "y = 3b": ("30290", "28383", "93.7"),
 }
-_PRINTED_SMALLEST = {"1": "81.7", "1.4": "88.0", "1.7": "91.4", "2": "92.8", "2.4": "95.1"}
-_EVERY = [variant(definition, amplitude) for definition in DEFINITIONS for amplitude in AMPLITUDES]
-PUBLISHED: dict[str, dict[Key, str]] = {
-    "3.3": {
-        (row, column, name): value
-        for name in _EVERY
-        for row, cells in _PRINTED.items()
-        for column, value in zip(("accessible", "attainable", "proportion"), cells, strict=True)
-    },
-    "3.4": {(row, "proportion", name): value for name in _EVERY for row, value in _PRINTED_SMALLEST.items()},
+EVERY = [variant(definition, amplitude) for definition in DEFINITIONS for amplitude in AMPLITUDES]
+PUBLISHED: dict[Key, str] = {
+    (row, column, name): value
+    for name in EVERY
+    for row, cells in _PRINTED.items()
+    for column, value in zip(("accessible", "attainable", "proportion"), cells, strict=True)
 }

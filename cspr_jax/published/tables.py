@@ -8,7 +8,7 @@ from typing import Any
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.table_layout import Cell, grid
 from cspr_jax.plans.planning import plan
-from cspr_jax.published import boralugoda, chapter_1, chapter_3, peers, table_3_2
+from cspr_jax.published import boralugoda, chapter_1, chapter_3, peers, table_3_2, table_3_4
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.published.chapter_3 import Choice
 from cspr_jax.runtime.stages import within
@@ -24,7 +24,9 @@ class Source:
         title: of the table, with its source.
         published: known cells as printed, by row, column and variant.
         compute: () -> computed cells, by row, column and variant; of a `Choice`, where there is one.
-        with_choice: whether there is one, of definitions, amplitude functions and step.
+        with_choice: whether there is one, of definitions, amplitude functions and step; `compute` takes a number of
+            processes, too, then.
+        by_processes: whether several compute it where nobody says how many.
         transposed: whether the source prints these rows as columns.
     """
 
@@ -32,6 +34,7 @@ class Source:
     published: dict[Key, str]
     compute: Callable[..., dict[Key, float | None]]
     with_choice: bool = False
+    by_processes: bool = False
     transposed: bool = False
 
 
@@ -86,16 +89,17 @@ TABLES = {
     ),
     "3.3": Source(
         "Dion-Gauvin thesis, Table 3.3: accessible and attainable orientations at four places, z0 = z = 1.7 m",
-        chapter_3.PUBLISHED["3.3"],
+        chapter_3.PUBLISHED,
         chapter_3.table_3_3,
         with_choice=True,
         transposed=True,
     ),
     "3.4": Source(
         "Dion-Gauvin thesis, Table 3.4: smallest proportion (%) of attainable orientations from 1.5b to 3b, z0 = z",
-        chapter_3.PUBLISHED["3.4"],
-        chapter_3.table_3_4,
+        table_3_4.PUBLISHED,
+        table_3_4.table_3_4,
         with_choice=True,
+        by_processes=True,
     ),
     "4.1": Source(
         "Boralugoda thesis, Table 4.1: solutions of (28) and (29), s",
@@ -121,19 +125,20 @@ TABLES = {
 }
 
 
-def table_cells(name: str, choice: Choice | None = None) -> list[Cell]:
+def table_cells(name: str, choice: Choice | None = None, workers: int = 1) -> list[Cell]:
     """Compute a table.
 
     Args:
         name: one of `TABLES`.
         choice: for those that have one; None: the usual one.
+        workers: processes, for those that have a choice.
 
     Returns:
         its cells, row by row.
     """
     source = TABLES[name]
     with within(f"table {name}"):
-        computed = source.compute(choice or Choice()) if source.with_choice else source.compute()
+        computed = source.compute(choice or Choice(), workers) if source.with_choice else source.compute()
     return [
         Cell(row, column, value, source.published.get((row, column, variant), ""), variant)
         for (row, column, variant), value in computed.items()
@@ -183,7 +188,7 @@ def chosen(name: str, given: dict[str, Any]) -> Choice | None:
 
     Args:
         name: of the table.
-        given: values of --definition, --amplitude and --fine, None where absent.
+        given: values of --definition, --amplitude, --fine and --workers, None where absent.
 
     Returns:
         the choice; None for a table that has none.

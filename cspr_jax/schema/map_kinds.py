@@ -47,6 +47,8 @@ class MapKind:
         cells: of a tile, at most, where the sweep file does not say.
         patterns: of motion of the robots that it moves, rows of `robots.patterns`, by which `config.equivalents` finds
             which robot that is; none: robots go to its class as their files have them.
+        by_processes: whether the command line has several processes compute its tiles, where nobody says how many: much
+            of the work is outside of XLA, where threads of one process wait for each other.
     """
 
     name: str
@@ -68,6 +70,7 @@ class MapKind:
     patterns: tuple[str, ...] = ()
     stored_with: tuple[tuple[str, tuple[str, ...]], ...] = ()
     planned: bool = False
+    by_processes: bool = False
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -188,6 +191,7 @@ MAP_KINDS: dict[str, MapKind] = {
             families=_OF_PLATFORMS,
             planned=True,
             patterns=("3R3T",),
+            by_processes=True,
             start="pose",
             needs=("axes.z0",),
             takes=(
@@ -207,6 +211,7 @@ MAP_KINDS: dict[str, MapKind] = {
             families=_OF_PLATFORMS,
             planned=True,
             patterns=("3R3T",),
+            by_processes=True,
             takes=("axes.z0", "orientations", "orientations.values", "limits", "limits.uncertainty"),
             stored_with=_UNCERTAIN,
             definitions=("grid",),
@@ -223,6 +228,7 @@ MAP_KINDS: dict[str, MapKind] = {
             motionless=_OF_PLACES,
             families=_OF_PLATFORMS,
             patterns=("3R3T",),
+            by_processes=True,
             takes=("orientations",),
             cells=64,  # a cell takes long
         ),
@@ -237,6 +243,7 @@ MAP_KINDS: dict[str, MapKind] = {
             motionless=_OF_PLACES,
             families=_OF_PLATFORMS,
             patterns=("3R3T",),
+            by_processes=True,
             takes=("axes.z0", "orientations", "orientations.values", "limits", "limits.uncertainty"),
             cells=16,
         ),

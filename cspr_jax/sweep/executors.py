@@ -3,28 +3,23 @@
 import collections
 import concurrent.futures
 import contextlib
-import multiprocessing
-import os
 import pickle
-import signal
-import sys
-import threading
-import time
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from cspr_jax.errors import ResourceError
+from cspr_jax.runtime.processes import Workers, usual_count
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
-from cspr_jax.sweep.signals import CODES, Stop
+from cspr_jax.sweep.signals import Stop
 from cspr_jax.sweep.tile import TileMap, compute_tile
 from cspr_jax.sweep.work import Computed
 
 # Times that the workers may die, one after another, without a tile between.
 DEATHS = 3
-SAFE_PATH = "PYTHONSAFEPATH"
-_NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
+# Where nobody says how many workers, each is for so many tiles or more, since it compiles for itself.
+TILES_EACH = 4
 
 
 class ThisProcess:
@@ -70,18 +65,20 @@ def _worker_tile(index: int) -> Computed:
     return compute_tile(_sweep[0], index)
 
 
-def _start_worker(parent: int, pickled: bytes) -> None:
-    # Signals reach the whole group: the parent decides. And no worker outlives it.
+def _take(pickled: bytes) -> None:
     _sweep[:] = [pickled]
-    for number in CODES:
-        signal.signal(number, signal.SIG_IGN)
 
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
 
-    threading.Thread(target=watch, daemon=True).start()
+def usual_workers(sweep: Sweep) -> int:
+    """Number of processes for a sweep where nobody says how many.
+
+    Args:
+        sweep: the sweep.
+
+    Returns:
+        the number.
+    """
+    return usual_count(len(sweep.grid.tiling) // TILES_EACH) if sweep.kind.by_processes else 1
 
 
 class Processes:
@@ -134,21 +131,13 @@ class Processes:
                     ) from error
 
     def _pool_tiles(self, waiting: collections.deque[int], stop: Stop) -> Generator[Computed, None, None]:
-        # A second Ctrl-C ends everything at once; what then cleans up behind Python need not complain about it.
-        if _NO_COMPLAINT not in sys.warnoptions:
-            sys.warnoptions.append(_NO_COMPLAINT)
-        context = multiprocessing.get_context("spawn")
-        with _safe_path():
-            pool = concurrent.futures.ProcessPoolExecutor(
-                self._count, mp_context=context, initializer=_start_worker, initargs=(os.getpid(), self._pickled)
-            )
-        stop.at_once = lambda: _kill(pool)
+        workers = Workers(self._count, _take, self._pickled)
+        stop.at_once = workers.kill
         running: set[concurrent.futures.Future[Computed]] = set()
         try:
             while running or (waiting and not stop):
                 while waiting and not stop and len(running) < self._count:
-                    with _signals_blocked(), _safe_path():  # workers inherit that, from their first moment on
-                        running.add(pool.submit(_worker_tile, waiting.popleft()))
+                    running.add(workers.submit(_worker_tile, waiting.popleft()))
                 done, running = concurrent.futures.wait(
                     running, timeout=0.1, return_when=concurrent.futures.FIRST_COMPLETED
                 )
@@ -156,41 +145,10 @@ class Processes:
                     yield future.result()
         except BrokenProcessPool:
             # The pool asks the others to end, but they ignore signals, and may wait for a lock that the dead one held.
-            _kill(pool)
+            workers.kill()
             raise
         finally:
             if running:
-                _kill(pool)
-            pool.shutdown(wait=True, cancel_futures=True)
+                workers.kill()
+            workers.close()
             stop.at_once = lambda: None
-
-
-@contextlib.contextmanager
-def _signals_blocked() -> Iterator[None]:
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, CODES)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextlib.contextmanager
-def _safe_path() -> Iterator[None]:
-    # A child of multiprocessing is started with `python -c`, which looks for modules in the working folder first: a
-    # file struct.py that lies there would be executed. It reads this variable; no option of its own can be given.
-    before = os.environ.get(SAFE_PATH)
-    os.environ[SAFE_PATH] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[SAFE_PATH]
-        else:
-            os.environ[SAFE_PATH] = before
-
-
-def _kill(pool: concurrent.futures.ProcessPoolExecutor) -> None:
-    # Python 3.14 has kill_workers() for this.
-    for process in list((pool._processes or {}).values()):
-        with contextlib.suppress(OSError, ValueError):  # it may be gone
-            process.kill()

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cspr_jax.runtime import xla
-from cspr_jax.sweep import executors
+from cspr_jax.runtime import processes, xla
 
 OTHERS = ("cspr_jax", "jax", "jaxlib", "numpy", "h5py", "scipy", "pydantic", "rich", "sitecustomize", "usercustomize")
 SWEEP = """schema = 1
@@ -48,7 +47,7 @@ def run_there(hostile, tmp_path, x, environment):
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
     assert not marks.exists(), marks.read_text()
     assert (done.returncode, done.stderr) == (0, "") and (tmp_path / "run" / "small.h5").exists()
-    assert executors.SAFE_PATH not in os.environ
+    assert processes.SAFE_PATH not in os.environ
 
 
 @pytest.mark.soak

@@ -1,0 +1,213 @@
+"""Worker processes of this machine: each computes on its share of the cores, and none outlives who started it.
+
+Threads of one process do what is outside of XLA one after the other, and XLA's own wait for work in loops: where much
+is outside, as many processes as cores, each with one thread, do more.
+"""
+
+import concurrent.futures
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from cspr_jax.arithmetic.cores import SHARE, cores
+from cspr_jax.errors import ConfigError, ResourceError
+
+SAFE_PATH = "PYTHONSAFEPATH"
+# So many workers at most; and where nobody says how many, since each takes a GB.
+LARGEST, MOST = 256, 8
+GROUPS = 2  # for each worker
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
+
+
+def check_count(count: int | None) -> None:
+    """Refuse a number of workers that cannot be.
+
+    Args:
+        count: the number; None: the usual one.
+
+    Raises:
+        ConfigError: it is none, or too many.
+    """
+    if count is not None and not (isinstance(count, int) and 1 <= count <= LARGEST):
+        raise ConfigError("--workers", f"{count}: must be an integer from 1 to {LARGEST}")
+
+
+def usual_count(parts: int) -> int:
+    """Number of processes for work that gains by them, where nobody says how many.
+
+    Args:
+        parts: into which the work can be divided.
+
+    Returns:
+        one a core, and no more than parts; 1 on a GPU, which they would have to share.
+    """
+    import jax
+
+    return max(1, min(cores(), MOST, parts)) if jax.default_backend() == "cpu" else 1
+
+
+class Workers:
+    """Worker processes, started when there is work for them.
+
+    They are told nothing by Ctrl-C and SIGTERM, which reach the whole group: who started them decides.
+
+    Args:
+        count: how many.
+        begin: called first in each; None: nothing is.
+        given: what it is called with.
+    """
+
+    def __init__(self, count: int, begin: Callable[..., None] | None = None, *given: Any) -> None:
+        """Start nothing yet."""
+        # A second Ctrl-C ends everything at once; what then cleans up behind Python need not complain about it.
+        if _NO_COMPLAINT not in sys.warnoptions:
+            sys.warnoptions.append(_NO_COMPLAINT)
+        # A child of multiprocessing is started with `python -c`, which looks for modules in the working folder first:
+        # a file struct.py that lies there would be executed. It reads this variable; no option can be given.
+        self._settings = {SAFE_PATH: "1", SHARE: str(max(cores() // count, 1))}
+        with _environment(self._settings):
+            self._pool = concurrent.futures.ProcessPoolExecutor(
+                count,
+                mp_context=multiprocessing.get_context("spawn"),
+                initializer=_start,
+                initargs=(os.getpid(), begin, given),
+            )
+
+    def submit(self, function: Callable, *given: Any) -> concurrent.futures.Future:
+        """Have a worker call a function.
+
+        Args:
+            function: of a module.
+            given: what it is called with.
+
+        Returns:
+            its result, when there is one.
+        """
+        with _signals_blocked(), _environment(self._settings):  # workers inherit both, from their first moment on
+            return self._pool.submit(function, *given)
+
+    def kill(self) -> None:
+        """End all workers now."""
+        # Python 3.14 has kill_workers() for this.
+        for process in list((self._pool._processes or {}).values()):
+            with contextlib.suppress(OSError, ValueError):  # it may be gone
+                process.kill()
+
+    def close(self) -> None:
+        """Wait for the end of what is being computed; what has not begun is given up."""
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+class Spread:
+    """Spread of work on many items over worker processes that stay until the block ends; one does it here.
+
+    Args:
+        count: how many processes.
+    """
+
+    def __init__(self, count: int) -> None:
+        """Start nothing yet."""
+        self._count, self._workers = count, Workers(count) if count > 1 else None
+
+    def __enter__(self) -> "Spread":
+        """Begin."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *about: object) -> None:
+        """End the workers."""
+        if self._workers is not None:
+            if kind is not None:
+                self._workers.kill()
+            self._workers.close()
+
+    def __call__(self, function: Callable[[list], list], items: Sequence, sizes: Sequence[float]) -> list:
+        """Results of a function, in order.
+
+        Args:
+            function: gives of a list of items one result each; it can be pickled.
+            items: the items.
+            sizes: how long each takes, in any unit.
+
+        Returns:
+            one result an item.
+
+        Raises:
+            ResourceError: a worker died.
+        """
+        if self._workers is None:
+            return function(list(items))
+        groups = balanced(sizes, GROUPS * self._count)
+        try:
+            futures = [self._workers.submit(function, [items[k] for k in group]) for group in groups]
+            found = {
+                k: one
+                for group, own in zip(groups, futures, strict=True)
+                for k, one in zip(group, own.result(), strict=True)
+            }
+        except BrokenProcessPool as error:
+            raise ResourceError("a worker died, perhaps for want of memory: --workers must be smaller") from error
+        return [found[k] for k in range(len(items))]
+
+
+def balanced(sizes: Sequence[float], count: int) -> list[list[int]]:
+    """Groups of items that take nearly equally long.
+
+    Args:
+        sizes: of each item.
+        count: how many groups at most.
+
+    Returns:
+        numbers of the items of each group, from 0 on; no group is empty, the largest comes first.
+    """
+    groups: list[list[int]] = [[] for _ in range(min(count, len(sizes)))]
+    whole = [0.0] * len(groups)
+    for k in sorted(range(len(sizes)), key=lambda k: -sizes[k]):
+        least = whole.index(min(whole))
+        groups[least].append(k)
+        whole[least] += sizes[k]
+    return [groups[k] for k in sorted(range(len(groups)), key=lambda k: -whole[k])]
+
+
+def _start(parent: int, begin: Callable[..., None] | None, given: tuple) -> None:
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+    if begin is not None:
+        begin(*given)
+
+
+@contextlib.contextmanager
+def _signals_blocked() -> Iterator[None]:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _environment(settings: dict[str, str]) -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in settings}
+    os.environ.update(settings)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
