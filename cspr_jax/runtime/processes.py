@@ -170,7 +170,7 @@ def balanced(sizes: Sequence[float], count: int) -> list[list[int]]:
     groups: list[list[int]] = [[] for _ in range(min(count, len(sizes)))]
     whole = [0.0] * len(groups)
     for k in sorted(range(len(sizes)), key=lambda k: -sizes[k]):
-        least = whole.index(min(whole))
+        least = min(range(len(groups)), key=lambda g: (whole[g], len(groups[g])))
         groups[least].append(k)
         whole[least] += sizes[k]
     return [groups[k] for k in sorted(range(len(groups)), key=lambda k: -whole[k])]

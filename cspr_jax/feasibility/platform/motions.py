@@ -19,7 +19,8 @@ def rows(segments: PoseSegment, which: np.ndarray) -> PoseSegment:
         leaves (m, ...).
     """
     # Four times as fast as by an index, where a leaf is no vector.
-    index = np.flatnonzero(which) if which.dtype == bool else which
+    index = np.asarray(which)
+    index = np.flatnonzero(index) if index.dtype == bool else index
     return jax.tree.map(lambda x: np.take(x, index, axis=0), segments)
 
 
