@@ -17,8 +17,9 @@ from cspr_jax.search.pose_ends import end_options
 VALUES = 20
 # Of other values than the preferred one, one in so many is tried before the rest.
 FEWER = 5
-# Motions of a part of a search that only asks whether; large ones fill their batches.
-PART, MIXED = CANDIDATES // 4, 16
+# Large parts fill their batches: candidates of a search for the smallest numbers of arcs, motions of one that only asks
+# whether.
+LARGE, PART, MIXED = 4 * CANDIDATES, CANDIDATES // 4, 16
 
 
 def attainable(
@@ -42,7 +43,7 @@ def attainable(
         max_arcs: largest number tried.
         values: of beta-hat, the preferred one first.
         symmetry: symmetries of the robot; orientations that they join are computed once.
-        margins: whether those of orientations that are attained are wanted.
+        margins: whether they are wanted, and not only why orientations are not attained.
 
     Returns:
         the answers.
@@ -54,7 +55,7 @@ def attainable(
         motions, beta_hats = _motions(checker, places[which], angles[which], z0[which], values)
         return reached(checker, motions, beta_hats, max_arcs=max_arcs, margins=margins)
 
-    return joined(in_parts(part, len(some), CANDIDATES // values)).rows(own)
+    return joined(in_parts(part, len(some), LARGE // values)).rows(own)
 
 
 def attained(

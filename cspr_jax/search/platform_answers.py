@@ -54,9 +54,15 @@ class PoseAnswers(Answers):
 
 
 def settled(
-    checker: MotionChecker, candidates: Candidates, smallest: Found, *, max_arcs: int, fixed: np.ndarray | None = None
+    checker: MotionChecker,
+    candidates: Candidates,
+    smallest: Found,
+    *,
+    max_arcs: int,
+    fixed: np.ndarray | None = None,
+    margins: bool = True,
 ) -> tuple[PoseAnswers, PoseSegment]:
-    """Answers with all margins.
+    """Answers of motions, whether a number of arcs was found or not.
 
     Args:
         checker: of the robot.
@@ -64,6 +70,7 @@ def settled(
         smallest: of these; its checks are completed.
         max_arcs: largest number tried.
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
+        margins: whether those of motions without a number of arcs are wanted, and not only why they fail.
 
     Returns:
         the answers; (2.55) does not apply: NaN. The segments that they belong to.
@@ -74,7 +81,7 @@ def settled(
     tried[none] = best_candidates(checker, candidates.rows(none), max_arcs=max_arcs)
     segments, checks = segments_with(checker.problem.robot, candidates, tried), smallest.checks
     others = np.flatnonzero(smallest.arcs == 0)
-    checks.put(others, checker.check(rows(segments, others), tried[others]))
+    checks.put(others, checker.check(rows(segments, others), tried[others], margins=margins))
     known = np.flatnonzero(~np.isnan(checks.tolerated))
     found = checker.tolerated(rows(segments, known), tried[known])
     checks.tolerated[known] = np.maximum(checks.tolerated[known], found.proved)
@@ -138,7 +145,7 @@ def reached(
         values: (n, n_values) in the order in which they are tried; NaN for none.
         max_arcs: largest number tried.
         same: whether the value at the end holds at the start too.
-        margins: whether those of motions that are found are wanted.
+        margins: whether they are wanted.
 
     Returns:
         the answers; where there is none, those of the first value, or of that at rest.
@@ -153,7 +160,7 @@ def reached(
     checks.put(cell[best], of_trials.checks.rows(best))
     np.minimum.at(undecided, cell, np.where(of_trials.undecided > 0, of_trials.undecided, NEVER))
     smallest = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
-    return settled(checker, _with_ends(motions, beta_hats, same=same), smallest, max_arcs=max_arcs)[0]
+    return settled(checker, _with_ends(motions, beta_hats, same=same), smallest, max_arcs=max_arcs, margins=margins)[0]
 
 
 def _with_ends(motions: Candidates, beta_hats: np.ndarray, *, same: bool) -> Candidates:
