@@ -1,1 +1,1 @@
-"""The process: XLA's settings, compiled code, what is being done, and how it is shown."""
+"""Processes: XLA's settings, compiled code, workers, what is being done, and how it is shown."""
