@@ -16,12 +16,12 @@ def rows(segments: PoseSegment, which: np.ndarray) -> PoseSegment:
         which: indices, or (n,) a mask.
 
     Returns:
-        leaves (m, ...).
+        leaves (m, ...), NumPy's, whichever the given ones are.
     """
     # Four times as fast as by an index, where a leaf is no vector.
     index = np.asarray(which)
     index = np.flatnonzero(index) if index.dtype == bool else index
-    return jax.tree.map(lambda x: np.take(x, index, axis=0), segments)
+    return jax.tree.map(lambda x: np.asarray(x).take(index, axis=0), segments)
 
 
 class Motions(NamedTuple):
