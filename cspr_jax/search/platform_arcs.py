@@ -19,12 +19,14 @@ from cspr_jax.trajectories.platform_segment import PoseSegment, pose_segment
 BATCH = 2048
 # So many candidates are held at a time.
 CANDIDATES = 262_144
-# Instants of the first look: in arcs before the end, those at which most motions fail, the most telling ones first;
-# then in arcs from both ends, where the amplitude function may bend most, and so many an arc, late ones first; and so
-# many where only the best of bad candidates is looked for.
+# Instants of the first look, in arcs before the end: those at which most motions fail, the most telling ones first; then
+# those at which most of the rest fail, with one beside the start, where the amplitude function may bend most. Chosen
+# one by one among motions of the MSSM with three amplitude functions; any others are as right, and slower.
 TELLING = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
-BESIDE_ENDS = np.array([1, 2, 4, 6]) / 96.0
-COARSE, COARSEST = 12, 4
+OTHERS = np.array([338, 192, 260, 3, 74, 63, 32, 330, 1, 49, 134, 56, 436, 168, 8]) / 96.0
+BESIDE_START = 6.0 / 96.0
+# So many instants an arc where only the best of bad candidates is looked for.
+COARSEST = 4
 
 
 class Candidates(NamedTuple):
@@ -133,12 +135,12 @@ def smallest_arcs(
         stage(f"arcs {arcs} of {max_arcs}")
         is_open = (last >= arcs) & ((only == 0) | (only == arcs))
         alive = np.flatnonzero((smallest == 0) & is_open[motion])
-        alive = _sieved(checker, segments, arcs, alive, np.maximum(1.0 - TELLING / arcs, 0.0))
+        alive = _sieved(checker, segments, arcs, alive, _instants(arcs, TELLING))
         first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
         # The first candidate of each motion, then all others of motions where it fails: few and large batches.
         for turn in (alive[first], np.delete(alive, first)):
             turn = turn[last[motion[turn]] >= arcs]
-            turn = _sieved(checker, segments, arcs, turn, _finer(arcs))
+            turn = _sieved(checker, segments, arcs, turn, np.append(BESIDE_START / arcs, _instants(arcs, OTHERS)))
             if not len(turn):
                 continue
             got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False, margins=margins)
@@ -150,9 +152,9 @@ def smallest_arcs(
     return Found(smallest, undecided, checks)
 
 
-def _finer(arcs: int) -> np.ndarray:
-    beside = BESIDE_ENDS / arcs
-    return np.concatenate([1.0 - beside, beside, np.linspace(1.0, 0.0, COARSE * arcs + 1)])
+def _instants(arcs: int, before: np.ndarray) -> np.ndarray:
+    # So many arcs before the end; at the start, where nothing fails, those of shorter motions.
+    return np.maximum(1.0 - before / arcs, 0.0)
 
 
 def _sieved(checker: MotionChecker, segments: _Segments, arcs: int, alive: np.ndarray, tau: np.ndarray) -> np.ndarray:
