@@ -22,6 +22,9 @@ from cspr_jax.runtime.stages import stage
 from cspr_jax.search.orientation_grids import OrientationGrid, equal_volume_grid, tilt_torsion_grid
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
+# Steps along rays that are tried at a time: few rays go farther, and with the usual step they fill three batches of
+# `OrientationSteps`.
+LEG = 23
 WHOLE = 8.0 * math.pi**2  # of SO(3), in the measure sin(theta) d phi d theta d sigma
 
 
@@ -112,17 +115,29 @@ def _section(
     azimuth = np.arange(count) * step
     rays = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
     far = np.arange(count + 1) * step
-    angles = _angles(centre + far[None, :, None] * rays[:, None, :], np.asarray(torsion))
-    samples = steps.at(from_tilt_torsion(angles.reshape(-1, 3) + towards))
-    index = np.arange(angles[..., 0].size).reshape(count, -1)
-    free = steps.passable(samples, index[:, :-1].ravel(), index[:, 1:].ravel()).reshape(count, -1)
-    free &= angles[:, 1:, 1] < math.pi
-    free = np.cumprod(free, axis=1).astype(bool)
-    ends = centre + (free.sum(1) * step)[:, None] * rays
-    reached = angles[:, 1:][free]
+    made, going = np.zeros(count, int), np.arange(count)
+    for start in range(0, count, LEG):
+        leg = far[start : start + LEG + 1]
+        free = _free(steps, towards, _angles(centre + leg[:, None] * rays[going, None], np.asarray(torsion)))
+        made[going] += free.sum(1)
+        going = going[free.all(1)]
+        if not len(going):
+            break
+    ends = centre + (made * step)[:, None] * rays
+    ray, last = np.nonzero(np.arange(count) < made[:, None])
+    reached = _angles(centre + far[last + 1, None] * rays[ray], np.asarray(torsion))
     # Of a sector of the plane, where the measure is sin(theta) / theta.
-    volume = np.broadcast_to(far[1:], free.shape)[free] * np.sinc(reached[:, 1] / math.pi) * step**3 / WHOLE
+    volume = far[last + 1] * np.sinc(reached[:, 1] / math.pi) * step**3 / WHOLE
     return (reached, volume), ends.mean(0)
+
+
+def _free(steps: OrientationSteps, towards: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    # Of orientations along rays (n, m + 1, 3): (n, m) which steps can be made, and all before them.
+    samples = steps.at(from_tilt_torsion(angles.reshape(-1, 3) + towards))
+    index = np.arange(angles[..., 0].size).reshape(len(angles), -1)
+    free = steps.passable(samples, index[:, :-1].ravel(), index[:, 1:].ravel()).reshape(len(angles), -1)
+    free &= angles[:, 1:, 1] < math.pi
+    return np.cumprod(free, axis=1).astype(bool)
 
 
 def _angles(points: np.ndarray, torsion: np.ndarray) -> np.ndarray:

@@ -19,9 +19,9 @@ from cspr_jax.trajectories.platform_segment import PoseSegment, pose_segment
 BATCH = 2048
 # So many candidates are held at a time.
 CANDIDATES = 262_144
-# Instants of the first look, in arcs before the end: those at which most motions fail, the most telling ones first; then
-# those at which most of the rest fail, with one beside the start, where the amplitude function may bend most. Chosen
-# one by one among motions of the MSSM with three amplitude functions; any others are as right, and slower.
+# Instants of the first look, in arcs before the end: those at which most motions fail, the most telling ones first;
+# then those at which most of the rest fail, with one beside the start, where the amplitude function may bend most.
+# Chosen one by one among motions of the MSSM with three amplitude functions; any others are as right, and slower.
 TELLING = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
 OTHERS = np.array([338, 192, 260, 3, 74, 63, 32, 330, 1, 49, 134, 56, 436, 168, 8]) / 96.0
 BESIDE_START = 6.0 / 96.0
