@@ -15,6 +15,7 @@ from support.platforms import FROM_REST, MSSM, checker_of, ours, place
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.feasibility.platform.orientation_steps import OrientationSteps
 from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
+from cspr_jax.search import accessible as scans
 from cspr_jax.search.accessible import DEFINITIONS, accessible
 from cspr_jax.search.attainable import attainable, attained, turns
 from cspr_jax.search.orientation_grids import equal_volume_grid, tilt_torsion_grid
@@ -128,6 +129,17 @@ def test_definitions_agree():
 
 
 @pytest.mark.thorough
+def test_rays_of_a_scan_go_as_far_in_short_legs(monkeypatch):
+    """In legs of three steps, the last of one, as in one leg of all sixteen."""
+    whole = [accessible(ours(MSSM), place(radius, 0.4), "scan", 8) for radius in (0.0, 1.5)]
+    monkeypatch.setattr(scans, "LEG", 3)
+    for radius, one in zip((0.0, 1.5), whole, strict=True):
+        legs = accessible(ours(MSSM), place(radius, 0.4), "scan", 8)
+        np.testing.assert_array_equal(legs.angles, one.angles)
+        np.testing.assert_array_equal(legs.volume, one.volume)
+    assert len(whole[1].angles) > 100
+
+
 def test_no_way_leads_through_touching_cables():
     """Steps of pi / 12 and pi / 24 have orientations where cables just touch, with gaps of rounding errors."""
     robot, there = ours(MSSM), place(1.5, 0.0)
