@@ -128,7 +128,6 @@ def test_definitions_agree():
             assert a == pytest.approx(b, rel=0.06), found
 
 
-@pytest.mark.thorough
 def test_rays_of_a_scan_go_as_far_in_short_legs(monkeypatch):
     """In legs of three steps, the last of one, as in one leg of all sixteen."""
     whole = [accessible(ours(MSSM), place(radius, 0.4), "scan", 8) for radius in (0.0, 1.5)]
@@ -140,6 +139,7 @@ def test_rays_of_a_scan_go_as_far_in_short_legs(monkeypatch):
     assert len(whole[1].angles) > 100
 
 
+@pytest.mark.thorough
 def test_no_way_leads_through_touching_cables():
     """Steps of pi / 12 and pi / 24 have orientations where cables just touch, with gaps of rounding errors."""
     robot, there = ours(MSSM), place(1.5, 0.0)
