@@ -10,7 +10,7 @@ from support.platforms import FROM_REST, LOOSE, MSSM, checker_of, ours, place
 
 from cspr_jax.outputs.plots.reasons import reasons
 from cspr_jax.published import chapter_3
-from cspr_jax.published.table_3_4 import smallest_proportion
+from cspr_jax.published.table_3_4 import smallest_proportions
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.accessible import accessible
 from cspr_jax.search.attainable import attainable
@@ -65,12 +65,37 @@ def test_the_smallest_proportion_is_that_of_all(monkeypatch):
         tried.append(sets)
         return chapter_3.attained(checker, sets, tried=values)
 
-    assert smallest_proportion(attained, asked) == min(every) < max(every) == 1.0
+    assert smallest_proportions(attained, [asked]) == [min(every)]
+    assert min(every) < max(every) == 1.0
     finished = {tuple(place) for sets in tried[1:] for place, _ in sets}
     assert finished == {tuple(asked[k][0]) for k in (1, 2)}
     preferred = [good.mean() for good in attained(asked, np.array([0]))]
     assert np.argmin(every) != np.argmin(preferred)
-    assert smallest_proportion(attained, asked[-1:]) == 1.0
+    assert smallest_proportions(attained, [asked[-1:]]) == [1.0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_smallest_proportions_of_many_annuli(seed):
+    """Each as if it were alone, and as if every value of beta-hat were tried everywhere."""
+    rng = np.random.default_rng(seed)
+    # Of each place's orientations, which values attain them; places are numbered, orientations too.
+    known = [rng.random((rng.integers(1, 30), 20)) < rng.choice([0.01, 0.1, 0.6]) for _ in range(9)]
+    sets = [(k, np.arange(len(own))) for k, own in enumerate(known)]
+    annuli = [sets[:2], sets[2:3], sets[3:9]]
+
+    asked = []
+
+    def attained(some, values):
+        asked.append([k for k, _ in some])
+        return [known[k][which][:, values].any(1) for k, which in some]
+
+    found = smallest_proportions(attained, annuli)
+    # Other values than the preferred one are tried first where that one attains least.
+    shares = [own[:, 0].mean() for own in known]
+    worst = [min((k for k, _ in annulus), key=shares.__getitem__) for annulus in annuli]
+    assert [*asked, []][1] == [k for k in worst if shares[k] < 1.0]
+    assert found == [min(known[k].any(1).mean() for k, _ in annulus) for annulus in annuli]
+    assert found == [smallest_proportions(attained, [annulus])[0] for annulus in annuli]
 
 
 SWEEP = """schema = 1

@@ -32,6 +32,7 @@ from cspr_jax.trajectories.platform_segment import Kind
 RADIUS = 0.86  # b of (3.95), m
 MAX_ARCS = 20
 DIVISIONS = 32  # of pi
+TOGETHER = 1_000_000  # orientations are held at a time, or those of one place more
 AMPLITUDES: dict[str, tuple[str, float | None]] = {
     "quintic": ("quintic", None),
     "effective": ("effective", 0.1),
@@ -137,8 +138,10 @@ def attained_there(
     Returns:
         (n,) of each.
     """
+    run = np.cumsum(sizes(sets)) // TOGETHER
     with double_precision():
-        return attained(checker_of(amplitude), sets, tried=tried)
+        own = [[sets[k] for k in np.flatnonzero(run == number)] for number in np.unique(run)]
+        return [good for some in own for good in attained(checker_of(amplitude), some, tried=tried)]
 
 
 def sizes(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -29,34 +29,40 @@ _RADII, _AZIMUTHS = (1.5, 2.0, 2.5, 3.0), np.radians(np.arange(0.0, 61.0, 10.0))
 Sets = list[tuple[np.ndarray, np.ndarray]]
 
 
-def smallest_proportion(attained: Callable[[Sets, np.ndarray], list[np.ndarray]], sets: Sets) -> float:
-    """Smallest part of the orientations of a place that horizontal transitions attain.
+def smallest_proportions(
+    attained: Callable[[Sets, np.ndarray], list[np.ndarray]], annuli: Sequence[Sets]
+) -> list[float]:
+    """Smallest part of the orientations of a place that horizontal transitions attain, in each of many annuli.
 
     Other values of beta-hat than the preferred one are tried only at places that could have the smallest one.
 
     Args:
         attained: gives those of sets that some values of beta-hat attain, as `chapter_3.attained` does.
-        sets: of each place, as there.
+        annuli: sets of the places of each, as there.
 
     Returns:
-        the part.
+        a part an annulus.
     """
     preferred, some, rest = attainable.turns()
+    sets = [one for annulus in annuli for one in annulus]
+    owner = np.repeat(np.arange(len(annuli)), [len(annulus) for annulus in annuli])
     good = attained(sets, preferred)
     shares = np.array([own.mean() for own in good])
-    smallest = 1.0
-    # All values at the place with the smallest share so far; then, turn by turn, where less is attained than there.
-    every, only = list(range(len(sets))), [int(shares.argmin())]
+    smallest = np.ones(len(annuli))
+    # All values at the place of each annulus with the smallest share so far; then, turn by turn, where less is attained
+    # than there. All annuli at once: no process waits for the end of one.
+    every, rising = np.arange(len(sets)), np.argsort(shares, kind="stable")
+    only = rising[np.unique(owner[rising], return_index=True)[1]]
     for which, tried in ((only, some), (only, rest), (every, some), (every, rest)):
-        left = [k for k in which if shares[k] < smallest]
+        left = which[shares[which] < smallest[owner[which]]].tolist()
         if left:
             found = attained([(sets[k][0], sets[k][1][~good[k]]) for k in left], tried)
             for k, own in zip(left, found, strict=True):
                 good[k][~good[k]] = own
                 shares[k] = good[k].mean()
         if tried is rest:
-            smallest = min(smallest, float(shares[which].min()))
-    return smallest
+            np.minimum.at(smallest, owner[which], shares[which])
+    return smallest.tolist()
 
 
 def table_3_4(choice: Choice, workers: int = 1) -> dict[Key, float | None]:
@@ -72,17 +78,19 @@ def table_3_4(choice: Choice, workers: int = 1) -> dict[Key, float | None]:
     cells: dict[Key, float | None] = {}
     divisions = DIVISIONS * choice.finer
     with Spread(workers) as spread:
-        for amplitude, definition, depth in itertools.product(choice.amplitudes, choice.definitions, _DEPTHS):
+        for amplitude, definition in itertools.product(choice.amplitudes, choice.definitions):
 
             def attained(sets: Sets, tried: np.ndarray, amplitude: str = amplitude) -> list[np.ndarray]:
                 return spread(partial(attained_there, amplitude, tried), sets, sizes(sets))
 
-            with within(f"{amplitude}, {definition}, z = {depth:g}"):
-                asked = [(place, divisions) for place in _places(amplitude, depth)]
-                inside = spread(partial(accessible_there, amplitude, definition), asked, [1] * len(asked))
-                angles = [(place, own.angles) for (place, _), own in zip(asked, inside, strict=True)]
-                smallest = smallest_proportion(attained, angles)
-            cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * smallest
+            with within(f"{amplitude}, {definition}"):
+                asked = [[(place, divisions) for place in _places(amplitude, depth)] for depth in _DEPTHS]
+                every = list(itertools.chain(*asked))
+                inside = iter(spread(partial(accessible_there, amplitude, definition), every, [1] * len(every)))
+                annuli = [[(place, next(inside).angles) for place, _ in annulus] for annulus in asked]
+                smallest = smallest_proportions(attained, annuli)
+            for depth, part in zip(_DEPTHS, smallest, strict=True):
+                cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * part
     return cells
 
 

@@ -22,7 +22,7 @@ from cspr_jax.errors import ConfigError, ResourceError
 SAFE_PATH = "PYTHONSAFEPATH"
 # So many workers at most; and where nobody says how many, since each takes a GB.
 LARGEST, MOST = 256, 8
-GROUPS = 2  # for each worker
+GROUPS = 6  # for each worker: who is done first takes another
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
 
