@@ -72,6 +72,10 @@ def test_the_smallest_proportion_is_that_of_all(monkeypatch):
     preferred = [good.mean() for good in attained(asked, np.array([0]))]
     assert np.argmin(every) != np.argmin(preferred)
     assert smallest_proportions(attained, [asked[-1:]]) == [1.0]
+    # Few places at a time, as of many orientations.
+    monkeypatch.setattr(chapter_3, "TOGETHER", 100)
+    some = chapter_3.attained_there("effective-c3", np.array([0]), asked)
+    assert [good.mean() for good in some] == preferred
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -32,7 +32,7 @@ from cspr_jax.trajectories.platform_segment import Kind
 RADIUS = 0.86  # b of (3.95), m
 MAX_ARCS = 20
 DIVISIONS = 32  # of pi
-TOGETHER = 1_000_000  # orientations are held at a time, or those of one place more
+TOGETHER = 1_000_000  # orientations are tried at a time, or some more: places stay whole
 AMPLITUDES: dict[str, tuple[str, float | None]] = {
     "quintic": ("quintic", None),
     "effective": ("effective", 0.1),
