@@ -14,6 +14,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts
 from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.errors import InputError
 from cspr_jax.feasibility.workspace import cocircuits, exact, geometry, kernels
 from cspr_jax.feasibility.workspace.margins import Wrenches
 from cspr_jax.feasibility.workspace.required import RequiredWrenches
@@ -36,6 +37,8 @@ MOST_SHORT = 8  # short batches
 BYTES = 6_400_000
 # Poses by which the base block is chosen, and those by which cocircuits that are none are left out.
 TRIALS, FEW_TRIALS = 200, 8
+# Boxes in which they are sought, each twice as wide as the one before: the largest pulleys have 1e6 m.
+WIDENINGS = 40
 # So many open poses go to singular values at once: to compile for them would take longer.
 FEW = 100
 
@@ -147,19 +150,26 @@ class WorkspaceSearch:
         return WorkspaceAnswers(verdict.astype(FLAGS), margin, is_exact)
 
     def _trials(self) -> np.ndarray:
-        # Wrench matrices of poses among the spools.
+        # Wrench matrices of poses among the spools, all finite: no cable ends within its pulley there. Large pulleys
+        # may leave no such pose among the spools, but they do farther out.
         rng, base, row = np.random.default_rng(1), np.asarray(self._robot.base_points), PATTERNS[self._robot.pattern]
         low, high = base.min(0), base.max(0)
         middle, half = 0.5 * (low + high), 0.4 * (high - low)
         # Where all spools have one x, what vanishes in their plane does so nowhere else.
         moves = np.isin(range(3), row.forces or range(3))
-        half = np.where(moves, np.maximum(half, 0.2 * half.max()), half)
-        places = middle + half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
-        turns = UNTURNED + 0.2 * rng.normal(size=(TRIALS, 4))
-        if row.is_planar:
-            turns[:, [1, 3]] = 0.0
-        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-        return self._matrices(places, turns)
+        half = np.where(moves, np.maximum(half, 0.2 * half.max() or 1.0), half)
+        regular = np.zeros((0, self._robot.dof, self._robot.n_cables))
+        for widening in range(WIDENINGS):
+            places = middle + 2.0**widening * half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
+            turns = UNTURNED + 0.2 * rng.normal(size=(TRIALS, 4))
+            if row.is_planar:
+                turns[:, [1, 3]] = 0.0
+            matrices = self._matrices(places, turns / np.linalg.norm(turns, axis=1, keepdims=True))
+            regular = np.concatenate([regular, matrices[np.isfinite(matrices).all((1, 2))]])
+            if len(regular) >= FEW_TRIALS:
+                return regular
+        allowed = "must leave room for poses where no cable ends within its pulley"
+        raise InputError("pulley_radius", None, allowed, fault="none among the spools, nor around them")
 
     def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Wrench matrices, moments over the length.

@@ -46,11 +46,15 @@ def choices_of(matrices: np.ndarray) -> Choices:
     """Choices of dof - 1 cables that are one at some pose: four cables at one point are none, wherever they are.
 
     Args:
-        matrices: (n, dof, n_cables) wrench matrices of some poses, of unit columns.
+        matrices: (n, dof, n_cables) finite wrench matrices of poses, of unit columns.
 
     Returns:
         the choices.
+
+    Raises:
+        ValueError: a matrix is not finite: as NaN compares with nothing, it would strike out what is there.
     """
+    _check_finite(matrices)
     dof, count = matrices.shape[1:]
     chosen = spanning(count, dof)
     others = [np.setdiff1d(np.arange(count), row) for row in chosen]
@@ -65,6 +69,11 @@ def choices_of(matrices: np.ndarray) -> Choices:
     is_one = (sizes > NOTHING).any(1)
     counts = (sizes > NOTHING)[is_one]
     return Choices(table[is_one], None if counts.all() else counts.astype(float))
+
+
+def _check_finite(matrices: np.ndarray) -> None:
+    if not len(matrices) or not np.isfinite(matrices).all():
+        raise ValueError("structure follows from finite wrench matrices alone, at least one")
 
 
 def normal(columns: Sequence[Column]) -> Column:
@@ -203,11 +212,15 @@ def base_order(matrices: np.ndarray) -> tuple[int, ...]:
     """Order of cables in space whose first six, and of these the first three forces, are the farthest from singular.
 
     Args:
-        matrices: (n, 6, n_cables) of some poses, moments over a length.
+        matrices: (n, 6, n_cables) of poses, finite, moments over a length.
 
     Returns:
         the cables.
+
+    Raises:
+        ValueError: a matrix is not finite.
     """
+    _check_finite(matrices)
     count = matrices.shape[2]
 
     def size(chosen, rows):
