@@ -1,5 +1,7 @@
 """Straight lines under limits and on spools in any layout, against brute force by linear programs."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +12,8 @@ import cspr_jax
 from cspr_jax import Verdict
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.problem import limits_over, prepared
+from cspr_jax.search.line_durations import by_formula
+from cspr_jax.search.line_verdicts import verdicts
 from cspr_jax.search.timed_lines import motions_of, timed_lines
 
 MASS = 10.0
@@ -137,3 +141,37 @@ def test_a_line_through_a_spool_is_singular(limits):
     for start, end in (([15, 15, 9], [25, 15, 11]), ([20, 15, 5], [20, 15, 15]), ([20, 15, 5], [20, 15, 10])):
         found = least(spools, start, end, **limits)
         assert found.verdict[0] == Verdict.SINGULAR and np.isnan(found.duration[0])
+
+
+# Of s'' T^2: the cubic's is 6 - 12 tau, the quintic's 60 tau - 180 tau^2 + 120 tau^3.
+PEAKS = {"cubic": 6.0, "quintic": 10.0 / np.sqrt(3.0)}
+
+
+@pytest.mark.parametrize("law", ["quintic", "cubic", "s-curve"])
+@pytest.mark.parametrize("limits", [{}, {"tension_min": 0.5, "cable_speed_max": 50.0}])
+def test_no_motion_exceeds_the_largest_acceleration(law, limits):
+    """Of spools out of one plane, where durations come from samples; peaks of laws in closed form."""
+    rng, count = np.random.default_rng(12), 16
+    base = np.c_[[10.0, -6.0, -5.0, 3.0], [1.0, 7.0, -6.0, -8.0], [12.0, 12.5, 11.4, 12.2]]
+    problem, frame = problem_of(base, limits)
+    starts, ends = (frame.inward(rng.uniform([-2, -2, 2], [2, 2, 6], (count, 3))) for _ in range(2))
+    largest = 0.3
+    answers = timed_lines(problem, starts, ends, law=law, max_acceleration=largest)
+    assert (answers.verdict == 0).all()
+    shorter = np.minimum(answers.acceleration_time, answers.duration - answers.acceleration_time)
+    peak = PEAKS[law] if law in PEAKS else 4.0 * answers.duration / shorter
+    share = np.linalg.norm(ends - starts, axis=1) * peak / answers.duration**2 / largest
+    assert (share <= 1.0).all()
+    assert (share > 1.0 - 1e-6).all()  # the limit binds
+
+
+@pytest.mark.parametrize("law", ["quintic", "s-curve"])
+def test_the_proof_covers_the_largest_acceleration(law):
+    """A motion that is a little too fast is not feasible, whatever search it came from."""
+    problem, frame = problem_of([[10, 1, 12], [-6, 7, 12], [-5, -6, 12], [3, -8, 12]], {"tension_min": 0.1})
+    starts, ends = frame.inward(np.array([[0.0, 0.0, 4.0]])), frame.inward(np.array([[1.0, 0.5, 3.0]]))
+    known = by_formula(problem.robot, starts, ends, law=law, rule="optimum", max_acceleration=0.3)
+    for factor, verdict in ((1.0 - 1e-6, Verdict.UNDECIDED), (1.0, 0)):
+        timed = dataclasses.replace(known, duration=known.duration * factor)
+        judged = verdicts(problem, starts, ends, timed, law=law, max_acceleration=0.3, sharp=False)
+        assert judged.verdict[0] == verdict

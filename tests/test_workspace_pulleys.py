@@ -25,7 +25,7 @@ def limited_robot(rng, pattern, n):
     """A robot with other limits for each cable, all finite; spools beside a guide, where a pulley's side is unique."""
     drawn = cable_robots.any_robot(rng, pattern, n, suspended=pattern != "3R")
     if pattern == "1T":
-        drawn = dataclasses.replace(drawn, base=drawn.base + [0.4, 0.2, 0.0])
+        drawn = dataclasses.replace(drawn, base=drawn.base + np.array([0.4, 0.2, 0.0]))
     force = drawn.mass * G
     return drawn.with_bounds(force * rng.uniform(0.0, 0.1, drawn.cables), force * rng.uniform(1.0, 3.0, drawn.cables))
 

@@ -13,7 +13,7 @@ from cspr_jax.feasibility.point_mass.line_search import LONGER
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.line_durations import Durations, Rule, by_cells, by_formula, by_search, moving
-from cspr_jax.search.line_verdicts import TOLERANCE, limits_at_rest, verdicts
+from cspr_jax.search.line_verdicts import TOLERANCE, acceleration_slack, limits_at_rest, verdicts
 from cspr_jax.search.proved_verdicts import Verdicts
 
 # Lines that a thread works on at a time, where there is something to search or to prove.
@@ -92,11 +92,13 @@ def _fastest(
     robot, in_plane = problem.robot, in_one_plane(problem.robot)
     found = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
     own, may_move, in_place = _at_rest(problem, starts, ends, found)
-    judged = partial(verdicts, problem, law=law, sharp=sharp)
+    judged = partial(verdicts, problem, law=law, max_acceleration=max_acceleration, sharp=sharp)
     if in_plane:
-        # What the formulas promise without limits needs no proof, but where the digits of p or T - p are lost.
+        # What the formulas promise without limits needs no proof, but where the digits of p or T - p are lost, or the
+        # peak of the acceleration may lie beyond its limit.
         is_short = (np.minimum(found.ratio, 1.0 - found.ratio) < SHORT) & (law == "s-curve")
-        some = np.flatnonzero(may_move & (sharp | bool(given(problem.limits)) | is_short))
+        is_within = acceleration_slack(starts, ends, found, law=law, max_acceleration=max_acceleration) > 0.0
+        some = np.flatnonzero(may_move & (sharp | bool(given(problem.limits)) | is_short | ~is_within))
         if len(some) > 0:
             own.replace(some, judged(starts[some], ends[some], found.part(some)))
     # Where a place breaks a limit, no other motion mends it.

@@ -21,7 +21,7 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.line_durations import BATCH, Durations, lines_of
 from cspr_jax.search.proved_verdicts import Verdicts, plain_slack
 from cspr_jax.trajectories.amplitudes import Amplitude
-from cspr_jax.trajectories.timed_lines import fixed_law, s_curve
+from cspr_jax.trajectories.timed_lines import fixed_law, largest_bend, s_curve
 
 # Over gravity, or the size of a limit: margins nearer to zero are undecided, and rest with a smaller margin is none.
 TOLERANCE = 1e-12
@@ -48,8 +48,35 @@ def laws_of(law: str, ratios: np.ndarray) -> Amplitude:
     return jax.tree.map(lambda x: np.broadcast_to(x, (len(ratios), *x.shape)), one)
 
 
+def acceleration_slack(
+    starts: np.ndarray, ends: np.ndarray, found: Durations, *, law: str, max_acceleration: float
+) -> np.ndarray:
+    """Slack of the largest acceleration along lines: a closed form, since the peak of s'' of each law is known.
+
+    Args:
+        starts: (n, 3) m.
+        ends: (n, 3) m.
+        found: their durations.
+        law: of time.
+        max_acceleration: m/s^2.
+
+    Returns:
+        (n,) 1 - (largest acceleration) / max_acceleration; NaN without a duration.
+    """
+    largest = np.linalg.norm(ends - starts, axis=1) * largest_bend(law, found.ratio)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return 1.0 - largest / found.duration**2 / max_acceleration
+
+
 def verdicts(
-    problem: Problem, starts: np.ndarray, ends: np.ndarray, found: Durations, *, law: str, sharp: bool
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    found: Durations,
+    *,
+    law: str,
+    max_acceleration: float,
+    sharp: bool,
 ) -> Verdicts:
     """Verdicts of motions whose durations are known.
 
@@ -59,6 +86,7 @@ def verdicts(
         ends: (n, 3) m, elsewhere.
         found: finite durations.
         law: of time.
+        max_acceleration: largest size of the acceleration, m/s^2; a motion beyond it is undecided.
         sharp: whether margins are wanted, and not verdicts only.
 
     Returns:
@@ -75,7 +103,8 @@ def verdicts(
     for name, values in zip(lines.names[1:], proved.attained.T[1:], strict=True):
         room = np.minimum(room, plain_slack(name, values / gravity if name.startswith("tension") else values))
     broken |= np.bitwise_or.reduce(flags, axis=1)
-    is_open = ~(proved.bound > doubt).all(1) | doubtful
+    is_within = acceleration_slack(starts, ends, found, law=law, max_acceleration=max_acceleration) > TOLERANCE
+    is_open = ~(proved.bound > doubt).all(1) | doubtful | ~is_within
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(FLAGS)
     return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
 

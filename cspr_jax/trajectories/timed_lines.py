@@ -9,13 +9,13 @@ import dataclasses
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from cspr_jax.robots.state import State
 from cspr_jax.trajectories import amplitudes
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 
-# Largest s'' tau^2 of each law; those of the S-model depend on its ratio.
 LAWS = ("s-curve", "quintic", "cubic")
 
 
@@ -60,6 +60,21 @@ def fixed_law(name: str) -> Amplitude:
         the law.
     """
     return amplitudes.named("quintic") if name == "quintic" else amplitudes.from_polynomial([0.0, 0.0, 3.0, -2.0])
+
+
+def largest_bend(law: str, ratio: np.ndarray) -> np.ndarray:
+    """Largest size of s'' over tau of a law.
+
+    Args:
+        law: one of `LAWS`.
+        ratio: (n,) p / T of the S-model.
+
+    Returns:
+        (n,) an upper bound, exact but for rounding.
+    """
+    if law == "s-curve":
+        return 4.0 / np.minimum(ratio, 1.0 - ratio)
+    return np.full(np.shape(ratio), np.asarray(fixed_law(law).largest)[2])
 
 
 @jax.tree_util.register_dataclass
