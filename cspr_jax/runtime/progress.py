@@ -1,12 +1,16 @@
-"""Progress at a terminal: how far a sweep is, or what is being done. Elsewhere nothing."""
+"""Progress: how far a sweep is, or what is being done. A terminal shows it all the time, a log once a minute."""
 
 import contextlib
 import datetime
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 
 from cspr_jax.runtime import stages
+
+# Between two lines where standard error is no terminal.
+LINE_SECONDS = 60.0
 
 
 class Pace:
@@ -59,13 +63,14 @@ class Pace:
 
 @contextlib.contextmanager
 def progress() -> Iterator[Callable[[int, int], None]]:
-    """Show how far a sweep is, where somebody looks.
+    """Show how far a sweep is: in a bar at a terminal, elsewhere by a line a minute on standard error.
 
     Yields:
-        what is to be told the cells done and all cells; it does nothing where standard error is no terminal.
+        what is to be told the cells done and all cells.
     """
     if not sys.stderr.isatty():
-        yield lambda done, total: None
+        with _lines() as on_tile:
+            yield on_tile
         return
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn
 
@@ -87,6 +92,32 @@ def progress() -> Iterator[Callable[[int, int], None]]:
 
         with stages.heard(lambda text: bar.update(task, description=text or "computing")):
             yield on_tile
+
+
+@contextlib.contextmanager
+def _lines() -> Iterator[Callable[[int, int], None]]:
+    pace, cells, over = Pace(), [(0, 0)], threading.Event()
+
+    def on_tile(done: int, total: int) -> None:
+        pace.told(done, total)
+        cells.append((done, total))
+
+    def write_lines() -> None:
+        while not over.wait(LINE_SECONDS):
+            done, total = cells[-1]
+            rate = "" if pace.rate is None else f", {pace.rate:,.3g} cells/s, {pace.left()}"
+            share = f"{100.0 * done / total:.0f} %, {done:,} of {total:,} cells" if total else "before the first tile"
+            with contextlib.suppress(OSError, ValueError):  # nobody may be there to be told
+                sys.stderr.write(f"cspr: {share}{rate}\n")
+                sys.stderr.flush()
+
+    thread = threading.Thread(target=write_lines, daemon=True)
+    thread.start()
+    try:
+        yield on_tile
+    finally:
+        over.set()
+        thread.join()
 
 
 @contextlib.contextmanager

@@ -16,7 +16,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.schema.quantities import QUANTITIES, REFUSALS
 from cspr_jax.schema.quantities import register as register_quantity
 from cspr_jax.schema.quantity import Quantity
-from cspr_jax.schema.tiles import LARGEST_TILE
+from cspr_jax.schema.tiles import LARGEST_TILE, ORDINARY_COST, CellCost
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,6 +45,7 @@ class MapKind:
         definitions: of the accessible set that it takes.
         is_over_orientations: whether its grid has axes over all orientations besides those of the sweep file.
         cells: of a tile, at most, where the sweep file does not say.
+        cost: of a cell, by which a run is divided into tiles.
         patterns: of motion of the robots that it moves, rows of `robots.patterns`, by which `config.equivalents` finds
             which robot that is; none: robots go to its class as their files have them.
         by_processes: whether the command line has several processes compute its tiles, where nobody says how many: much
@@ -67,6 +68,7 @@ class MapKind:
     definitions: tuple[str, ...] = ("grid", "scan", "equal-volume")
     is_over_orientations: bool = False
     cells: int = LARGEST_TILE
+    cost: CellCost = ORDINARY_COST
     patterns: tuple[str, ...] = ()
     stored_with: tuple[tuple[str, tuple[str, ...]], ...] = ()
     planned: bool = False
@@ -133,6 +135,7 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Smallest number of arcs",
             description="smallest number of arcs to each target",
             implementation="cspr_jax.maps.arcs:MinimumArcsMap",
+            cost=CellCost(seconds=6e-5),
             quantities=("arcs", "tried_arcs", *_COMMON, *_TOLERATED),
             stored=("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
             pictured=("arcs",),
@@ -149,6 +152,7 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Smallest number of oscillations",
             description="smallest number of oscillations of a transition from rest to each target",
             implementation="cspr_jax.maps.oscillations:MinimumOscillationsMap",
+            cost=CellCost(seconds=1e-4, limits=0.3),
             quantities=(
                 *("oscillations", "tried_oscillations", "envelope_oscillations", *_OF_TRANSITIONS, *_COMMON),
                 *_TOLERATED,
@@ -185,6 +189,7 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Smallest number of arcs to poses",
             description="smallest number of arcs of a platform to each pose",
             implementation="cspr_jax.maps.poses:PosesMap",
+            cost=CellCost(seconds=1.5e-3, limits=5.0),
             quantities=_OF_POSES,
             stored=_POSES_STORED,
             pictured=("arcs",),
@@ -205,6 +210,7 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Smallest number of arcs to accessible orientations",
             description="smallest number of arcs of a platform from rest to each orientation accessible at each place",
             implementation="cspr_jax.maps.orientations:OrientationsMap",
+            cost=CellCost(seconds=3e-4, limits=5.0),
             quantities=_OF_POSES,
             stored=_POSES_STORED,
             pictured=("arcs",),
@@ -222,6 +228,7 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Accessible orientations",
             description="orientations of a platform that are accessible at each place",
             implementation="cspr_jax.maps.places:OrientationWorkspaceMap",
+            cost=CellCost(orientation=3e-6),
             quantities=_OF_PLACES,
             stored=_OF_PLACES,
             pictured=("accessible_volume",),
@@ -230,13 +237,14 @@ MAP_KINDS: dict[str, MapKind] = {
             patterns=("3R3T",),
             by_processes=True,
             takes=("orientations",),
-            cells=64,  # a cell takes long
+            cells=64,
         ),
         MapKind(
             name="attainability",
             title="Accessible and attainable orientations",
             description="orientations of a platform that are accessible at each place, and attained from rest",
             implementation="cspr_jax.maps.places:AttainabilityMap",
+            cost=CellCost(orientation=6e-5, limits=5.0),
             quantities=(*_OF_PLACES, *_OF_ATTAINED),
             stored=(*_OF_PLACES, *_OF_ATTAINED),
             pictured=("attainable_fraction", "accessible_volume"),
@@ -252,6 +260,7 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Feasible accelerations",
             description="accelerations that a point mass on any number of cables can have at each place",
             implementation="cspr_jax.maps.accelerations:FeasibleAccelerationMap",
+            cost=CellCost(limits=0.0),
             quantities=_OF_ACCELERATIONS,
             stored=_OF_ACCELERATIONS,
             pictured=("acceleration_margin",),
@@ -265,6 +274,7 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Least durations along straight lines",
             description="least duration of the S-model along the straight line to each target, beside the least of all",
             implementation="cspr_jax.maps.least_time:LeastTimeMap",
+            cost=CellCost(limits=2.0),
             quantities=_OF_LINES,
             stored=_OF_LINES,
             pictured=("duration",),
@@ -279,6 +289,7 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Range of launches",
             description="least speed with which an object, released on one Bezier segment, reaches each landing place",
             implementation="cspr_jax.maps.launch_range:LaunchRangeMap",
+            cost=CellCost(seconds=2e-2),
             quantities=_OF_LAUNCHES,
             stored=_OF_LAUNCHES,
             pictured=("release_speed",),
@@ -286,13 +297,14 @@ MAP_KINDS: dict[str, MapKind] = {
             patterns=("2T", "3T"),
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "launch", "limits"),
-            cells=1024,  # a cell takes long
+            cells=1024,
         ),
         MapKind(
             name="sensitivity",
             title="Sensitivity to errors of the cable lengths",
             description="largest displacement, and turn of a platform, that errors of the cable lengths cause",
             implementation="cspr_jax.maps.sensitivity:SensitivityMap",
+            cost=CellCost(seconds=1e-6),
             quantities=_OF_LENGTHS,
             stored=_OF_LENGTHS,
             pictured=("sigma_p",),
@@ -304,6 +316,7 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Workspace",
             description="poses that a robot of any pattern can hold, or places at which it can hold sets of them",
             implementation="cspr_jax.maps.workspace:WorkspaceMap",
+            cost=CellCost(seconds=2e-6, limits=0.0),
             quantities=(*_OF_WORKSPACES, *_MORE_OF_WORKSPACES),
             stored=_OF_WORKSPACES,
             stored_with=(

@@ -24,6 +24,7 @@ from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 from cspr_jax.store.netcdf import bytes_needed, dtype_of
 from cspr_jax.store.shards import Layout
 from cspr_jax.sweep.checks import check_map, check_points, is_given
+from cspr_jax.sweep.tile_sizes import tile_cells
 
 # Each tile is a file.
 LARGEST_TILES = 100_000
@@ -120,7 +121,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
         if name not in kind.quantities:
             raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(kind.quantities)} in this map")
     shape = tuple(counts.values())
-    usual = tile_shape(shape, kind.cells)
+    usual = tile_shape(shape, tile_cells(kind, keys, math.prod(shape)))
     tile = usual if keys.run.tile is None else _tile(keys.run.tile, shape, path)
     _check_size(counts, tile, usual, bytes_needed(shape, store, keys.run.dtype), path)
     axes = {name: axis_points(getattr(keys.axes, name)) for name in data["axes"]}

@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
-from cspr_jax.errors import RefusedError, StoppedError, StoreError, one_line
+from cspr_jax.errors import ExitCode, RefusedError, StoppedError, StoreError, one_line
 from cspr_jax.schema.identity import canonical_json, digest
 from cspr_jax.store.consolidation import consolidate, read_content
 from cspr_jax.store.disk import Disk
@@ -217,7 +217,8 @@ class Run:
         line = f"{self._folder.path}: {finished} of {len(self._tiling)} tiles are kept; run it again to go on"
         if code is None:
             raise StoreError(line)
-        raise StoppedError(f"stopped: {line}", code)
+        by = " by SIGTERM" if code is ExitCode.TERMINATED else ""
+        raise StoppedError(f"stopped{by}: {line}", code)
 
     # -- the result ------------------------------------------------------------------------------
 

@@ -1,6 +1,7 @@
 """Ctrl-C and SIGTERM are noticed at once, whatever is being compiled, by a thread that waits for them.
 
-A run finishes the tile in progress, and keeps it; all else ends within two seconds.
+A run that is interrupted finishes the tile in progress, and keeps it. SIGTERM gives it eight seconds for that, since a
+batch system kills soon after; all else ends within two seconds.
 """
 
 import contextlib
@@ -16,8 +17,11 @@ from cspr_jax.errors import ExitCode
 CODES = {signal.SIGINT: ExitCode.INTERRUPTED, signal.SIGTERM: ExitCode.TERMINATED}
 # Where nothing must be finished, the main thread has so long to leave by itself; it cannot while it compiles.
 GRACE_SECONDS = 1.2
+# What a tile in progress has after SIGTERM.
+TILE_SECONDS = 8.0
 FINISHING = "finishing the tile in progress; Ctrl-C again ends at once"
 STOPPING = "stopping; Ctrl-C again ends at once"
+TERMINATING = f"SIGTERM: waiting up to {TILE_SECONDS:.0f} s for the tile in progress"
 # Takes the line of a progress display away, and shows the cursor that it hid.
 _TIDY = b"\r\x1b[2K\x1b[?25h"
 
@@ -52,7 +56,8 @@ class Stop:
         del frame
         if self.code is None:
             self.code = CODES[signal.Signals(number)]
-            self.tell(FINISHING if self.busy else STOPPING)
+            finishing = TERMINATING if self.code is ExitCode.TERMINATED else FINISHING
+            self.tell(finishing if self.busy else STOPPING)
             return
         self.end(CODES[signal.Signals(number)])
 
@@ -63,7 +68,9 @@ class Stop:
             code: its exit code.
         """
         self.at_once()
-        _end(code, b"cspr: stopped at once; finished tiles are kept, run it again to go on\n")
+        signal_name = "SIGTERM: " if code is ExitCode.TERMINATED else ""
+        line = f"cspr: {signal_name}stopped at once; finished tiles are kept, run it again to go on\n"
+        _end(code, line.encode())
 
 
 @contextlib.contextmanager
@@ -83,8 +90,11 @@ def stop_signals(tell: Callable[[str], None] = lambda line: None) -> Iterator[St
         return
 
     def end_unless_over() -> None:
-        if not over.wait(GRACE_SECONDS) and not stop.busy and stop.code is not None:
-            stop.end(stop.code)
+        if over.wait(GRACE_SECONDS) or stop.code is None:
+            return
+        if stop.busy and (stop.code is not ExitCode.TERMINATED or over.wait(TILE_SECONDS - GRACE_SECONDS)):
+            return
+        stop.end(stop.code)
 
     def asked(number: int) -> None:
         stop.ask(number)

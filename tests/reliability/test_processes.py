@@ -95,8 +95,10 @@ def stops(job, tmp_path, count):
         code, err = finish(process, timeout=10)
         assert code == {signal.SIGINT: 130, signal.SIGTERM: 143}[number]
         first, last = err.splitlines()
-        assert first.endswith("; Ctrl-C again ends at once")
-        assert last.startswith("cspr: stopped") and "run it again" in last
+        is_terminated = number == signal.SIGTERM
+        assert first.endswith("the tile in progress" if is_terminated else "; Ctrl-C again ends at once")
+        assert last.startswith("cspr: stopped by SIGTERM: " if is_terminated else "cspr: stopped")
+        assert "run it again" in last
         check_prefix(directory, reference)
         complete(sweep, directory, reference)
 

@@ -3,10 +3,12 @@
 import dataclasses
 import io
 import os
+import re
 import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import jax
@@ -16,6 +18,7 @@ from cspr_jax.api.pictures import plot
 from cspr_jax.cli import main
 from cspr_jax.errors import StoreError
 from cspr_jax.published import tables
+from cspr_jax.runtime import progress as progress_lines
 from cspr_jax.runtime import stages
 from cspr_jax.runtime.progress import Pace, progress, waiting
 from reliability.support import go, sweep_of
@@ -73,10 +76,26 @@ def test_ctrl_c_where_nothing_must_be_finished(started):
 def test_a_run_says_at_once_that_it_finishes_its_tile(started, tmp_path, number, code):
     process = started("run", sweep_of(tmp_path, tiles=4).file, "-o", tmp_path / "run")
     process.send_signal(number)
-    assert process.stderr.readline() == "cspr: finishing the tile in progress; Ctrl-C again ends at once\n"
+    line = {
+        signal.SIGINT: "finishing the tile in progress; Ctrl-C again ends at once",
+        signal.SIGTERM: "SIGTERM: waiting up to 8 s for the tile in progress",
+    }[number]
+    assert process.stderr.readline() == f"cspr: {line}\n"
     process.send_signal(number)
     assert process.wait(timeout=5) == code
-    assert process.stderr.read().startswith("cspr: stopped at once; finished tiles are kept")
+    stopped = "SIGTERM: stopped at once" if number == signal.SIGTERM else "stopped at once"
+    assert process.stderr.read().startswith(f"cspr: {stopped}; finished tiles are kept")
+
+
+@pytest.mark.thorough
+def test_a_tile_that_takes_long_does_not_hold_up_sigterm(started, tmp_path):
+    """A batch system kills half a minute after it; the tile in progress is given up before."""
+    process = started("run", sweep_of(tmp_path, tiles=4).file, "-o", tmp_path / "run")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(timeout=12) == 143
+    first, last = process.stderr.read().splitlines()
+    assert first == "cspr: SIGTERM: waiting up to 8 s for the tile in progress"
+    assert last == "cspr: SIGTERM: stopped at once; finished tiles are kept, run it again to go on"
 
 
 class Terminal(io.StringIO):
@@ -141,6 +160,28 @@ def test_a_run_shows_what_it_does_until_the_first_tile(monkeypatch):
         on_tile(0, 10)
         on_tile(5, 10)
     assert " left" in terminal.getvalue()
+
+
+def test_a_log_gets_a_line_now_and_then(monkeypatch):
+    """Where standard error is no terminal; before the first tile there is no rate."""
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    monkeypatch.setattr(progress_lines, "LINE_SECONDS", 0.02)
+
+    def next_line():
+        count = sys.stderr.getvalue().count("\n")
+        while sys.stderr.getvalue().count("\n") < count + 2:
+            time.sleep(0.005)
+        return sys.stderr.getvalue().splitlines()[-1]
+
+    with progress() as on_tile:
+        assert next_line() == "cspr: before the first tile"
+        on_tile(0, 2000)
+        assert next_line() == "cspr: 0 %, 0 of 2,000 cells"
+        on_tile(1500, 2000)
+        assert re.fullmatch(r"cspr: 75 %, 1,500 of 2,000 cells, \S+ cells/s, 0:00:\d\d left", next_line())
+    written = sys.stderr.getvalue()
+    time.sleep(0.06)
+    assert sys.stderr.getvalue() == written
 
 
 def test_the_pace_of_a_sweep():

@@ -1,0 +1,69 @@
+"""Number of cells of a tile, by what they cost.
+
+What a killed run loses, and how long it is silent, is a tile. The costs are a table that was measured once, and not
+measured again in each run: the shape of the tiles is part of a sweep's identity, on every machine the same.
+"""
+
+import math
+
+from cspr_jax.config.sweep import Orientations, SweepFile
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.map_kinds import MapKind
+from cspr_jax.sweep.checks import is_given
+
+# Work of a tile on one core; two cores share it, and a slow one takes twice as long.
+TILE_SECONDS = 40.0
+# So many tiles a run has at least, unless these would take less than a few seconds: each pads its last batches, and a
+# tile of a platform's poses takes half a second whatever it holds.
+FEWEST_TILES, SHORTEST_SECONDS = 20, 5.0
+# Seconds that proofs of limits take a cell of a map of arcs, with 30 arcs.
+LIMIT_SECONDS = {
+    "tension_min": 5e-4,
+    "tension_max": 5e-4,
+    "floor": 2e-4,
+    "cable_length_max": 3e-4,
+    "cable_speed_max": 6e-3,
+    "cable_acceleration_max": 2e-3,
+    "uncertainty": 1e-2,
+}
+# Likewise of a workspace: what else is asked of each cell.
+WORKSPACE_SECONDS = {"prove": 2e-4, "obstacle": 5e-5, "platform_hull": 5e-5, "platform_box": 5e-5}
+ARCS = 30
+
+
+def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
+    """Estimate what a cell takes on one core.
+
+    Args:
+        kind: of map.
+        keys: of the sweep.
+
+    Returns:
+        seconds.
+    """
+    names = (*(row.name for row in LIMITS), "uncertainty")
+    limits = sum(
+        LIMIT_SECONDS.get(name, max(LIMIT_SECONDS.values())) for name in names if is_given(keys, f"limits.{name}")
+    )
+    asked = sum(cost for name, cost in WORKSPACE_SECONDS.items() if is_given(keys, f"workspace.{name}"))
+    divisions = (keys.orientations or Orientations()).divisions
+    motion = (kind.cost.seconds + kind.cost.limits * limits) * (
+        keys.trajectory.max_arcs / ARCS if kind.families else 1.0
+    )
+    return motion + asked + kind.cost.orientation * 4 * divisions**3
+
+
+def tile_cells(kind: MapKind, keys: SweepFile, cells: int) -> int:
+    """Choose the largest number of cells of a tile.
+
+    Args:
+        kind: of map.
+        keys: of the sweep.
+        cells: of the whole grid.
+
+    Returns:
+        at least 1.
+    """
+    seconds = cell_seconds(kind, keys)
+    most = min(kind.cells, math.ceil(TILE_SECONDS / seconds))
+    return min(most, max(math.ceil(cells / FEWEST_TILES), math.ceil(SHORTEST_SECONDS / seconds)))
