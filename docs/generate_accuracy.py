@@ -2,8 +2,10 @@
 
 python docs/generate_accuracy.py            all of them, about 20 minutes
 python docs/generate_accuracy.py 2.1 4.1    these; the others stay as they are
+python docs/generate_accuracy.py choices    how proportions of Tables 3.3 and 3.4 depend on what was tried, some hours
 """
 
+import itertools
 import re
 import sys
 import textwrap
@@ -11,16 +13,18 @@ from pathlib import Path
 
 import cspr_jax
 from cspr_jax.outputs.table_layout import Cell, computed_text
+from cspr_jax.published import chapter_3, table_3_4
 
 PAGE = Path(__file__).with_name("accuracy.md")
 HEAD = """# Accuracy
 
 Do not edit: written by `python docs/generate_accuracy.py` (about 20 minutes), not by `make docs`. Every published cell
 that is known here, of every table that is computed again (`cspr table NAME`): **published / computed**, with as many
-digits as printed. Published numbers are compared with, never computed with. In **bold**: cells that differ by more than
-the rounding of these digits. "none": no feasible number was found. Below each table is why they differ; further
-comparisons, with oracles written apart and with other simulators, are in [what was compared](comparisons.md). What
-other tools print is compared by `cspr table peers`, in [performance](performance.md).
+digits as printed; of blocks with more than a hundred cells those that differ by more than one in their last digit.
+Published numbers are compared with, never computed with. In **bold**: cells that differ by more than the rounding of
+these digits. "none": no feasible number was found. Below each table is why they differ; further comparisons, with
+oracles written apart and with other simulators, are in [what was compared](comparisons.md). What other tools print is
+compared by `cspr table peers`, in [performance](performance.md).
 """
 # Why computed cells differ from the printed ones.
 REASONS = {
@@ -41,12 +45,22 @@ REASONS = {
     "depend on the amplitude function, see Table 3.2.",
     "3.4": "As Table 3.3.",
     "4.1": "The two imaginary solutions are printed with the sign of p exchanged.",
-    "4.2": "The published cells of this table are not known here, so none is compared; `cspr table 4.2` computes them.",
-    "4.3": "With exact boundaries 45 numbers of the grid differ by one in their last digit; with boundaries of five "
-    "decimals, as the source must have had them, all of the grid agree. The other two cells that differ are the "
-    "optimum T that the source's text names, 4.35 s, in both readings: it contradicts the source's own table, where "
-    "the first node without overshoot is 4.40 s.",
+    "4.2": "No reading gives all eight numbers: -1.752 follows from the printed T and p, of three decimals, and 0.896 "
+    "from exact ones.",
+    "4.3": "The source must have had boundaries of five decimals: with them all 1,240 numbers of the grid agree. The "
+    "other cell that differs is the optimum T that the source's text names, 4.35 s: it contradicts the source's own "
+    "table, where the first node without overshoot is 4.40 s.",
 }
+CHOICES_WORDS = (
+    "The text does not say up to which number of arcs p, and with how many values of beta-hat, orientations were "
+    "tried. These are the nine proportions, in percent, for both amplitude functions with short ends. Elsewhere on "
+    "this page p goes to 20, with 20 values."
+)
+# Blocks with more cells are summed up.
+MANY = 100
+CHOICES = "choices"
+# What the text does not say was tried in Tables 3.3 and 3.4.
+LARGEST_ARCS, NUMBERS_OF_VALUES, AMPLITUDES = (10, 14, 20), (6, 12, 20), ("effective", "effective-c3")
 
 
 def section(name: str, cells: list[Cell]) -> str:
@@ -67,7 +81,7 @@ def section(name: str, cells: list[Cell]) -> str:
     for variant in dict.fromkeys(cell.variant for cell in printed):
         own = [cell for cell in printed if cell.variant == variant]
         parts += [f"*{variant}*\n"] if variant else []
-        parts.append(block(own))
+        parts.append(block(own) if len(own) <= MANY else summary(own))
     return "\n".join([*parts, textwrap.fill(REASONS[name], 118, break_long_words=False) + "\n"])
 
 
@@ -90,6 +104,41 @@ def block(cells: list[Cell]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def summary(cells: list[Cell]) -> str:
+    """How far the cells of a large block agree; those that differ by more than one in their last digit are listed."""
+    differing = [cell for cell in cells if cell.differs]
+    far = [cell for cell in differing if abs(cell.computed - float(cell.printed)) > 1.5 * 10.0 ** -decimals(cell)]
+    words = f"{len(cells):,} cells compared; {len(differing) - len(far)} differ by one in their last digit"
+    words += f", {len(far)} by more:" if far else "."
+    return textwrap.fill(words, 118) + "\n" + (f"\n{block(far)}" if far else "")
+
+
+def decimals(cell: Cell) -> int:
+    """Number of decimals that are printed."""
+    return len(cell.printed.partition(".")[2])
+
+
+def choices() -> str:
+    """How the nine proportions of Tables 3.3 and 3.4 depend on the arcs and the values of beta-hat that are tried."""
+    names = [f"3.3: {row}" for row in chapter_3.PLACES] + [f"3.4: z = {row}" for row in table_3_4.PRINTED]
+    printed = [cells[2] for cells in chapter_3.PRINTED.values()] + list(table_3_4.PRINTED.values())
+    parts = ["## Tables 3.3 and 3.4: what was tried\n\n" + textwrap.fill(CHOICES_WORDS, 118) + "\n"]
+    for amplitude in AMPLITUDES:
+        lines = ["| p up to | values | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
+        lines.append("| printed | | " + " | ".join(printed) + " |")
+        for most, values in itertools.product(LARGEST_ARCS, NUMBERS_OF_VALUES):
+            cells = [
+                cell
+                for name in ("3.3", "3.4")
+                for cell in cspr_jax.table(name, amplitude=amplitude, max_arcs=most, values=values, workers=None)
+                if cell.column == "proportion"
+            ]
+            lines.append(f"| {most} | {values} | " + " | ".join(f"{cell.computed:.1f}" for cell in cells) + " |")
+            sys.stderr.write(f"{amplitude} {lines[-1]}\n")
+        parts.append(f"*amplitude = {amplitude} 0.1; definition = scan*\n\n" + "\n".join(lines) + "\n")
+    return "\n".join(parts)
+
+
 def text(cell: Cell, cells: list[Cell]) -> str:
     """Published and computed number of a cell."""
     both = f"{cell.printed} / {computed_text(cell, cells)}"
@@ -99,11 +148,15 @@ def text(cell: Cell, cells: list[Cell]) -> str:
 def main(names: list[str]) -> None:
     """Compute tables, and replace their sections."""
     known = re.split(r"^(?=## )", PAGE.read_text("utf-8"), flags=re.MULTILINE)[1:] if PAGE.exists() else []
-    sections = {re.match(r"## Table (\S+)", own)[1]: own for own in known}
+    titles = [re.match(r"## (Tables|Table \S+)", own)[1] for own in known]
+    sections = {
+        CHOICES if title == "Tables" else title.removeprefix("Table "): own
+        for title, own in zip(titles, known, strict=True)
+    }
     for name in names or REASONS:
-        sections[name] = section(name, cspr_jax.table(name))
+        sections[name] = choices() if name == CHOICES else section(name, cspr_jax.table(name))
     PAGE.write_text(
-        "\n".join([HEAD, *(sections[name].strip() + "\n" for name in REASONS if name in sections)]), "utf-8"
+        "\n".join([HEAD, *(sections[name].strip() + "\n" for name in (*REASONS, CHOICES) if name in sections)]), "utf-8"
     )
 
 

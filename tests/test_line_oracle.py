@@ -15,7 +15,7 @@ SIDES = {"x_max": 45.0, "y_max": 30.0, "z_max": 30.0}
 LOAD = {"mass": 10.0, "gravity": G}
 STEP = oracle.END - oracle.START
 LIFT = np.array([0.0, 0.0, G])
-# Of Tables 4.3a and 4.3b, the rows that the seed prints.
+# Of Tables 4.3a and 4.3b, the first four rows.
 P_VALUES, DURATIONS = np.arange(1.8, 2.76, 0.05), np.array([2.9, 2.95, 3.0, 3.05])
 MAX_A = """
 0.3646 0.3449 0.3263 0.3087 0.2920 0.2762 0.2611 0.2469 0.2333 0.2204

@@ -22,6 +22,8 @@ def table(
     definition: str | None = None,
     amplitude: str | None = None,
     fine: bool = False,
+    max_arcs: int | None = None,
+    values: int | None = None,
     workers: int | None = 1,
 ) -> list[Cell]:
     """Compute a published table again.
@@ -32,6 +34,8 @@ def table(
             usual one.
         amplitude: in these: "quintic", "effective", "effective-c3" or "all"; None: the usual one.
         fine: in these: whether the step is pi/64 instead of pi/32.
+        max_arcs: in these: largest number of arcs tried; None: 20.
+        values: in these: values of beta-hat tried at each orientation; None: 20.
         workers: in these: processes on this machine; above 1, a script calls it under `if __name__ == "__main__":`.
             None: as many as are usual.
 
@@ -46,6 +50,7 @@ def table(
         raise ConfigError("table", f"{shown(name)}: must be one of {', '.join(tables.TABLES)}")
     check_count(workers)
     given = {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None}
+    given |= {"--max-arcs": max_arcs, "--values": values}
     choice = tables.chosen(name, given | {"--workers": None if workers == 1 else workers})
     if workers is None:
         workers = usual_count(LARGEST) if tables.TABLES[name].by_processes else 1

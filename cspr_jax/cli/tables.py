@@ -18,6 +18,8 @@ def _add_table(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--amplitude", choices=("quintic", "effective", "effective-c3", "all"), help="3.3, 3.4")
     parser.add_argument("--fine", action="store_true", help="3.3, 3.4: step pi/64 instead of pi/32")
+    parser.add_argument("--max-arcs", type=int, metavar="P", help="3.3, 3.4: largest number of arcs tried (default 20)")
+    parser.add_argument("--values", type=int, metavar="N", help="3.3, 3.4: values of beta-hat tried (default 20)")
     parser.add_argument(
         "--workers", type=int, metavar="N", help="3.3, 3.4: processes (default 1; for 3.4 one a core, at most 8)"
     )
@@ -33,7 +35,9 @@ def _table(options: argparse.Namespace) -> int:
     if options.list:
         sys.stdout.write("".join(f"{name}  {title}\n" for name, title in tables.table_names().items()))
         return ExitCode.DONE
-    choices = {name: getattr(options, name) for name in ("definition", "amplitude", "fine", "workers")}
+    choices = {
+        name: getattr(options, name) for name in ("definition", "amplitude", "fine", "max_arcs", "values", "workers")
+    }
     with waiting():
         cells = tables.table(options.name, **choices)
     if options.json:

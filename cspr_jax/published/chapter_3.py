@@ -50,11 +50,18 @@ class Choice:
         definitions: of the accessible set, of `search.accessible.DEFINITIONS`.
         amplitudes: of `AMPLITUDES`.
         finer: how many times as fine the step is as pi / 32.
+        max_arcs: largest number of arcs tried.
+        values: of beta-hat tried at each orientation.
     """
 
     definitions: tuple[str, ...] = ("scan",)
     amplitudes: tuple[str, ...] = ("effective-c3",)
     finer: int = 1
+    max_arcs: int = MAX_ARCS
+    values: int = attainable.VALUES
+
+
+USUAL = Choice()
 
 
 def variant(definition: str, amplitude: str) -> str:
@@ -88,7 +95,11 @@ def checker_of(amplitude: str) -> PoseChecker:
 
 
 def attained(
-    checker: PoseChecker, sets: list[tuple[np.ndarray, np.ndarray]], *, tried: np.ndarray | None = None
+    checker: PoseChecker,
+    sets: list[tuple[np.ndarray, np.ndarray]],
+    *,
+    choice: Choice = USUAL,
+    tried: np.ndarray | None = None,
 ) -> list[np.ndarray]:
     """Orientations that horizontal transitions attain; the centroid of the spools is the origin.
 
@@ -96,7 +107,8 @@ def attained(
         checker: of `checker_of`.
         sets: of each set its place (3,), m, and its orientations (n, 3): tilt and torsion in the cylindrical frame,
             rad.
-        tried: which values of beta-hat, as for `search.attainable.attained`.
+        choice: largest number of arcs, and number of values of beta-hat.
+        tried: which of these values, as for `search.attainable.attained`.
 
     Returns:
         (n,) of each.
@@ -106,7 +118,8 @@ def attained(
     symmetry = symmetries(checker.problem.robot)
     every = np.concatenate([angles for _, angles in sets])
     z0 = places[:, 2]
-    good = attainable.attained(checker, places, every, z0, max_arcs=MAX_ARCS, tried=tried, symmetry=symmetry)
+    how = {"max_arcs": choice.max_arcs, "values": choice.values}
+    good = attainable.attained(checker, places, every, z0, tried=tried, symmetry=symmetry, **how)
     return np.split(good, np.cumsum(sizes)[:-1])
 
 
@@ -126,13 +139,14 @@ def accessible_there(amplitude: str, definition: str, asked: list[tuple[np.ndarr
 
 
 def attained_there(
-    amplitude: str, tried: np.ndarray | None, sets: list[tuple[np.ndarray, np.ndarray]]
+    amplitude: str, choice: Choice, tried: np.ndarray | None, sets: list[tuple[np.ndarray, np.ndarray]]
 ) -> list[np.ndarray]:
     """Orientations that horizontal transitions attain, in whichever process.
 
     Args:
         amplitude: key of `AMPLITUDES`.
-        tried: as for `attained`.
+        choice: as for `attained`.
+        tried: likewise.
         sets: likewise.
 
     Returns:
@@ -141,7 +155,7 @@ def attained_there(
     run = np.cumsum(sizes(sets)) // TOGETHER
     with double_precision():
         own = [[sets[k] for k in np.flatnonzero(run == number)] for number in np.unique(run)]
-        return [good for some in own for good in attained(checker_of(amplitude), some, tried=tried)]
+        return [good for some in own for good in attained(checker_of(amplitude), some, choice=choice, tried=tried)]
 
 
 def sizes(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
@@ -177,7 +191,7 @@ def table_3_3(choice: Choice, workers: int = 1) -> dict[Key, float | None]:
                 asked = [(place, n) for n in steps for place in places]
                 sets = spread(partial(accessible_there, amplitude, definition), asked, [n**3 for _, n in asked])
                 angles = [(place, inside.angles) for (place, _), inside in zip(asked, sets, strict=True)]
-                masks = spread(partial(attained_there, amplitude, None), angles, sizes(angles))
+                masks = spread(partial(attained_there, amplitude, choice, None), angles, sizes(angles))
             every = [_cells(inside, good) for inside, good in zip(sets, masks, strict=True)]
             for row, fine, coarse in zip(PLACES, every[: len(places)], every[len(places) :], strict=True):
                 errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
@@ -195,7 +209,7 @@ def _cells(inside: Accessible, good: np.ndarray) -> dict[str, float]:
     }
 
 
-_PRINTED = {
+PRINTED = {
     "x = 1.5b": ("27610", "26816", "97.1"),
     "x = 3b": ("32141", "29375", "91.4"),
     "y = 1.5b": ("25788", "25482", "98.8"),
@@ -205,6 +219,6 @@ EVERY = [variant(definition, amplitude) for definition in DEFINITIONS for amplit
 PUBLISHED: dict[Key, str] = {
     (row, column, name): value
     for name in EVERY
-    for row, cells in _PRINTED.items()
+    for row, cells in PRINTED.items()
     for column, value in zip(("accessible", "attainable", "proportion"), cells, strict=True)
 }

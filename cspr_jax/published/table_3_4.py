@@ -30,7 +30,9 @@ Sets = list[tuple[np.ndarray, np.ndarray]]
 
 
 def smallest_proportions(
-    attained: Callable[[Sets, np.ndarray], list[np.ndarray]], annuli: Sequence[Sets]
+    attained: Callable[[Sets, np.ndarray], list[np.ndarray]],
+    annuli: Sequence[Sets],
+    values: int = attainable.VALUES,
 ) -> list[float]:
     """Smallest part of the orientations of a place that horizontal transitions attain, in each of many annuli.
 
@@ -39,11 +41,12 @@ def smallest_proportions(
     Args:
         attained: gives those of sets that some values of beta-hat attain, as `chapter_3.attained` does.
         annuli: sets of the places of each, as there.
+        values: of beta-hat that there are.
 
     Returns:
         a part an annulus.
     """
-    preferred, some, rest = attainable.turns()
+    preferred, some, rest = attainable.turns(values)
     sets = [one for annulus in annuli for one in annulus]
     owner = np.repeat(np.arange(len(annuli)), [len(annulus) for annulus in annuli])
     good = attained(sets, preferred)
@@ -81,14 +84,14 @@ def table_3_4(choice: Choice, workers: int = 1) -> dict[Key, float | None]:
         for amplitude, definition in itertools.product(choice.amplitudes, choice.definitions):
 
             def attained(sets: Sets, tried: np.ndarray, amplitude: str = amplitude) -> list[np.ndarray]:
-                return spread(partial(attained_there, amplitude, tried), sets, sizes(sets))
+                return spread(partial(attained_there, amplitude, choice, tried), sets, sizes(sets))
 
             with within(f"{amplitude}, {definition}"):
                 asked = [[(place, divisions) for place in _places(amplitude, depth)] for depth in _DEPTHS]
                 every = list(itertools.chain(*asked))
                 inside = iter(spread(partial(accessible_there, amplitude, definition), every, [1] * len(every)))
                 annuli = [[(place, next(inside).angles) for place, _ in annulus] for annulus in asked]
-                smallest = smallest_proportions(attained, annuli)
+                smallest = smallest_proportions(attained, annuli, choice.values)
             for depth, part in zip(_DEPTHS, smallest, strict=True):
                 cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * part
     return cells
@@ -105,5 +108,5 @@ def _places(amplitude: str, depth: float) -> list[np.ndarray]:
     ]
 
 
-_PRINTED = {"1": "81.7", "1.4": "88.0", "1.7": "91.4", "2": "92.8", "2.4": "95.1"}
-PUBLISHED: dict[Key, str] = {(row, "proportion", name): value for name in EVERY for row, value in _PRINTED.items()}
+PRINTED = {"1": "81.7", "1.4": "88.0", "1.7": "91.4", "2": "92.8", "2.4": "95.1"}
+PUBLISHED: dict[Key, str] = {(row, "proportion", name): value for name in EVERY for row, value in PRINTED.items()}

@@ -14,6 +14,8 @@ from cspr_jax.published.chapter_3 import Choice
 from cspr_jax.runtime.stages import within
 
 SCHEMA = 1
+# As in plans and sweeps.
+LARGEST_ARCS, LARGEST_VALUES = 1000, 100
 
 
 @dataclasses.dataclass(frozen=True)
@@ -188,7 +190,7 @@ def chosen(name: str, given: dict[str, Any]) -> Choice | None:
 
     Args:
         name: of the table.
-        given: values of --definition, --amplitude, --fine and --workers, None where absent.
+        given: values of --definition, --amplitude, --fine, --max-arcs, --values and --workers, None where absent.
 
     Returns:
         the choice; None for a table that has none.
@@ -213,4 +215,14 @@ def chosen(name: str, given: dict[str, Any]) -> Choice | None:
         every("--definition", chapter_3.DEFINITIONS, usual.definitions),
         every("--amplitude", chapter_3.AMPLITUDES, usual.amplitudes),
         2 if given["--fine"] else 1,
+        _count("--max-arcs", given["--max-arcs"], usual.max_arcs, LARGEST_ARCS),
+        _count("--values", given["--values"], usual.values, LARGEST_VALUES),
     )
+
+
+def _count(option: str, value: Any, otherwise: int, most: int) -> int:
+    if value is None:
+        return otherwise
+    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= most:
+        raise ConfigError(option, f"{shown(value)}: must be an integer from 1 to {most}")
+    return value
