@@ -291,6 +291,11 @@ def test_files_that_are_none(tmp_path, capsys):
     ]
     (tmp_path / "alone_cables.xml").write_text(path.read_text())
     cases.append(([], tmp_path / "alone_cables.xml", "no such file beside it: alone_bodies.xml"))
+    (tmp_path / "HUB_cables.xml").write_text(path.read_text())
+    words = f"no such file beside it: HUB_bodies.xml: {tmp_path / 'hub_bodies.xml'} is there, which differs in capitals"
+    cases.append(([], tmp_path / "HUB_cables.xml", words))
+    words = f"no such file: {tmp_path / 'hub_bodies.xml'} is there, which differs in capitals"
+    cases.append(([], tmp_path / "Hub_bodies.xml", words))
     (tmp_path / "big.json").write_text(" " * (1 << 20) + "{}")
     cases.append(([], tmp_path / "big.json", "must be at most 1048576"))
     for more, file, line in cases:
@@ -343,6 +348,9 @@ def test_cdpyr_files_that_are_refused(tmp_path, kind, data, line, capsys):
     assert line in err and err.count("\n") == 1 and len(err) < 800, err
 
 
+MERGES = f"a: &a {{{', '.join(f'k{k}: 1' for k in range(2000))}}}\nb:\n  <<: [{', '.join(['*a'] * 2000)}]\n"
+
+
 def test_yaml_runs_nothing_and_expands_nothing(tmp_path, capsys):
     bomb = "a: &a [x, x, x]\n" + "".join(
         f"{chr(98 + k)}: &{chr(98 + k)} [{', '.join(['*' + chr(97 + k)] * 9)}]\n" for k in range(9)
@@ -356,6 +364,13 @@ def test_yaml_runs_nothing_and_expands_nothing(tmp_path, capsys):
         ("a: !!int ''", "is not YAML: "),
         ("a: !!bool x", "is not YAML: "),
         ("a: !!timestamp x", "is not YAML: "),
+        (f"a: {':'.join('1' * 400)}.5", "is not YAML: int too large"),
+        (f"a: {':'.join('1' * 10000)}", "is not YAML: a value of 19999 characters: must be at most 10000"),
+        ("[" + "1," * (3 << 17) + "]", "parts"),
+        (MERGES, "its mappings have too many keys"),
+        ("a: &a x\n<<: [1]", "is not YAML: "),
+        ("\n".join(f"{(2**61 - 1) * k}: 1" for k in range(2000)), "its mappings have too many keys"),
+        ("? [a]\n: 1", "is not YAML: "),
         ("\x00", "is not YAML: "),
         ("", "the file = "),
     ):
@@ -417,3 +432,84 @@ def test_wirex_files_that_are_refused(tmp_path, given, line, capsys):
     assert main(["import", str(wirex(tmp_path, **given))]) == 2
     err = capsys.readouterr().err
     assert line in err and err.count("\n") == 1, err
+
+
+def encoded(folder, encoding, declared=None):
+    """A model of CASPR with a name that is not ASCII."""
+    for name in ("bodies", "cables"):
+        path = folder / f"hub_{name}.xml"
+        text = path.read_text().replace("c0", "Stra\xdfe \xfc").partition("?>")[2].lstrip()
+        head = f'<?xml version="1.0" encoding="{declared or encoding}"?>' if declared != "" else ""
+        path.write_bytes((head + text).encode(encoding, "xmlcharrefreplace" if encoding == "ascii" else "strict"))
+    return folder / "hub_cables.xml"
+
+
+@pytest.mark.parametrize(
+    ("encoding", "declared"),
+    [
+        *((name, None) for name in ("utf-8", "ISO-8859-1", "iso-8859-15", "windows-1252", "cp1252", "UTF-16", "ascii")),
+        *(("utf-16", "utf-8"), ("utf-16", ""), ("utf-16-le", ""), ("utf-16-be", ""), ("utf-16-le", None)),
+        *(("utf-8-sig", ""), ("utf-8-sig", "UTF-8"), ("utf-8-sig", "ISO-8859-1")),
+    ],
+)
+def test_xml_in_its_declared_encoding(tmp_path, encoding, declared):
+    """What a mark at the start says outweighs the declaration, as Windows often writes another one."""
+    caspr(tmp_path)
+    found = cspr_jax.import_robot(encoded(tmp_path, encoding, declared))
+    assert "# cables: Stra\xdfe \xfc, c1" in found.to_toml() and found.warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("data", "line"),
+    [
+        (b'<?xml version="1.0" encoding="nonsense"?><cables/>', 'encoding = "nonsense": must be UTF-8, UTF-16, or'),
+        (b'<?xml version="1.0" encoding="shift_jis"?><cables/>', 'encoding = "shift_jis": must be UTF-8, UTF-16, or'),
+        (b'<?xml version="1.0" encoding="idna"?><cables/>', 'encoding = "idna": must be UTF-8, UTF-16, or'),
+        (b'<?xml version="1.0" encoding="hex"?><cables/>', 'encoding = "hex": must be UTF-8, UTF-16, or'),
+        (b'<?xml version="1.0" encoding="' + b"x" * 99999 + b'"?><cables/>', 'encoding = "xxx'),
+        (b'<?xml version="1.0" encoding="UTF-16"?><cables/>', "is not XML: "),
+        (b'<?xml version="1.0" encoding="UTF-8"?>\n<cables a="\xfc"/>', "is not UTF-8 text: byte 0xFC in line 2"),
+        (b'<cables a="\xfc"/>', "is not UTF-8 text: byte 0xFC in line 1"),
+        (b'<?xml version="1.0" encoding="us-ascii"?><cables a="\xfc"/>', "is not XML: "),
+        (b'<?xml version="1.0" encoding="cp1252"?><cables a="\x81"/>', "is not XML: "),
+        ("<cables/>".encode("utf-32"), "is not XML: "),
+        (b"\xff\xfe<\0a\0", "is not XML: "),
+        (b"", "is not XML: "),
+        ("<cables n=\u201cx\u201d/>".encode(), 'did you mean " in place of U+201C'),
+        (f"<!DOCTYPE cables [{BOMB}]><cables>&e11;</cables>".encode("utf-16"), "declares XML entities"),
+        (f'<?xml version="1.0" encoding="latin1"?>{SECRET}<cables>&leak;</cables>'.encode(), "declares XML entities"),
+    ],
+)
+def test_xml_in_hostile_encodings(tmp_path, data, line, capsys):
+    path = caspr(tmp_path)
+    path.write_bytes(data)
+    assert main(["import", str(path)]) == 2
+    err = capsys.readouterr().err
+    assert line in err and err.count("\n") == 1 and len(err) < 500, err
+
+
+@pytest.mark.parametrize("kind", ["json", "yaml"])
+def test_marks_and_look_alikes_in_json_and_yaml(tmp_path, kind, capsys):
+    path = written(tmp_path, kind)
+    plain, text = cspr_jax.import_robot(path).keys, path.read_text()
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert cspr_jax.import_robot(path).keys == plain
+    cases = [(text.encode("utf-16"), "is UTF-16 text: save it as UTF-8")]
+    if kind == "json":
+        cases.append((text.replace('"name"', "\u201cname\u201d").encode(), 'did you mean " in place of U+201C'))
+        cases.append((text.replace("-3.0", "\u22123.0").encode(), "did you mean - in place of U+2212"))
+    else:
+        cases.append((text.replace("-3.0", "\u22123.0").encode(), "finite numbers: did you mean - in place of U+2212"))
+        cases.append((text.replace("frame_anchor: 7", "frame_anchor: \u22127").encode(), "did you mean - in place of"))
+    for data, line in cases:
+        path.write_bytes(data)
+        assert main(["import", str(path)]) == 2
+        err = capsys.readouterr().err
+        assert line in err and err.count("\n") == 1, err
+
+
+def test_look_alikes_in_numbers_of_xml(tmp_path, capsys):
+    path = caspr(tmp_path, plain_cables(base=[["\u22123", -2, 4], *BASE[1:]]))
+    assert main(["import", str(path)]) == 2
+    err = capsys.readouterr().err
+    assert 'location = "\u22123": must be a finite number: did you mean - in place of U+2212, minus sign?' in err

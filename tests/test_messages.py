@@ -8,7 +8,7 @@ import pytest
 
 from cspr_jax.config import hints, wording
 from cspr_jax.config.plan import PlanFile, read_plan
-from cspr_jax.config.reading import checked
+from cspr_jax.config.reading import checked, read_text
 from cspr_jax.config.robot import RobotFile, read_robot, resolve_robot
 from cspr_jax.config.suggestions import nearest
 from cspr_jax.config.sweep import SweepFile
@@ -378,3 +378,85 @@ def test_values_are_shown_as_toml():
     assert shown(deep) == "[[[...]]]" and shown({}) == "{}" and shown([]) == "[]"
     assert shown(list(range(10**5))).endswith("11, ...]") and shown("x" * 99) == f'"{"x" * 56}...'
     assert shown(10**9000) == "a very large integer"
+
+
+@pytest.mark.parametrize(
+    ("line", "wanted"),
+    [
+        ("name = \u201chall\u201d", 'did you mean " in place of U+201C, left double quotation mark?'),
+        ('name = "hall\u201d', 'did you mean " in place of U+201D, right double quotation mark?'),
+        ("name = \u2018hall\u2019", "did you mean ' in place of U+2018"),
+        ("mass = \u22121.5", "did you mean - in place of U+2212, minus sign?"),
+        ("base_points = [[0, \u20131, 0]]", "did you mean - in place of U+2013, en dash?"),
+        ("mass\u00a0= 1.5", "did you mean a plain space in place of U+00A0, no-break space?"),
+        ("mass =\u00a01.5", "did you mean a plain space in place of U+00A0, no-break space?"),
+        ("mass = 1.5\u202f", "did you mean a plain space in place of U+202F"),
+        ("\u200bmass = 1.5", "it holds U+200B, zero width space, which cannot be seen"),
+        ("[robot\u200b]", "it holds U+200B, zero width space, which cannot be seen"),
+        ("\u201cname\u201d = 1", 'did you mean " in place of U+201C'),
+        ("mass = 1 x  # it\u2019s", None),
+        ('name = "it\u2019s" x', None),
+        ("source = 'a \u2212 b' = 1", None),
+    ],
+)
+@pytest.mark.parametrize("before", ["", "# one \u201cquoted\u201d word\nz_axis = 'up'\n"])
+def test_look_alikes_in_toml(tmp_path, before, line, wanted):
+    """A character that only looks like one of TOML's is named, but not where it may stand."""
+    (tmp_path / "in.toml").write_text(before + line + "\n")
+    with pytest.raises(ConfigError) as caught:
+        read_robot(tmp_path / "in.toml")
+    text = str(caught.value)
+    assert "is not TOML: " in text and len(text.splitlines()) == 1
+    assert wanted in text if wanted else "U+" not in text, text
+
+
+def test_look_alikes_in_strings_that_should_be_numbers():
+    line = line_of(RobotFile, robot(mass="\u22121.5"))
+    assert "did you mean - in place of U+2212, minus sign? must be a number, not a string" in line
+
+
+@pytest.mark.parametrize("given", PIECES)
+def test_marks_and_line_breaks_of_other_systems(tmp_path, given):
+    """A byte order mark is no part of the text; line breaks may be those of Windows."""
+    (tmp_path / "in.toml").write_bytes(b"\xef\xbb\xbf" + PIECES[given].replace("\n", "\r\n").encode())
+    path = tmp_path / "in.toml"
+    read = {"sweep": read_sweep, "plan": lambda path: read_plan(read_text(path), path), "robot": read_robot}[given]
+    keys = read(path)
+    path.write_text(PIECES[given])
+    again = read(path)
+    assert (keys.identity, keys.text) == (again.identity, again.text) if given == "sweep" else keys == again
+
+
+@pytest.mark.parametrize(
+    ("data", "wanted"),
+    [
+        (ROBOT.encode("utf-16"), "is UTF-16 text: save it as UTF-8"),
+        (ROBOT.encode("utf-16-le"), "is UTF-16 text: save it as UTF-8"),
+        (ROBOT.encode("utf-16-be"), "is UTF-16 text: save it as UTF-8"),
+        (ROBOT.encode("utf-32"), "is UTF-32 text: save it as UTF-8"),
+        (ROBOT.encode("utf-32-be"), "is UTF-32 text: save it as UTF-8"),
+        (f'{ROBOT}source = "L\xf6ffel"'.encode("latin-1"), "is not UTF-8 text: byte 0xF6 in line 4: save it as UTF-8"),
+    ],
+)
+def test_other_encodings_of_toml(tmp_path, data, wanted):
+    (tmp_path / "in.toml").write_bytes(data)
+    with pytest.raises(ConfigError) as caught:
+        read_robot(tmp_path / "in.toml")
+    assert str(caught.value) == f"{tmp_path / 'in.toml'}: {wanted}"
+
+
+def test_files_whose_names_differ_in_capitals(tmp_path):
+    """Disks of other systems do not tell them apart."""
+    (tmp_path / "Robots").mkdir()
+    (tmp_path / "Robots" / "Hall.toml").write_text(ROBOT)
+    (tmp_path / "Robots" / "Hall_cables.xml").write_text("")
+    for name in ("robots/Hall.toml", "Robots/hall.toml", "Robots/HALL_cables.xml"):
+        with pytest.raises(ConfigError) as caught:
+            resolve_robot(name, "plan.toml", tmp_path)
+        there = "Robots" if name[0] == "r" else f"Robots/{'Hall_cables.xml' if 'xml' in name else 'Hall.toml'}"
+        assert f": no such file: {tmp_path / there} is there, which differs in capitals: must be" in str(caught.value)
+    with pytest.raises(ConfigError, match=r"hall\.toml is there, which differs in capitals"):
+        (tmp_path / "hall.toml").write_text("")
+        read_robot(tmp_path / "HALL.toml")
+    with pytest.raises(ConfigError, match="no such file: must be"):
+        resolve_robot("nowhere/at/all.toml", "plan.toml", tmp_path)

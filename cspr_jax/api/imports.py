@@ -6,6 +6,7 @@ from typing import Any
 
 from cspr_jax.config.formats.table import ENDINGS, Imported, format_of
 from cspr_jax.config.formats.writing import robot_text
+from cspr_jax.config.reading import other_case
 from cspr_jax.config.robot import RobotFile, read_foreign
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import ConfigError
@@ -76,7 +77,7 @@ def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobo
     if format_of(file.name) is None:
         raise ConfigError(file, f"must end in {', '.join(ENDINGS)}")
     if not file.is_file():
-        raise ConfigError(file, "no such file")
+        raise ConfigError(file, f"no such file{other_case(file)}")
     spec, found = read_foreign(file, cable_set)
     return ImportedRobot(_built(spec, file), found.keys, found.warnings, found)
 

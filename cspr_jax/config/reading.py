@@ -1,5 +1,7 @@
 """TOML to a checked model; a mistake becomes one line that names file, key, value and what is allowed."""
 
+import codecs
+import os
 import re
 import tomllib
 from pathlib import Path
@@ -8,6 +10,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from cspr_jax.config import wording
+from cspr_jax.config.suggestions import look_alike
 from cspr_jax.errors import ConfigError
 
 LARGEST_FILE = 1 << 20
@@ -15,6 +18,21 @@ LARGEST_FILE = 1 << 20
 LONGEST_KEY = 64
 MOST_LINES = 1000  # of one file's faults
 _PART = r"""(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[\w-]++)"""
+_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)$")
+_STRING = re.compile(r"""\"[^"\n]*"|'[^'\n]*'""")
+_MARKS = (
+    (codecs.BOM_UTF32_LE, "UTF-32"),  # begins as that of UTF-16 does
+    (codecs.BOM_UTF32_BE, "UTF-32"),
+    (codecs.BOM_UTF16_LE, "UTF-16"),
+    (codecs.BOM_UTF16_BE, "UTF-16"),
+)
+# Which of the first four bytes are zero, where no mark says it.
+_ZEROS = {
+    (False, True, False, True): "UTF-16",
+    (True, False, True, False): "UTF-16",
+    (False, True, True, True): "UTF-32",
+    (True, True, True, False): "UTF-32",
+}
 _LONG_KEY = re.compile(rf"""(?<![\w"'-])(?:{_PART}[ \t]*+\.[ \t]*+){{{LONGEST_KEY - 1}}}""")
 
 Model = TypeVar("Model", bound="Table")
@@ -26,17 +44,36 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
-def read_text(path: Path) -> str:
-    """Text of a file.
+def other_case(path: Path) -> str:
+    """Clause for a message about a missing file that names one whose name differs in capitals alone.
+
+    Args:
+        path: of the file that is missing.
+
+    Returns:
+        the clause, which begins with a colon; "" if there is no such file or folder.
+    """
+    while path.parent != path and not path.parent.is_dir():
+        path = path.parent
+    try:
+        names = sorted(os.listdir(path.parent))
+    except (OSError, ValueError):
+        return ""
+    alike = [name for name in names if name.casefold() == path.name.casefold() and name != path.name]
+    return f": {path.with_name(alike[0])} is there, which differs in capitals" if alike else ""
+
+
+def read_bytes(path: Path) -> bytes:
+    """Content of a file.
 
     Args:
         path: the file.
 
     Returns:
-        its text.
+        its bytes.
 
     Raises:
-        ConfigError: the file cannot be read, is larger than 1 MB, or is not UTF-8.
+        ConfigError: the file cannot be read, or is larger than 1 MB.
     """
     try:
         if path.exists() and not path.is_file():
@@ -44,13 +81,68 @@ def read_text(path: Path) -> str:
         size = path.stat().st_size
         if size > LARGEST_FILE:
             raise ConfigError(path, f"file of {size} bytes: must be at most {LARGEST_FILE}")
-        return path.read_text("utf-8")
+        return path.read_bytes()
+    except FileNotFoundError as error:
+        raise ConfigError(path, f"cannot be read: {error.strerror or error}{other_case(path)}") from error
     except OSError as error:
         raise ConfigError(path, f"cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise ConfigError(path, f"is not UTF-8 text: {error.reason} at byte {error.start}") from error
     except ValueError as error:
         raise ConfigError(path, f"cannot be read: {error}") from error
+
+
+def read_text(path: Path) -> str:
+    """Text of a file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        its text, with plain line breaks, and without the byte order mark that some editors put before it.
+
+    Raises:
+        ConfigError: the file cannot be read, is larger than 1 MB, or is not UTF-8.
+    """
+    return decoded(read_bytes(path), path)
+
+
+def decoded(data: bytes, path: Path) -> str:
+    """Text of the content of a file.
+
+    Args:
+        data: the content.
+        path: of the file, named in errors.
+
+    Returns:
+        the text, as `read_text` gives it.
+
+    Raises:
+        ConfigError: it is not UTF-8.
+    """
+    marked = (name for mark, name in _MARKS if data.startswith(mark))
+    encoding = next(marked, _ZEROS.get(tuple(byte == 0 for byte in data[:4])))
+    if encoding is not None:
+        raise ConfigError(path, f"is {encoding} text: save it as UTF-8")
+    try:
+        text = data.removeprefix(codecs.BOM_UTF8).decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = error.object.count(b"\n", 0, error.start) + 1
+        words = f"byte 0x{error.object[error.start]:02X} in line {line}: save it as UTF-8"
+        raise ConfigError(path, f"is not UTF-8 text: {words}") from error
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def look_alike_before(text: str, end: int) -> str:
+    """Clause for the message of a parser that stopped at a character that only looks like one of its own.
+
+    Args:
+        text: that was parsed.
+        end: index of the character at which the parser stopped.
+
+    Returns:
+        the clause of `suggestions.look_alike`, about the last such character of the line up to there, outside strings.
+    """
+    start = text.rfind("\n", 0, end) + 1
+    return look_alike(_STRING.sub("", text[start : end + 1])[::-1])
 
 
 def parse_toml(text: str, path: Path) -> dict[str, Any]:
@@ -73,7 +165,16 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
     except RecursionError as error:
         raise ConfigError(path, "is not TOML: nested too deeply") from error
     except ValueError as error:
-        raise ConfigError(path, f"is not TOML: {error}") from error
+        raise ConfigError(path, f"is not TOML: {error}{look_alike_before(text, _stop(text, str(error)))}") from error
+
+
+def _stop(text: str, message: str) -> int:
+    # Index at which tomllib stopped; it counts lines and columns from 1.
+    place = _PLACE.search(message)
+    if place is None:
+        return len(text.rstrip())
+    lines = text.split("\n")[: int(place[1]) - 1]
+    return sum(len(line) + 1 for line in lines) + int(place[2]) - 1
 
 
 def read_toml(path: Path) -> dict[str, Any]:

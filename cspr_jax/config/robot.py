@@ -18,7 +18,7 @@ from cspr_jax.config.limits import (
     Positive,
     Row,
 )
-from cspr_jax.config.reading import checked, read_toml
+from cspr_jax.config.reading import checked, other_case, read_toml
 from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import ConfigError, InputError, shown
@@ -286,12 +286,12 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
     if format_of(name) is not None:
         path = directory / name
         if not path.is_file():
-            raise ConfigError(file, f"robot = {shown(reference)}: no such file: must be a catalogue name, or a path")
+            raise _missing(reference, file, path)
         return read_foreign(path, cable_set)[0]
     if reference.endswith(".toml") or "/" in reference:
         path = directory / reference
         if not path.is_file():
-            raise ConfigError(file, f"robot = {shown(reference)}: no such file: must be a catalogue name, or a path")
+            raise _missing(reference, file, path)
         return read_robot(path)
     if reference in catalogue_names():
         return read_robot(CATALOGUE / f"{reference}.toml")
@@ -302,6 +302,11 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
         f"robot = {shown(reference)}: {hint}must be one of {names}, or a path to a .toml file, or one of another "
         f"program ({', '.join(ENDINGS)})",
     )
+
+
+def _missing(reference: str, file: object, path: Path) -> ConfigError:
+    words = f"no such file{other_case(path)}: must be a catalogue name, or a path"
+    return ConfigError(file, f"robot = {shown(reference)}: {words}")
 
 
 def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, Imported]:

@@ -2,6 +2,7 @@
 
 import difflib
 import re
+import unicodedata
 from collections.abc import Iterable
 
 # Words that users write for those of the keys.
@@ -33,6 +34,18 @@ ALIKE = 0.8  # of letters, for two words to be one that is misspelt
 ENOUGH = 0.5  # of all words of both keys
 LETTERS = 0.6
 LONGEST = 100  # letters of what somebody may have meant to be a key
+# What word processors and web pages put in place of plain characters.
+_LOOK_ALIKES = {
+    '"': "\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb\uff02",
+    "'": "\u2018\u2019\u201a\u201b\u2032\u2039\u203a\u00b4\uff07",
+    "-": "\u2212\u2010\u2011\u2012\u2013\u2014\u2015\ufe63\uff0d",
+    "a plain space": "\u00a0\u2002\u2003\u2007\u2008\u2009\u200a\u202f\u205f\u3000",
+    "": "\u200b\u200c\u200d\u200e\u200f\u2060\ufeff\u00ad",  # nothing to be seen
+    "=": "\uff1d",
+    ",": "\uff0c",
+    ".": "\uff0e",
+}
+_PLAIN = {character: plain for plain, characters in _LOOK_ALIKES.items() for character in characters}
 
 
 def nearest(given: str, allowed: Iterable[str]) -> str | None:
@@ -59,6 +72,22 @@ def nearest(given: str, allowed: Iterable[str]) -> str | None:
             return best[2]
     near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=LETTERS)
     return near[0] if near else None
+
+
+def look_alike(text: str) -> str:
+    """Clause for a message about text that holds a character that only looks like a plain one.
+
+    Args:
+        text: that could not be read.
+
+    Returns:
+        the clause, about the first such character, which begins with a colon; "" if there is none.
+    """
+    character = next((character for character in text if character in _PLAIN), "")
+    if not character:
+        return ""
+    name, plain = f"U+{ord(character):04X}, {unicodedata.name(character, 'unnamed').lower()}", _PLAIN[character]
+    return f": did you mean {plain} in place of {name}?" if plain else f": it holds {name}, which cannot be seen"
 
 
 def did_you_mean(given: str, allowed: Iterable[str]) -> str:

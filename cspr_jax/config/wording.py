@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from cspr_jax.config.suggestions import nearest
+from cspr_jax.config.suggestions import look_alike, nearest
 from cspr_jax.errors import shown
 
 # Names of the variants of a union; they are part of pydantic's location of an error, not of the user's key.
@@ -125,7 +125,8 @@ def _question(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> 
     is_plain = (error["type"] in ("float_type", "int_type") and _is_number(value)) or (
         error["type"] == "bool_type" and value in ("true", "false")
     )
-    return f"did you mean {value}, without quotes? " if is_plain else ""
+    odd = look_alike(value).removeprefix(": ") if error["type"] in ("float_type", "int_type") else ""
+    return f"did you mean {value}, without quotes? " if is_plain else odd and f"{odd} "
 
 
 def _is_number(text: str) -> bool:

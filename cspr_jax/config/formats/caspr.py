@@ -13,6 +13,7 @@ import numpy as np
 from cspr_jax.config.formats import model
 from cspr_jax.config.formats.model import Body, Cable
 from cspr_jax.config.formats.xml_text import child, number, read_xml, text_of, vector
+from cspr_jax.config.reading import other_case
 from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
@@ -80,7 +81,7 @@ def _both(path: Path) -> tuple[Path, Path]:
     files = path.with_name(stem + _ENDINGS[0]), path.with_name(stem + _ENDINGS[1])
     for file in files:
         if not file.is_file():
-            raise ConfigError(path, f"no such file beside it: {file.name}")
+            raise ConfigError(path, f"no such file beside it: {file.name}{other_case(file)}")
     return files
 
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from cspr_jax.config.formats import model
 from cspr_jax.config.formats.model import Body, Cable
-from cspr_jax.config.reading import read_text
+from cspr_jax.config.reading import look_alike_before, read_text
+from cspr_jax.config.suggestions import look_alike
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
 
@@ -37,7 +38,7 @@ def read_json(path: Path) -> Body:
     Raises:
         ConfigError: no JSON, several platforms, or what no robot file can say.
     """
-    return _read(path, json.loads, "JSON")
+    return _read(path, _json, "JSON")
 
 
 def read_yaml(path: Path) -> Body:
@@ -55,13 +56,22 @@ def read_yaml(path: Path) -> Body:
     return _read(path, _yaml, "YAML")
 
 
+def _json(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"{error}{look_alike_before(text, error.pos)}") from error
+
+
 def _yaml(text: str) -> Any:
     import yaml
 
+    from cspr_jax.config.formats.yaml_text import load  # only who reads YAML waits for it
+
     try:
-        data = yaml.safe_load(text)
+        data = load(text)
     # Its constructors of numbers and dates raise what they happen to, as of "!!int ''" and "!!timestamp x".
-    except (yaml.YAMLError, LookupError, AttributeError) as error:
+    except (yaml.YAMLError, LookupError, AttributeError, ArithmeticError, TypeError) as error:
         raise ValueError(" ".join(str(error).split())[:200]) from error
     if not _size(data, {}) <= LARGEST:
         raise ValueError(f"its references (*name) stand for more than {LARGEST} values, or for themselves")
@@ -121,15 +131,18 @@ class _Table:
             found = np.full(1, np.nan)
         if found.shape == shape and np.isposinf(np.abs(found)).any():
             return None
-        if found.shape != shape or not np.isfinite(found).all():
+        if found.shape != shape or not (np.abs(found) <= model.LARGEST_NUMBER).all():
             words = f"{' x '.join(map(str, shape))} finite numbers" if shape else "a finite number"
-            raise ConfigError(self.file, f"{self.place}{key} = {shown(self.data[key])}: must be {words}")
+            words += f" up to {model.LARGEST_NUMBER:g}" * bool(found.shape == shape and np.isfinite(found).all())
+            value = shown(self.data[key])
+            raise ConfigError(self.file, f"{self.place}{key} = {value}: must be {words}{look_alike(value)}")
         return found
 
     def index(self, key: str, count: int, missing: int | None = None) -> int:
         found = self.data.get(key, missing)
         if isinstance(found, bool) or not isinstance(found, int) or not 0 <= found < count:
-            raise ConfigError(self.file, f"{self.place}{key} = {shown(found)}: must be a number from 0 to {count - 1}")
+            words = f"must be a number from 0 to {count - 1}{look_alike(shown(found))}"
+            raise ConfigError(self.file, f"{self.place}{key} = {shown(found)}: {words}")
         return found
 
     def _given(self, key: str) -> Any:
@@ -170,7 +183,8 @@ def _pattern(platform: _Table) -> str:
         given = PATTERNS.get(counts, given) if all(isinstance(count, int) for count in counts) else given
     if not isinstance(given, str) or given not in PATTERNS.values():
         key = f"{platform.place}motion_pattern"
-        raise ConfigError(platform.file, f"{key} = {shown(given)}: must be {either(PATTERNS.values())}")
+        allowed = f"{either(PATTERNS.values())}{look_alike(shown(given))}"
+        raise ConfigError(platform.file, f"{key} = {shown(given)}: must be {allowed}")
     return given
 
 

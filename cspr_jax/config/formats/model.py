@@ -20,6 +20,7 @@ NO_GRAVITY = 1e-9  # m/s^2; of robots that move in a level plane
 OUT_OF_PLANE = 1e-9
 LARGEST = 1e9  # N; tensions beyond stand for none
 DIGITS = 15  # of numbers that are sums
+LARGEST_NUMBER = 1e18  # of a file, whatever its unit: products of several still stay finite
 
 
 @dataclasses.dataclass
@@ -62,6 +63,7 @@ class Body:
         is_level: whether its plane is level, so that it feels no gravity.
         cable_diameter: m.
         warnings: what was left out.
+        notes: what stands for numbers that the file does not have, in words that begin with "placeholder".
     """
 
     file: object
@@ -76,6 +78,7 @@ class Body:
     is_level: bool = False
     cable_diameter: float | None = None
     warnings: list[str] = dataclasses.field(default_factory=list)
+    notes: list[str] = dataclasses.field(default_factory=list)
 
 
 def about_centre(tensor: np.ndarray, mass: float, centre: list[float]) -> np.ndarray:
@@ -118,7 +121,7 @@ def robot_keys(body: Body) -> dict[str, Any]:
         swivels = _in_plane(body, swivels)
     if not row.is_body:  # it does not turn: forces alone count
         base, platform = base - platform, np.zeros_like(platform)
-    notes: list[str] = []
+    notes = list(body.notes)
     keys: dict[str, Any] = {"name": body.name, "pattern": pattern, "z_axis": "up", "base_points": _rounded(base)}
     if row.is_body:
         keys["platform_points"] = _rounded(platform)

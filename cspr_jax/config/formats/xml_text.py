@@ -1,11 +1,24 @@
 """XML of somebody else: nothing is expanded or fetched; what is missing becomes one line."""
 
+import codecs
 import math
+import re
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError
 
-from cspr_jax.config.reading import read_text
+from cspr_jax.config.formats.model import LARGEST_NUMBER
+from cspr_jax.config.reading import decoded, look_alike_before, read_bytes
+from cspr_jax.config.suggestions import look_alike
 from cspr_jax.errors import ConfigError, shown
+
+LONGEST_FAULT = 200  # characters of a parser's message
+_DECLARED = re.compile(rb"""<\?xml[^>]*?\sencoding\s*=\s*["']([^"']{1,40})""")
+_UTF16 = {
+    codecs.BOM_UTF16_LE: "UTF-16",
+    codecs.BOM_UTF16_BE: "UTF-16",
+    b"<\0": "UTF-16LE",
+    b"\0<": "UTF-16BE",
+}
 
 
 def read_xml(path: Path) -> Element:
@@ -15,20 +28,43 @@ def read_xml(path: Path) -> Element:
         path: the file.
 
     Returns:
-        the root. A DOCTYPE that names a file is passed over: that file is not read.
+        the root. A DOCTYPE that names a file is passed over: that file is not read. The encoding is the one that the
+        file declares; without a declaration it is UTF-8, or UTF-16 if the file begins so.
 
     Raises:
         ConfigError: the file cannot be read, is larger than 1 MB, is no XML, or declares entities.
     """
     from defusedxml import DefusedXmlException, ElementTree  # only who reads XML waits for it
 
-    text = read_text(path)
+    data = read_bytes(path)
+    encoding, name = _encoding(data)
+    text = decoded(data, path) if encoding == "UTF-8" else ""
+    parser = ElementTree.DefusedXMLParser(encoding=encoding)
     try:
-        return ElementTree.fromstring(text.encode("utf-8"))
+        parser.feed(text.encode("utf-8") if encoding == "UTF-8" else data)
+        return parser.close()
     except DefusedXmlException as error:
         raise ConfigError(path, "declares XML entities: must be without, these are not expanded") from error
-    except (ParseError, ValueError, LookupError, RecursionError) as error:
-        raise ConfigError(path, f"is not XML: {error}") from error
+    except ParseError as error:
+        line, column = error.position
+        end = sum(len(row) + 1 for row in text.split("\n")[: line - 1]) + column
+        hint = look_alike_before(text, end)
+        raise ConfigError(path, f"is not XML: {error}"[:LONGEST_FAULT] + hint) from error
+    except RecursionError as error:
+        raise ConfigError(path, "is not XML that is read here: nested too deeply") from error
+    except (ValueError, LookupError) as error:  # of codecs
+        allowed = "UTF-8, UTF-16, or one with a byte for each character, such as ISO-8859-1"
+        raise ConfigError(path, f"encoding = {shown(name)}: must be {allowed}") from error
+
+
+def _encoding(data: bytes) -> tuple[str | None, str]:
+    # What the first bytes say outweighs what is declared; None: the parser is to take the name that is declared.
+    if data[:2] in _UTF16:
+        return _UTF16[data[:2]], ""
+    declared = _DECLARED.match(data)
+    name = declared[1].decode("latin-1") if declared else "UTF-8"
+    is_utf8 = data.startswith(codecs.BOM_UTF8) or name.upper() in ("UTF-8", "UTF8")
+    return ("UTF-8" if is_utf8 else None), name
 
 
 def child(parent: Element, tag: str, file: object, place: str = "") -> Element:
@@ -83,8 +119,9 @@ def number(text: str, file: object, place: str, *, infinite: bool = False) -> fl
         value = float(text[:100])
     except ValueError:
         value = math.nan
-    if math.isnan(value) or (math.isinf(value) and not (infinite and value > 0.0)):
-        raise ConfigError(file, f"{place} = {shown(text)}: must be a finite number")
+    if not abs(value) <= LARGEST_NUMBER and not (infinite and value > 0.0):
+        size = f" up to {LARGEST_NUMBER:g}" * math.isfinite(value)
+        raise ConfigError(file, f"{place} = {shown(text)}: must be a finite number{size}{look_alike(text[:100])}")
     return value
 
 
