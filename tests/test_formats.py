@@ -1,11 +1,13 @@
 """Robots of other programs: what is read of them, what is refused, and that nothing is expanded, fetched or run."""
 
 import json
+import re
 import tomllib
 
 import numpy as np
 import pytest
 import yaml
+from scipy.optimize import nnls
 
 import cspr_jax
 from cspr_jax.cli import main
@@ -432,6 +434,111 @@ def test_wirex_files_that_are_refused(tmp_path, given, line, capsys):
     assert main(["import", str(wirex(tmp_path, **given))]) == 2
     err = capsys.readouterr().err
     assert line in err and err.count("\n") == 1, err
+
+
+def defaults(folder, mass="25.000000", centre=("0.000000", "1.000000", "0.200000"), tensor='Ixx="14"', version="0.31"):
+    """A file as the library of WireX writes it."""
+    text = wirex(folder).read_text().replace('version="0.31"', f'version="{version}"').replace('"2.5"', f'"{mass}"')
+    text = text.replace('Ixx="0.2" Iyy="0.3" Izz="0.4"', tensor)
+    x, y, z = centre
+    text = text.replace('x="0.1" y="0" z="0.05"', f'x="{x}" y="{y}" z="{z}"')
+    (folder / "robot.wcrfx").write_text(text)
+    return folder / "robot.wcrfx"
+
+
+TENSOR = 'Ixx="2.000000" Ixy="0.000000" Iyy="3.000000" Izz="4.000000"'
+
+
+@pytest.mark.parametrize(("version", "tensor"), [("0.31", 'Ixx="14"'), ("0.32", TENSOR)])
+def test_wirex_defaults_are_placeholders(tmp_path, version, tensor):
+    """Its library writes these into every file: its own tensors, mass and mass centre; other values are read."""
+    found = cspr_jax.import_robot(defaults(tmp_path, tensor=tensor, version=version))
+    mean = np.mean(ENDS, axis=0)
+    np.testing.assert_allclose(found.robot.centre_of_mass, mean, atol=1e-9)
+    radius = np.linalg.norm(np.array(ENDS) - mean, axis=1).max()
+    np.testing.assert_allclose(found.robot.inertia, 0.4 * 25.0 * radius**2 * np.eye(3), rtol=1e-8)
+    assert float(found.robot.mass) == 25.0
+    words = "placeholder mass of 25 kg; placeholder mass centre at the mean of the platform's points; placeholder inert"
+    assert found.keys["source"].startswith(words)
+    (line,) = found.warnings
+    assert line.endswith("default of WireX: the mass of 25 kg, the mass centre [0.0, 1.0, 0.2], the inertia tensor")
+    found = cspr_jax.import_robot(defaults(tmp_path, mass="130", tensor=tensor, version=version))
+    assert float(found.robot.mass) == 130.0 and found.keys["source"].startswith("placeholder mass centre")
+    found = cspr_jax.import_robot(defaults(tmp_path, centre=("0", "0", "0.02"), tensor=tensor, version=version))
+    np.testing.assert_array_equal(found.robot.centre_of_mass, [0.0, 0.0, 0.02])
+    assert found.keys["source"].startswith("placeholder mass of 25 kg; placeholder inertia")
+    own = 'Ixx="0.2" Iyy="0.3" Izz="0.4"'
+    found = cspr_jax.import_robot(defaults(tmp_path, centre=("0", "0", "0.02"), tensor=own, version=version))
+    assert found.warnings == () and found.keys["source"] == "WireX robot robot.wcrfx"
+    np.testing.assert_allclose(found.robot.inertia, np.diag([0.2, 0.3, 0.4]), atol=1e-15)
+
+
+def test_wirex_points_have_no_placeholders_of_bodies(tmp_path):
+    path = defaults(tmp_path)
+    path.write_text(path.read_text().replace("3R3T", "3T"))
+    found = cspr_jax.import_robot(path)
+    assert found.keys["source"] == "placeholder mass of 25 kg; WireX robot robot.wcrfx"
+
+
+def loaded(folder, *applications, place="</robot>", more=""):
+    text = "".join(f'<application name="a" {keys}/>' for keys in applications)
+    path = wirex(folder)
+    path.write_text(path.read_text().replace(place, text + place).replace('radius="0.003"', f'radius="0.003" {more}'))
+    return path
+
+
+def test_wirex_loads_are_limits(tmp_path, capsys):
+    """Wherever the application stands; of several all hold; zero is a largest load that is not known."""
+    both = 'min_cable_load="40.000000" max_cable_load="1000.000000"'
+    for place in ("</robot>", "</models>"):
+        keys = cspr_jax.import_robot(loaded(tmp_path, both, place=place)).keys
+        assert (keys["tension_min"], keys["tension_max"]) == (40.0, 1000.0)
+    keys = cspr_jax.import_robot(loaded(tmp_path, both, 'min_cable_load="50" max_cable_load="700"')).keys
+    assert (keys["tension_min"], keys["tension_max"]) == (50.0, 700.0)
+    keys = cspr_jax.import_robot(loaded(tmp_path, 'min_cable_load="0" max_cable_load="0.000000"')).keys
+    assert "tension_min" not in keys and "tension_max" not in keys
+    assert cspr_jax.import_robot(loaded(tmp_path, more='minimum_load="3"')).keys["tension_min"] == 3.0
+    for keys, line in (
+        ('min_cable_load="-1"', 'application.min_cable_load = "-1": must be a number >= 0'),
+        ('max_cable_load="much"', 'application.max_cable_load = "much": must be a finite number'),
+        ('min_cable_load="50" max_cable_load="40"', "tension_min = "),
+    ):
+        assert main(["import", str(loaded(tmp_path, keys))]) == 2
+        err = capsys.readouterr().err
+        assert line in err and err.count("\n") == 1, err
+    assert cspr_jax.import_robot(defaults(tmp_path, mass="3", version="0.4")).warnings[0].startswith('version = "0.4"')
+
+
+COGIRO = (  # base and platform points, as the file of WireX has them, m
+    ([-7.175, -5.244, 5.462], [0.503, -0.493, 0.0]),
+    ([-7.316, -5.103, 5.472], [-0.51, 0.351, 0.998]),
+    ([-7.303, 5.236, 5.476], [-0.503, -0.27, 0.0]),
+    ([-7.161, 5.373, 5.485], [0.496, 0.356, 1.0]),
+    ([7.182, 5.348, 5.488], [-0.503, 0.493, 0.0]),
+    ([7.323, 5.206, 5.499], [0.5, -0.34, 0.999]),
+    ([7.302, -5.133, 5.489], [0.502, 0.275, 0.0]),
+    ([7.161, -5.27, 5.497], [-0.505, -0.346, 0.998]),
+)
+
+
+def test_static_workspace_of_wirex_cogiro(tmp_path):
+    """All of 12 x 8 x 3 m, by least squares with tensions >= 0; with the library's mass centre less than a half."""
+    path = defaults(tmp_path)
+    chains = "".join(chain(base, end) for base, end in COGIRO)
+    path.write_text(re.sub("<geometry>.*</geometry>", f"<geometry>{chains}</geometry>", path.read_text(), flags=re.S))
+    robot = cspr_jax.import_robot(path).keys
+    base, ends = np.array(robot["base_points"]), np.array(robot["platform_points"])
+    grid = np.stack(np.meshgrid(np.arange(-5.5, 6), np.arange(-3.5, 4), np.arange(1.5, 4), indexing="ij"), -1)
+
+    def held(place, centre):
+        along = base - place - ends
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        wrenches = np.vstack([along.T, np.cross(ends - centre, along).T])
+        return nnls(wrenches, [0.0, 0.0, 25.0 * 9.81, 0.0, 0.0, 0.0])[1] < 1e-6
+
+    places = grid.reshape(-1, 3)  # cells of 1 m^3
+    assert sum(held(place, robot["centre_of_mass"]) for place in places) == 288
+    assert sum(held(place, [0.0, 1.0, 0.2]) for place in places) < 130
 
 
 def encoded(folder, encoding, declared=None):

@@ -17,6 +17,7 @@ from cspr_jax.sweep.definition import read_sweep
 
 SPOOLS = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
 RING = [[math.cos(angle), math.sin(angle), 0.0] for angle in range(6)]
+HEXAGON = [[math.cos(k * math.pi / 3.0), math.sin(k * math.pi / 3.0), 0.0] for k in range(6)]
 BODY = {"platform_points": RING, "inertia": [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]}
 PLAN = """schema = 1
 robot = "prototype"
@@ -348,12 +349,53 @@ def test_hints_about_units(keys, wanted):
     assert len(found) == len(wanted) and all(text in line for text, line in zip(wanted, found, strict=True))
 
 
-def test_the_catalogue_gives_no_hint():
+def test_the_catalogue_gives_no_hint_but_two():
+    """Of all robots two have their mass centre outside the hull of their points, as their sources give them."""
     from cspr_jax.config.robot import CATALOGUE, catalogue_names
 
-    assert [
-        line for name in catalogue_names() for line in hints.robot_hints(read_robot(CATALOGUE / f"{name}.toml"))
-    ] == []
+    lines = {name: hints.robot_hints(read_robot(CATALOGUE / f"{name}.toml")) for name in catalogue_names()}
+    outside = {"greenline": "0.005 m outside the hull", "ipanema-1-iros": "0.25 m outside the hull"}
+    assert {name for name, said in lines.items() if said} == set(outside)
+    assert all(len(lines[name]) == 1 and words in lines[name][0] for name, words in outside.items())
+
+
+@pytest.mark.parametrize(
+    ("keys", "distance"),
+    [
+        ({"centre_of_mass": [0.0, 0.0, 0.0]}, None),
+        ({"centre_of_mass": [0.0, 0.86, 0.0]}, None),  # the middle of a side is at 0.866
+        ({"centre_of_mass": [0.0, 1.0, 0.0]}, "0.134 m"),
+        ({"centre_of_mass": [0.0, 0.0, -0.2]}, "0.2 m"),
+        ({"centre_of_mass": [4.0, 0.0, 4.0]}, "5 m"),
+        (
+            {
+                "platform_points": [[p[0], p[1], (-1.0) ** k] for k, p in enumerate(HEXAGON)],
+                "centre_of_mass": [0, 0, 0.9],
+            },
+            None,
+        ),
+        ({"platform_points": [[p[0], 7.0, p[1]] for p in HEXAGON], "pattern": "1R2T"}, None),  # y counts for nothing
+        (
+            {"platform_points": [[p[0], 0.0, p[1]] for p in HEXAGON], "pattern": "1R2T", "centre_of_mass": [2, 0, 0]},
+            "1 m",
+        ),
+        (
+            {"platform_points": [[p[0], p[1], 1.0] for p in HEXAGON], "pattern": "3R", "centre_of_mass": [0, 0, 0.5]},
+            None,
+        ),
+        (
+            {"platform_points": [[p[0], p[1], 1.0] for p in HEXAGON], "pattern": "3R", "centre_of_mass": [0, 0, 1.5]},
+            "0.5 m",
+        ),
+        ({"platform_points": [[0.5] * 3] * 6, "pattern": "3R", "centre_of_mass": [0, 0, 0]}, None),
+    ],
+)
+def test_hints_about_the_mass_centre(keys, distance):
+    """Distances by hand; outside of the points' hull, or that of the points and the joint."""
+    found = hints.robot_hints(spec_of(**BODY | {"base_points": RING, "platform_points": HEXAGON, "mass": 0.1} | keys))
+    assert [line for line in found if "hull" not in line] == []
+    assert len(found) == (distance is not None)
+    assert distance is None or (f": {distance} outside the hull of platform_points" in found[0]), found
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from typing import Any
 
 from cspr_jax.config.formats.table import ENDINGS, Imported, format_of
 from cspr_jax.config.formats.writing import robot_text
+from cspr_jax.config.hints import robot_hints
 from cspr_jax.config.reading import other_case
 from cspr_jax.config.robot import RobotFile, read_foreign
 from cspr_jax.config.trajectory import TrajectoryKeys
@@ -24,7 +25,7 @@ class ImportedRobot:
     Fields:
         robot: for all functions that take one.
         keys: of its robot file, plain values.
-        warnings: what was left out, one line each.
+        warnings: what was left out, and what is probably a mistake, one line each.
     """
 
     robot: PointMassRobot | PlatformRobot
@@ -79,7 +80,7 @@ def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobo
     if not file.is_file():
         raise ConfigError(file, f"no such file{other_case(file)}")
     spec, found = read_foreign(file, cable_set)
-    return ImportedRobot(_built(spec, file), found.keys, found.warnings, found)
+    return ImportedRobot(_built(spec, file), found.keys, tuple(robot_hints(spec)), found)
 
 
 def _built(spec: RobotFile, file: Path) -> PointMassRobot | PlatformRobot:

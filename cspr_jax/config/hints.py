@@ -7,12 +7,15 @@ import numpy as np
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.errors import shown
 
 # Cameras over stadiums hang from spools up to 250 m apart; what is larger, such as the cabin of a radio telescope,
 # weighs tonnes.
 LARGEST_SPAN, LARGEST_MASS = 300.0, 1000.0  # m, kg
 # A body's radius of gyration is near its size. Grams for kilograms or millimetres for metres miss by 1e3 at least.
 INERTIA_RATIOS = (1e-5, 1e3)
+# Part of the distances between the points of a platform; tables of points are rounded.
+ROUNDING = 1e-3
 
 
 def robot_hints(spec: RobotFile) -> list[str]:
@@ -40,7 +43,40 @@ def robot_hints(spec: RobotFile) -> list[str]:
                 f"robot.inertia: {largest:g} kg m^2 for a mass of {spec.mass:g} kg and platform_points {size:g} m "
                 "from it: do the units fit? Inertia is in kg m^2, lengths are in m"
             )
-    return lines
+    return lines + _unbalanced(spec)
+
+
+def _unbalanced(spec: RobotFile) -> list[str]:
+    # A mass centre far from the points is mostly one from another origin, or what another program writes by default.
+    if spec.platform_points is None:
+        return []
+    centre, axes = np.asarray(spec.centre_of_mass or [0.0, 0.0, 0.0]), [0, 2] if spec.is_planar else [0, 1, 2]
+    points = np.asarray(spec.platform_points)
+    if spec.own_pattern == "3R":  # the joint holds it too
+        points = np.vstack([points, np.zeros(3)])
+    size = float(np.ptp(points, axis=0).max())
+    away = _distance_to_hull((points - centre)[:, axes] / size) * size if size > 0.0 else 0.0
+    if away <= ROUNDING * size:
+        return []
+    return [
+        f"robot.centre_of_mass = {shown(centre.tolist())}: {away:.3g} m outside the hull of platform_points: is it "
+        "from the origin of the platform's axes?"
+    ]
+
+
+def _distance_to_hull(points: np.ndarray) -> float:
+    # Of the origin from the hull of points (n, axes), whose size is 1. One heavy row holds the sum of the weights.
+    if np.linalg.norm(points.mean(axis=0)) <= ROUNDING:
+        return 0.0
+    from scipy.optimize import nnls  # takes long to import, and the mean mostly answers
+
+    heavy = 1e3
+    rows = np.vstack([points.T, np.full(len(points), heavy)])
+    try:
+        weights, _ = nnls(rows, np.append(np.zeros(points.shape[1]), heavy), maxiter=100 * len(points))
+    except RuntimeError:  # it found no end
+        return 0.0
+    return float(np.linalg.norm(weights @ points) / weights.sum())
 
 
 def plan_hints(keys: PlanFile, spec: RobotFile) -> list[str]:

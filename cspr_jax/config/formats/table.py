@@ -45,7 +45,7 @@ FORMATS = (
     ),
     Format("cdpyr", (".json",), "a robot as JSON", _HERE + "cdpyr:read_json"),
     Format("cdpyr", (".yaml", ".yml"), "a robot as YAML", _HERE + "cdpyr:read_yaml"),
-    Format("WireX", (".wcrfx",), "a robot of version 0.31", _HERE + "wirex:read"),
+    Format("WireX", (".wcrfx",), "a robot of version 0.31 or 0.32", _HERE + "wirex:read"),
 )
 ENDINGS = tuple(ending for row in FORMATS for ending in row.endings)
 

@@ -1,19 +1,29 @@
 """Robots of WireX: XML named .wcrfx, metres, kilogrammes, z up; numbers of platforms and cables count from 1.
 
 A pulley swivels about the z axis of its base point, and the cable enters along it. Inertia is about the mass centre.
+
+Its library reads neither mass nor mass centre nor inertia, but writes them: in files of robots that nobody weighed they
+are the values with which it starts. These are taken for placeholders.
 """
 
+import math
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from cspr_jax.config.formats import cdpyr
+from cspr_jax.config.formats.model import LARGEST_NUMBER, Body, Cable
 from cspr_jax.config.formats.model import SAME as UPRIGHT
-from cspr_jax.config.formats.model import Body, Cable
 from cspr_jax.config.formats.xml_text import child, number, read_xml
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.robots.patterns import PATTERNS
+
+VERSIONS = ("0.31", "0.32")
+_MASS, _CENTRE = 25.0, [0.0, 1.0, 0.2]  # kg, m
+# Version 0.31 writes one number instead of the tensor, 0.32 the tensor.
+_TENSORS = (np.diag([14.0, 0.0, 0.0]), np.diag([2.0, 3.0, 4.0]))  # kg m^2
 
 
 def read(path: Path) -> Body:
@@ -45,8 +55,12 @@ def read(path: Path) -> Body:
     cables = [_cable(chain, k, path) for k, chain in enumerate(chains)]
     body = Body(path, robot.get("name") or path.stem, given, cables, f"WireX robot {path.name}")
     body.axes = cdpyr.AXES.get(given, UPRIGHT)
+    if root.get("version") not in (None, *VERSIONS):
+        body.warnings.append(f"version = {shown(root.get('version'))}: read as {either(VERSIONS)}")
     if platform is not None:
         _weigh(platform, body, path)
+        _replace_defaults(body)
+    _limit(root, body, path)
     sizes = [_of(cable, "radius", path, "cable") for cable in root.findall("cable")]
     body.cable_diameter = 2.0 * max(sizes, default=0.0) or None
     if len(set(sizes)) > 1:
@@ -80,4 +94,42 @@ def _weigh(platform: Element, body: Body, file: Path) -> None:
             for a in "xyz"
         ]
         found = np.array(parts)
-        body.inertia = found if np.isfinite(found).all() and found.any() else None
+        body.inertia = found if (np.abs(found) <= LARGEST_NUMBER).all() and found.any() else None
+
+
+def _replace_defaults(body: Body) -> None:
+    is_body, defaults = PATTERNS[body.pattern].is_body, []
+    is_tensor = body.inertia is not None and any(np.array_equal(body.inertia, tensor) for tensor in _TENSORS)
+    is_centre = body.centre == _CENTRE
+    # A robot of 25 kg may have been weighed; nobody measures these tensors or that mass centre.
+    if body.mass == _MASS and (is_centre or is_tensor):
+        defaults.append(f"the mass of {_MASS:g} kg")
+        body.notes.append(f"placeholder mass of {_MASS:g} kg")
+    if is_centre and is_body:
+        defaults.append(f"the mass centre {shown(_CENTRE)}")
+        body.centre = np.mean([cable.platform for cable in body.cables], axis=0).round(9).tolist()
+        body.notes.append("placeholder mass centre at the mean of the platform's points")
+    if is_tensor and is_body:
+        defaults.append("the inertia tensor")
+        body.inertia = None
+    if defaults:
+        body.warnings.append(f"placeholders stand for what is a default of WireX: {', '.join(defaults)}")
+
+
+def _limit(root: Element, body: Body, file: Path) -> None:
+    # Of several applications all are to be possible. Zero stands for a largest load that is not known.
+    applications = list(root.iter("application"))
+    cables = [(one, "minimum_load", "cable") for one in root.findall("cable")]
+    least = [_load(*one, file) for one in [*((one, "min_cable_load", "application") for one in applications), *cables]]
+    most = [_load(one, "max_cable_load", "application", file) or math.inf for one in applications]
+    for cable in body.cables:
+        cable.tension_min = max(least, default=0.0) or None
+        cable.tension_max = min(most, default=math.inf)
+
+
+def _load(element: Element, key: str, place: str, file: Path) -> float:
+    text = element.get(key)
+    load = 0.0 if text is None else number(text, file, f"{place}.{key}", infinite=True)
+    if load < 0.0:
+        raise ConfigError(file, f"{place}.{key} = {shown(text)}: must be a number >= 0")
+    return load
