@@ -14,7 +14,7 @@ from cspr_jax.cli.command import (
     print_json,
     warn,
 )
-from cspr_jax.errors import ConfigError, ExitCode
+from cspr_jax.errors import ConfigError, ExitCode, one_line
 from cspr_jax.runtime.progress import progress
 from cspr_jax.sweep.signals import stop_signals
 
@@ -74,11 +74,11 @@ def _status(options: argparse.Namespace) -> int:
         return ExitCode.DONE
     last = state["last"] or {}
     sys.stdout.write(
-        f"{state['directory']}: {state['sweep']}, identity {state['identity'][:12]}\n"
+        f"{state['directory']}: {one_line(state['sweep'])}, identity {state['identity'][:12]}\n"
         f"  {state['shards']} of {state['tiles']} tiles as shards, {state['quarantined']} set aside, "
         f"{state['unfinished']} unfinished\n"
         f"  result: {state['result'] or 'not yet'}\n"
-        f"  last: {last.get('event', '-')} at {last.get('time', '-')}\n"
+        f"  last: {one_line(last.get('event', '-'))} at {one_line(last.get('time', '-'))}\n"
     )
     return ExitCode.DONE
 
@@ -100,7 +100,10 @@ def _verify(options: argparse.Namespace) -> int:
     again = "run the sweep" if "shards" in report else "run or plan it"
     for fault in report["faults"]:
         sys.stderr.write(f"cspr: {fault}: {again} again to make it anew\n")
-    return ExitCode.INPUT_OUTPUT if report["faults"] else ExitCode.DONE
+    unreadable = report.get("unreadable", [])
+    for line in unreadable:
+        sys.stderr.write(f"cspr: {line}\n")
+    return ExitCode.INPUT_OUTPUT if report["faults"] or unreadable else ExitCode.DONE
 
 
 def _add_volume(parser: argparse.ArgumentParser) -> None:

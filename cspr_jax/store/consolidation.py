@@ -17,10 +17,10 @@ from cspr_jax.schema.quantities import AXES, QUANTITIES
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.store import guard
 from cspr_jax.store.disk import Disk
+from cspr_jax.store.documents import Settings, document, plain_json
 from cspr_jax.store.guard import Found
 from cspr_jax.store.netcdf import (
     UNREADABLE,
-    file_size,
     make_datasets,
     open_hdf5,
     plain,
@@ -28,7 +28,7 @@ from cspr_jax.store.netcdf import (
     set_attributes,
 )
 from cspr_jax.store.publishing import new_file
-from cspr_jax.store.seal import DamagedError, check_file
+from cspr_jax.store.seal import DamagedError
 from cspr_jax.store.shards import Layout, Shard, digest_of
 
 LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES, LARGEST_TILES = 1 << 24, 1 << 28, 100_000
@@ -122,29 +122,11 @@ def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[]
     return digests
 
 
-def read_content(path: Path) -> Content:
-    """Read all of a result and compare it with its checksums.
-
-    Args:
-        path: the file.
-
-    Returns:
-        what it holds.
-
-    Raises:
-        DamagedError: it is not what was written, or was not written by this program.
-    """
-    if file_size(path) < 0:
-        raise DamagedError("it is not a file")
-    check_file(path)
-    return content_of(path)
-
-
 def content_of(path: Path, begun: Callable[[Iterable[Found]], None] = lambda _: None) -> Content:
-    """The same of a file whose seal was compared already.
+    """All of a result, read and compared with its checksums, but for its seal.
 
     Args:
-        path: the file.
+        path: the file. HDF5 may fail or hang on it: `store.isolated` reads it in another process.
         begun: called with all datasets before they are read, which takes long.
 
     Returns:
@@ -155,7 +137,8 @@ def content_of(path: Path, begun: Callable[[Iterable[Found]], None] = lambda _: 
     """
     try:
         with h5py.File(path, "r") as file:
-            settings = json.loads(_text(file, "settings"))
+            settings = plain_json(_text(file, "settings"))
+            document(Settings, settings, "its settings")
             if identity(settings) != _text(file, "identity"):
                 raise DamagedError("its settings and its identity do not fit")
             tile, store, axes = settings["run"]["tile"], settings["run"]["store"], settings["dimensions"]

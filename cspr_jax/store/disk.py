@@ -1,6 +1,8 @@
 """Everything that changes a disk, one system call a method: tests put a failing disk in its place."""
 
+import errno
 import os
+import stat
 from pathlib import Path
 
 READ_ONLY = 0o444
@@ -11,16 +13,16 @@ class Disk:
     """The calls that change a disk."""
 
     def create(self, path: Path, mode: int = USUAL) -> int:
-        """Open an empty file for writing and reading.
+        """Make a file, and open it for writing and reading.
 
         Args:
-            path: its name; what is there is emptied.
+            path: its name, which nothing may have: a link there could lead to a file of somebody else.
             mode: its permissions.
 
         Returns:
             a file descriptor.
         """
-        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, mode)
+        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
 
     def write(self, file: int, data: bytes, offset: int) -> int:
         """Write some of the data, perhaps not all.
@@ -90,18 +92,61 @@ class Disk:
         os.mkdir(path)
 
     def append(self, path: Path, data: bytes) -> None:
-        """Add to the end of a file; it is made if absent.
+        """Add to the end of a plain file; it is made if absent.
 
         Args:
             path: its name.
             data: what to add.
         """
-        how = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
-        file = os.open(path, how, USUAL)
+        file = open_plain(path, os.O_WRONLY | os.O_APPEND)
         try:
             os.write(file, data)
         finally:
             os.close(file)
+
+
+def open_plain(path: Path, how: int) -> int:
+    """Open a file for writing that has no other name, or make it.
+
+    Args:
+        path: its name.
+        how: flags of `os.open`, besides those that every file has here.
+
+    Returns:
+        a descriptor.
+
+    Raises:
+        OSError: the disk refuses, or what is there is a link, a file with a second name, or no file: what is
+            written to it would go elsewhere.
+    """
+    check_plain(path)  # opening a device can do something to it; looked at again against a change between
+    file = os.open(path, how | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY, USUAL)
+    try:
+        _check_plain(os.fstat(file))
+    except OSError:
+        os.close(file)
+        raise
+    return file
+
+
+def check_plain(path: Path) -> None:
+    """Refuse what `open_plain` refuses, without opening it; a name that is free will do.
+
+    Args:
+        path: the name.
+
+    Raises:
+        OSError: it is a link, a file with a second name, or no file.
+    """
+    if os.path.lexists(path):
+        _check_plain(os.lstat(path))
+
+
+def _check_plain(status: os.stat_result) -> None:
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(errno.EINVAL, "it must be a file, not a link, a folder or a pipe")
+    if status.st_nlink > 1:
+        raise OSError(errno.EMLINK, f"it must be a file with one name, and it has {status.st_nlink} (hard links)")
 
 
 def write_all(disk: Disk, file: int, data: bytes, offset: int = 0) -> None:

@@ -12,13 +12,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.errors import RefusedError, StoreError
-from cspr_jax.store.disk import Disk
-from cspr_jax.store.publishing import make_folders, refusal
+from cspr_jax.errors import RefusedError, StoreError, one_line
+from cspr_jax.store.disk import Disk, check_plain, open_plain
+from cspr_jax.store.publishing import PART, make_folders, refusal
 
 _SHARD = re.compile(r"(\d{5,})\.h5")
 # What a lock says; empty when it is new.
 _HOLDER = re.compile(rb"(?:process \d+ on [^\n]*\n)?")
+_NO_LOCKS = (
+    "network disks and FUSE may have no locks: choose -o on another disk; other programs read a result that is copied "
+    "here with HDF5_USE_FILE_LOCKING=FALSE"
+)
 
 
 class RunFolder:
@@ -39,6 +43,7 @@ class RunFolder:
         self.quarantine = path / "quarantine"
         self.log = path / "log.jsonl"
         self.lock = path / "LOCK"
+        self._held: os.stat_result | None = None
 
     def shard(self, index: int) -> Path:
         """Path of the shard of a tile.
@@ -81,7 +86,11 @@ class RunFolder:
         """
         path = self.lock
         try:
-            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK, 0o644)
+            check_plain(self.log)
+        except OSError as error:
+            raise refusal(self.log, error) from error
+        try:
+            file = open_plain(path, os.O_RDWR)
         except OSError as error:
             raise refusal(path, error) from error
         try:
@@ -89,17 +98,54 @@ class RunFolder:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
                 holder = os.pread(file, 200, 0).decode("utf-8", "replace").strip() or "another process"
-                raise RefusedError(f"{self.path}: is being written by {holder}; wait for it or stop it") from error
+                line = f"{self.path}: is being written by {holder}; wait for it or stop it"
+                raise RefusedError(one_line(line)) from error
             except OSError as error:
-                raise StoreError(f"{path}: cannot be locked: {error.strerror}") from error
-            if not stat.S_ISREG(os.fstat(file).st_mode) or not _HOLDER.fullmatch(os.pread(file, 400, 0)):
+                raise StoreError(one_line(f"{path}: cannot be locked: {error.strerror}: {_NO_LOCKS}")) from error
+            if not _HOLDER.fullmatch(os.pread(file, 400, 0)):
                 raise RefusedError(f"{path}: is somebody's file, not a lock of cspr: choose another -o")
             with contextlib.suppress(OSError):  # it only serves the message of others
                 os.ftruncate(file, 0)
                 os.pwrite(file, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
+            self._held = os.fstat(file)
+            self.check_held()
             yield
         finally:
+            self._held = None
             os.close(file)
+
+    def check_held(self) -> None:
+        """Refuse to write on where the lock is no longer this process's, or a folder of the run leads elsewhere.
+
+        Raises:
+            RefusedError: the lock was removed or replaced, so that another process may write here; or a folder is
+                a link.
+        """
+        for folder in (self.shards, self.quarantine):
+            if folder.is_symlink():
+                raise RefusedError(one_line(f"{folder}: is a link: must be a folder of the run: choose another -o"))
+        try:
+            there = os.lstat(self.lock)
+        except FileNotFoundError:
+            if not self.path.is_dir():
+                return  # nothing can be written either
+            there = None
+        except OSError as error:
+            raise refusal(self.lock, error) from error
+        if there is None or self._held is None or not os.path.samestat(there, self._held):
+            raise RefusedError(
+                one_line(f"{self.lock}: was removed or replaced, so that another process may write here: run it again")
+            )
+
+    def leftovers(self) -> list[Path]:
+        """What processes have begun to write and not finished.
+
+        Returns:
+            the files; what is no file, such as a link, is none of ours.
+        """
+        own = re.compile(rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5){PART}")
+        parts = [part for folder in (self.path, self.shards) for part in sorted(folder.glob(".*.part"))]
+        return [part for part in parts if own.fullmatch(part.name) and _is_file(part)]
 
     def sweep_leftovers(self) -> None:
         """Remove what dead processes left unfinished; only under the lock.
@@ -107,15 +153,12 @@ class RunFolder:
         Raises:
             StoreError: the disk or the folder refuses.
         """
-        own = rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5)\.\d+\.part"
-        for folder in (self.path, self.shards):
-            for part in sorted(folder.glob(".*.part")):
-                if not re.fullmatch(own, part.name) or not part.is_file():
-                    continue
-                try:
-                    self.disk.unlink(part)
-                except OSError as error:
-                    raise refusal(part, error) from error
+        self.check_held()
+        for part in self.leftovers():
+            try:
+                self.disk.unlink(part)
+            except OSError as error:
+                raise refusal(part, error) from error
 
     def set_aside(self, path: Path) -> Path:
         """Move something damaged into quarantine/; nothing there is ever deleted by the program.
@@ -129,6 +172,7 @@ class RunFolder:
         Raises:
             StoreError: the disk or the folder refuses.
         """
+        self.check_held()
         make_folders(self.disk, self.quarantine)
         number = 0
         while os.path.lexists(target := self.quarantine / f"{path.name}.{number}"):
@@ -157,3 +201,10 @@ class RunFolder:
             self.disk.append(self.log, (line + "\n").encode())
         except OSError as error:
             raise refusal(self.log, error) from error
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return stat.S_ISREG(os.lstat(path).st_mode)
+    except OSError:
+        return False

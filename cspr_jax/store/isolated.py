@@ -1,28 +1,34 @@
-"""Reading a file that anybody may have made: another process does it, which may fail, hang or take all its memory.
+"""Reading files that anybody may have made: another process does it, which may fail, hang or take all its memory.
 
-That process starts from nothing (`python -I`, in the root folder, without HDF5's plugins), gets the open file
-as its standard input, and has a limit of memory and one of processor time that follow from the file's size.
+That process starts from nothing (`python -I`, in the root folder, without HDF5's plugins and locks), gets one open file
+after the other, and has a limit of memory and one of processor time for each, which follow from the file's size.
 """
 
 import contextlib
 import dataclasses
 import importlib.util
+import io
 import json
 import os
 import select
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from io import RawIOBase
 from pathlib import Path
-from typing import Any, cast
+from types import TracebackType
+from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 
 from cspr_jax.errors import StoreError, one_line
 from cspr_jax.schema.quantities import from_outside
+from cspr_jax.store.consolidation import Content
+from cspr_jax.store.documents import Header
 from cspr_jax.store.seal import DamagedError, check_mark, check_open, open_regular
+from cspr_jax.store.shards import LARGEST_SHARD, Layout, Shard, decode
 
 # Hashing that many bytes takes a moment; of larger files it is asked before what they hold.
 _QUICK = 512 << 20
@@ -30,126 +36,258 @@ _QUICK = 512 << 20
 _PATIENCE = 60.0
 # The package is not taken from the working folder, nor are the libraries; the path of the parent serves last.
 _CODE = """import sys
-sys.path.extend(sys.argv[2].split("\\n"))
+sys.path.extend(sys.argv[1].split("\\n"))
 import h5py, numpy
-sys.path.insert(0, sys.argv[3])
+sys.path.insert(0, sys.argv[2])
 import cspr_jax
 del sys.path[0]
 from cspr_jax.store.reader import serve
 serve()
 """
+# What a file can do to the process that reads it. Other signals come from people, batch systems or the system's lack of
+# memory, and say nothing about the file.
 _ENDS = {
     signal.SIGXCPU: "HDF5 finds no end in it",
-    signal.SIGKILL: "the process that read it was killed",
+    **dict.fromkeys((signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL), "HDF5 fails on it"),
 }
 
 
-def fetch(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Attributes, axes and quantities of a sealed file, as far as this program writes them.
+class _Opened(NamedTuple):
+    path: Path
+    file: int
+    seal: bytes | None  # None: not compared yet, since the file is large
 
-    Args:
-        path: the file, or a link to one.
 
-    Returns:
-        its attributes, and its arrays by name.
+class Reader:
+    """A process that reads files, started when the first one is asked for, and anew after one on which it failed.
 
-    Raises:
-        DamagedError: it is no file, is damaged, or holds what no file of this program does.
-        StoreError: the system refuses to read anything at the moment.
+    Fields:
+        known: seals of shards that this process has written itself, or that were read without a fault before: it reads
+            their bytes itself.
     """
-    with _asked(path, "result") as (answer, pipe):
-        arrays = {}
-        for name, dtype, shape in answer["arrays"]:
-            _header(pipe, patience=None)
-            arrays[name] = np.empty(shape, dtype)
-            if arrays[name].size:
-                _fill(pipe, arrays[name].reshape(-1).data.cast("B"))
-    return answer["attributes"], arrays
 
+    def __init__(self) -> None:
+        """Nothing is started yet."""
+        self.known: set[bytes] = set()
+        self._child: subprocess.Popen[bytes] | None = None
+        self._channel: socket.socket | None = None
+        self._pipe: RawIOBase | None = None
+        self._idle = False
 
-def content(path: Path) -> dict[str, Any] | None:
-    """Content of a result, from `store.consolidation.read_content`.
+    def __enter__(self) -> Self:
+        """Nothing is started yet."""
+        return self
 
-    Args:
-        path: the file, or a link to one.
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """The process ends."""
+        self._end()
 
-    Returns:
-        its fields; None for a motion.
+    def result(self, path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+        """Attributes, axes and quantities of a sealed file, as far as this program writes them.
 
-    Raises:
-        DamagedError: it is no file, or damaged.
-        StoreError: the system refuses to read anything at the moment.
-    """
-    with _asked(path, "content") as (answer, pipe):
-        return None if "motion" in answer else _header(pipe, patience=None)["content"]
+        Args:
+            path: the file, or a link to one.
 
+        Returns:
+            its attributes, and its arrays by name.
 
-@contextlib.contextmanager
-def _asked(path: Path, what: str) -> Iterator[tuple[dict[str, Any], RawIOBase]]:
-    file = open_regular(path)
-    try:
-        check_mark(path, file)
-        large = os.fstat(file).st_size > _QUICK
-        if not large:
-            check_open(path, file)
-        with _reading(path, file, what) as pipe:
-            answer = _header(pipe, patience=_PATIENCE)
-            if large:
+        Raises:
+            DamagedError: it is no file, is damaged, or holds what no file of this program does.
+            StoreError: the system refuses to read anything at the moment.
+        """
+        with self._opened(path, follow=True) as opened, self._asked(opened, {"what": "result"}) as (answer, pipe):
+            arrays = {}
+            for name, dtype, shape in answer["arrays"]:
+                self._header(pipe, patience=None)
+                arrays[name] = _array(pipe, dtype, shape)
+            return answer["attributes"], arrays
+
+    def content(self, path: Path, *, follow: bool = False) -> Content | None:
+        """Content of a result, from `store.consolidation.content_of`.
+
+        Args:
+            path: the file.
+            follow: whether it may be a link to one.
+
+        Returns:
+            what it holds; None for a motion.
+
+        Raises:
+            DamagedError: it is no file, or damaged.
+            StoreError: the system refuses to read anything at the moment.
+        """
+        with self._opened(path, follow=follow) as opened, self._asked(opened, {"what": "content"}) as (answer, pipe):
+            return None if "motion" in answer else Content(**self._header(pipe, patience=None)["content"])
+
+    def shard(self, path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -> Shard:
+        """A shard, checked in every respect.
+
+        Args:
+            path: the file.
+            layout: of the run.
+            index: of the tile that it must hold.
+            shape: of the tile.
+
+        Returns:
+            its content.
+
+        Raises:
+            DamagedError: it is anything else.
+            StoreError: the system refuses to read anything at the moment.
+        """
+        words = {"what": "shard", "layout": dataclasses.asdict(layout), "index": index, "shape": shape}
+        with self._opened(path, most=LARGEST_SHARD) as opened:
+            if opened.seal in self.known:
+                with os.fdopen(os.dup(opened.file), "rb") as data:
+                    return decode(io.BytesIO(data.read()), layout, index, shape)
+            with self._asked(opened, words) as (answer, pipe):
+                values = {name: _array(pipe, dtype, shape) for name, dtype in answer["arrays"]}
+            if opened.seal is not None:
+                self.known.add(opened.seal)
+            return Shard(**answer["shard"], values=values)
+
+    def header(self, path: Path) -> Header:
+        """Header of a shard, of whatever run.
+
+        Args:
+            path: the file.
+
+        Returns:
+            what it says.
+
+        Raises:
+            DamagedError: it is no shard, or a damaged one.
+            StoreError: the system refuses to read anything at the moment.
+        """
+        with (
+            self._opened(path, most=LARGEST_SHARD) as opened,
+            self._asked(opened, {"what": "header"}) as (answer, _),
+        ):
+            return Header(**answer["header"])
+
+    @contextlib.contextmanager
+    def _opened(self, path: Path, *, follow: bool = False, most: int | None = None) -> Iterator["_Opened"]:
+        file = open_regular(path, follow=follow)
+        try:
+            size = os.fstat(file).st_size
+            if most is not None and size > most:
+                raise DamagedError("it is not a file of a fitting size")
+            check_mark(path, file)
+            yield _Opened(path, file, None if size > _QUICK else check_open(path, file))
+        finally:
+            os.close(file)
+
+    @contextlib.contextmanager
+    def _asked(self, opened: "_Opened", words: dict[str, Any]) -> Iterator[tuple[dict[str, Any], RawIOBase]]:
+        path, file, seal = opened
+        try:
+            pipe = self._sent(path, file, words)
+            answer = self._header(pipe, patience=_PATIENCE)
+            if seal is None:
                 check_open(path, file)
             yield answer, pipe
-    finally:
-        os.close(file)
-
-
-@contextlib.contextmanager
-def _reading(path: Path, file: int, what: str) -> Iterator[RawIOBase]:
-    specs = [spec for name in ("h5py", "numpy") if (spec := importlib.util.find_spec(name)) is not None]
-    places = {str(Path(spec.origin).parent.parent) for spec in specs if spec.origin is not None}
-    home = str(Path(__file__).parents[2])
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::"}
-    rows = json.dumps([dataclasses.asdict(quantity) for quantity in from_outside()])
-    command = [sys.executable, "-I", "-c", _CODE, what, "\n".join(sorted(places)), home, rows]
-    try:
-        child = subprocess.Popen(
-            command,
-            bufsize=0,
-            stdin=file,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            cwd="/",
-            env=environment,
-        )
-    except OSError as error:
-        raise StoreError(one_line(f"{path}: no process could be started to read it: {error.strerror}")) from error
-    with child:
-        try:
-            yield cast(RawIOBase, child.stdout)
         except EOFError as error:
-            code = child.wait()
-            if code >= 0:
-                raise StoreError(one_line(f"{path}: the process that read it ended with exit code {code}")) from error
-            raise DamagedError(_ENDS.get(signal.Signals(-code), "HDF5 fails on it")) from error
-        finally:
-            child.kill()
+            raise self._ended(path) from error
+        except DamagedError:
+            if seal is not None:
+                check_open(path, file)  # a disk that fails now is no fault of the file
+            raise
+        self._idle = True
+
+    def _sent(self, path: Path, file: int, words: dict[str, Any]) -> RawIOBase:
+        # One that died unasked, or did not come to its end, is replaced.
+        if self._child is None or self._child.poll() is not None or not self._idle:
+            self._end()
+            self._start(path)
+        channel, pipe = cast(socket.socket, self._channel), cast(RawIOBase, self._pipe)
+        data = json.dumps(words).encode()
+        data = len(data).to_bytes(8, "little") + data
+        self._idle = False
+        try:
+            channel.sendall(data[socket.send_fds(channel, [data], [file]) :])
+        except OSError as error:
+            raise EOFError from error
+        return pipe
+
+    def _start(self, path: Path) -> None:
+        specs = [spec for name in ("h5py", "numpy") if (spec := importlib.util.find_spec(name)) is not None]
+        places = {str(Path(spec.origin).parent.parent) for spec in specs if spec.origin is not None}
+        home = str(Path(__file__).parents[2])
+        settings = {"OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::", "HDF5_USE_FILE_LOCKING": "FALSE"}
+        rows = json.dumps([dataclasses.asdict(quantity) for quantity in from_outside()])
+        command = [sys.executable, "-I", "-c", _CODE, "\n".join(sorted(places)), home, rows]
+        here, there = socket.socketpair()
+        with there:
+            try:
+                # A session of its own: Ctrl-C is for us.
+                self._child = subprocess.Popen(
+                    command,
+                    stdin=there.fileno(),
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                    cwd="/",
+                    env=os.environ | settings,
+                    start_new_session=True,
+                )
+            except OSError as error:
+                here.close()
+                line = f"{path}: no process could be started to read it: {error.strerror}"
+                raise StoreError(one_line(line)) from error
+        self._channel, self._pipe = here, here.makefile("rb", buffering=0)
+        try:
+            self._header(self._pipe, patience=None)
+        except EOFError as error:
+            line = f"{path}: the process that reads it did not start: exit code {self._child.wait()}"
+            raise StoreError(one_line(line)) from error
+
+    def _ended(self, path: Path) -> StoreError | DamagedError:
+        code = cast(subprocess.Popen[bytes], self._child).wait()
+        if -code in _ENDS:
+            return DamagedError(_ENDS[signal.Signals(-code)])
+        end = f"was killed: signal {-code}" if code < 0 else f"ended with exit code {code}"
+        return StoreError(one_line(f"{path}: the process that read it {end}; run it again"))
+
+    def _end(self) -> None:
+        for end in (self._pipe, self._channel):
+            if end is not None:
+                end.close()
+        if self._child is not None:
+            self._child.kill()
+            self._child.wait()
+        self._child = self._channel = self._pipe = None
+
+    def _header(self, pipe: RawIOBase, *, patience: float | None) -> dict[str, Any]:
+        if patience is not None and not select.select([pipe], [], [], patience)[0]:
+            raise DamagedError("HDF5 waits for something")
+        size = bytearray(8)
+        _fill(pipe, memoryview(size))
+        data = bytearray(int.from_bytes(size, "little"))
+        _fill(pipe, memoryview(data))
+        header = json.loads(data)
+        self._idle = "refused" in header or "failed" in header
+        if "failed" in header:
+            raise StoreError(one_line(header["failed"]))
+        if "refused" in header:
+            raise DamagedError(header["refused"])
+        return header
 
 
-def _header(pipe: RawIOBase, *, patience: float | None) -> dict[str, Any]:
-    if patience is not None and not select.select([pipe], [], [], patience)[0]:
-        raise DamagedError("HDF5 waits for something")
-    size = bytearray(8)
-    _fill(pipe, memoryview(size))
-    data = bytearray(int.from_bytes(size, "little"))
-    _fill(pipe, memoryview(data))
-    header = json.loads(data)
-    if "refused" in header:
-        raise DamagedError(header["refused"])
-    return header
+def _array(pipe: RawIOBase, dtype: str, shape: list[int] | tuple[int, ...]) -> np.ndarray:
+    array = np.empty(shape, dtype)
+    if array.size:
+        _fill(pipe, array.reshape(-1).data.cast("B"))
+    return array
 
 
 def _fill(pipe: RawIOBase, place: memoryview) -> None:
     done = 0
     while done < len(place):
-        count = pipe.readinto(place[done:])
+        try:
+            count = pipe.readinto(place[done:])
+        except ConnectionError as error:
+            raise EOFError from error
         if not count:
             raise EOFError
         done += count

@@ -6,15 +6,19 @@ folder, flushed, renamed, and the folder flushed. A crash leaves the old state o
 
 import contextlib
 import os
+import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
 from cspr_jax.errors import StoreError, one_line
 from cspr_jax.store.disk import USUAL, Disk, write_all
 
+# Ending of what is not whole: of this version, and of earlier ones, which named their process.
+PART = r"\.(?:[0-9a-f]{12}|\d+)\.part"
+
 
 def part_of(path: Path) -> Path:
-    """Name under which a file is written until it is whole.
+    """Name under which a file is written until it is whole; nobody can know it beforehand.
 
     Args:
         path: its final name.
@@ -22,7 +26,7 @@ def part_of(path: Path) -> Path:
     Returns:
         the name, in the same folder.
     """
-    return path.with_name(f".{path.name}.{os.getpid()}.part")
+    return path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
 
 
 @contextlib.contextmanager
@@ -42,7 +46,7 @@ def new_file(disk: Disk, path: Path, *, mode: int = USUAL) -> Iterator[int]:
     """
     part = part_of(path)
     try:
-        file = disk.create(part, mode)
+        file = disk.create(part, mode)  # where it fails, what has that name is not ours to remove
         try:
             try:
                 yield file

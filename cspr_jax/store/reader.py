@@ -1,16 +1,18 @@
-"""Work of the process that reads one file for another one: see `store.isolated`."""
+"""Work of the process that reads files for another one: see `store.isolated`."""
 
 import dataclasses
 import json
 import math
 import os
 import resource
+import socket
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import h5py
+import numpy as np
 
 from cspr_jax.errors import StoreError
 from cspr_jax.schema.motion_quantities import FLIGHT, SEGMENTS, TRAJECTORY
@@ -20,9 +22,8 @@ from cspr_jax.store import guard
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.netcdf import UNREADABLE, reason
 from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.shards import Layout, decode, header_of
 
-# The file is this process's standard input.
-FILE = Path("/dev/fd/0")
 # A result is read into memory as a whole; one byte of a file that is more than noise stands for a few of its data.
 LARGEST_DATA, DENSEST = 8e9, 50
 # Seconds of the processor to find out what a file holds; those that reading it takes on slow machines.
@@ -39,58 +40,112 @@ _INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass
 
 
 def serve() -> None:
-    """Answer with what the file on standard input holds: what was found as JSON, then each array behind an answer.
+    """Answer what is asked about one file after the other, until nobody asks any more.
 
-    The words of the command: what is asked for, two folders of `store.isolated`, and the quantities that the process
+    Standard input is a socket: on it come questions, each with an open file, and go the answers: what was found as
+    JSON, and arrays. The words of the command: two folders of `store.isolated`, and the quantities that the process
     that asks has registered.
     """
-    for row in json.loads(sys.argv[4]):
+    for row in json.loads(sys.argv[3]):
         register(Quantity(**row))
-    out = os.fdopen(os.dup(1), "wb")
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    _grant(_LOOK, 0)
+    channel = socket.socket(fileno=0)
+    out = channel.makefile("wb")
+    _tell(out, {})  # ready
+    while (asked := _next(channel)) is not None:
+        words, file = asked
+        _grant(_LOOK, 0)
+        answer(Path(f"/dev/fd/{file}"), words, out)
+        os.close(file)
+
+
+def answer(file: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    """Answer one question.
+
+    Args:
+        file: the file.
+        words: the question.
+        out: where the answer goes.
+    """
     try:
-        (_result if sys.argv[1] == "result" else _content)(out)
+        _ANSWERS[words["what"]](file, words, out)
     except MemoryError:
-        _answer(out, {"refused": "it needs more memory than its size explains"})
+        if _Limits.are_foreign:
+            _tell(out, {"failed": "too little memory to read a file: raise the limit (ulimit -v)"})
+        else:
+            _tell(out, {"refused": "it needs more memory than its size explains"})
     except (DamagedError, StoreError, *UNREADABLE) as error:
-        _answer(out, {"refused": reason(error)})
+        _tell(out, {"refused": reason(error)})
 
 
-def _result(out: BinaryIO) -> None:
-    with h5py.File(FILE, "r") as file:
+def _next(channel: socket.socket) -> tuple[dict[str, Any], int] | None:
+    data, files, _, _ = socket.recv_fds(channel, 8, 1)
+    if not data:
+        return None
+    size = int.from_bytes(data + _exactly(channel, 8 - len(data)), "little")
+    return json.loads(_exactly(channel, size)), files[0]
+
+
+def _exactly(channel: socket.socket, count: int) -> bytes:
+    data = b""
+    while len(data) < count:
+        part = channel.recv(count - len(data))
+        if not part:
+            raise EOFError
+        data += part
+    return data
+
+
+def _result(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    with h5py.File(path, "r") as file:
         attributes = _attributes(file)
         tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS, FLIGHT)
         datasets = guard.datasets(file, [name for table in tables for name in table])
         marks = [name for name in _MARKS if "map" not in attributes and file.id.links.exists(name)]
         guard.refuse_others(file, len(datasets) + len(marks), len(attributes))
-        guard.refuse_dense(datasets.values(), FILE.stat().st_size, densest=DENSEST)
+        guard.refuse_dense(datasets.values(), path.stat().st_size, densest=DENSEST)
         total = sum(one.size for one in datasets.values())
         if total > LARGEST_DATA:
             raise DamagedError(f"it holds {total / 1e9:.3g} GB of data: must be at most {LARGEST_DATA / 1e9:.3g} GB")
         arrays = [[name, one.dtype, one.shape] for name, one in datasets.items()]
-        _answer(out, {"attributes": attributes, "arrays": arrays})
+        _tell(out, {"attributes": attributes, "arrays": arrays})
         _grant_for(datasets.values())
         for one in datasets.values():
             values = one.values()
-            _answer(out, {})  # it could be read
-            if one.size:
-                out.write(values.reshape(-1).data.cast("B"))
+            _tell(out, {})  # it could be read
+            _send(out, values)
         out.flush()
 
 
-def _content(out: BinaryIO) -> None:
-    with h5py.File(FILE, "r") as file:
+def _content(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    with h5py.File(path, "r") as file:
         motion = guard.text(file, "map") is None
     if motion:
-        _answer(out, {"motion": True})
+        _tell(out, {"motion": True})
         return
 
     def go_on(datasets: Iterable[guard.Found]) -> None:
-        _answer(out, {})  # what takes long begins
+        _tell(out, {})  # what takes long begins
         _grant_for(datasets)
 
-    _answer(out, {"content": dataclasses.asdict(content_of(FILE, go_on))})
+    _tell(out, {"content": dataclasses.asdict(content_of(path, go_on))})
+
+
+def _shard(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    shard = decode(path, Layout(**words["layout"]), words["index"], tuple(words["shape"]), _grant_for)
+    plain = {field.name: getattr(shard, field.name) for field in dataclasses.fields(shard) if field.name != "values"}
+    _tell(out, {"shard": plain, "arrays": [[name, array.dtype.name] for name, array in shard.values.items()]})
+    for array in shard.values.values():
+        _send(out, array)
+    out.flush()
+
+
+def _header(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    with h5py.File(path, "r") as file:
+        _tell(out, {"header": header_of(file).model_dump()})
+
+
+_ANSWERS = {"result": _result, "content": _content, "shard": _shard, "header": _header}
 
 
 def _attributes(file: h5py.File) -> dict[str, Any]:
@@ -106,10 +161,15 @@ def _attributes(file: h5py.File) -> dict[str, Any]:
     return {name: value for name, value in attributes.items() if value is not None}
 
 
-def _answer(out: BinaryIO, answer: dict[str, Any]) -> None:
+def _tell(out: BinaryIO, answer: dict[str, Any]) -> None:
     data = json.dumps(answer).encode()
     out.write(len(data).to_bytes(8, "little") + data)
     out.flush()
+
+
+def _send(out: BinaryIO, values: np.ndarray) -> None:
+    if values.size:
+        out.write(values.reshape(-1).data.cast("B"))
 
 
 def _grant_for(datasets: Iterable[guard.Found]) -> None:
@@ -129,6 +189,13 @@ def _grant(seconds: float, memory: int) -> None:
     _limit(resource.RLIMIT_AS, pages * resource.getpagesize() + _MEMORY + memory)
 
 
+class _Limits:
+    # Whether somebody else has set narrower ones, so that what fails at them is no fault of the file.
+    are_foreign = False
+
+
 def _limit(what: int, most: int) -> None:
     hard = resource.getrlimit(what)[1]
-    resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    if hard != resource.RLIM_INFINITY and hard < most:
+        most, _Limits.are_foreign = hard, True
+    resource.setrlimit(what, (most, hard))

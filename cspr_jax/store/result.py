@@ -1,7 +1,6 @@
 """Reading result files: what another process found in one, checked with the schema of what wrote it."""
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,8 @@ from cspr_jax.errors import ConfigError, StoreError, one_line, shown
 from cspr_jax.schema import labelled
 from cspr_jax.schema.motion_quantities import FLIGHT_DIMS, PARTS, SEGMENTS
 from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES
-from cspr_jax.store.isolated import fetch
+from cspr_jax.store.documents import plain_json
+from cspr_jax.store.isolated import Reader
 from cspr_jax.store.seal import DamagedError
 
 if TYPE_CHECKING:
@@ -84,7 +84,8 @@ def open_result(path: Path) -> Result:
         StoreError: no such file, not HDF5, damaged, or not written by this program.
     """
     try:
-        attributes, arrays = fetch(Path(path))
+        with Reader() as reader:
+            attributes, arrays = reader.result(Path(path))
         arrays = dict(sorted(arrays.items()))
         settings = _settings(attributes, path) if "map" in attributes else {}
         _check_robot(attributes, path)
@@ -109,8 +110,8 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
     if max(text.count("[") + text.count("{"), text.count(":")) > _MOST_PARTS:
         raise DamagedError(f"its {name} have more parts than cspr writes")
     try:
-        table = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        table = plain_json(text)
+    except DamagedError as error:
         raise DamagedError(f"its {name} cannot be read: {error}") from error
     if not isinstance(table, dict):
         raise DamagedError(f"its {name} = {shown(table)}: must be a table")

@@ -19,8 +19,9 @@ _STEP = 1 << 20
 _NONE = "it is not whole, or not of cspr"
 
 
-# What a process or system lacks at the moment, or may not do: it says nothing about the file.
-_PASSING = {errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EACCES, errno.EPERM, errno.ESTALE, errno.ETIMEDOUT}
+# What is not there, or is no file. Every other refusal comes from the system or the disk, and says nothing about the
+# file.
+_NO_FILE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.ENAMETOOLONG}
 
 
 class DamagedError(Exception):
@@ -37,9 +38,10 @@ def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
     Returns:
         the error to raise: damage, or a refusal that may pass.
     """
-    if error.errno in _PASSING:
-        return StoreError(one_line(f"{path}: cannot be read: {error.strerror}; mend that and run again"))
-    return DamagedError(f"it cannot be read: {error.strerror or error}")
+    reason = error.strerror or str(error)
+    if error.errno in _NO_FILE:
+        return DamagedError(f"it cannot be read: {reason}")
+    return StoreError(one_line(f"{path}: cannot be read: {reason}; mend that, or remove the file, and run again"))
 
 
 def sealed(data: bytes) -> bytes:
@@ -54,21 +56,16 @@ def sealed(data: bytes) -> bytes:
     return data + _line(hashlib.sha256(data).hexdigest())
 
 
-def unsealed(data: bytes) -> bytes:
-    """Data without their seal.
+def seal_of(data: bytes) -> bytes:
+    """The seal at the end of data.
 
     Args:
         data: as `sealed` gives them.
 
     Returns:
-        the data before the line.
-
-    Raises:
-        DamagedError: there is no seal, or it does not fit.
+        the line, which is equal for equal data alone.
     """
-    content, line = data[:-LENGTH], data[-LENGTH:]
-    _check(line, hashlib.sha256(content).hexdigest())
-    return content
+    return data[-LENGTH:]
 
 
 def seal_file(disk: Disk, file: int, size: int) -> None:
@@ -85,11 +82,12 @@ def seal_file(disk: Disk, file: int, size: int) -> None:
     write_all(disk, file, _line(_hash(file, size)), size)
 
 
-def open_regular(path: Path) -> int:
+def open_regular(path: Path, *, follow: bool = True) -> int:
     """Open a file for reading, and only a file: a pipe would keep its reader waiting.
 
     Args:
-        path: the file, or a link to one.
+        path: the file.
+        follow: whether it may be a link to one, as a user may name it; nothing in a run directory is a link.
 
     Returns:
         a descriptor.
@@ -100,9 +98,10 @@ def open_regular(path: Path) -> int:
     """
     try:
         # Opening a device can do something to it, so it is looked at before, and again against a change between.
-        if not stat.S_ISREG(os.stat(path).st_mode):
+        if not stat.S_ISREG(os.stat(path, follow_symlinks=follow).st_mode):
             raise DamagedError("it is not a file")
-        file = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY)
+        how = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY | (0 if follow else os.O_NOFOLLOW)
+        file = os.open(path, how)
     except ValueError as error:  # a name with a null byte
         raise DamagedError(f"it cannot be read: {error}") from error
     except OSError as error:
@@ -113,20 +112,29 @@ def open_regular(path: Path) -> int:
     return file
 
 
-def check_file(path: Path) -> None:
-    """Compare a file with its seal.
+def read_regular(path: Path, most: int, *, last: bool = False) -> bytes:
+    """Content of a file of a run directory, which is no link.
 
     Args:
         path: the file.
+        most: bytes that it may have.
+        last: whether only so many of its last bytes are read, of however many.
+
+    Returns:
+        the bytes.
 
     Raises:
-        DamagedError: it is no regular file, cannot be read, has no seal, or one that does not fit.
-        StoreError: the system refuses to read anything at the moment.
+        DamagedError: it is no regular file, or a larger one.
+        StoreError: the system or the disk refuses.
     """
-    file = open_regular(path)
+    file = open_regular(path, follow=False)
     try:
-        check_mark(path, file)
-        check_open(path, file)
+        size = os.fstat(file).st_size
+        if size > most and not last:
+            raise DamagedError("it is not a file of a fitting size")
+        return _bytes_of(file, min(size, most), max(size - most, 0))
+    except OSError as error:
+        raise unreadable(path, error) from error
     finally:
         os.close(file)
 
@@ -150,12 +158,15 @@ def check_mark(path: Path, file: int) -> None:
         raise DamagedError(_NONE)
 
 
-def check_open(path: Path, file: int) -> None:
+def check_open(path: Path, file: int) -> bytes:
     """Compare an open file with its seal.
 
     Args:
         path: named in errors.
         file: descriptor.
+
+    Returns:
+        the seal, which is equal for equal files alone.
 
     Raises:
         DamagedError: it cannot be read, has no seal, or one that does not fit.
@@ -163,9 +174,11 @@ def check_open(path: Path, file: int) -> None:
     """
     try:
         size = os.fstat(file).st_size - LENGTH
-        _check(os.pread(file, LENGTH, max(size, 0)), _hash(file, size))
+        line = os.pread(file, LENGTH, max(size, 0))
+        _check(line, _hash(file, size))
     except OSError as error:
         raise unreadable(path, error) from error
+    return line
 
 
 def _line(digest: str) -> bytes:
@@ -188,3 +201,11 @@ def _hash(file: int, size: int) -> str:
         total.update(data)
         place += len(data)
     return total.hexdigest()
+
+
+def _bytes_of(file: int, size: int, place: int) -> bytes:
+    parts = []
+    while size > 0 and (data := os.pread(file, min(_STEP, size), place)):
+        parts.append(data)
+        size, place = size - len(data), place + len(data)
+    return b"".join(parts)

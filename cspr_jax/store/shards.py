@@ -3,19 +3,22 @@
 import dataclasses
 import hashlib
 import io
-import json
-from collections.abc import Iterable
+import math
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
 
+from cspr_jax.errors import one_line
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantity import EARLIER
 from cspr_jax.store import guard
-from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, file_size, new_dataset, reason
-from cspr_jax.store.seal import DamagedError, sealed, unreadable, unsealed
+from cspr_jax.store.documents import Header, document, plain_json
+from cspr_jax.store.guard import Found
+from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, new_dataset, reason
+from cspr_jax.store.seal import DamagedError, sealed
 
 LARGEST_SHARD = 64 << 20
 
@@ -101,80 +104,71 @@ def _header(layout: Layout, shard: Shard) -> dict[str, Any]:
     return {"identity": layout.identity, "tile": shard.index, **of_shard}
 
 
-def read_shard(path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -> Shard:
-    """A shard, checked in every respect.
+def decode(
+    place: Path | BinaryIO,
+    layout: Layout,
+    index: int,
+    shape: tuple[int, ...],
+    begun: Callable[[Iterable[Found]], None] = lambda _: None,
+) -> Shard:
+    """A shard, checked in every respect but its seal.
 
     Args:
-        path: the file.
+        place: the file, or what it holds. HDF5 may fail or hang on one that this process has not written itself:
+            `store.isolated` reads it elsewhere.
         layout: of the run.
         index: of the tile that it must hold.
         shape: of the tile.
+        begun: called with all datasets before they are read.
 
     Returns:
         its content.
 
     Raises:
         DamagedError: it is anything else.
-        StoreError: the system refuses to read anything at the moment.
     """
-    file, header = _opened(path)
-    with file:
-        if header["identity"] != layout.identity:
-            raise DamagedError("it belongs to another sweep")
-        if header["tile"] != index:
-            raise DamagedError(f"it holds tile {header['tile']}")
-        try:
+    kinds = {name: dtype_of(name, layout.dtype) for name in layout.store}
+    try:
+        with h5py.File(place, "r") as file:
+            header = header_of(file)
+            if header.identity != layout.identity:
+                raise DamagedError("it belongs to another sweep")
+            if header.tile != index:
+                raise DamagedError(f"it holds tile {header.tile}")
             if set(file) != set(layout.store):
                 raise DamagedError("it holds other quantities")
             datasets = guard.datasets(file, layout.store)
-            kinds = {name: dtype_of(name, layout.dtype) for name in layout.store}
             if any(one.dtype not in (kinds[name], *EARLIER.get(kinds[name], ())) for name, one in datasets.items()):
                 raise DamagedError("it holds other types")
             if any(one.shape != shape for one in datasets.values()):
                 raise DamagedError("it holds a tile of another shape")
+            begun(datasets.values())
             values = {name: one.values() for name, one in datasets.items()}
             written = file.attrs["content_sha256"]
-        except UNREADABLE as error:
-            raise DamagedError(f"HDF5 cannot read it: {reason(error)}") from error
+    except UNREADABLE as error:
+        raise DamagedError(one_line(f"HDF5 cannot read it: {reason(error)}")) from error
     # Of the types in which it was written.
-    if digest_of(values) != written:
+    if not isinstance(written, str) or digest_of(values) != written:
         raise DamagedError("its content has changed")
+    if max(header.near_zero, header.undecided or 0) > math.prod(shape):
+        raise DamagedError("it counts more cells than it has")
     values = {name: array.astype(kinds[name], copy=False) for name, array in values.items()}
-    return Shard(index, str(header["environment"]), int(header["near_zero"]), values, header.get("undecided"))
+    return Shard(index, header.environment, header.near_zero, values, header.undecided)
 
 
-def owners(paths: Iterable[Path]) -> set[tuple[str, str]]:
-    """Whose shards these are.
+def header_of(file: h5py.File) -> Header:
+    """Header of a shard.
 
     Args:
-        paths: of the shards; damaged ones are passed over.
+        file: open.
 
     Returns:
-        the identities of their sweeps, each with the hash of an environment.
+        what it says.
+
+    Raises:
+        DamagedError: it is no header of a shard.
     """
-    identities = set()
-    for path in paths:
-        try:
-            file, header = _opened(path)
-        except DamagedError:
-            continue
-        file.close()
-        identities.add((str(header["identity"]), str(header["environment"])))
-    return identities
-
-
-def _opened(path: Path) -> tuple[h5py.File, dict[str, Any]]:
-    if not 0 <= file_size(path) <= LARGEST_SHARD:
-        raise DamagedError("it is not a file of a fitting size")
-    try:
-        data = unsealed(path.read_bytes())
-    except OSError as error:
-        raise unreadable(path, error) from error
-    try:
-        file = h5py.File(io.BytesIO(data), "r")
-        header = json.loads(file.attrs["header"])
-        if not {"identity", "tile", "environment", "near_zero"} <= header.keys():
-            raise DamagedError("its header is not whole")
-    except UNREADABLE as error:
-        raise DamagedError(f"HDF5 cannot read it: {reason(error)}") from error
-    return file, header
+    text = file.attrs.get("header")
+    if not isinstance(text, str):
+        raise DamagedError("it has no header")
+    return document(Header, plain_json(text), "its header")

@@ -1,25 +1,28 @@
 """Whose a run directory is, and what may go on in it."""
 
+import contextlib
 import os
 from pathlib import Path
 from typing import Any
 
 from cspr_jax.errors import RefusedError, one_line
 from cspr_jax.schema.identity import differences, digest
-from cspr_jax.store.consolidation import read_content
+from cspr_jax.store.consolidation import Content
+from cspr_jax.store.documents import Record
 from cspr_jax.store.folder import RunFolder
-from cspr_jax.store.record import Record, read_record, write_record
+from cspr_jax.store.isolated import Reader
+from cspr_jax.store.record import read_record, write_record
 from cspr_jax.store.seal import DamagedError
-from cspr_jax.store.shards import owners
 from cspr_jax.sweep.definition import Sweep
 
 
-def refuse_other_sweep(sweep: Sweep, folder: RunFolder) -> None:
+def refuse_other_sweep(sweep: Sweep, folder: RunFolder, reader: Reader) -> None:
     """Refuse a directory that belongs to another sweep.
 
     Args:
         sweep: the sweep.
         folder: the directory.
+        reader: of its files.
 
     Raises:
         RefusedError: with a line for each key that differs.
@@ -31,28 +34,26 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder) -> None:
         return
     # Without a record that can be believed, shards and results say whose they are.
     for path in sorted(folder.path.glob("*.h5")):
-        try:
-            content = read_content(path)
-        except DamagedError:
-            continue
-        if content.identity != sweep.identity:
+        content = content_at(path, reader)
+        if isinstance(content, Content) and content.identity != sweep.identity:
             raise RefusedError(differing(sweep, folder, content.settings))
-    if {identity for identity, _ in owners(folder.shard_names())} - {sweep.identity}:
+    if {identity for identity, _ in _owners(folder, reader)} - {sweep.identity}:
         raise RefusedError(one_line(f"{folder.path}: holds shards of another sweep: choose another -o"))
 
 
-def refuse_strangers(folder: RunFolder) -> None:
+def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
     """Refuse a directory where somebody else keeps files under the names of a run.
 
     A run makes its lock before anything else, so that where it is, a file that is not whole is a damaged one.
 
     Args:
         folder: the directory.
+        reader: of its files.
 
     Raises:
         RefusedError: names the file.
     """
-    if folder.lock.exists() or _record(folder.record) is not None or owners(folder.shard_names()):
+    if folder.lock.exists() or _record(folder.record) is not None or _owners(folder, reader):
         return
     inside = sorted(folder.shards.iterdir()) if folder.shards.is_dir() else [folder.shards]
     if strangers := [path for path in (folder.record, *inside) if os.path.lexists(path)]:
@@ -74,13 +75,14 @@ def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> str:
     return "\n".join(one_line(f"{folder.path}: {line}: must be equal, or another -o") for line in lines)
 
 
-def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], accept: bool) -> None:
+def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], accept: bool, reader: Reader) -> None:
     """Refuse to go on with another program, library or machine than began.
 
     Args:
         folder: the directory.
         environment: what computes now.
         accept: whether it may be mixed in.
+        reader: of its files.
 
     Raises:
         RefusedError: with a line for each key that differs.
@@ -90,7 +92,7 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
         return
     advice = "--accept-environment-change mixes them, another -o starts anew"
     if record is None:
-        if {theirs for _, theirs in owners(folder.shard_names())} - {digest(environment)}:
+        if {theirs for _, theirs in _owners(folder, reader)} - {digest(environment)}:
             raise RefusedError(one_line(f"{folder.path}: its shards were computed in another environment: {advice}"))
         return
     lines = differences(environment, record.environment)
@@ -151,7 +153,7 @@ def own_record(sweep: Sweep, folder: RunFolder, environment: dict[str, Any], com
     if present is not None:
         return present
     source = {"file": sweep.file.name, "text": sweep.text, "command": list(command)}
-    record = Record(sweep.identity, sweep.settings, environment, source)
+    record = Record(identity=sweep.identity, settings=sweep.settings, environment=environment, source=source)
     write_record(folder.disk, folder.record, record)
     return record
 
@@ -162,3 +164,32 @@ def _record(path: Path) -> Record | None:
         return read_record(path)
     except DamagedError:
         return None
+
+
+def content_at(path: Path, reader: Reader) -> Content | str:
+    """Content of a result in a run directory.
+
+    Args:
+        path: its name.
+        reader: of the directory's files.
+
+    Returns:
+        what it holds, or what is wrong with it.
+
+    Raises:
+        StoreError: the system refuses to read anything at the moment.
+    """
+    try:
+        return reader.content(path) or "it is a motion"
+    except DamagedError as error:
+        return str(error)
+
+
+def _owners(folder: RunFolder, reader: Reader) -> set[tuple[str, str]]:
+    # Identities of sweeps, each with the hash of an environment; damaged shards are passed over.
+    owners = set()
+    for path in folder.shard_names():
+        with contextlib.suppress(DamagedError):
+            header = reader.header(path)
+            owners.add((header.identity, header.environment))
+    return owners

@@ -13,13 +13,14 @@ from pathlib import Path
 
 from cspr_jax.errors import ExitCode, RefusedError, StoppedError, StoreError, one_line
 from cspr_jax.schema.identity import canonical_json, digest
-from cspr_jax.store.consolidation import consolidate, read_content
+from cspr_jax.store.consolidation import Content, consolidate
 from cspr_jax.store.disk import Disk
+from cspr_jax.store.documents import Record
 from cspr_jax.store.folder import RunFolder
+from cspr_jax.store.isolated import Reader
 from cspr_jax.store.publishing import make_folders, publish, refusal
-from cspr_jax.store.record import Record
-from cspr_jax.store.seal import DamagedError
-from cspr_jax.store.shards import Shard, encode, read_shard
+from cspr_jax.store.seal import DamagedError, seal_of
+from cspr_jax.store.shards import Shard, encode
 from cspr_jax.sweep import claims
 from cspr_jax.sweep.definition import Sweep, attributes, check_room
 from cspr_jax.sweep.signals import Stop
@@ -93,7 +94,7 @@ class Run:
         """Nothing is touched yet."""
         self._sweep, self._disk = sweep, disk or Disk()
         self._options, self._hooks = options or Options(), hooks or Hooks()
-        self._folder = RunFolder(directory, sweep.name, self._disk)
+        self._folder, self._reader = RunFolder(directory, sweep.name, self._disk), Reader()
         self._tiling = sweep.grid.tiling
 
     def finished(self) -> Path | None:
@@ -106,14 +107,14 @@ class Run:
             RefusedError: the directory, or the result in it, belongs to another sweep.
             StoreError: the disk refuses to remove shards.
         """
-        claims.refuse_other_sweep(self._sweep, self._folder)
-        if not self._folder.result.exists():
-            return None
-        try:
-            content = read_content(self._folder.result)
-        except DamagedError as error:
+        with self._reader:
+            claims.refuse_other_sweep(self._sweep, self._folder, self._reader)
+            if not self._folder.result.exists():
+                return None
+            content = claims.content_at(self._folder.result, self._reader)
+        if not isinstance(content, Content):
             if not (self._folder.record.exists() or self._folder.shards.is_dir()):
-                raise RefusedError(f"{self._folder.result}: is there, and {error}: choose another -o") from error
+                raise RefusedError(one_line(f"{self._folder.result}: is there, and {content}: choose another -o"))
             return None
         if content.identity != self._sweep.identity:
             raise RefusedError(claims.differing(self._sweep, self._folder, content.settings))
@@ -137,16 +138,20 @@ class Run:
             StoreError: the disk or the folder refuses.
             StoppedError: asked to stop; what was finished is kept.
         """
-        claims.refuse_strangers(self._folder)
+        with self._reader:
+            return self._go(executor)
+
+    def _go(self, executor: Executor) -> Outcome:
+        claims.refuse_strangers(self._folder, self._reader)
         check_room(self._sweep, self._folder.path, len(self._folder.shard_names()) / len(self._tiling))
         environment, accept = executor.environment(), self._options.accept_environment_change
-        claims.refuse_other_environment(self._folder, environment, accept)  # before anything is made
+        claims.refuse_other_environment(self._folder, environment, accept, self._reader)  # before anything is made
         self._folder.make()
         with self._folder.locked():
-            claims.refuse_other_sweep(self._sweep, self._folder)
+            claims.refuse_other_sweep(self._sweep, self._folder, self._reader)
             if (reason := claims.damage(self._folder.record)) is not None:
                 self._quarantine(self._folder.record, reason)
-            claims.refuse_other_environment(self._folder, environment, accept)
+            claims.refuse_other_environment(self._folder, environment, accept, self._reader)
             self._folder.sweep_leftovers()
             record = claims.own_record(self._sweep, self._folder, environment, self._options.command)
             if self._is_whole():  # another process finished it meanwhile
@@ -171,7 +176,7 @@ class Run:
         self._hooks.warn(one_line(f"{path}: {reason}: moved to {target} and made again"))
 
     def _read(self, index: int) -> Shard:
-        return read_shard(self._folder.shard(index), self._sweep.layout, index, self._tiling.extent(index))
+        return self._reader.shard(self._folder.shard(index), self._sweep.layout, index, self._tiling.extent(index))
 
     def _verified(self, environment: str) -> list[int]:
         # Tiles whose shard is there and is what was written; anything else under their names is set aside.
@@ -200,7 +205,10 @@ class Run:
                 if not self._options.accept_environment_change:
                     claims.refuse_worker(record.environment, computed.environment)
                 index = computed.shard.index
-                publish(self._disk, self._folder.shard(index), encode(self._sweep.layout, computed.shard))
+                data = encode(self._sweep.layout, computed.shard)
+                self._folder.check_held()
+                publish(self._disk, self._folder.shard(index), data)
+                self._reader.known.add(seal_of(data))
                 finished.add(index)
                 done += self._cells(index)
                 self._folder.note("tile", index=index)
@@ -234,6 +242,7 @@ class Run:
         shards = (self._read(index) for index in range(len(self._tiling)))
 
         def between() -> None:
+            self._folder.check_held()
             if self._hooks.stop:
                 self._stopped(len(self._tiling))
 
@@ -245,12 +254,11 @@ class Run:
             ) from error
 
     def _is_whole(self) -> bool:
-        try:
-            return read_content(self._folder.result).identity == self._sweep.identity
-        except DamagedError:
-            return False
+        content = claims.content_at(self._folder.result, self._reader)
+        return isinstance(content, Content) and content.identity == self._sweep.identity
 
     def _prune(self) -> None:
+        self._folder.check_held()
         for path in self._folder.shard_names():
             try:
                 if path.is_file():

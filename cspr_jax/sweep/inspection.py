@@ -1,21 +1,24 @@
 """Content of a run directory: looked at without the lock, and without writing anything."""
 
-import json
+import functools
+import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cspr_jax.errors import StoreError, one_line
-from cspr_jax.schema.tiles import Tiling
+from cspr_jax.store.consolidation import Content
 from cspr_jax.store.disk import Disk
+from cspr_jax.store.documents import Entry, Record, Settings, document, plain_json
 from cspr_jax.store.folder import RunFolder
-from cspr_jax.store.isolated import content
+from cspr_jax.store.isolated import Reader
 from cspr_jax.store.netcdf import file_size
-from cspr_jax.store.record import Record, read_record
+from cspr_jax.store.record import read_record
 from cspr_jax.store.result import open_result
-from cspr_jax.store.seal import DamagedError
-from cspr_jax.store.shards import Layout, read_shard
+from cspr_jax.store.seal import DamagedError, read_regular
+from cspr_jax.store.shards import Layout
 
 LOG_TAIL = 1 << 16
 
@@ -34,17 +37,17 @@ def status(directory: Path) -> dict[str, Any]:
     """
     record = _record(directory)
     folder = _folder(directory, record)
-    tiles = len(_tiling(record))
+    tiles = len(_settings(record).tiling)
     return {
         "schema": 1,
         "directory": str(directory),
-        "sweep": record.source.get("file"),
+        "sweep": record.source["file"],
         "identity": record.identity,
         "tiles": tiles,
-        "shards": sum(1 for index in range(tiles) if folder.shard(index).is_file()),
+        "shards": sum(1 for index in range(tiles) if file_size(folder.shard(index)) >= 0),
         "quarantined": len(list(folder.quarantine.glob("*"))),
-        "unfinished": len(list(directory.glob(".*.part"))) + len(list(folder.shards.glob(".*.part"))),
-        "result": str(folder.result) if folder.result.is_file() else None,
+        "unfinished": len(folder.leftovers()),
+        "result": str(folder.result) if file_size(folder.result) >= 0 else None,
         "last": _last(folder.log),
     }
 
@@ -65,26 +68,36 @@ def verify(path: Path) -> dict[str, Any]:
         # A link that a user names is followed.
         return _verify_file(path, {"schema": 1, "path": str(path), "faults": []})
     record = _record(path)
-    folder = _folder(path, record)
-    report: dict[str, Any] = {"schema": 1, "path": str(path), "tiles": 0, "shards": 0, "missing": 0, "faults": []}
-    tiling = _tiling(record)
+    folder, tiling = _folder(path, record), _settings(record).tiling
+    report: dict[str, Any] = {"schema": 1, "path": str(path), "tiles": len(tiling), "shards": 0, "missing": 0}
+    report |= {"faults": [], "unreadable": []}
     run = record.settings["run"]
     layout = Layout(record.identity, list(run["store"]), run["dtype"])
-    report["tiles"] = len(tiling)
-    for index in range(len(tiling)):
-        place = folder.shard(index)
-        if not place.exists():
-            report["missing"] += 1
-            continue
-        try:
-            read_shard(place, layout, index, tiling.extent(index))
-            report["shards"] += 1
-        except DamagedError as error:
-            report["faults"].append(one_line(f"{place}: {error}"))
-    if folder.result.exists():
-        # Shards may have been pruned: the result stands for them.
-        _verify_result(folder.result, record, report)
+    with Reader() as reader:
+        for index in range(len(tiling)):
+            place = folder.shard(index)
+            if not os.path.lexists(place):
+                report["missing"] += 1
+            elif _is_read(report, place, functools.partial(reader.shard, place, layout, index, tiling.extent(index))):
+                report["shards"] += 1
+        if os.path.lexists(folder.result):
+            # Shards may have been pruned: the result stands for them.
+            report["result"] = str(folder.result)
+            _is_read(report, folder.result, lambda: _count_result(folder.result, record, report, reader))
     return report
+
+
+def _is_read(report: dict[str, Any], path: Path, read: Callable[[], object]) -> bool:
+    # What is damaged is a fault; what the system or the disk refuses to read may be whole.
+    try:
+        read()
+    except DamagedError as error:
+        report["faults"].append(one_line(f"{path}: {error}"))
+        return False
+    except StoreError as error:
+        report["unreadable"].append(one_line(str(error)))
+        return False
+    return True
 
 
 def result_in(directory: Path) -> Path:
@@ -107,7 +120,8 @@ def result_in(directory: Path) -> Path:
 
 def _verify_file(path: Path, report: dict[str, Any]) -> dict[str, Any]:
     try:
-        inside = content(path)
+        with Reader() as reader:
+            inside = reader.content(path, follow=True)
     except DamagedError as error:
         return report | {"result": str(path), "faults": [one_line(f"{path}: {error}")]}
     if inside is not None:
@@ -127,27 +141,20 @@ def _verify_file(path: Path, report: dict[str, Any]) -> dict[str, Any]:
     return report | {"motion": str(path)} | {key: value for key, value in counts.items() if value is not None}
 
 
-def _verify_result(path: Path, record: Record, report: dict[str, Any]) -> None:
-    report["result"] = str(path)
-    try:
-        if file_size(path) < 0:
-            raise DamagedError("it is not a file")
-        inside = content(path)
-        if inside is None or inside["identity"] != record.identity:
-            raise DamagedError("it belongs to another sweep")
-    except DamagedError as error:
-        report["faults"].append(one_line(f"{path}: {error}"))
-    else:
-        report |= {key: value for key, value in _counts(inside).items() if key not in report}
+def _count_result(path: Path, record: Record, report: dict[str, Any], reader: Reader) -> None:
+    inside = reader.content(path)
+    if inside is None or inside.identity != record.identity:
+        raise DamagedError("it belongs to another sweep")
+    report |= {key: value for key, value in _counts(inside).items() if key not in report}
 
 
-def _counts(inside: dict[str, Any]) -> dict[str, Any]:
+def _counts(inside: Content) -> dict[str, Any]:
     counts = {
-        "cells": inside["cells"],
-        "cells_near_zero": inside["near_zero"],
-        "mixed": inside["mixed"],
-        "tiles": inside["tiles"],
-        "proved": inside["proved"],
+        "cells": inside.cells,
+        "cells_near_zero": inside.near_zero,
+        "mixed": inside.mixed,
+        "tiles": inside.tiles,
+        "proved": inside.proved,
     }
     return {name: count for name, count in counts.items() if count is not None}
 
@@ -164,29 +171,22 @@ def _record(directory: Path) -> Record:
 
 
 def _folder(directory: Path, record: Record) -> RunFolder:
-    return RunFolder(directory, Path(str(record.source.get("file", "result.toml"))).stem, Disk())
+    return RunFolder(directory, Path(record.source["file"]).stem, Disk())
 
 
-def _tiling(record: Record) -> Tiling:
-    # From the settings alone: an axis is a range with a count, or a list.
-    axes = record.settings["axes"]
-    counts = [len(a) if isinstance(a, list) else a["count"] for a in (axes[d] for d in record.settings["dimensions"])]
-    return Tiling(tuple(counts), tuple(record.settings["run"]["tile"]))
+def _settings(record: Record) -> Settings:
+    return document(Settings, record.settings, "its settings")
 
 
 def _last(log: Path) -> dict[str, Any] | None:
     # The last line of the log that is whole.
     try:
-        with open(log, "rb") as file:
-            file.seek(max(0, log.stat().st_size - LOG_TAIL))
-            lines = file.read().splitlines()
-    except OSError:
-        return None
+        lines = read_regular(log, LOG_TAIL, last=True).splitlines()
+    except (DamagedError, StoreError):
+        return None  # nothing depends on it
     for line in reversed(lines):
         try:
-            entry = json.loads(line)
-        except ValueError:
+            return document(Entry, plain_json(line), "its log").model_dump()
+        except DamagedError:
             continue
-        if isinstance(entry, dict):
-            return entry
     return None

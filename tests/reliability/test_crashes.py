@@ -4,11 +4,18 @@ import itertools
 import shutil
 
 import pytest
+from support.reading import read_here
 
 from cspr_jax.errors import ExitCode, StoreError
 from reliability.support import FAULTS, STORE, Crash, FaultyDisk, Paper, check_prefix, check_same, content, go, sweep_of
 
 CRASHES = ("before", "half", "after", "power")
+
+
+@pytest.fixture(autouse=True)
+def read_in_this_process(monkeypatch):
+    """How files are read is what test_isolation.py is about."""
+    read_here(monkeypatch)
 
 
 @pytest.fixture(scope="module")

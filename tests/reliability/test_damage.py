@@ -4,15 +4,22 @@ import errno
 import json
 import os
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
+from support.commands import cspr
+from support.reading import read_here
 
 from cspr_jax.cli import main
 from cspr_jax.errors import CsprError, RefusedError, StoreError
 from cspr_jax.sweep.inspection import verify
 from reliability.support import Paper, check_same, content, go, sweep_of
+
+
+@pytest.fixture(autouse=True)
+def read_in_this_process(monkeypatch):
+    """How files are read is what test_isolation.py is about."""
+    read_here(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -206,23 +213,29 @@ def test_other_names_among_the_shards_are_left_alone(finished, tmp_path):
     check_same(tmp_path / "run", reference)
 
 
-def test_a_refusal_to_read_is_no_damage(finished, tmp_path, monkeypatch):
-    """Too many open files, say: nothing is set aside, and the next run goes on."""
+@pytest.mark.parametrize("code", [errno.EMFILE, errno.EIO, errno.ENOLCK])
+@pytest.mark.parametrize("call", ["open", "pread"])
+def test_a_refusal_to_read_is_no_damage(finished, tmp_path, monkeypatch, call, code):
+    """Too many open files, a disk that fails, say: nothing is set aside, and the next run goes on."""
     sweep, source, reference = finished
     shutil.copytree(source, tmp_path / "run")
     (tmp_path / "run" / "small.h5").unlink()
     before = content(tmp_path / "run")
-    read_bytes = Path.read_bytes
+    usual, shard, words = getattr(os, call), tmp_path / "run" / "shards" / "00002.h5", os.strerror(code)
 
-    def refuse(path):
-        if path.name == "00002.h5":
-            raise OSError(errno.EMFILE, "Too many open files", str(path))
-        return read_bytes(path)
+    def refuse(place, *arguments):
+        there = os.fstat(place) if isinstance(place, int) else os.lstat(place) if os.path.lexists(place) else None
+        if there is not None and os.path.samestat(there, os.lstat(shard)):
+            raise OSError(code, words)
+        return usual(place, *arguments)
 
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "read_bytes", refuse)
-        with pytest.raises(StoreError, match=r"00002\.h5: cannot be read: Too many open files"):
+        patch.setattr(os, call, refuse)
+        with pytest.raises(StoreError, match=rf"00002\.h5: cannot be read: {words}"):
             go(sweep, tmp_path / "run")
+        found = verify(tmp_path / "run")
+        assert (found["shards"], found["faults"], len(found["unreadable"])) == (3, [], 1)
+        assert words in cspr("verify", tmp_path / "run")[2] and cspr("verify", tmp_path / "run")[0] == 4
     assert content(tmp_path / "run").keys() >= before.keys() and not (tmp_path / "run" / "quarantine").exists()
     go(sweep, tmp_path / "run")
     check_same(tmp_path / "run", reference)

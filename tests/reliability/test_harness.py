@@ -1,6 +1,7 @@
 """The harness is alive: with any one safeguard taken out, a test of this folder fails."""
 
 import hashlib
+import os
 import signal
 import time
 
@@ -32,6 +33,7 @@ def without_folder_sync(monkeypatch):
 def without_replace(monkeypatch):
     """Files are written where they shall stand."""
     monkeypatch.setattr(publishing, "part_of", lambda path: path)
+    monkeypatch.setattr(Disk, "create", lambda self, path, mode=0o644: os.open(path, os.O_RDWR | os.O_CREAT, mode))
     for kind in (Disk, support.FaultyDisk):
         monkeypatch.setattr(kind, "replace", lambda self, part, path: None)
 

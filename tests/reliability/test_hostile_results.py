@@ -385,17 +385,19 @@ def test_mutations_all(tmp_path):
 
 
 def test_a_process_that_fails_says_so(tmp_path, monkeypatch):
-    """That reads a file: killed, without end, without an interpreter."""
+    """That reads a file: killed, without end, without an interpreter; before it has begun, the file had no part."""
     path = forged(tmp_path / "map.h5", a_map)
-    for code, words in (
-        ("import os; os.kill(os.getpid(), 11)", "HDF5 fails on it"),
-        ("import os; os.kill(os.getpid(), 9)", "was killed"),
-        ("raise SystemExit(7)", "exit code 7"),
+    usual, instead = isolated._CODE, "import cspr_jax.store.reader as r, os\nr.answer = lambda *a: {}\nserve()"
+    for end, words, at_first in (
+        ("os.kill(os.getpid(), 11)", "cannot be read as a result: HDF5 fails on it", "did not start: exit code -11"),
+        ("os.kill(os.getpid(), 9)", "was killed: signal 9", "did not start: exit code -9"),
+        ("os._exit(7)", "exit code 7", "did not start: exit code 7"),
     ):
-        with monkeypatch.context() as patch:
-            patch.setattr(isolated, "_CODE", code)
-            with pytest.raises(StoreError, match=words):
-                cspr_jax.open_result(path)
+        for code, line in ((usual.replace("serve()", instead.format(end)), words), (f"import os; {end}", at_first)):
+            with monkeypatch.context() as patch:
+                patch.setattr(isolated, "_CODE", code)
+                with pytest.raises(StoreError, match=line):
+                    cspr_jax.open_result(path)
     monkeypatch.setattr(sys, "executable", str(tmp_path / "none"))
     with pytest.raises(StoreError, match="no process could be started"):
         cspr_jax.open_result(path)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule, run_state_machine_as_test
+from support.reading import read_here
 
 from cspr_jax.errors import RefusedError, StoppedError, StoreError
 from cspr_jax.sweep.inspection import status, verify
@@ -180,6 +181,12 @@ class RunDirectory(RuleBasedStateMachine):
         found = {k: v for k, v in content(self.directory).items() if not k.startswith("quarantine")}
         for name, data in found.items():
             assert name.endswith(".part") or data == self.reference[name], name
+
+
+@pytest.fixture(autouse=True)
+def read_in_this_process(monkeypatch):
+    """How files are read is what test_isolation.py is about."""
+    read_here(monkeypatch)
 
 
 def check(tmp_path_factory, examples, steps):

@@ -1,0 +1,241 @@
+"""JSON that a run directory holds: its record, the lines of its log, the headers of its shards; one schema for all.
+
+Anybody can write a text with a right checksum. What is read here is of known types and sizes, so that whoever uses it
+needs no look of their own.
+"""
+
+import json
+import math
+import os
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic.functional_validators import PlainValidator
+
+from cspr_jax.errors import one_line
+from cspr_jax.schema.identity import FORMAT_VERSION, digest
+from cspr_jax.schema.tiles import LARGEST_TILE, Tiling
+from cspr_jax.store.guard import LARGEST_CHUNKS, LARGEST_RANK
+from cspr_jax.store.seal import DamagedError
+
+# Settings nest some six deep; what walks through them may call itself.
+DEEPEST = 32
+LONGEST_NAME = 255
+_LARGEST_COUNT = 10_000_000
+_LARGEST_CELLS = 1 << 46
+
+Known = TypeVar("Known", bound="Document")
+
+
+class Document(BaseModel):
+    """A JSON object: keys of known types, numbers finite; keys that a later version adds are passed over."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def _text(value: Any) -> str:
+    # pydantic's own type refuses names of files that are not UTF-8.
+    if not isinstance(value, str):
+        raise ValueError("must be a text")
+    return value
+
+
+def _file_name(value: Any) -> str:
+    name = _text(value)
+    if name in ("", ".", "..") or "/" in name or "\0" in name or len(os.fsencode(name)) > LONGEST_NAME:
+        raise ValueError("must be the name of a file")
+    return name
+
+
+Text = Annotated[str, PlainValidator(_text)]
+FileName = Annotated[str, PlainValidator(_file_name)]
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+Count = Annotated[int, Field(ge=0, le=_LARGEST_CELLS)]
+
+
+class Header(Document):
+    """Header of a shard.
+
+    Fields:
+        identity: of the sweep.
+        tile: index of the tile.
+        environment: hash of what computed it.
+        near_zero: cells whose margin lies within 1e-9 of zero.
+        undecided: cells whose answer is not proved; None: the map proves nothing, or an earlier version wrote it.
+    """
+
+    identity: Digest
+    tile: Count
+    environment: Digest
+    near_zero: Count
+    undecided: Count | None = None
+
+
+class Entry(Document):
+    """A line of the log; it may say more.
+
+    Fields:
+        time: of the clock on the wall.
+        event: what happened.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    time: Text
+    event: Text
+
+
+class _Range(Document):
+    count: Annotated[int, Field(ge=1, le=_LARGEST_COUNT)]
+
+
+class _Divisions(Document):
+    divisions: Annotated[int, Field(ge=4, le=128)] = 32
+
+
+class _Run(Document):
+    tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1, max_length=LARGEST_RANK)]
+    store: Annotated[list[Text], Field(min_length=1, max_length=1000)]
+    dtype: Literal["float64", "float32"]
+
+
+class Settings(Document):
+    """The part of resolved settings that says how a run is laid out.
+
+    Fields:
+        axes: those of the sweep file, each a list or a range with a count.
+        dimensions: names of all axes in the order of the result.
+        orientations: of a map over all of them, whose axes follow from their divisions.
+        run: shape of a tile, names of the quantities, and their type.
+    """
+
+    axes: dict[str, _Range | Annotated[list[Any], Field(min_length=1, max_length=_LARGEST_COUNT)]]
+    dimensions: Annotated[list[Text], Field(min_length=1, max_length=LARGEST_RANK)]
+    orientations: _Divisions = _Divisions()
+    run: _Run
+
+    @property
+    def tiling(self) -> Tiling:
+        """Tiles of the grid."""
+        known = {name: axis.count if isinstance(axis, _Range) else len(axis) for name, axis in self.axes.items()}
+        step = self.orientations.divisions
+        counts = {"torsion": 2 * step, "tilt_azimuth": 2 * step, "tilt": step} | known
+        return Tiling(tuple(counts[name] for name in self.dimensions), tuple(self.run.tile))
+
+    @model_validator(mode="after")
+    def _fits(self) -> "Settings":
+        if len({*self.dimensions}) < len(self.dimensions) or len(self.dimensions) != len(self.run.tile):
+            raise ValueError("dimensions and tiles do not fit")
+        try:
+            tiling = self.tiling
+        except KeyError as error:
+            raise ValueError("dimensions must be axes") from error
+        if len(tiling) > LARGEST_CHUNKS or math.prod(tiling.shape) > _LARGEST_CELLS:
+            raise ValueError(f"more than {LARGEST_CHUNKS} tiles")
+        return self
+
+
+class Source(Document):
+    """Where a run comes from; no decision uses it.
+
+    Fields:
+        file: name of the sweep file.
+        text: what it held.
+        command: words of the command.
+    """
+
+    file: FileName
+    text: Text = ""
+    command: list[Text] = []
+
+
+class Record(Document):
+    """Content of run.json, without its checksum.
+
+    Fields:
+        identity: of the sweep.
+        settings: resolved, what the identity is the hash of.
+        environment: what computes.
+        source: name and text of the sweep file, and the command; no decision uses them.
+    """
+
+    identity: Digest
+    settings: dict[str, Any]
+    environment: dict[str, Any]
+    source: dict[str, Any]
+
+    @field_validator("settings")
+    @classmethod
+    def _laid_out(cls, settings: dict[str, Any]) -> dict[str, Any]:
+        Settings.model_validate(settings)
+        return settings
+
+    @field_validator("source")
+    @classmethod
+    def _named(cls, source: dict[str, Any]) -> dict[str, Any]:
+        return Source.model_validate(source).model_dump()
+
+    @model_validator(mode="after")
+    def _is_identity(self) -> "Record":
+        formats = range(1, FORMAT_VERSION + 1)
+        if self.identity not in [digest({"format": version, **self.settings}) for version in formats]:
+            raise ValueError("its settings and its identity do not fit")
+        return self
+
+
+def plain_json(text: str | bytes) -> Any:
+    """JSON of finite numbers that is not nested deeply.
+
+    Args:
+        text: anything.
+
+    Returns:
+        its value.
+
+    Raises:
+        DamagedError: it is not such JSON.
+    """
+    try:
+        value = json.loads(text, parse_constant=_not_finite, parse_float=_finite)
+    except RecursionError as error:
+        raise DamagedError("it is nested too deeply") from error
+    except ValueError as error:
+        raise DamagedError(one_line(f"it is not JSON: {error}")) from error
+    level: list[Any] = [value]
+    for _ in range(DEEPEST):
+        nested = [one for one in level if isinstance(one, dict | list)]
+        if not nested:
+            return value
+        level = [inner for one in nested for inner in (one.values() if isinstance(one, dict) else one)]
+    raise DamagedError("it is nested too deeply")
+
+
+def document(kind: type[Known], value: Any, what: str) -> Known:
+    """JSON as the document that it must be.
+
+    Args:
+        kind: of the document.
+        value: from `plain_json`.
+        what: its name in errors.
+
+    Returns:
+        the document.
+
+    Raises:
+        DamagedError: it is none.
+    """
+    try:
+        return kind.model_validate(value)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        raise DamagedError(one_line(f"{what} is not of cspr: {place or 'it'}: {first['msg']}"[:300])) from error
+
+
+def _not_finite(word: str) -> float:
+    raise ValueError(f"{word} is not a number")
+
+
+def _finite(word: str) -> float:
+    number = float(word)
+    return number if math.isfinite(number) else _not_finite(word)
