@@ -1,8 +1,10 @@
 """Commands about sweeps and their runs: run, status, verify, volume."""
 
 import argparse
+import datetime
 import sys
 from pathlib import Path
+from typing import Any
 
 from cspr_jax.cli.command import (
     Command,
@@ -72,15 +74,29 @@ def _status(options: argparse.Namespace) -> int:
     if options.json:
         print_json(state)
         return ExitCode.DONE
-    last = state["last"] or {}
+    last, share = state["last"] or {}, 100.0 * state["cells_done"] / state["cells"]
+    cells = f"{state['cells_done']:,} of {state['cells']:,} cells, {state['shards']} of {state['tiles']} tiles"
     sys.stdout.write(
         f"{state['directory']}: {one_line(state['sweep'])}, identity {state['identity'][:12]}\n"
-        f"  {state['shards']} of {state['tiles']} tiles as shards, {state['quarantined']} set aside, "
-        f"{state['unfinished']} unfinished\n"
+        f"  {share:.0f} % done: {cells}\n"
+        f"{_pace(state)}"
         f"  result: {state['result'] or 'not yet'}\n"
         f"  last: {one_line(last.get('event', '-'))} at {one_line(last.get('time', '-'))}\n"
     )
     return ExitCode.DONE
+
+
+def _pace(state: dict[str, Any]) -> str:
+    # What only some runs have to say.
+    lines = []
+    if state["cells_per_second"] is not None and state["result"] is None:
+        left = datetime.timedelta(seconds=round(state["seconds_left"]))
+        lines.append(f"{state['cells_per_second']:,.3g} cells/s; at this rate {left} left")
+    if state["quarantined"]:
+        lines.append(f"damaged files moved to quarantine/: {state['quarantined']}")
+    if state["unfinished"]:
+        lines.append(f"half-written files, which the next run removes: {state['unfinished']}")
+    return "".join(f"  {line}\n" for line in lines)
 
 
 def _add_verify(parser: argparse.ArgumentParser) -> None:

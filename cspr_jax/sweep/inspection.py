@@ -1,6 +1,9 @@
 """Content of a run directory: looked at without the lock, and without writing anything."""
 
+import contextlib
+import datetime
 import functools
+import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.errors import StoreError, one_line
+from cspr_jax.schema.tiles import Tiling
 from cspr_jax.store.consolidation import Content
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.documents import Entry, Record, Settings, document, plain_json
@@ -30,25 +34,34 @@ def status(directory: Path) -> dict[str, Any]:
         directory: of the run.
 
     Returns:
-        plain values: "identity", "tiles", "shards", "quarantined", "unfinished", "result", "last" (of log.jsonl).
+        plain values: "identity", "tiles", "shards", "quarantined", "unfinished", "result", "last" (of log.jsonl),
+        "cells", "cells_done", "cells_per_second" and "seconds_left" (None where nothing tells).
 
     Raises:
         StoreError: no run directory.
     """
     record = _record(directory)
     folder = _folder(directory, record)
-    tiles = len(_settings(record).tiling)
+    tiling = _settings(record).tiling
+    there = [index for index in range(len(tiling)) if file_size(folder.shard(index)) >= 0]
+    cells, done = math.prod(tiling.shape), sum(math.prod(tiling.extent(index)) for index in there)
+    result, entries = file_size(folder.result) >= 0, _entries(folder.log)
+    done, rate = cells if result else done, _rate(entries, tiling)
     return {
         "schema": 1,
         "directory": str(directory),
         "sweep": record.source["file"],
         "identity": record.identity,
-        "tiles": tiles,
-        "shards": sum(1 for index in range(tiles) if file_size(folder.shard(index)) >= 0),
+        "tiles": len(tiling),
+        "shards": len(there),
         "quarantined": len(list(folder.quarantine.glob("*"))),
         "unfinished": len(folder.leftovers()),
-        "result": str(folder.result) if file_size(folder.result) >= 0 else None,
-        "last": _last(folder.log),
+        "result": str(folder.result) if result else None,
+        "last": entries[0] if entries else None,
+        "cells": cells,
+        "cells_done": done,
+        "cells_per_second": rate,
+        "seconds_left": (cells - done) / rate if rate else None,
     }
 
 
@@ -178,15 +191,33 @@ def _settings(record: Record) -> Settings:
     return document(Settings, record.settings, "its settings")
 
 
-def _last(log: Path) -> dict[str, Any] | None:
-    # The last line of the log that is whole.
+def _entries(log: Path) -> list[dict[str, Any]]:
+    # The last lines of the log that are whole, the newest first; nothing depends on them.
     try:
         lines = read_regular(log, LOG_TAIL, last=True).splitlines()
     except (DamagedError, StoreError):
-        return None  # nothing depends on it
+        return []
+    entries = []
     for line in reversed(lines):
-        try:
-            return document(Entry, plain_json(line), "its log").model_dump()
-        except DamagedError:
+        with contextlib.suppress(DamagedError):
+            entries.append(document(Entry, plain_json(line), "its log").model_dump())
+    return entries
+
+
+def _rate(entries: list[dict[str, Any]], tiling: Tiling) -> float | None:
+    # Cells a second of the process that wrote last, the newest entry first. Its first tile holds the time of compiling.
+    times, cells = list[datetime.datetime](), 0
+    for entry in entries:
+        if entry["event"] != "tile":
+            if entry["event"] == "started":
+                break
             continue
-    return None
+        index = entry.get("index")
+        if not isinstance(index, int) or not 0 <= index < len(tiling):
+            continue
+        with contextlib.suppress(ValueError):
+            times.append(datetime.datetime.strptime(entry["time"], "%Y-%m-%dT%H:%M:%S%z"))
+            cells += math.prod(tiling.extent(index))
+            first = math.prod(tiling.extent(index))
+    seconds = (times[0] - times[-1]).total_seconds() if times else 0.0
+    return (cells - first) / seconds if seconds > 0.0 else None

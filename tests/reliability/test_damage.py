@@ -10,6 +10,7 @@ import pytest
 from support.commands import cspr
 from support.reading import read_here
 
+import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import CsprError, RefusedError, StoreError
 from cspr_jax.sweep.inspection import verify
@@ -241,6 +242,30 @@ def test_a_refusal_to_read_is_no_damage(finished, tmp_path, monkeypatch, call, c
     check_same(tmp_path / "run", reference)
 
 
+def test_status_tells_the_pace(finished, tmp_path, capsys):
+    """Without the first tile of the last process, which holds the time of compiling, and without broken entries."""
+    _, source, _ = finished
+    shutil.copytree(source, tmp_path / "run")
+    (tmp_path / "run" / "shards" / "00003.h5").unlink()
+    next((tmp_path / "run").glob("*.h5")).unlink()
+    minute = "2026-01-01T00:{:02d}:00+0000"
+    events = [("tile", 9, 3), ("started", 20, None), ("tile", 25, 0), ("tile", 26, 1), ("tile", 28, 2)]
+    lines = [{"time": minute.format(at), "event": event, "index": index} for event, at, index in events]
+    lines += [
+        {"time": "yesterday", "event": "tile", "index": 1},
+        {"time": minute.format(1), "event": "tile", "index": "x"},
+    ]
+    text = "\n".join([*map(json.dumps, lines[:4]), "no entry", *map(json.dumps, lines[4:])])
+    (tmp_path / "run" / "log.jsonl").write_text(text + "\n")
+    state = cspr_jax.status(tmp_path / "run")
+    assert (state["cells"], state["cells_done"]) == (12, 9)
+    assert state["cells_per_second"] == pytest.approx(6 / 180) and state["seconds_left"] == pytest.approx(90)
+    assert main(["status", str(tmp_path / "run")]) == 0
+    out = capsys.readouterr().out
+    assert "75 % done: 9 of 12 cells, 3 of 4 tiles\n  0.0333 cells/s; at this rate 0:01:30 left\n" in out
+    assert "shards" not in out and "set aside" not in out
+
+
 def test_verify_and_status_tell_without_touching(finished, tmp_path, capsys):
     _, source, _ = finished
     shutil.copytree(source, tmp_path / "run")
@@ -261,7 +286,10 @@ def test_verify_and_status_tell_without_touching(finished, tmp_path, capsys):
     assert (found["tiles"], found["shards"], found["unfinished"]) == (4, 3, 1)
     assert found["last"]["event"] == "finished"
     assert main(["status", directory]) == 0
-    assert "3 of 4 tiles" in capsys.readouterr().out
+    assert (
+        "100 % done: 12 of 12 cells, 3 of 4 tiles\n  half-written files, which the next run removes: 1\n"
+        in capsys.readouterr().out
+    )
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "run").rglob("*")} == before
     for command in ("status", "verify"):
         assert main([command, str(tmp_path)]) == 4
