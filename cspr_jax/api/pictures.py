@@ -20,6 +20,7 @@ def plot(  # noqa: PLR0913
     *,
     quantity: str | None = None,
     at: Mapping[str, float] | None = None,
+    best: str | Sequence[str] = (),
     lines: str | None = None,
     envelope: bool = False,
     solid: bool = False,
@@ -37,6 +38,8 @@ def plot(  # noqa: PLR0913
             instant `at` (None: that of the smallest margin); "path_acceleration", over the way along straight lines;
             or "landing", of throws; None: path and tensions over time.
         at: fixed values of axes, within their ranges; the nearest point is taken. Of a motion t, s.
+        best: axes of a map of which each cell shows the best point, such as "z0"; see `Result.best`. Its quantity
+            "best_z0" is that point.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
         solid: whether to draw the boundary of a workspace over x, y and z, with its robot, in three dimensions.
@@ -63,9 +66,22 @@ def plot(  # noqa: PLR0913
 
     def draw() -> Figure:
         given_at = None if at is None else dict(at)
-        return drawn(loaded, names, quantity=quantity, at=given_at, lines=lines, envelope=envelope, solid=solid)
+        shown = [one.best(*names_of(best)) for one in loaded] if best else loaded
+        return drawn(shown, names, quantity=quantity, at=given_at, lines=lines, envelope=envelope, solid=solid)
 
     return finished(draw, names[0], style, output)
+
+
+def names_of(axes: str | Sequence[str]) -> list[str]:
+    """Names of axes that may be given as one.
+
+    Args:
+        axes: one, or several.
+
+    Returns:
+        all of them.
+    """
+    return [axes] if isinstance(axes, str) else list(axes)
 
 
 def finished(draw: Callable[[], Figure], name: str, style: Style, output: str | Path | None) -> Figure:

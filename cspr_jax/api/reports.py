@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.api.pictures import names_of
 from cspr_jax.api.plans import Plan, plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, InputError
@@ -35,6 +36,7 @@ def report(
     trajectories: int = USUAL,
     cells: Sequence[Mapping[str, float]] = (),
     quantity: str | None = None,
+    best: str | Sequence[str] = (),
 ) -> list[str]:
     """Write a page to explore a map, or a plan, in a browser: one file that needs no network.
 
@@ -49,6 +51,7 @@ def report(
         cells: of these the motions are computed, too: coordinates by axis, the nearest point is taken; axes that are
             missing are at their first point.
         quantity: of a map, to show first; None: the one that its kind of map is about.
+        best: axes of a map of which each cell shows the best point, such as "z0", as in `plot`.
 
     Returns:
         warnings, one line each.
@@ -65,9 +68,12 @@ def report(
     try:
         loaded = _loaded(given)
         if isinstance(loaded, Result) and loaded.is_map:
-            title, content, warnings = _of_map(loaded, trajectories, cells, quantity)
-        elif cells or quantity is not None:
-            raise InputError("--cell" if cells else "--quantity", "given", "absent but with a map")
+            shown = loaded.best(*names_of(best))
+            title, content, warnings = _of_map(shown, trajectories, cells, quantity)
+        elif cells or best or quantity is not None:
+            raise InputError(
+                "--cell" if cells else "--best" if best else "--quantity", "given", "absent but with a map"
+            )
         else:
             title, content, warnings = _of_motion(loaded, str(given))
         page = page_of(title, content)
@@ -160,12 +166,13 @@ def _places(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
 
 
 def _words(result: Result, index: tuple[int, ...]) -> str:
-    varying = [(axis, i) for axis, i in zip(result.axes, index, strict=True) if len(result.axes[axis]) > 1]
-    return ", ".join(value(result, axis, result.axes[axis][i]) for axis, i in varying)
+    points = result.axes | {axis: choice.points for axis, choice in result.choices.items()}
+    place = result.place(index)
+    return ", ".join(value(result, axis, place[axis]) for axis, every in points.items() if len(every) > 1)
 
 
 def _cell(result: Result, index: tuple[int, ...]) -> dict[str, Any] | None:
-    place = {axis: float(points[i]) for (axis, points), i in zip(result.axes.items(), index, strict=True)}
+    place = result.place(index)
     values = {name: data[index] for name, data in result.data.items()}
     keys = cell_plan(result.settings, place, values)
     if keys is None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cspr_jax.cli.command import Command, add_all_errors, add_device, add_output, prepare_jax, warn
 from cspr_jax.errors import ConfigError, ExitCode
-from cspr_jax.outputs.plots.options import ACCELERATION, add_plot
+from cspr_jax.outputs.plots.options import ACCELERATION, add_best, add_plot
 from cspr_jax.runtime.progress import waiting
 
 
@@ -21,7 +21,7 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or results[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
-    names = ("quantity", "lines", "envelope", "solid", "size", "dpi", "font_size")
+    names = ("quantity", "best", "lines", "envelope", "solid", "size", "dpi", "font_size")
     with waiting():
         plot(results, at=at, output=output, **{name: getattr(options, name) for name in names})
     sys.stdout.write(f"{output}\n")
@@ -32,6 +32,7 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", type=Path, help="result or run directory, motion of `cspr plan -o`, or plan file")
     add_output(parser, "page: .html (default: beside)", metavar="FILE")
     parser.add_argument("--quantity", help="quantity of a map to show first")
+    add_best(parser)
     parser.add_argument(
         "--trajectories",
         type=int,
@@ -56,7 +57,8 @@ def _report(options: argparse.Namespace) -> int:
         prepare_jax(options, quick=True)
         from cspr_jax.api.reports import report
 
-        warnings = report(given, output, trajectories=options.trajectories, cells=cells, quantity=options.quantity)
+        some = {"trajectories": options.trajectories, "quantity": options.quantity, "best": options.best}
+        warnings = report(given, output, cells=cells, **some)
     for line in warnings:
         warn(line)
     sys.stdout.write(f"{output}\n")

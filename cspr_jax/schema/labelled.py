@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.schema.best import best_of, check_axis
 from cspr_jax.schema.meanings import value_attributes
 from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT_DIMS, PARTS, SEGMENTS
 from cspr_jax.schema.quantities import EVERY, flag_attributes
@@ -105,11 +106,7 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
         ConfigError: xarray is not installed.
     """
     count = len(next(iter(arrays.values())))
-    axes = {name: np.asarray(points) for name, points in ({"target": range(count)} if dims is None else dims).items()}
-    shape = tuple(points.size for points in axes.values())
-    if any(points.ndim != 1 for points in axes.values()) or math.prod(shape) != count:
-        given = {name: list(points.shape) for name, points in axes.items()}
-        raise InputError("dims", given, f"lists of coordinates whose product has {count} points")
+    axes, shape = _shape({"target": range(count)} if dims is None else dims, count)
     numbers = {name: values for name, values in arrays.items() if values.dtype != object}
     both = {"end": ENDS} if any(values.ndim == 2 for values in numbers.values()) else {}
     controls = {"control_point": CONTROL_POINTS, "axis": PARTS["axis"]}
@@ -123,6 +120,15 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
     if "beta_hat" in data and both:
         data["beta_hat"].attrs = {"units": "1", "long_name": "beta-hat"}  # the table's is at the target alone
     return data
+
+
+def _shape(dims: Mapping[str, Any], count: int) -> tuple[dict[str, np.ndarray], tuple[int, ...]]:
+    axes = {name: np.asarray(points) for name, points in dims.items()}
+    shape = tuple(points.size for points in axes.values())
+    if any(points.ndim != 1 for points in axes.values()) or math.prod(shape) != count:
+        given = {name: list(points.shape) for name, points in axes.items()}
+        raise InputError("dims", given, f"lists of coordinates whose product has {count} points")
+    return axes, shape
 
 
 class Columns:
@@ -151,6 +157,26 @@ class Columns:
             ConfigError: xarray is not installed.
         """
         return over(self.arrays(), dims)
+
+    def best(self, axis: str, dims: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """The answers at the best point of one of the dimensions whose product they are, as of a map.
+
+        Args:
+            axis: of `dims`, such as "z0".
+            dims: as for `to_xarray`.
+
+        Returns:
+            the fields over the other dimensions by name, and as "best_z0" the point chosen, NaN where none is feasible;
+            `store.result.Result.best` says which one that is.
+
+        Raises:
+            InputError: dimensions of another number of points, or an axis that is none of them.
+        """
+        arrays = self.arrays()
+        axes, shape = _shape(dims, len(next(iter(arrays.values()))))
+        check_axis(axis, tuple(axes))
+        whole = {name: values.reshape(*shape, *values.shape[1:]) for name, values in arrays.items()}
+        return best_of(whole, axis, axes[axis], list(axes).index(axis)).data
 
 
 def _described(name: str, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:

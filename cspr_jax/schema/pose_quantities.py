@@ -10,6 +10,7 @@ POSES = (
         "Largest distance that tensions which supply all wrenches can keep from their finite limits; negative "
         "outside of the workspace, infinite where nothing bounds it.",
         signed=True,
+        better="larger",
     ),
     Quantity(
         "capacity_margin",
@@ -26,6 +27,7 @@ POSES = (
         "Smallest distance of all checked pairs: of cables without a common point, and of cables and platform "
         "from obstacles and of cables from the platform where the sweep has these; less the cables' thickness.",
         signed=True,
+        better="larger",
     ),
     Quantity(
         "clearance_cables",
@@ -88,5 +90,6 @@ POSES = (
         "1",
         "part of the orientations",
         "Part of a set of orientations, by volume, that is inside the workspace at a place; of one pose 0 or 1.",
+        better="larger",
     ),
 )

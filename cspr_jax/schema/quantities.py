@@ -5,42 +5,12 @@ from collections import ChainMap
 import numpy as np
 
 from cspr_jax.errors import InputError
+from cspr_jax.schema.axes import AXES, BEST
 from cspr_jax.schema.limits import LARGEST_MULTIPLE
 from cspr_jax.schema.motion_quantities import FLIGHT, HOW, MARGIN, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.pose_quantities import POSES
 from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.verdicts import FLAGS, SENTENCES, Verdict
-
-AXES = {
-    q.name: q
-    for q in (
-        Quantity("x", "m", "x of the target", "Horizontal coordinate of the target."),
-        Quantity("y", "m", "y of the target", "Horizontal coordinate of the target."),
-        Quantity("radius", "m", "distance from the central vertical", "From the vertical through the centroid."),
-        Quantity("azimuth", "rad", "azimuth", "Direction of the target from the central vertical, from x to y."),
-        Quantity("z", "m", "z of the target", "Vertical coordinate of the target; see z_axis."),
-        Quantity(
-            "tilt_azimuth",
-            "rad",
-            "azimuth phi of the tilt",
-            "From the direction of the target, in workspaces from x; tilt and torsion.",
-        ),
-        Quantity("tilt", "rad", "tilt theta", "Angle between the platform's normal and the vertical."),
-        Quantity("torsion", "rad", "torsion sigma", "Of tilt and torsion, Z_phi X_theta Z_(sigma - phi)."),
-        Quantity("z0", "m", "depth of P0 below the centroid", "The point P0 about which the effector swings."),
-        Quantity(
-            "inclination",
-            "1",
-            "inclination",
-            "How much deeper below the spools the target is than P0, over z0: v of thesis (1.31).",
-        ),
-        Quantity("tau", "1", "normalised time", "Time since the start of the segment over its duration."),
-        Quantity("cable", "1", "cable", "Number of a cable, in cable order from 1 on."),
-        Quantity("from_x", "m", "x of the start point", "Horizontal coordinate of the start point."),
-        Quantity("from_y", "m", "y of the start point", "Horizontal coordinate of the start point."),
-        Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
-    )
-}
 
 # Why accessible orientations are not attained, by the best candidate's flags.
 REFUSALS = {
@@ -59,20 +29,23 @@ _REFUSED = (
 QUANTITIES = {
     q.name: q
     for q in (
-        Quantity("arcs", "1", "smallest number of arcs", f"Smallest number of feasible arcs{HOW}; 0: none.", "int16"),
+        Quantity(
+            "arcs",
+            "1",
+            "smallest number of arcs",
+            f"Smallest number of feasible arcs{HOW}; 0: none.",
+            "int16",
+            better="smaller",
+        ),
         Quantity("verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint32", unflagged="feasible"),
         Quantity(
             "duration",
             "s",
             "duration",
             "Duration with `arcs` arcs, or with `tried_arcs` where arcs is 0.",
+            better="smaller",
         ),
-        Quantity(
-            "margin",
-            "1",
-            "smallest normalised pseudotension",
-            MARGIN,
-        ),
+        Quantity("margin", "1", "smallest normalised pseudotension", MARGIN, better="larger"),
         Quantity(
             "margin_bound",
             "1",
@@ -120,6 +93,7 @@ QUANTITIES = {
             "smallest number of oscillations",
             "Smallest number of oscillations proved feasible from the pseudotensions themselves; 0: none.",
             "int16",
+            better="smaller",
         ),
         Quantity(
             "tried_oscillations",
@@ -159,6 +133,7 @@ QUANTITIES = {
             "1",
             "lower envelope of the normalised pseudotension",
             "(1.39) of the cable, or the lowest over the cables, with the real number `least_oscillations`.",
+            better="larger",
         ),
         Quantity("used_inclination", "1", "inclination v", "Inclination of the transition, v of (1.31).", signed=True),
         Quantity(
@@ -192,7 +167,7 @@ QUANTITIES = {
             "accessible part of the grid points",
             "Of all orientations of the grid; NaN for a scan, which has no grid.",
         ),
-        Quantity("accessible_volume", "1", "accessible part of SO(3)", "By volume (Haar measure)."),
+        Quantity("accessible_volume", "1", "accessible part of SO(3)", "By volume (Haar measure).", better="larger"),
         Quantity(
             "accessible_error", "1", "its error", "Difference of the accessible volume from that with twice the step."
         ),
@@ -201,7 +176,11 @@ QUANTITIES = {
             "attainable", "1", "attainable orientations", "Number that a horizontal transition from rest attains."
         ),
         Quantity(
-            "attainable_fraction", "1", "attainable part of the accessible orientations", "By number; NaN for none."
+            "attainable_fraction",
+            "1",
+            "attainable part of the accessible orientations",
+            "By number; NaN for none.",
+            better="larger",
         ),
         Quantity("attainable_volume", "1", "attainable part of the accessible volume", "By volume; NaN for none."),
         Quantity(
@@ -230,6 +209,7 @@ QUANTITIES = {
             "Distance of rest from the nearest face of the feasible accelerations: positive inside the wrench-feasible "
             "workspace, that is with the limits of the tensions.",
             signed=True,
+            better="larger",
         ),
         Quantity(
             "static_margin",
@@ -245,6 +225,7 @@ QUANTITIES = {
             "Positive inside the wrench-closure workspace, where the cables can resist every force; -1 where they do "
             "not even span the space. Never positive of suspended robots.",
             signed=True,
+            better="larger",
         ),
         *POSES,
         Quantity(
@@ -312,12 +293,14 @@ QUANTITIES = {
             "Largest margin (smallest slack of taut cables, depth and limits) that a launch to the cell was found to "
             "have; below 0 no launch was found, which is no proof that there is none.",
             signed=True,
+            better="larger",
         ),
         Quantity(
             "release_speed",
             "m s-1",
             "least speed at the release",
             "Of the feasible launches found; NaN where none was.",
+            better="smaller",
         ),
         Quantity(
             "release_time", "s", "time of the release", "After the start of the segment, of the launch of least speed."
@@ -335,6 +318,7 @@ QUANTITIES = {
             "sensitivity of the position",
             "Largest displacement over the largest error of a cable length, Machines 11 (2), 2023, 224, (7); at "
             "least 1, infinite where the cables do not hold the effector.",
+            better="smaller",
         ),
         Quantity(
             "sigma_r",
@@ -346,7 +330,7 @@ QUANTITIES = {
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
 }
-EVERY = ChainMap(AXES, QUANTITIES, TRAJECTORY, SEGMENTS, FLIGHT)
+EVERY = ChainMap(AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT)
 _OWN = frozenset(QUANTITIES)
 
 
@@ -359,7 +343,7 @@ def register(quantity: Quantity) -> None:
     Raises:
         InputError: another quantity, or a coordinate, has that name.
     """
-    tables = (AXES, QUANTITIES, TRAJECTORY, SEGMENTS, FLIGHT)
+    tables = (AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT)
     known = next((table[quantity.name] for table in tables if quantity.name in table), quantity)
     if known != quantity:
         raise InputError("quantity", quantity.name, "a name that no other quantity or axis has")

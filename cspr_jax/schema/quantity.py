@@ -21,6 +21,7 @@ class Quantity:
         signed: whether either sign is as good as the other, so that zero is in the middle of a picture's colours.
         meanings: of whole numbers that stand for words: their row of `schema.meanings.MEANINGS`; empty: they do not.
         contoured: whether sections of it show where it is a whole number.
+        better: of two cells' numbers, which one is better; empty: neither.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Quantity:
     signed: bool = False
     meanings: str = ""
     contoured: bool = False
+    better: Literal["", "smaller", "larger"] = ""
 
     @property
     def readable(self) -> tuple[str, ...]:

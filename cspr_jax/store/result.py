@@ -2,7 +2,7 @@
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,8 +10,10 @@ from cspr_jax.config.limits import LARGEST_LENGTH, MOST_CABLES
 from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
-from cspr_jax.errors import ConfigError, StoreError, one_line, shown
+from cspr_jax.errors import ConfigError, InputError, StoreError, one_line, shown
 from cspr_jax.schema import labelled
+from cspr_jax.schema.best import best_of, check_axis
+from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.motion_quantities import FLIGHT_DIMS, PARTS, SEGMENTS
 from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES
 from cspr_jax.store.documents import plain_json
@@ -28,6 +30,18 @@ _MOST_PARTS = 10_000
 _BLOCK = 1 << 20
 
 
+class Choice(NamedTuple):
+    """An axis of which every cell has its best point.
+
+    Fields:
+        points: (n,) of the axis.
+        index: (...) of the best one, of the shape of the quantities.
+    """
+
+    points: np.ndarray
+    index: np.ndarray
+
+
 @dataclasses.dataclass(frozen=True)
 class Result:
     """A result file in memory.
@@ -39,6 +53,7 @@ class Result:
         labels: long names of axes and quantities.
         attributes: of the file, those that this program writes.
         settings: of the sweep; empty for a motion.
+        choices: axes of the sweep that `best` has taken out, by name.
     """
 
     axes: dict[str, np.ndarray]
@@ -47,11 +62,65 @@ class Result:
     labels: dict[str, str]
     attributes: dict[str, Any]
     settings: dict[str, Any]
+    choices: dict[str, Choice] = dataclasses.field(default_factory=dict)
 
     @property
     def is_map(self) -> bool:
         """Whether it is a map, not a motion over time."""
         return "map" in self.attributes
+
+    def best(self, *axes: str) -> "Result":
+        """The map with the best point of each of some axes chosen for every cell: the answer to "at any z0?".
+
+        A cell is feasible if it is so at some point, else undecided if it is so at some point. Among feasible points
+        the one with the fewest arcs is chosen (or with the best of what the map is about: the least duration, the
+        largest margin, ...), of these that with the largest margin, then the first. All quantities of a cell are those
+        of the point chosen; where none is feasible, of the best candidate. Where a point is undecided, the verdict
+        keeps the flag that fewer arcs may be possible.
+
+        Args:
+            axes: names, such as "z0".
+
+        Returns:
+            a result without these axes, and with "best_z0" among the quantities: the point chosen, NaN where none is
+            feasible.
+
+        Raises:
+            InputError: a motion, no such axis, one that is no choice (tau, cable), or no quantity tells what is better.
+        """
+        if not self.is_map:
+            raise InputError("--best", " ".join(axes), "absent for a motion")
+        whole = self
+        for axis in axes:
+            whole = whole._without(axis)
+        return whole
+
+    def _without(self, axis: str) -> "Result":
+        check_axis(axis, tuple(self.axes))
+        place, points = list(self.axes).index(axis), self.axes[axis]
+        data, index = best_of(self.data, axis, points, place, MAP_KINDS[self.attributes["map"]].pictured)
+        others = {name: points for name, points in self.axes.items() if name != axis}
+        earlier = {
+            name: Choice(
+                choice.points, np.take_along_axis(choice.index, np.expand_dims(index, place), place).squeeze(place)
+            )
+            for name, choice in self.choices.items()
+        }
+        choices = earlier | {axis: Choice(points, index)}
+        units, labels = _described([*others, *choices, *data])
+        return dataclasses.replace(self, axes=others, data=data, units=units, labels=labels, choices=choices)
+
+    def place(self, index: tuple[int, ...]) -> dict[str, float]:
+        """Coordinates of a cell of a map.
+
+        Args:
+            index: of the cell.
+
+        Returns:
+            by axis, those chosen by `best` included.
+        """
+        place = {axis: float(points[i]) for (axis, points), i in zip(self.axes.items(), index, strict=True)}
+        return place | {axis: float(choice.points[choice.index[index]]) for axis, choice in self.choices.items()}
 
     def to_xarray(self) -> "xarray.Dataset":
         """The result for xarray: named dimensions, units and long names, and the attributes of the file.
@@ -64,7 +133,8 @@ class Result:
         """
         if self.is_map:
             variables = {name: (tuple(self.axes), data) for name, data in self.data.items()}
-            return labelled.dataset(variables, self.axes, self.attributes, self.settings)
+            best = {"best_over": " ".join(self.choices)} if self.choices else {}
+            return labelled.dataset(variables, self.axes, self.attributes | best, self.settings)
         return labelled.motion(self.axes | self.data, self.attributes)
 
 
@@ -98,8 +168,13 @@ def open_result(path: Path) -> Result:
     except ConfigError as error:
         raise StoreError(str(error)) from error
     names = [*axes, *data]
-    units, labels = ({n: getattr(EVERY[n], key) for n in names} for key in ("units", "long_name"))
+    units, labels = _described(names)
     return Result(axes, data, units, labels, attributes, settings)
+
+
+def _described(names: list[str]) -> tuple[dict[str, str], dict[str, str]]:
+    # Units and long names.
+    return {name: EVERY[name].units for name in names}, {name: EVERY[name].long_name for name in names}
 
 
 def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
-from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, value, values
+from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, values
 from cspr_jax.outputs.plots.lines import Line, line_figure, lines_of, names_of, overlaid
 from cspr_jax.outputs.plots.motion_comparison import motion_comparison_figure
 from cspr_jax.outputs.plots.motion_pictures import motion_picture
-from cspr_jax.outputs.plots.notes import notes
+from cspr_jax.outputs.plots.notes import first_of, notes
 from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.sections import POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
@@ -96,6 +96,8 @@ def _envelope(results: list[Result], quantity: str | None, at: dict[str, float],
     _refuse("--envelope", {"--quantity": quantity, "--lines": lines})
     elsewhere = {axis: points[0] for axis, points in result.axes.items() if axis not in AXES and len(points) > 1}
     view = _view(result, "verdict", elsewhere | at)
+    told = zip(elsewhere | at, view.fixed, strict=True)
+    view = view._replace(fixed=[words if axis in at else first_of(result, axis) for axis, words in told])
     if set(view.across) != set(AXES):
         raise InputError("--at", sorted(at), "no axis of " + ", ".join(AXES))
     return envelope_figure(
@@ -142,7 +144,7 @@ def _varying(result: Result, at: dict[str, float]) -> list[str]:
 def _fixed(result: Result, at: dict[str, float], across: list[str]) -> tuple[dict[str, int], list[str]]:
     # Which point of each other axis, the first where nobody says, and what the picture says of it.
     chosen_points = {axis: nearest(result, axis, wanted) for axis, wanted in at.items()}
-    others = {axis: (0, value(result, axis, result.axes[axis][0])) for axis in result.axes if axis not in across}
+    others = {axis: (0, first_of(result, axis)) for axis in result.axes if axis not in across}
     every = others | chosen_points
     return {axis: place for axis, (place, _) in every.items()}, [words for _, words in every.values()]
 
@@ -230,7 +232,7 @@ def _panelled(result: Result, view: View, order: list[str]) -> View:
     for extra in order[3:]:
         data = data[:, :, :, 0]
         place[extra] = float(result.axes[extra][0])
-        fixed.append(value(result, extra, place[extra]))
+        fixed.append(first_of(result, extra))
     return View(view.name, data, order[:3], fixed, place)
 
 

@@ -115,6 +115,8 @@ def _rest_point(section: _Section, name: str) -> np.ndarray | None:
     # P0 lies below the centroid of the spools; None where it is not one point.
     place, result = section.place, section.result
     frame, depth = frame_of(section.base, str(result.attributes.get("z_axis", "down"))), place.get("z0")
+    if "z0" in result.choices or "inclination" in result.choices:
+        return None
     if depth is None and "z" in place and starts_at_rest(result, name):
         # z0 is chosen for each target: its own depth, or by the inclination.
         given = table(result.settings, "trajectory").get("inclination")

@@ -1,7 +1,9 @@
 """Constants of a picture of a map: the start of the motions, and the axes that it does not show."""
 
+import numpy as np
+
 from cspr_jax.outputs.plots.fitting import shortened
-from cspr_jax.outputs.plots.labels import value
+from cspr_jax.outputs.plots.labels import unit, value, values
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
 
@@ -30,7 +32,7 @@ def start(result: Result) -> dict[str, float]:
         its coordinates; empty if it is none.
     """
     given = table(table(result.settings, "trajectory"), "from").get("position") or ()
-    moving = any(axis.startswith("from_") for axis in result.axes)
+    moving = any(axis.startswith("from_") for axis in (*result.axes, *result.choices))
     return {} if moving else dict(zip("xyz", given, strict=False))
 
 
@@ -69,7 +71,32 @@ def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[
     elif name and starts_at_rest(result, name):
         phrases.append("from rest")
     phrases += fixed
+    phrases += [_best(result, axis) for axis in result.choices]
     phrases += [value(result, a, p[0]) for a, p in result.axes.items() if a not in used and len(p) == 1]
-    if "z" in result.axes:
+    if "z" in result.axes or "z" in result.choices:
         phrases.append(f"z axis {shortened(str(result.attributes.get('z_axis', 'down')))}")
     return list(dict.fromkeys(phrases))
+
+
+def _best(result: Result, axis: str) -> str:
+    # Such as "best z0 of 5 (1.2 to 2.4 m)".
+    points = np.unique(result.choices[axis].points)
+    name, _, low = values(result, axis, points[:1])[0].partition(" = ")
+    high = values(result, axis, points[-1:])[0].partition(" = ")[2]
+    span = low if low == high else f"{low.removesuffix(unit(result, axis)).rstrip()} to {high}"
+    return f"best {name} of {len(points)} ({span})"
+
+
+def first_of(result: Result, axis: str) -> str:
+    """A coordinate that the picture shows because nobody chose another one.
+
+    Args:
+        result: the map.
+        axis: its name.
+
+    Returns:
+        its value, and of how many points it is the first.
+    """
+    points = result.axes[axis]
+    words = value(result, axis, points[0])
+    return words if len(points) == 1 else f"{words} (the first of {len(points)})"

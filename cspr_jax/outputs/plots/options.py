@@ -22,6 +22,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         "space; tensions, with their limits; summary, on a page; acceleration, beside all that are feasible at an "
         "instant; path_acceleration, over the way; or landing",
     )
+    add_best(parser)
     parser.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
     parser.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
     parser.add_argument(
@@ -32,6 +33,22 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
     )
     parser.set_defaults(device=None)
     add_look(parser)
+
+
+def add_best(parser: argparse.ArgumentParser) -> None:
+    """The argument for the best point of an axis of a map.
+
+    Args:
+        parser: of a command that shows maps.
+    """
+    parser.add_argument(
+        "--best",
+        action="append",
+        default=[],
+        metavar="AXIS",
+        help="of a map, such as z0: each cell at the best point of this axis, that with the fewest arcs if any is "
+        "feasible; --quantity best_AXIS: which one",
+    )
 
 
 def add_look(parser: argparse.ArgumentParser) -> None:

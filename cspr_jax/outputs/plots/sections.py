@@ -9,12 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.projections.polar import PolarAxes
 
-from cspr_jax.outputs.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar, scale_of
+from cspr_jax.outputs.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar
 from cspr_jax.outputs.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
 from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
 from cspr_jax.outputs.plots.marks import mark, marked
+from cspr_jax.outputs.plots.steps import edges, number_scale
 from cspr_jax.outputs.plots.worded import word_scale, worded
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.quantities import EVERY
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
 
@@ -69,11 +70,9 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
     orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in across]
     points = [as_drawn(result, axis, result.axes[axis][order]) for axis, order in zip(across, orders, strict=True)]
     data = as_drawn(result, name, data[np.ix_(*orders, shown)])
-    quantity = QUANTITIES[name]
+    quantity = EVERY[name]
     found = worded(result, name, data)
-    cells, scale = (
-        (data, scale_of(data, signed=quantity.signed)) if found is None else (found[0], word_scale(*found[1:]))
-    )
+    cells, scale = (data, number_scale(result, name, data)) if found is None else (found[0], word_scale(*found[1:]))
     titles = values(result, over, result.axes[over][shown]) if over is not None else []
     legend: dict[str, Artist] = {"no value": Patch(color=NONE_COLOUR)} if scale.missing else {}
     for k, panel in enumerate(every):
@@ -87,7 +86,7 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
     words = list(section.fixed)
     if polar:
         outward = np.flatnonzero(says[:, orders[1]][:, :, shown].any((0, 2)))
-        reach_polar(every, _edges(points[1])[outward[-1] + 1 if len(outward) else -1], unit(result, across[1]))
+        reach_polar(every, edges(points[1])[outward[-1] + 1 if len(outward) else -1], unit(result, across[1]))
         words.append(f"around: {axis_label(result, across[0])}, outward: {axis_label(result, across[1])}")
     else:
         _name_axes(result, across, bottom, left)
@@ -146,13 +145,13 @@ def tells(name: str, data: np.ndarray) -> np.ndarray:
     Returns:
         of data's shape.
     """
-    if QUANTITIES[name].unflagged:
+    if EVERY[name].unflagged:
         return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0
     return data > 0 if data.dtype.kind == "i" else np.isfinite(data)
 
 
 def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], points: list[np.ndarray], scale: Scale):
-    x, y = map(_edges, points)
+    x, y = map(edges, points)
     if isinstance(panel, PolarAxes):
         # Sides of a cell are straight: narrow ones look round.
         parts = int(min(120.0, np.ceil(np.diff(x).max() / 3.0)))
@@ -177,10 +176,3 @@ def _loci(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
     lines = panel.contour(*points, cells.T, levels=levels, colors="white", linewidths=0.8)
     for text in panel.clabel(lines, fmt="%d", fontsize="small"):
         text.set_rotation(0.0)  # turned, a 6 could be a 9
-
-
-def _edges(points: np.ndarray) -> np.ndarray:
-    if len(points) == 1:
-        return points[0] + np.array([-0.5, 0.5]) * max(1.0, abs(points[0]))
-    middles = 0.5 * (points[1:] + points[:-1])
-    return np.concatenate([[1.5 * points[0] - 0.5 * points[1]], middles, [1.5 * points[-1] - 0.5 * points[-2]]])

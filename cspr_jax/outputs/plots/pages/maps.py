@@ -14,7 +14,7 @@ from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
 from cspr_jax.outputs.plots.worded import word_scale, worded
 from cspr_jax.schema.map_kinds import MAP_KINDS
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.quantities import EVERY
 from cspr_jax.schema.verdicts import SENTENCES, Verdict
 from cspr_jax.store.result import Result
 
@@ -98,7 +98,7 @@ def _axis(result: Result, name: str, points: np.ndarray) -> dict[str, Any]:
 
 
 def _quantity(result: Result, name: str, data: np.ndarray) -> dict[str, Any]:
-    row = QUANTITIES[name]
+    row = EVERY[name]
     found, drawn = worded(result, name, data), as_drawn(result, name, data)
     if found is not None:
         drawn, scale = found[0], word_scale(*found[1:])

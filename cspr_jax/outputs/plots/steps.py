@@ -1,0 +1,50 @@
+"""Points of an axis as colours: the edges between them, and the scale of a quantity whose values they are."""
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
+
+from cspr_jax.outputs.plots.colours import NONE_COLOUR, TOLD_APART, Scale, scale_of
+from cspr_jax.outputs.plots.labels import as_drawn
+from cspr_jax.schema.axes import best_name
+from cspr_jax.schema.quantities import EVERY
+from cspr_jax.store.result import Result
+
+
+def number_scale(result: Result, name: str, values: np.ndarray) -> Scale:
+    """The scale of a quantity whose numbers are no words.
+
+    Args:
+        result: the map.
+        name: of the quantity.
+        values: all of the picture, as drawn.
+
+    Returns:
+        the scale: of the best points of an axis a colour each, where they are few.
+    """
+    choice = next((choice for axis, choice in result.choices.items() if best_name(axis) == name), None)
+    points = np.zeros(0) if choice is None else np.unique(as_drawn(result, name, choice.points))
+    if not 0 < len(points) <= TOLD_APART:
+        return scale_of(values, signed=EVERY[name].signed)
+    shades = matplotlib.colormaps["cividis"](np.linspace(0.0, 1.0, len(points)))
+    return Scale(
+        ListedColormap(list(shades)).with_extremes(bad=NONE_COLOUR),
+        BoundaryNorm(edges(points), len(points)),
+        ticks=(points.tolist(), [f"{point:.4g}" for point in points]),
+        missing=bool(np.isnan(values).any()),
+    )
+
+
+def edges(points: np.ndarray) -> np.ndarray:
+    """Edges of cells about points.
+
+    Args:
+        points: (n,) ascending.
+
+    Returns:
+        (n + 1,) half-way between them, and as far beyond the ends.
+    """
+    if len(points) == 1:
+        return points[0] + np.array([-0.5, 0.5]) * max(1.0, abs(points[0]))
+    middles = 0.5 * (points[1:] + points[:-1])
+    return np.concatenate([[1.5 * points[0] - 0.5 * points[1]], middles, [1.5 * points[-1] - 0.5 * points[-2]]])

@@ -1,0 +1,139 @@
+"""Best points of an axis that may be chosen freely, such as z0: whether any will do, which, and what it gives.
+
+Every cell of the other axes takes all of its quantities from one point of that axis: a feasible one if there is one,
+else an undecided one; of those that with the fewest arcs, or what else the map is about; of these that with the largest
+margin.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.errors import InputError
+from cspr_jax.schema.axes import AXES, BEST, best_name
+from cspr_jax.schema.meanings import CELL_SIDES
+from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+# What tells first which of two points is better where a kind of map says nothing; then whatever else can tell.
+FIRST = ("arcs", "oscillations", "release_speed", "margin")
+# Of these 0 stands for none, and fewer may be possible where a point is undecided.
+COUNTS = ("arcs", "oscillations")
+_DOUBT = Verdict.UNDECIDED.value | Verdict.FEWER_ARCS_UNDECIDED.value
+_INSIDE, _OUTSIDE = CELL_SIDES.index("inside"), CELL_SIDES.index("outside")
+
+
+class Best(NamedTuple):
+    """What remains of arrays without one of their axes.
+
+    Fields:
+        data: by name; that of `schema.quantities.best_name` is the best point itself, NaN where no point will do.
+        index: (...) of the best point in the axis, of the best candidate where none will do.
+    """
+
+    data: dict[str, np.ndarray]
+    index: np.ndarray
+
+
+def check_axis(axis: str, known: Sequence[str]) -> None:
+    """Refuse an axis of which no best point can be chosen.
+
+    Args:
+        axis: its name.
+        known: axes that there are.
+
+    Raises:
+        InputError: no such axis, or one along which a motion or a robot has all points.
+    """
+    allowed = [name for name in known if name not in AXES or best_name(name) in BEST]
+    if axis not in allowed:
+        raise InputError("--best", axis, f"one of {', '.join(allowed)}" if allowed else "absent: there is no such axis")
+
+
+def best_of(
+    data: Mapping[str, np.ndarray], name: str, points: np.ndarray, place: int, pictured: Sequence[str] = ()
+) -> Best:
+    """Reduce arrays over one of their axes.
+
+    Args:
+        data: (..., n, ...) by names of the table of quantities; further dimensions may follow.
+        name: of the axis.
+        points: (n,) of it.
+        place: of the axis among the dimensions.
+        pictured: quantities that the map is about, the first one first.
+
+    Returns:
+        the arrays without that axis.
+
+    Raises:
+        InputError: nothing tells which point is better.
+    """
+    order = ranked(data, pictured)
+    verdict = data.get("verdict")
+    if not order and verdict is None:
+        raise InputError("--best", name, "absent: no stored quantity says which cell is better")
+    keys = [] if verdict is None else [_unfitness(verdict)]
+    keys += [_badness(quantity, data[quantity]) for quantity in order]
+    index = np.lexsort(keys[::-1], axis=place).take(0, place)
+    reduced = {quantity: _taken(values, index, place) for quantity, values in data.items()}
+    if verdict is not None:
+        will_do = _unfitness(reduced["verdict"]) == 0
+        reduced["verdict"] = _with_doubt(reduced, verdict, will_do, place)
+    else:
+        will_do = np.isfinite(_badness(order[0], reduced[order[0]]))
+    if "cell_side" in data:
+        reduced["cell_side"] = _side(data["cell_side"], place)
+    chosen = np.where(will_do, np.asarray(points, float)[index], np.nan)
+    return Best({best_name(name): chosen} | reduced, index)
+
+
+def ranked(names: Mapping[str, np.ndarray], pictured: Sequence[str] = ()) -> list[str]:
+    """Quantities that tell which of two cells is better, the first one first.
+
+    Args:
+        names: of the quantities that there are.
+        pictured: as in `best_of`.
+
+    Returns:
+        those of them whose row says which numbers are better.
+    """
+    order = dict.fromkeys((*pictured, *FIRST, *QUANTITIES))
+    return [name for name in order if name in names and QUANTITIES[name].better]
+
+
+def _unfitness(verdict: np.ndarray) -> np.ndarray:
+    # 0: feasible, if not surely with the fewest arcs; 1: undecided; 2: not feasible; 3: not even accessible.
+    flags = verdict.astype(np.int64)
+    rank = np.where(flags & Verdict.UNDECIDED.value, 1, np.where(flags & Verdict.NOT_ACCESSIBLE.value, 3, 2))
+    return np.where(flags & ~Verdict.FEWER_ARCS_UNDECIDED.value, rank, 0)
+
+
+def _badness(name: str, values: np.ndarray) -> np.ndarray:
+    # The smaller, the better; infinite where there is none.
+    drawn = values.astype(float)
+    worse = drawn if QUANTITIES[name].better == "smaller" else -drawn
+    is_none = np.isnan(drawn) | ((drawn <= 0.0) if name in COUNTS else False)
+    return np.where(is_none, np.inf, worse)
+
+
+def _taken(values: np.ndarray, index: np.ndarray, place: int) -> np.ndarray:
+    where = np.expand_dims(index, place)
+    where = where.reshape(*where.shape, *[1] * (values.ndim - where.ndim))
+    return np.take_along_axis(values, where, axis=place).squeeze(place)
+
+
+def _with_doubt(reduced: dict[str, np.ndarray], verdict: np.ndarray, will_do: np.ndarray, place: int) -> np.ndarray:
+    # Where some point is undecided, it may be feasible with fewer arcs than the best of those that are.
+    count = next((reduced[name] for name in COUNTS if name in reduced), None)
+    if count is None:
+        return reduced["verdict"]
+    doubtful = will_do & (count > 1) & ((verdict.astype(np.int64) & _DOUBT) != 0).any(place)
+    fewer = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0).astype(FLAGS)
+    return reduced["verdict"] | fewer
+
+
+def _side(sides: np.ndarray, place: int) -> np.ndarray:
+    # A whole cell is inside where it is for some point, and outside where it is for every one.
+    some, every = (sides == _INSIDE).any(place), (sides == _OUTSIDE).all(place)
+    return np.where(some, _INSIDE, np.where(every, _OUTSIDE, 0)).astype(sides.dtype)
