@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.api.arguments import amplitude_of, kernel_problem
+from cspr_jax.api.arguments import amplitude_of, kernel_problem, warn_of_rest
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
@@ -78,7 +78,7 @@ def hypocycloid(
     """
     own, frame = _prepared(robot, ("3T",), "a point mass on three cables")
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
-    first, last = _places(frame, start, end, z0)
+    first, last = _places(robot, frame, start, end, z0)
     geometry = segment(own, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
     return Placed(Hypocycloid(geometry, function, p), frame)
 
@@ -141,7 +141,7 @@ def platform_motion(
     """
     own, frame = _prepared(robot, ("3R3T",), "a platform on six cables or more", any_cables=True)
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
-    places = _places(frame, start, end, z0)
+    places = _places(robot, frame, start, end, z0)
     turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
     beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
     first, last = zip(places, turns, strict=True)
@@ -209,8 +209,12 @@ def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array
     return _MARGIN(problem, _inner(motion), samples=samples)
 
 
-def _places(frame: Frame, start, end, z0) -> tuple[Array, Array]:
-    # In the kernels' axes.
+def _places(robot: Any, frame: Frame, start, end, z0) -> tuple[Array, Array]:
+    # In the kernels' axes. Of what jax traces nobody knows where it is.
+    if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((robot, start, end, z0))):
+        if start is not None:
+            warn_of_rest(robot, "start", start, z0, "start = None")
+        warn_of_rest(robot, "end", end, z0, "its coordinates in full")
     first = rest_point(jnp.asarray(z0, float)) if start is None else jnp.asarray(frame.inward(start), float)
     return first, jnp.asarray(frame.inward(end), float)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cspr_jax.api.given import plain, text_of
-from cspr_jax.config.hints import robot_hints
+from cspr_jax.config.hints import robot_hints, sweep_hints
 from cspr_jax.errors import ConfigError
 from cspr_jax.runtime.processes import check_count
 from cspr_jax.schema import labelled
@@ -82,7 +82,8 @@ class Job:
             CsprError: as `run` does.
         """
         with _executor(self, prepare) as executor:  # refuses in one line, so hints come after it
-            for line in robot_hints(self.sweep.robot):
+            robot = self.sweep.robot
+            for line in [*robot_hints(robot), *sweep_hints(self.sweep.keys, robot)]:
                 self.hooks.warn(f"hint: {line}")
             return self._run.go(executor).result
 

@@ -1,13 +1,16 @@
 """Hints of likely mistakes in files that can be computed; they change neither results nor exit codes."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import shown
+from cspr_jax.robots.spool_plane import AT_P0, in_plane, size
 
 # Cameras over stadiums hang from spools up to 250 m apart; what is larger, such as the cabin of a radio telescope,
 # weighs tonnes.
@@ -16,6 +19,9 @@ LARGEST_SPAN, LARGEST_MASS = 300.0, 1000.0  # m, kg
 INERTIA_RATIOS = (1e-5, 1e3)
 # Part of the distances between the points of a platform; tables of points are rounded.
 ROUNDING = 1e-3
+
+# Places nearer to P0 than this, m or of z0, are hardly meant to be other places.
+NEAR_P0 = 1e-3
 
 
 def robot_hints(spec: RobotFile) -> list[str]:
@@ -36,11 +42,11 @@ def robot_hints(spec: RobotFile) -> list[str]:
         )
     if spec.platform_points is not None and spec.inertia is not None:
         arms = np.asarray(spec.platform_points) - np.asarray(spec.centre_of_mass or [0.0, 0.0, 0.0])
-        size, largest = float(np.linalg.norm(arms, axis=1).max()), float(np.abs(spec.inertia).max())
-        ratio = largest / (spec.mass * size**2) if size > 0.0 else 1.0
+        reach, largest = float(np.linalg.norm(arms, axis=1).max()), float(np.abs(spec.inertia).max())
+        ratio = largest / (spec.mass * reach**2) if reach > 0.0 else 1.0
         if not INERTIA_RATIOS[0] < ratio < INERTIA_RATIOS[1]:
             lines.append(
-                f"robot.inertia: {largest:g} kg m^2 for a mass of {spec.mass:g} kg and platform_points {size:g} m "
+                f"robot.inertia: {largest:g} kg m^2 for a mass of {spec.mass:g} kg and platform_points {reach:g} m "
                 "from it: do the units fit? Inertia is in kg m^2, lengths are in m"
             )
     return lines + _unbalanced(spec)
@@ -54,9 +60,9 @@ def _unbalanced(spec: RobotFile) -> list[str]:
     points = np.asarray(spec.platform_points)
     if spec.own_pattern == "3R":  # the joint holds it too
         points = np.vstack([points, np.zeros(3)])
-    size = float(np.ptp(points, axis=0).max())
-    away = _distance_to_hull((points - centre)[:, axes] / size) * size if size > 0.0 else 0.0
-    if away <= ROUNDING * size:
+    extent = float(np.ptp(points, axis=0).max())
+    away = _distance_to_hull((points - centre)[:, axes] / extent) * extent if extent > 0.0 else 0.0
+    if away <= ROUNDING * extent:
         return []
     return [
         f"robot.centre_of_mass = {shown(centre.tolist())}: {away:.3g} m outside the hull of platform_points: is it "
@@ -89,9 +95,91 @@ def plan_hints(keys: PlanFile, spec: RobotFile) -> list[str]:
     Returns:
         one line each.
     """
-    targets = [pose.position for pose in keys.pose if pose.position is not None and not pose.rest]
-    text = forgotten_axis(spec, targets)
-    return [f"pose: {text}"] if text else []
+    targets = {i: pose.position for i, pose in enumerate(keys.pose) if pose.position is not None and not pose.rest}
+    places = np.asarray(list(targets.values()), float).reshape(-1, 3)
+    level = in_plane(np.asarray(spec.base_points), places, planar=spec.is_planar)
+    lines = [
+        f"pose[{i}].position = {shown(place)}: in the plane of the spools, where no tension of the cables carries a "
+        "weight: must be below it"
+        for (i, place), is_level in zip(targets.items(), level, strict=True)
+        if is_level
+    ]
+    text = forgotten_axis(spec, places[~level].tolist())
+    return [*lines, f"pose: {text}"] if text else lines
+
+
+def sweep_hints(keys: SweepFile, spec: RobotFile) -> list[str]:
+    """Likely mistakes in a sweep.
+
+    Args:
+        keys: the sweep.
+        spec: its robot.
+
+    Returns:
+        one line each.
+    """
+    lines, start, asked = list[str](), keys.trajectory.start, keys.workspace
+    if start is not None and start.position is not None and not start.rest and keys.axes.z0 is not None:
+        every = (
+            almost_at_rest("trajectory.from.position", start.position, z0, spec) for z0 in axis_points(keys.axes.z0)
+        )
+        lines += [line for line in every if line][:1]
+    if asked is not None and "interference-free" in asked.conditions and not spec.cable_diameter:
+        shapes = (asked.obstacle, asked.platform_box, asked.platform_hull)
+        if all(shape is None for shape in shapes):
+            lines.append(
+                'workspace.conditions: "interference-free" excludes nothing: cables without a thickness hardly ever '
+                "meet, and there is neither an obstacle nor a shape of the platform; does the robot lack "
+                "cable_diameter?"
+            )
+    return lines
+
+
+def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure: str = "rest = true") -> str:
+    """Whether a place is P0 but for its last digits.
+
+    Args:
+        key: that gives the place.
+        place: (3,) in the robot's axes, m; not said to be at rest.
+        z0: depth of P0 below the centroid of the spools, m.
+        robot: its `base_points` and `z_axis`.
+        cure: what would say that it is at rest.
+
+    Returns:
+        what to look at, if it is so near to P0 and not at rest there; else nothing.
+    """
+    apart, rest = _from_rest(place, z0, robot)
+    if not AT_P0 * size(np.asarray(robot.base_points)) < apart <= NEAR_P0 * max(1.0, z0):
+        return ""
+    written = ", ".join(f"{value:.12g}" for value in (np.round(rest, 12) + 0.0).tolist())
+    return (
+        f"{key} = {shown(np.asarray(place).tolist())}: {apart:.2g} m from P0 = [{written}], and not at rest there: the "
+        f"direction of so short a way decides the motion; if P0 is meant: {cure}"
+    )
+
+
+def first_nearest(places: np.ndarray, z0: np.ndarray, robot: Any) -> int:
+    """The one of many places that is nearest to P0, in parts of `NEAR_P0`, without being it.
+
+    Args:
+        places: (n, 3) in the robot's axes, m.
+        z0: (n,) m.
+        robot: its `base_points` and `z_axis`.
+
+    Returns:
+        its index.
+    """
+    apart = _from_rest(places, z0, robot)[0]
+    at_rest = apart <= AT_P0 * size(np.asarray(robot.base_points))
+    return int(np.argmin(np.where(at_rest, np.inf, apart / np.maximum(1.0, z0))))
+
+
+def _from_rest(places: Any, z0: Any, robot: Any) -> tuple[Any, np.ndarray]:
+    # Distances from P0, and P0 in the robot's axes.
+    depth = np.asarray(z0, float)
+    hub = np.stack([np.zeros_like(depth), np.zeros_like(depth), depth], axis=-1)
+    rest = frame_of(np.asarray(robot.base_points), robot.z_axis).outward(hub)
+    return np.linalg.norm(np.asarray(places, float) - rest, axis=-1), rest
 
 
 def forgotten_axis(spec: RobotFile, targets: Iterable[Sequence[float]]) -> str:
@@ -106,7 +194,7 @@ def forgotten_axis(spec: RobotFile, targets: Iterable[Sequence[float]]) -> str:
     """
     frame = frame_of(spec.base_points, spec.z_axis)
     depths, spools = (frame.depth([point[2] for point in points]) for points in (targets, spec.base_points))
-    is_above = bool(len(depths)) and depths.max() <= spools.min()
+    is_above = bool(len(depths)) and depths.max() < spools.min()
     return f"every target is above every spool: {axis_question(spec.z_axis)}" if is_above else ""
 
 

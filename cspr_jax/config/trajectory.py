@@ -83,8 +83,8 @@ class TrajectoryKeys(Table):
     beat: Beat | None = Field(
         None,
         description='platforms: time function of the rotation: "beta_ff" (3.93), the default, a beta-hat of its own at '
-        'each end; "beta_f" (3.68), that of the target at both; "beta_0" (3.67), no angular acceleration at the ends; '
-        '"beta_1" (3.66), a cosine',
+        'each end; "beta_f" (3.68), that of the target at both, on the way to rest that of the start; "beta_0" '
+        '(3.67), no angular acceleration at the ends; "beta_1" (3.66), a cosine',
     )
     inclination: Inclination | None = Field(
         None, description='transitions: inclination v, a number in ]-1, 1[, or "best"; in place of z0'

@@ -12,7 +12,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.problem import build_problem
-from cspr_jax.robots.point_mass import is_planar, plane_normal, rest_point
+from cspr_jax.robots.point_mass import AT_P0, is_planar, plane_normal, rest_point, spool_radius
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
@@ -124,10 +124,11 @@ class GridMap(abc.ABC):
         depth = points @ np.asarray(plane_normal(self._problem.robot))
         floor = self._problem.limits.floor
         if not (depth > 0.0).any():
-            question = axis_question(self._z_axis)
-            raise ConfigError(
-                self._file, f"{key}: every point is above the spool plane: must be some below ({question})"
-            )
+            level = np.abs(depth) <= AT_P0 * float(spool_radius(self._problem.robot))
+            places = {True: "in the spool plane", False: "above the spool plane"}
+            where = places[True] + " or above it" if len(set(level.tolist())) == 2 else places[bool(level[0])]
+            question = "" if level.all() else f" ({axis_question(self._z_axis)})"
+            raise ConfigError(self._file, f"{key}: every point is {where}: must be some below{question}")
         if floor is not None and not (points[:, 2] <= np.asarray(floor)).any():
             raise ConfigError(self._file, f"{key}: every point is below the floor: must be some above it")
 

@@ -9,6 +9,8 @@ from cspr_jax.plans.released import released
 from cspr_jax.schema.verdicts import Verdict
 
 SCHEMA = 1
+# Places can be copied into a plan: P0 is at rest to 1e-9 of the robot's size.
+DIGITS = 12
 
 
 def plan_object(plan: Plan) -> dict[str, Any]:
@@ -132,7 +134,7 @@ def plan_table(plan: Plan):
     from rich.table import Table  # only a terminal needs it
 
     words = [", ".join(plan.keys.families), plan.problem.amplitude.name if plan.keys.takes_amplitude else ""]
-    words += [f"z0 = {plan.z0:.6g} m"] if math.isfinite(plan.z0) else []
+    words += [f"z0 = {plan.z0:.{DIGITS}g} m"] if math.isfinite(plan.z0) else []
     title = f"{plan.spec.name}: {', '.join(filter(None, words))}"
     whole = plan_object(plan)
     caption, segments = _caption(plan) + _launch(whole.get("launch")), whole["segments"]
@@ -150,7 +152,10 @@ Column = Callable[[dict[str, Any]], str]
 
 def _places(plan: Plan) -> dict[str, Column]:
     def position(segment: dict[str, Any]) -> str:
-        return f"({', '.join(f'{round(value, 9) + 0.0:.4g}' for value in plan.points[segment['to']])})"
+        pose = plan.keys.pose[segment["to"]]
+        # Where a launch ends follows from it: nobody gives that place.
+        digits = DIGITS if pose.rest or pose.position is not None else 4
+        return f"({', '.join(f'{round(value, DIGITS) + 0.0:.{digits}g}' for value in plan.points[segment['to']])})"
 
     return {"to": lambda segment: str(segment["to"]), "position (m)": position}
 

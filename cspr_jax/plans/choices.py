@@ -5,7 +5,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.config.hints import plan_hints
+from cspr_jax.config.hints import almost_at_rest, plan_hints
 from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.feasibility.problem import Problem
@@ -101,6 +101,24 @@ def _check_rest(robot: Robot, stops: Stops, z0: float) -> None:
             raise ConfigError(
                 stops.path, f"pose[{i}].position = {shown(pose.position)}: must be P0 = {place} at rest, or absent"
             )
+
+
+def nearly_resting(stops: Stops, z0: float) -> list[str]:
+    """Poses that are P0 but for their last digits.
+
+    Args:
+        stops: all poses of the plan.
+        z0: of the plan, m; NaN where it has no P0.
+
+    Returns:
+        hints, one line each.
+    """
+    lines = [
+        almost_at_rest(f"{stops.name(i)}.position", pose.position, z0, stops.spec)
+        for i, pose in enumerate(stops.poses)
+        if not pose.rest and pose.position is not None and not _rests_anywhere(stops, i)
+    ]
+    return [f"hint: {line}" for line in lines if line]
 
 
 def _rests_anywhere(stops: Stops, i: int) -> bool:

@@ -19,7 +19,7 @@ from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.demands import SAMPLES, Demands, demands
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.plans.choices import best_amplitude, chosen_depth
+from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
 from cspr_jax.plans.sequence import Sequence
 from cspr_jax.problem import build_problem
 from cspr_jax.robots.limits import NO_LIMITS
@@ -170,6 +170,7 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
         end = motions[keys.launch.segment].state(jnp.asarray(1.0)).position
         points[keys.launch.segment + 1] = frame.outward(np.asarray(end))
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
+    lines += nearly_resting(sequence.stops, z0)
     lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), asked)
     return Plan(spec, keys, problem, z0, frame, points, legs, asked, tuple(dict.fromkeys(lines)))
 

@@ -18,6 +18,7 @@ from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.pulleys import Pulleys, exits
 from cspr_jax.robots.robot import Robot
+from cspr_jax.robots.spool_plane import AT_P0 as AT_P0
 from cspr_jax.robots.spool_plane import SMALLEST_LEVEL_RATIO, is_on_line, is_vertical
 from cspr_jax.robots.state import State
 
@@ -27,8 +28,6 @@ SPATIAL, PLANAR, GUIDED = 3, 2, 1
 LARGEST_LENGTH = 1e6  # m; beyond, products of lengths lose their meaning
 # Two spools count as level if their heights differ by less than this part of their distance.
 LEVEL = 1e-9
-# Of the size of a robot: points nearer to P0 than this are at rest there, and points nearer to a line through P0 on it.
-AT_P0 = 1e-9
 
 Axis = Literal["down", "up"]
 

@@ -5,6 +5,8 @@ import numpy as np
 # Below these ratios points count as lying on a line, and their plane as vertical.
 SMALLEST_AREA_RATIO = 1e-6
 SMALLEST_LEVEL_RATIO = 1e-3
+# Of the size of a robot: points nearer to P0 than this are at rest there, and points nearer to a line through P0 on it.
+AT_P0 = 1e-9
 
 
 def spread(points: np.ndarray) -> np.ndarray:
@@ -44,3 +46,34 @@ def is_vertical(points: np.ndarray) -> bool:
     # The product of both spreads from above, over that of both in space: how far the plane is from vertical.
     spreads, level = spread(points), spread(points[:, :2])
     return not level[0] * level[1] > SMALLEST_LEVEL_RATIO * spreads[0] * spreads[1]
+
+
+def size(base_points: np.ndarray) -> float:
+    """Size of a robot.
+
+    Args:
+        base_points: (n, 3) spools.
+
+    Returns:
+        the largest distance of a spool from the centroid of all, m.
+    """
+    return float(np.linalg.norm(base_points - base_points.mean(0), axis=1).max())
+
+
+def in_plane(base_points: np.ndarray, points: np.ndarray, *, planar: bool = False) -> np.ndarray:
+    """Points that lie in the plane of all spools.
+
+    Args:
+        base_points: (n, 3) spools.
+        points: (k, 3).
+        planar: whether the robot is planar, of whose plane that of the spools is a line.
+
+    Returns:
+        (k,) whether each does; none where the spools lie in no plane, in a vertical one, or on a line in space.
+    """
+    spools = np.concatenate([base_points, base_points + np.array([0.0, 1.0, 0.0])]) if planar else base_points
+    if len(spools) < 3 or is_on_line(spools) or is_vertical(spools):
+        return np.zeros(len(points), bool)
+    _, sizes, axes = np.linalg.svd(spools - spools.mean(0))
+    near = AT_P0 * size(base_points)
+    return (np.abs((points - spools.mean(0)) @ axes[2]) <= near) & bool(sizes[2] <= near)

@@ -161,7 +161,8 @@ def closure_margin(pull: Pull) -> Bounds:
         pull: the cocircuit.
 
     Returns:
-        lower and upper bound of its largest component of the rarer sign, over the largest of all, in [-1, 1].
+        lower and upper bound of its largest component of the rarer sign, over the largest of all, in [-1, 1]; of
+        components of one sign minus the least of them, over the largest.
     """
     fewest = jnp.minimum(largest(pull.entries), largest([-entry for entry in pull.entries]))
     inverse = 1.0 / largest([jnp.abs(entry) for entry in pull.entries])
