@@ -14,9 +14,11 @@ from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, Swee
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ExitCode
+from cspr_jax.schema.axes import AXES, BEST
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
-from cspr_jax.schema.motion_quantities import SEGMENTS, TRAJECTORY
-from cspr_jax.schema.quantities import AXES, QUANTITIES
+from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT, FLIGHT_DIMS, PARTS, SEGMENTS, TRAJECTORY, columns_of
+from cspr_jax.schema.plan_fields import LAUNCH, SCATTER, SEGMENT, WHOLE
+from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import SENTENCES
 
 EXITS = {
@@ -73,13 +75,24 @@ STARTS = {
     "pose": "`trajectory.from`, or P0, at rest",
 }
 
+BEST_POINTS = """With `--best AXIS` of `cspr plot` and `cspr report`, and of `open_result(...).best("z0")`, besides:
+
+"""
+PLAN = """## JSON of a plan
+
+`cspr plan --json` prints one object. Numbers are in the units given, places in the axes of the robot file; what does
+not apply, or is not finite, is null.
+
+"""
+
 MOTION = """## Columns of a motion
 
-`cspr plan -o FILE.csv` writes `t`, then `_x _y _z`, `_w _x _y _z` or `_1 _2 _3` of each, `samples` rows per segment;
-with `--rate HZ` a row every 1/HZ s and one at the end itself. `FILE.h5` has the same as datasets, with the attributes
-`software`, `schema`, `plan` (the text of the plan file; from Python, a dictionary's JSON), `robot_settings` (the robot,
-as JSON), `base_points` (the spools), `mass`, `z_axis`, `z0`, `family`, and `feasible`, 1 or 0. It carries a checksum
-like a result: `cspr verify FILE.h5` and `cspr plot FILE.h5` detect any changed byte.
+`cspr plan -o FILE.csv` writes the columns below, as far as the robot and the families have them, `samples` rows per
+segment; with `--rate HZ` a row every 1/HZ s and one at the end itself. `FILE.h5` has the same as datasets, with the
+attributes `Conventions`, `title`, `software`, `schema`, `plan` (the text of the plan file; from Python, a dictionary's
+JSON), `robot`, `robot_settings` (the robot, as JSON), `base_points` (the spools), `mass`, `z_axis`, `z0`, `family`, and
+`feasible`, 1 or 0. It carries a checksum like a result: `cspr verify FILE.h5` and `cspr plot FILE.h5` detect any
+changed byte.
 
 An infeasible or undecided plan is written only with `--anyway`, with the best candidate's motion for each such segment.
 Its picture says NOT PROVED FEASIBLE and for which segments; its HDF5 file has `feasible = 0` and the verdicts of its
@@ -115,13 +128,62 @@ def reference_text() -> str:
     parts.append(MAPS)
     parts += [kind_text(kind) for kind in MAP_KINDS.values()]
     parts.append("## Quantities of a result\n\n" + quantities_text(QUANTITIES) + "\nAxes:\n\n" + quantities_text(AXES))
+    parts.append(BEST_POINTS + quantities_text(BEST))
     parts.append(MOTION)
-    parts.append(quantities_text(TRAJECTORY) + "\nOf each segment, in HDF5 files:\n\n" + quantities_text(SEGMENTS))
+    parts.append(motion_text())
+    parts.append(plan_text())
     rows = "".join(f"| {flag.value} | `{flag.text}` | {text} |\n" for flag, text in SENTENCES.items())
     parts.append(f"## Verdicts\n\nBit flags; 0 is feasible.\n\n| bit | name | meaning |\n|---|---|---|\n{rows}")
     rows = "".join(f"| {code.value} | {text} |\n" for code, text in EXITS.items())
     parts.append(f"## Exit codes\n\n| code | meaning |\n|---|---|\n{rows}")
     return "\n".join(parts)
+
+
+def motion_text() -> str:
+    """What files of motions hold.
+
+    Returns:
+        tables, Markdown.
+    """
+    rows = "".join(
+        f"| `{q.name}` | {_columns(q.name)} | {q.units} | {cell_text(q.description)} |\n" for q in TRAJECTORY.values()
+    )
+    scales = {*ACROSS.values(), *(dim for dims in FLIGHT_DIMS.values() for dim in dims)}
+    scales -= {*TRAJECTORY, *FLIGHT}
+    words = [
+        f"`{name}` ({', '.join(PARTS[name])})" if name in PARTS else f"`{name}` (from 1 on)" for name in sorted(scales)
+    ]
+    return (
+        f"| name | columns in CSV | units | meaning |\n|---|---|---|---|\n{rows}\n"
+        f"Of each segment, in HDF5 files:\n\n{quantities_text(SEGMENTS)}\n"
+        f"Of an object that is released, in HDF5 files:\n\n{quantities_text(FLIGHT)}\n"
+        + textwrap.fill(f"Further dimensions of HDF5 files, as datasets: {', '.join(words)}.", 120)
+        + "\n"
+    )
+
+
+def _columns(name: str) -> str:
+    parts = columns_of(name, 2)
+    return ", ".join(f"`{part}`" for part in parts) + (", ..." if ACROSS.get(name) == "cable" else "")
+
+
+def plan_text() -> str:
+    """What `cspr plan --json` prints.
+
+    Returns:
+        tables, Markdown.
+    """
+    tables = {
+        "The object:\n\n": WHOLE,
+        "Each of `segments`:\n\n": SEGMENT,
+        "`launch`:\n\n": LAUNCH,
+        "Its `scatter`:\n\n": SCATTER,
+    }
+    texts = []
+    for head, fields in tables.items():
+        rows = "".join(f"| `{name}` | {units} | {cell_text(text)} |\n" for name, (units, text) in fields.items())
+        texts.append(f"{head}| field | units | meaning |\n|---|---|---|\n{rows}")
+    return PLAN + "\n".join(texts)
 
 
 def _keys(model: type[BaseModel]) -> str:

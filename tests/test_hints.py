@@ -130,19 +130,13 @@ def test_p0_can_be_copied_from_the_table_of_a_plan(capsys, tmp_path):
         assert len(planned.warnings) == count and all("from P0 = [0, 0, " in line for line in planned.warnings)
 
 
-def test_functions_from_python_warn_of_a_rounded_p0():
+def test_a_motion_from_python_warns_of_a_rounded_p0():
     """Once each, and not of P0 itself."""
     robot, z0 = cspr_jax.load_robot("prototype"), 1.2345678
     near, target = np.array([0.0, 0.0, 1.235]), np.array([0.2, 0.1, 1.2])
     calls = (
         ("start", "start = None", lambda: cspr_jax.hypocycloid(robot, near, target, z0=z0, arcs=2)),
         ("end", "its coordinates in full", lambda: cspr_jax.hypocycloid(robot, target, near, z0=z0, arcs=2)),
-        ("start", "start = None", lambda: cspr_jax.minimum_arcs(robot, target[None], start=near, z0=z0, max_arcs=2)),
-        (
-            "start",
-            "start = None",
-            lambda: cspr_jax.minimum_arcs(robot, [target] * 2, start=[target, near], z0=[z0, z0], max_arcs=2),
-        ),
     )
     for key, cure, call in calls:
         with pytest.warns(UserWarning, match=rf"{key} = \[0.0, 0.0, 1.235\]: 0.00043 m .* is meant: {cure}$") as told:
@@ -151,7 +145,6 @@ def test_functions_from_python_warn_of_a_rounded_p0():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         cspr_jax.hypocycloid(robot, np.array([0.0, 0.0, z0]), target, z0=z0, arcs=2)
-        cspr_jax.minimum_arcs(robot, [near], z0=z0, max_arcs=2)  # a target of many
 
 
 def test_gradients_near_p0_grow_as_the_distance_shrinks():

@@ -8,7 +8,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
-from cspr_jax.config.hints import almost_at_rest, first_nearest
+from cspr_jax.config.hints import almost_at_rest
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.problem import limits_over, prepared
@@ -59,25 +59,20 @@ def amplitude_of(given: str | Amplitude, *, free_end: bool | None = None) -> Amp
     return function
 
 
-def warn_of_rest(robot: Any, key: str, places: Any, z0: Any, cure: str) -> None:
+def warn_of_rest(robot: Any, key: str, place: Any, z0: Any, cure: str) -> None:
     """Warn of a place that is P0 but for its last digits.
 
     Args:
         robot: of the place.
         key: the argument that gives it.
-        places: (3,) or (n, 3) in the robot's axes, m.
-        z0: () or (n,) m.
+        place: (3,) in the robot's axes, m.
+        z0: () m.
         cure: what would say that it is at rest.
     """
-    points, depth = np.asarray(places, float), np.asarray(z0, float)
-    if points.shape[-1:] != (3,) or points.ndim > 2 or depth.ndim > 1:
-        return
-    points, depth = np.broadcast_arrays(points, depth[..., None])
-    points, depth = points.reshape(-1, 3), depth[..., 0].ravel()
-    nearest = first_nearest(points, depth, robot)
-    line = almost_at_rest(key, points[nearest].tolist(), float(depth[nearest]), robot, cure)
-    if line:
-        warnings.warn(line, stacklevel=4)
+    if np.shape(place) == (3,) and np.shape(z0) == ():
+        line = almost_at_rest(key, np.asarray(place, float).tolist(), float(z0), robot, cure)
+        if line:
+            warnings.warn(line, stacklevel=4)
 
 
 def kernel_problem(

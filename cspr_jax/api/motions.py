@@ -64,7 +64,9 @@ def hypocycloid(
 
     Args:
         robot: a point mass on three cables.
-        start: (3,) in the robot's axes, m; None: at rest in P0.
+        start: (3,) in the robot's axes, m; None: at rest in P0. Near P0 the direction from P0 decides the motion, and
+            gradients grow as one over the distance: within 1e-3 m or 1e-3 z0 of P0 and not at rest it gives a warning
+            where jax does not trace it.
         end: (3,) likewise.
         z0: () depth of P0 below the centroid of the spools, m.
         arcs: () number of arcs.
@@ -124,7 +126,7 @@ def platform_motion(
 
     Args:
         robot: a platform on six cables or more; jax may trace its spools, but not its platform points.
-        start: (3,) position of the mass centre in the robot's axes, m; None: P0.
+        start: (3,) position of the mass centre in the robot's axes, m; None: P0. Near P0: as in `hypocycloid`.
         end: (3,) likewise.
         z0: () depth of P0 below the centroid of the spools, m.
         arcs: () number of arcs.

@@ -5,7 +5,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cspr_jax.api.answers import PlatformAnswers
-from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, quaternions, warn_of_rest
+from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.platform.checker import PoseChecker
@@ -64,8 +64,6 @@ def minimum_pose_arcs(  # noqa: PLR0913
         raise InputError("robot", getattr(robot, "name", robot), "a platform on six cables")
     places = points_of("positions", positions)
     depth, turns = depths(z0, len(places)), quaternions("orientations", orientations, len(places))
-    if start is not None:
-        warn_of_rest(robot, "start", points_of("start", [start[0]]), depth, "start = None")
     with double_precision():
         problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",))
         for each in np.unique(depth):

@@ -6,7 +6,7 @@ In the axes of the robot, and in float64 whatever jax is set to. They give NumPy
 import numpy as np
 
 from cspr_jax.api.answers import ArcsAnswers, TransitionAnswers
-from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, warn_of_rest
+from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
 from cspr_jax.robots.limits import Limits
@@ -37,8 +37,8 @@ def minimum_arcs(
         robot: a point mass on three cables.
         targets: (n, 3) in the robot's axes, m.
         start: (3,) or (n, 3) in the robot's axes, m; None: at rest in P0. A start within 1e-9 of the robot's size
-            (the largest distance of a spool from the centroid of all) of P0 is at rest there too; one that is not, but
-            within 1e-3 m or 1e-3 z0 of P0, gives a warning.
+            (the largest distance of a spool from the centroid of all) of P0 is at rest there too; of one that
+            is not, but near P0, the direction of so short a way decides the motion.
         z0: () or (n,) depth of P0 below the centroid of the spools, m.
         amplitude: its name, or the function; None: the quintic (2.50).
         limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
@@ -58,8 +58,6 @@ def minimum_arcs(
     given = None if start is None else np.asarray(start, float)
     if given is not None and given.shape not in ((3,), ends.shape):
         raise InputError("start", f"shape {given.shape}", f"finite numbers of shape (3,) or {ends.shape}")
-    if given is not None:
-        warn_of_rest(robot, "start", points_of("start", np.atleast_2d(given)), depth, "start = None")
     with double_precision():
         problem, frame = kernel_problem(robot, amplitude or "quintic", limits, families=("hypocycloid-standard",))
         starts = rest_point(depth) if given is None else frame.inward(points_of("start", np.atleast_2d(given)))

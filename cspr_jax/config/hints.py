@@ -148,38 +148,16 @@ def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure
     Returns:
         what to look at, if it is so near to P0 and not at rest there; else nothing.
     """
-    apart, rest = _from_rest(place, z0, robot)
-    if not AT_P0 * size(np.asarray(robot.base_points)) < apart <= NEAR_P0 * max(1.0, z0):
+    spools = np.asarray(robot.base_points)
+    rest = frame_of(spools, robot.z_axis).outward(np.array([0.0, 0.0, z0]))
+    apart = float(np.linalg.norm(np.asarray(place) - rest))
+    if not AT_P0 * size(spools) < apart <= NEAR_P0 * max(1.0, z0):
         return ""
     written = ", ".join(f"{value:.12g}" for value in (np.round(rest, 12) + 0.0).tolist())
     return (
         f"{key} = {shown(np.asarray(place).tolist())}: {apart:.2g} m from P0 = [{written}], and not at rest there: the "
         f"direction of so short a way decides the motion; if P0 is meant: {cure}"
     )
-
-
-def first_nearest(places: np.ndarray, z0: np.ndarray, robot: Any) -> int:
-    """The one of many places that is nearest to P0, in parts of `NEAR_P0`, without being it.
-
-    Args:
-        places: (n, 3) in the robot's axes, m.
-        z0: (n,) m.
-        robot: its `base_points` and `z_axis`.
-
-    Returns:
-        its index.
-    """
-    apart = _from_rest(places, z0, robot)[0]
-    at_rest = apart <= AT_P0 * size(np.asarray(robot.base_points))
-    return int(np.argmin(np.where(at_rest, np.inf, apart / np.maximum(1.0, z0))))
-
-
-def _from_rest(places: Any, z0: Any, robot: Any) -> tuple[Any, np.ndarray]:
-    # Distances from P0, and P0 in the robot's axes.
-    depth = np.asarray(z0, float)
-    hub = np.stack([np.zeros_like(depth), np.zeros_like(depth), depth], axis=-1)
-    rest = frame_of(np.asarray(robot.base_points), robot.z_axis).outward(hub)
-    return np.linalg.norm(np.asarray(places, float) - rest, axis=-1), rest
 
 
 def forgotten_axis(spec: RobotFile, targets: Iterable[Sequence[float]]) -> str:

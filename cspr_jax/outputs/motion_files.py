@@ -21,7 +21,15 @@ from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
 from cspr_jax.schema.identity import canonical_json
-from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT, FLIGHT_DIMS, PARTS, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.motion_quantities import (
+    ACROSS,
+    FLIGHT,
+    FLIGHT_DIMS,
+    PARTS,
+    SEGMENTS,
+    TRAJECTORY,
+    columns_of,
+)
 from cspr_jax.schema.quantities import flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
@@ -176,10 +184,7 @@ def _feasible_rows(plan: Plan, t: np.ndarray) -> np.ndarray:
 
 
 def _csv(columns: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
-    heads = ["t"]
-    for name in list(columns)[1:]:
-        is_one = columns[name].ndim == 1
-        heads += [name] if is_one else [f"{name}_{part}" for part in _parts(name, columns[name].shape[1])]
+    heads = [head for name, values in columns.items() for head in columns_of(name, values[0].size)]
     table = np.column_stack(list(columns.values()))
     last = [[]] * len(table) if feasible is None else [[int(flag)] for flag in feasible]
     text = io.StringIO()
@@ -187,10 +192,6 @@ def _csv(columns: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
     writer.writerow(heads if feasible is None else [*heads, "feasible"])
     writer.writerows([[repr(float(value)) for value in row] + flag for row, flag in zip(table, last, strict=True)])
     return text.getvalue()
-
-
-def _parts(name: str, count: int) -> list[str]:
-    return list(PARTS.get(ACROSS[name], [str(k + 1) for k in range(count)]))
 
 
 def _write_hdf5(plan: Plan, path: Path, columns: dict[str, np.ndarray]) -> None:

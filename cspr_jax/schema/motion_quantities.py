@@ -121,3 +121,18 @@ PARTS = {
     "couple": ("12", "23", "34", "41"),
     "bound": ("least", "actual", "largest"),
 }
+
+
+def columns_of(name: str, count: int) -> list[str]:
+    """Columns of a quantity of a motion in a CSV file.
+
+    Args:
+        name: of the quantity, a row of `TRAJECTORY`.
+        count: of its numbers at an instant.
+
+    Returns:
+        their heads.
+    """
+    if name not in ACROSS:
+        return [name]
+    return [f"{name}_{part}" for part in PARTS.get(ACROSS[name], [str(k + 1) for k in range(count)])]
