@@ -29,11 +29,11 @@ class Best(NamedTuple):
 
     Fields:
         data: by name; that of `schema.quantities.best_name` is the best point itself, NaN where no point will do.
-        index: (...) of the best point in the axis, of the best candidate where none will do.
+        places: (...) of the best point in the axis, of the best candidate where none will do.
     """
 
     data: dict[str, np.ndarray]
-    index: np.ndarray
+    places: np.ndarray
 
 
 def check_axis(axis: str, known: Sequence[str]) -> None:
@@ -75,8 +75,8 @@ def best_of(
         raise InputError("--best", name, "absent: no stored quantity says which cell is better")
     keys = [] if verdict is None else [_unfitness(verdict)]
     keys += [_badness(quantity, data[quantity]) for quantity in order]
-    index = np.lexsort(keys[::-1], axis=place).take(0, place)
-    reduced = {quantity: _taken(values, index, place) for quantity, values in data.items()}
+    places = np.asarray(np.take(np.lexsort(keys[::-1], axis=place), 0, axis=place))
+    reduced = {quantity: _taken(values, places, place) for quantity, values in data.items()}
     if verdict is not None:
         will_do = _unfitness(reduced["verdict"]) == 0
         reduced["verdict"] = _with_doubt(reduced, verdict, will_do, place)
@@ -84,8 +84,8 @@ def best_of(
         will_do = np.isfinite(_badness(order[0], reduced[order[0]]))
     if "cell_side" in data:
         reduced["cell_side"] = _side(data["cell_side"], place)
-    chosen = np.where(will_do, np.asarray(points, float)[index], np.nan)
-    return Best({best_name(name): chosen} | reduced, index)
+    chosen = np.where(will_do, np.asarray(points, float)[places], np.nan)
+    return Best({best_name(name): chosen} | reduced, places)
 
 
 def ranked(names: Mapping[str, np.ndarray], pictured: Sequence[str] = ()) -> list[str]:
@@ -117,8 +117,8 @@ def _badness(name: str, values: np.ndarray) -> np.ndarray:
     return np.where(is_none, np.inf, worse)
 
 
-def _taken(values: np.ndarray, index: np.ndarray, place: int) -> np.ndarray:
-    where = np.expand_dims(index, place)
+def _taken(values: np.ndarray, places: np.ndarray, place: int) -> np.ndarray:
+    where = np.expand_dims(places, place)
     where = where.reshape(*where.shape, *[1] * (values.ndim - where.ndim))
     return np.take_along_axis(values, where, axis=place).squeeze(place)
 

@@ -35,11 +35,11 @@ class Choice(NamedTuple):
 
     Fields:
         points: (n,) of the axis.
-        index: (...) of the best one, of the shape of the quantities.
+        places: (...) of the best one, of the shape of the quantities.
     """
 
     points: np.ndarray
-    index: np.ndarray
+    places: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,15 +98,15 @@ class Result:
     def _without(self, axis: str) -> "Result":
         check_axis(axis, tuple(self.axes))
         place, points = list(self.axes).index(axis), self.axes[axis]
-        data, index = best_of(self.data, axis, points, place, MAP_KINDS[self.attributes["map"]].pictured)
+        data, places = best_of(self.data, axis, points, place, MAP_KINDS[self.attributes["map"]].pictured)
         others = {name: points for name, points in self.axes.items() if name != axis}
         earlier = {
             name: Choice(
-                choice.points, np.take_along_axis(choice.index, np.expand_dims(index, place), place).squeeze(place)
+                choice.points, np.take_along_axis(choice.places, np.expand_dims(places, place), place).squeeze(place)
             )
             for name, choice in self.choices.items()
         }
-        choices = earlier | {axis: Choice(points, index)}
+        choices = earlier | {axis: Choice(points, places)}
         units, labels = _described([*others, *choices, *data])
         return dataclasses.replace(self, axes=others, data=data, units=units, labels=labels, choices=choices)
 
@@ -120,7 +120,7 @@ class Result:
             by axis, those chosen by `best` included.
         """
         place = {axis: float(points[i]) for (axis, points), i in zip(self.axes.items(), index, strict=True)}
-        return place | {axis: float(choice.points[choice.index[index]]) for axis, choice in self.choices.items()}
+        return place | {axis: float(choice.points[choice.places[index]]) for axis, choice in self.choices.items()}
 
     def to_xarray(self) -> "xarray.Dataset":
         """The result for xarray: named dimensions, units and long names, and the attributes of the file.
