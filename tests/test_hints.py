@@ -91,7 +91,7 @@ def test_hints_about_a_pose_among_the_spools(spools, planar, place, told):
     spec = spec_of(base_points=spools, **({"planar": True} if planar else {}))
     lines = hints.plan_hints(PlanFile.model_validate(keys), spec)
     wanted = f"pose[1].position = {shown(place)}: in the plane of the spools"
-    assert [line for line in lines if line.startswith(wanted)] == lines[: int(told)]
+    assert [line.startswith(wanted) for line in lines if "z_axis" not in line] == [True] * told
     assert any("z_axis" in line for line in lines) == (place[2] < np.min(spools, axis=0)[2])
 
 
