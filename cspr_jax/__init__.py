@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cspr_jax.api.lines import straight_line as straight_line
     from cspr_jax.api.lists import list_quantities as list_quantities
     from cspr_jax.api.lists import list_robots as list_robots
+    from cspr_jax.api.motions import amplitude as amplitude
     from cspr_jax.api.motions import hypocycloid as hypocycloid
     from cspr_jax.api.motions import make_problem as make_problem
     from cspr_jax.api.motions import platform_motion as platform_motion
@@ -35,10 +36,15 @@ if TYPE_CHECKING:
     from cspr_jax.api.replays import Replay as Replay
     from cspr_jax.api.replays import replay as replay
     from cspr_jax.api.reports import report as report
+    from cspr_jax.api.robots import load_robot as load_robot
     from cspr_jax.api.robots import parallel_pair_robot as parallel_pair_robot
     from cspr_jax.api.robots import platform as platform
     from cspr_jax.api.robots import point_mass as point_mass
+    from cspr_jax.api.robots import point_mass_robot as point_mass_robot
     from cspr_jax.api.robots import three_cable_equivalent as three_cable_equivalent
+    from cspr_jax.api.robots import with_cables as with_cables
+    from cspr_jax.api.runs import keep_compiled_code as keep_compiled_code
+    from cspr_jax.api.runs import open_result as open_result
     from cspr_jax.api.runs import status as status
     from cspr_jax.api.runs import verify as verify
     from cspr_jax.api.searches import minimum_arcs as minimum_arcs
@@ -54,16 +60,10 @@ if TYPE_CHECKING:
     from cspr_jax.api.volumes import WorkspaceVolume as WorkspaceVolume
     from cspr_jax.api.volumes import workspace_volume as workspace_volume
     from cspr_jax.api.workspaces import workspace as workspace
-    from cspr_jax.problem import load_robot as load_robot
-    from cspr_jax.robots.cables import with_cables as with_cables
     from cspr_jax.robots.limits import Limits as Limits
     from cspr_jax.robots.limits import Uncertainty as Uncertainty
-    from cspr_jax.robots.point_mass import point_mass_robot as point_mass_robot
-    from cspr_jax.runtime.xla import keep_compiled_code as keep_compiled_code
     from cspr_jax.schema.verdicts import Verdict as Verdict
     from cspr_jax.search.landings import LaunchErrors as LaunchErrors
-    from cspr_jax.store.result import open_result as open_result
-    from cspr_jax.trajectories.amplitudes import named as amplitude
 
 __version__ = "0.1.0"
 
@@ -76,7 +76,7 @@ _PUBLIC = {
     "Verdict": ("cspr_jax.schema.verdicts", "Verdict"),
     "WorkspaceVolume": ("cspr_jax.api.volumes", "WorkspaceVolume"),
     "accessible": ("cspr_jax.api.platform_searches", "accessible"),
-    "amplitude": ("cspr_jax.trajectories.amplitudes", "named"),
+    "amplitude": ("cspr_jax.api.motions", "amplitude"),
     "attainable": ("cspr_jax.api.platform_searches", "attainable"),
     "available_accelerations": ("cspr_jax.api.accelerations", "available_accelerations"),
     "benchmark": ("cspr_jax.api.speed", "benchmark"),
@@ -88,26 +88,26 @@ _PUBLIC = {
     "encoder_error": ("cspr_jax.api.sensitivities", "encoder_error"),
     "hypocycloid": ("cspr_jax.api.motions", "hypocycloid"),
     "import_robot": ("cspr_jax.api.imports", "import_robot"),
-    "keep_compiled_code": ("cspr_jax.runtime.xla", "keep_compiled_code"),
+    "keep_compiled_code": ("cspr_jax.api.runs", "keep_compiled_code"),
     "launch_range": ("cspr_jax.api.launches", "launch_range"),
     "least_time": ("cspr_jax.api.lines", "least_time"),
     "list_examples": ("cspr_jax.api.examples", "list_examples"),
     "list_quantities": ("cspr_jax.api.lists", "list_quantities"),
     "list_robots": ("cspr_jax.api.lists", "list_robots"),
-    "load_robot": ("cspr_jax.problem", "load_robot"),
+    "load_robot": ("cspr_jax.api.robots", "load_robot"),
     "make_problem": ("cspr_jax.api.motions", "make_problem"),
     "minimum_arcs": ("cspr_jax.api.searches", "minimum_arcs"),
     "minimum_oscillations": ("cspr_jax.api.searches", "minimum_oscillations"),
     "minimum_pose_arcs": ("cspr_jax.api.platform_searches", "minimum_pose_arcs"),
     "new_file": ("cspr_jax.api.templates", "new_file"),
-    "open_result": ("cspr_jax.store.result", "open_result"),
+    "open_result": ("cspr_jax.api.runs", "open_result"),
     "parallel_pair_robot": ("cspr_jax.api.robots", "parallel_pair_robot"),
     "plan": ("cspr_jax.api.plans", "plan"),
     "platform": ("cspr_jax.api.robots", "platform"),
     "platform_motion": ("cspr_jax.api.motions", "platform_motion"),
     "plot": ("cspr_jax.api.pictures", "plot"),
     "point_mass": ("cspr_jax.api.robots", "point_mass"),
-    "point_mass_robot": ("cspr_jax.robots.point_mass", "point_mass_robot"),
+    "point_mass_robot": ("cspr_jax.api.robots", "point_mass_robot"),
     "replay": ("cspr_jax.api.replays", "replay"),
     "report": ("cspr_jax.api.reports", "report"),
     "run": ("cspr_jax.api.sweeps", "run"),
@@ -122,7 +122,7 @@ _PUBLIC = {
     "three_cable_equivalent": ("cspr_jax.api.robots", "three_cable_equivalent"),
     "transition": ("cspr_jax.api.motions", "transition"),
     "verify": ("cspr_jax.api.runs", "verify"),
-    "with_cables": ("cspr_jax.robots.cables", "with_cables"),
+    "with_cables": ("cspr_jax.api.robots", "with_cables"),
     "workspace": ("cspr_jax.api.workspaces", "workspace"),
     "workspace_volume": ("cspr_jax.api.volumes", "workspace_volume"),
 }
@@ -193,3 +193,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, attribute = _PUBLIC[name]
     return getattr(importlib.import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    """Names that completion offers: the public ones, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -50,7 +50,8 @@ class InputError(CsprError, ValueError):
 
     def __init__(self, key: str, value: object, allowed: str, *, fault: str = "") -> None:
         """Keep the parts, so that a reader of files can add its name."""
-        super().__init__(f"{key}: {fault}: {allowed}" if fault else f"{key} = {shown(value)}: must be {allowed}")
+        line = f"{key}: {fault}: {allowed}" if fault else f"{key} = {shown(value)}: must be {allowed}"
+        super().__init__(one_line(line))
         self.key, self.value, self.allowed, self.fault = key, value, allowed, fault
 
 
@@ -158,7 +159,8 @@ def _toml(value: object, depth: int) -> str:
 
 
 def _plain(value: object) -> str:
-    return str(value) if isinstance(value, datetime.date | datetime.time) else repr(value)
+    # Arrays are written over several lines.
+    return str(value) if isinstance(value, datetime.date | datetime.time) else " ".join(repr(value).split())
 
 
 def _container(value: dict | list | tuple, depth: int) -> str:

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
@@ -39,6 +40,7 @@ class AvailableAccelerations:
     _faces: Faces
     _frame: Frame
 
+    @checked
     def margin(self, accelerations) -> np.ndarray:
         """Distance of accelerations from the nearest face.
 
@@ -54,6 +56,7 @@ class AvailableAccelerations:
         """
         return self._judged(accelerations)[0]
 
+    @checked
     def verdict(self, accelerations) -> np.ndarray:
         """Verdicts of accelerations.
 
@@ -70,7 +73,7 @@ class AvailableAccelerations:
 
     def _judged(self, accelerations) -> tuple[np.ndarray, np.ndarray]:
         given = np.asarray(accelerations, float)
-        if given.shape not in ((3,), self.positions.shape) or not np.isfinite(given).all():
+        if given.shape not in ((3,), self.positions.shape):
             allowed = f"finite numbers of shape (3,) or {self.positions.shape}"
             raise InputError("accelerations", f"shape {given.shape}", allowed)
         if self._robot.dof == 2 and given[..., 1].any():
@@ -80,6 +83,7 @@ class AvailableAccelerations:
             return search.judged(self._robot, self._faces, self._frame.inward(self.positions), turned)
 
 
+@checked
 def available_accelerations(
     robot: PointMassRobot, positions, *, tension_min=None, tension_max=None
 ) -> AvailableAccelerations:

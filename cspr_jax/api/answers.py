@@ -12,7 +12,8 @@ from cspr_jax.trajectories.motion import Placed
 
 @dataclasses.dataclass(frozen=True)
 class _WithMotions:
-    make: Callable[[], Placed] = dataclasses.field(kw_only=True, repr=False, compare=False)
+    # Of a module and with its arguments, so that answers can be pickled and copied.
+    make: Callable[[Any], Placed] = dataclasses.field(kw_only=True, repr=False, compare=False)
 
     def motions(self) -> Any:
         """Motions that the answers belong to: of the number of arcs found, else of the best candidate.
@@ -20,7 +21,7 @@ class _WithMotions:
         Returns:
             one motion whose leaves have a leading dimension (n,), in the robot's axes: `jax.vmap` takes it apart.
         """
-        return self.make()
+        return self.make(self)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,11 +15,16 @@ from cspr_jax.problem import limits_over, prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot
 from cspr_jax.robots.robot import check_determined
-from cspr_jax.schema.given_numbers import numbers
+from cspr_jax.schema.given_numbers import ANY, Numbers
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.pose_targets import REFERENCE
-from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors, named
+from cspr_jax.trajectories.amplitudes import NAMES, Amplitude, boundary_errors, named
 from cspr_jax.trajectories.motion import Placed
+
+POINTS = Numbers(
+    "finite numbers of shape (n, 3), n >= 1, at most 1e6 m", ((ANY, 3),), least=-LARGEST_LENGTH, largest=LARGEST_LENGTH
+)
+DEPTHS = Numbers("a number > 0, at most 1e6 m", ((), (ANY,)), least=0.0, above=True, largest=LARGEST_LENGTH)
 
 
 def check_point_mass(robot: Any) -> None:
@@ -48,7 +53,11 @@ def amplitude_of(given: str | Amplitude, *, free_end: bool | None = None) -> Amp
     Raises:
         InputError: an unknown name, or conditions that it breaks.
     """
-    function = named(given) if isinstance(given, str) else given
+    try:
+        function = named(given) if isinstance(given, str) else given
+    except InputError as error:
+        allowed = f"one of {', '.join(NAMES)}; those with an epsilon are amplitude(name, epsilon)"
+        raise InputError("amplitude", given, allowed) from error
     if free_end is not None and isinstance(function.coefficients, np.ndarray):
         broken = boundary_errors(function, free_end=free_end)
         if broken:
@@ -138,11 +147,7 @@ def depths(z0, count: int) -> np.ndarray:
     """
     if np.shape(z0) not in ((), (count,)):
         raise InputError("z0", f"shape {np.shape(z0)}", f"a number > 0, or ({count},) of them")
-    depth = np.broadcast_to(np.asarray(z0, float), (count,)).copy()
-    fits = (depth > 0.0) & (depth <= LARGEST_LENGTH)
-    if not fits.all():
-        raise InputError("z0", float(depth[~fits][0]), "a number > 0, at most 1e6 m")
-    return depth
+    return np.broadcast_to(DEPTHS.array("z0", z0), (count,)).copy()
 
 
 def quaternions(key: str, given, count: int) -> np.ndarray:
@@ -180,11 +185,4 @@ def points_of(key: str, given) -> np.ndarray:
     Raises:
         InputError: another shape, not finite, or beyond 1e6 m.
     """
-    allowed = "finite numbers of shape (n, 3), n >= 1"
-    points = numbers(key, given, allowed)
-    if points.ndim != 2 or points.shape[1] != 3 or not len(points):
-        raise InputError(key, None, f"must be {allowed}", fault=f"an array of shape {points.shape}")
-    fits = (np.abs(points) <= LARGEST_LENGTH).all(1)
-    if not fits.all():
-        raise InputError(key, points[~fits][0].tolist(), "finite numbers, at most 1e6 m")
-    return points
+    return POINTS.array(key, given)

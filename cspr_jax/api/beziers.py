@@ -5,6 +5,7 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_point_mass, kernel_problem, points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
@@ -44,6 +45,7 @@ class BezierVerdicts(Columns):
         return self.verdict == 0
 
 
+@checked
 def bezier(robot: PointMassRobot, start, control_point, end, *, duration) -> Placed[Bezier]:
     """Motion along a Bezier curve of the second order from rest to rest, launch paper (9), (13).
 
@@ -66,6 +68,7 @@ def bezier(robot: PointMassRobot, start, control_point, end, *, duration) -> Pla
     return Placed(Bezier(first, middle, last, jnp.asarray(duration, float), plane_normal(own) @ first), frame)
 
 
+@checked
 def bezier_verdicts(
     robot: PointMassRobot, starts, control_points, ends, *, durations, limits: Limits | None = None
 ) -> BezierVerdicts:
@@ -90,7 +93,7 @@ def bezier_verdicts(
     names = ("starts", "control_points", "ends")
     points = _points(robot, dict(zip(names, (starts, control_points, ends), strict=True)))
     times = np.asarray(durations, float)
-    if times.shape != (len(points[0]),) or not ((times > 0.0) & np.isfinite(times)).all():
+    if times.shape != (len(points[0]),):
         raise InputError("durations", f"shape {times.shape}", f"finite numbers > 0 of shape ({len(points[0])},)")
     with double_precision():
         problem, frame = kernel_problem(robot, "quintic", limits, free_end=None)
@@ -99,6 +102,7 @@ def bezier_verdicts(
         return BezierVerdicts(own.verdict, own.margin, own.bound, own.room)
 
 
+@checked
 def bezier_durations(
     robot: PointMassRobot, starts, ends, *, control_points=None, accelerations=None
 ) -> list[np.ndarray]:

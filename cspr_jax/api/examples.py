@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.outputs import example_files
 
 
@@ -18,6 +19,7 @@ def list_examples() -> dict[str, str]:
     return example_files.examples()
 
 
+@checked
 def copy_examples(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
     """Copy examples, to be changed; nothing is overwritten.
 

@@ -7,20 +7,31 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.errors import InputError
 
-def plain(value: Any) -> Any:
+# Deeper than any file of ours is nested; what holds itself is deeper than everything.
+DEEPEST = 32
+
+
+def plain(value: Any, depth: int = DEEPEST) -> Any:
     """A value as parsed TOML has it.
 
     Args:
         value: mappings, sequences, arrays, numbers, paths, and whatever else TOML knows.
+        depth: to which it may be nested.
 
     Returns:
         dictionaries, lists and Python's own numbers in their place; anything else as it is, for the schema to refuse.
+
+    Raises:
+        InputError: it is nested more deeply, or holds itself.
     """
+    if not depth:
+        raise InputError("given", None, f"must be nested at most {DEEPEST} deep", fault="nested too deep, or in itself")
     if isinstance(value, Mapping):
-        return {str(key): plain(inner) for key, inner in value.items()}
+        return {str(key): plain(inner, depth - 1) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(inner) for inner in value]
+        return [plain(inner, depth - 1) for inner in value]
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     return os.fspath(value) if isinstance(value, os.PathLike) else value

@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.config.formats.table import ENDINGS, Imported, format_of
 from cspr_jax.config.formats.writing import robot_text
 from cspr_jax.config.hints import robot_hints
@@ -41,6 +42,7 @@ class ImportedRobot:
         """
         return robot_text(self.keys, self._imported.cable_names)
 
+    @checked
     def save(self, path: str | Path) -> Path:
         """Write the robot file.
 
@@ -61,6 +63,7 @@ class ImportedRobot:
         return target
 
 
+@checked
 def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobot:
     """A robot of CASPR (NAME_cables.xml beside NAME_bodies.xml), cdpyr (.json, .yaml) or WireX (.wcrfx).
 

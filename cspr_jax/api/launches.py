@@ -4,18 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_point_mass, kernel_problem, points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import LARGEST_LENGTH, PLANAR, PointMassRobot
+from cspr_jax.robots.point_mass import PLANAR, PointMassRobot
 from cspr_jax.search.launch_range import POPULATION, LaunchRange
 from cspr_jax.search.launch_range import launch_range as searched
 from cspr_jax.search.release_bounds import bounds_of
 
-LEAST_POPULATION = 16
 
-
+@checked
 def launch_range(
     robot: PointMassRobot,
     targets: np.ndarray,
@@ -57,19 +57,10 @@ def launch_range(
         raise InputError("targets", "y not 0", "y = 0: the plane of a planar robot")
     ranges = {"release_x": release_x, "release_y": release_y, "release_z": release_z}
     for name, values in ranges.items():
-        if values is not None and not _is_range(values):
+        if values is not None and not values[0] <= values[1]:
             raise InputError(name, list(values), "[least, largest], the first not above the second, at most 1e6 m")
-    if max_duration is not None and not (np.isfinite(max_duration) and max_duration > 0.0):
-        raise InputError("max_duration", max_duration, "a number > 0, s")
-    if population < LEAST_POPULATION:
-        raise InputError("population", population, f"an integer >= {LEAST_POPULATION}")
     with double_precision():
         problem, frame = kernel_problem(robot, "quintic", limits, free_end=None)
         bounds = bounds_of(problem, frame, list(ranges.values()), max_duration)
         first = np.broadcast_to(frame.inward(starts), ends.shape).copy()
         return searched(problem, first, frame.inward(ends), bounds, int(population)).placed(frame)
-
-
-def _is_range(values: Sequence[float]) -> bool:
-    ends = np.asarray(values, float)
-    return ends.shape == (2,) and bool((np.abs(ends) <= LARGEST_LENGTH).all() and ends[0] <= ends[1])

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_point_mass, points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
@@ -16,6 +17,7 @@ from cspr_jax.trajectories.motion import Placed
 from cspr_jax.trajectories.timed_lines import LAWS, TimedLine, fixed_law, s_curve
 
 
+@checked
 def straight_line(
     robot: PointMassRobot, start, end, *, duration, law: str = "s-curve", acceleration_time=None
 ) -> Placed[TimedLine]:
@@ -45,6 +47,7 @@ def straight_line(
     return Placed(TimedLine(first, last - first, shape, time), frame)
 
 
+@checked
 def least_time(
     robot: PointMassRobot,
     targets: np.ndarray,
@@ -71,8 +74,6 @@ def least_time(
             not finite.
     """
     check_point_mass(robot)
-    if max_acceleration is not None and not (np.isfinite(max_acceleration) and max_acceleration > 0.0):
-        raise InputError("max_acceleration", max_acceleration, "a number > 0, m/s^2")
     ends = points_of("targets", targets)
     starts = points_of("start", np.atleast_2d(np.asarray(start, float)))
     if len(starts) not in (1, len(ends)):

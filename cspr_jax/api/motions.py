@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import amplitude_of, kernel_problem, warn_of_rest
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame
@@ -28,16 +29,18 @@ from cspr_jax.robots.state import State
 from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
 from cspr_jax.search.pose_targets import REFERENCE
 from cspr_jax.trajectories import transition as transitions
-from cspr_jax.trajectories.amplitudes import Amplitude
+from cspr_jax.trajectories.amplitudes import Amplitude, named
 from cspr_jax.trajectories.hypocycloid import Hypocycloid, segment
 from cspr_jax.trajectories.motion import Motion, Placed, inward
 from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, pose_segment
 
+amplitude = checked(named, "amplitude", __name__)
 # Compiled whole: XLA would compile each of their operations by itself.
 _SLACKS = jax.jit(feasibility.slacks)
 _MARGIN = jax.jit(feasibility.sampled_margin, static_argnames="samples")
 
 
+@checked
 def make_problem(
     robot: AnyRobot, *, amplitude: str | Amplitude = "quintic", limits: Limits | None = None
 ) -> Problem[Any]:
@@ -57,6 +60,7 @@ def make_problem(
     return kernel_problem(robot, amplitude, limits, free_end=None)[0]
 
 
+@checked
 def hypocycloid(
     robot: PointMassRobot, start, end, *, z0, arcs, amplitude: str | Amplitude = "quintic"
 ) -> Placed[Hypocycloid]:
@@ -85,6 +89,7 @@ def hypocycloid(
     return Placed(Hypocycloid(geometry, function, p), frame)
 
 
+@checked
 def transition(
     robot: PointMassRobot, target, *, z0, oscillations, amplitude: str | Amplitude = "quintic"
 ) -> Placed[Hypocycloid]:
@@ -110,6 +115,7 @@ def transition(
     return Placed(Hypocycloid(geometry, function, 2.0 * jnp.asarray(oscillations, float)), frame)
 
 
+@checked
 def platform_motion(
     robot: PlatformRobot,
     start,
@@ -151,6 +157,7 @@ def platform_motion(
     return Placed(PlatformMotion(geometry, function, p, Kind(variable)), frame)
 
 
+@checked
 def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
     """Tensions of the cables in a state.
 
@@ -181,6 +188,7 @@ def _is_finite(numbers: Array) -> bool:
     return isinstance(numbers, jax.core.Tracer) or bool(np.isfinite(np.asarray(numbers)).all())
 
 
+@checked
 def slacks(problem: Problem, motion: Motion, tau) -> Array:
     """Slacks of all criteria at one instant of a motion: taut cables, determinant, depth, limits.
 
@@ -195,6 +203,7 @@ def slacks(problem: Problem, motion: Motion, tau) -> Array:
     return _SLACKS(problem, _inner(motion), jnp.asarray(tau, float))
 
 
+@checked
 def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array:
     """Smallest slack at equidistant instants of a motion; it can be differentiated.
 

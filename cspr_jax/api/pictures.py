@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs.plots.draw import drawn
 from cspr_jax.outputs.plots.selection import result_at
@@ -15,6 +16,7 @@ from cspr_jax.store.publishing import publish
 from cspr_jax.store.result import Result, open_result
 
 
+@checked
 def plot(  # noqa: PLR0913
     results: str | Path | Result | Sequence[str | Path | Result],
     *,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.given import plain, text_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.plan import plan_keys
@@ -32,6 +33,7 @@ NAME = Path("plan")
 class Plan(planning.Plan):
     """A planned sequence, and what can be had of it; see `cspr_jax.plans.planning.Plan` for its fields."""
 
+    @checked
     def rows(self, rate: float | None = None) -> dict[str, np.ndarray]:
         """The motion as rows over time.
 
@@ -48,6 +50,7 @@ class Plan(planning.Plan):
         with double_precision():
             return motion_files.rows(self, rate=rate)
 
+    @checked
     def save(self, path: str | Path, rate: float | None = None, anyway: bool = False) -> Path:
         """Write the motion.
 
@@ -72,6 +75,7 @@ class Plan(planning.Plan):
             motion_files.write_rows(self, path, rate=rate)
         return path
 
+    @checked
     def save_mjcf(self, path: str | Path, step: float = STEP, anyway: bool = False) -> Path:
         """Write a model of the robot for MuJoCo, and beside it NAME_control.csv, the tensions that play the plan.
 
@@ -97,6 +101,7 @@ class Plan(planning.Plan):
             write_mjcf(self, path, step)
         return path
 
+    @checked
     def animate(self, path: str | Path, speed: float = 1.0, anyway: bool = False) -> Path:
         """Write a film of the motion: the robot in space, its cables coloured by tension, and its tensions.
 
@@ -150,6 +155,7 @@ class Plan(planning.Plan):
         with double_precision():
             return plan_report.plan_table(self)
 
+    @checked
     def scatter(self, errors: LaunchErrors) -> Scatter:
         """Scatter of the landings of the object that the plan launches.
 
@@ -167,6 +173,7 @@ class Plan(planning.Plan):
         with double_precision():
             return scattered(self, errors)
 
+    @checked
     def to_xarray(self, rate: float | None = None) -> "xarray.Dataset":
         """The motion for xarray, with units and long names.
 
@@ -185,6 +192,7 @@ class Plan(planning.Plan):
         return labelled.motion(arrays, motion_files.attributes(self))
 
 
+@checked
 def plan(given: str | Path | Mapping[str, Any]) -> Plan:
     """Plan a sequence of poses.
 

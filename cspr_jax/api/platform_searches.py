@@ -1,12 +1,15 @@
 """Searches of platforms from Python: poses and orientations in, answers out; see `api.searches`."""
 
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
 from cspr_jax.api.answers import PlatformAnswers
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
@@ -26,6 +29,7 @@ from cspr_jax.trajectories.motion import Placed
 from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion
 
 
+@checked
 def minimum_pose_arcs(  # noqa: PLR0913
     robot: PlatformRobot,
     positions: np.ndarray,
@@ -80,15 +84,18 @@ def minimum_pose_arcs(  # noqa: PLR0913
         trial = Candidates(first, ends, depth, np.arange(len(depth)), (beta_hats, beta_hats))
         value = float(beta_hat) if isinstance(beta_hat, int) else beta_hat
         answers = pose_arcs(checker, trial, beta_hat=value, max_arcs=max_arcs)
-
-    def motions() -> Placed[PlatformMotion]:
-        chosen = trial._replace(beta_hats=tuple(answers.beta_hat.T))
-        segments = segments_with(problem.robot, chosen, answers.tried_arcs)
-        return batched(PlatformMotion, segments, problem, answers, frame, Kind(variable))
-
-    return PlatformAnswers(**vars(answers), make=motions)
+    return PlatformAnswers(**vars(answers), make=partial(_motions, problem, frame, trial, Kind(variable)))
 
 
+def _motions(
+    problem: Problem, frame: Frame, trial: Candidates, kind: Kind, answers: PoseAnswers
+) -> Placed[PlatformMotion]:
+    chosen = trial._replace(beta_hats=tuple(answers.beta_hat.T))
+    segments = segments_with(problem.robot, chosen, answers.tried_arcs)
+    return batched(PlatformMotion, segments, problem, answers, frame, kind)
+
+
+@checked
 def accessible(
     robot: PlatformRobot, place, *, definition: Literal["grid", "scan", "equal-volume"] = "scan", divisions: int = 32
 ) -> Accessible:
@@ -112,6 +119,7 @@ def accessible(
         return search_accessible(problem.robot, where, definition, divisions)
 
 
+@checked
 def attainable(
     robot: PlatformRobot,
     place,

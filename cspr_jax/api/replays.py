@@ -7,6 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.pictures import finished
 from cspr_jax.api.plans import NAME, Plan, plan
 from cspr_jax.arithmetic.elementary import double_precision
@@ -21,6 +22,7 @@ from cspr_jax.outputs.plots.style import style_of
 class Replay(replays.Replay):
     """A plan beside what MuJoCo makes of it; see `cspr_jax.outputs.replay.Replay` for its fields."""
 
+    @checked
     def plot(
         self,
         *,
@@ -47,6 +49,7 @@ class Replay(replays.Replay):
         return finished(lambda: replay_figure(self), self.robot, style_of(size, dpi, font_size), output)
 
 
+@checked
 def replay(given: str | Path | Mapping[str, Any] | Plan, *, step: float = STEP, anyway: bool = False) -> Replay:
     """Play a plan in MuJoCo: where its tensions take the robot, and which tensions MuJoCo asks for along its path.
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.pictures import names_of
 from cspr_jax.api.plans import Plan, plan
 from cspr_jax.arithmetic.elementary import double_precision
@@ -29,6 +30,7 @@ from cspr_jax.store.result import Result, open_result
 USUAL, MOST, RATE = 50, 500, 60.0
 
 
+@checked
 def report(
     given: str | Path | Result | Plan,
     output: str | Path,

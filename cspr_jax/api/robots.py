@@ -2,14 +2,23 @@
 
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.errors import InputError
 from cspr_jax.problem import MAKERS, pair_limits
+from cspr_jax.problem import load_robot as _load_robot
+from cspr_jax.robots.cables import with_cables as _with_cables
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.parallel_pairs import parallel_pairs
 from cspr_jax.robots.platform import RIGID, PlatformRobot, platform_robot
-from cspr_jax.robots.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot, point_mass_robot
+from cspr_jax.robots.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot
+from cspr_jax.robots.point_mass import point_mass_robot as _point_mass_robot
+
+load_robot = checked(_load_robot, "load_robot", __name__)
+point_mass_robot = checked(_point_mass_robot, "point_mass_robot", __name__)
+with_cables = checked(_with_cables, "with_cables", __name__)
 
 
+@checked
 def point_mass(
     base_points,
     *,
@@ -46,6 +55,7 @@ def point_mass(
     return MAKERS[wanted](base_points, mass=mass, gravity=gravity, name=name, z_axis=z_axis, limits=limits)
 
 
+@checked
 def platform(  # noqa: PLR0913
     base_points,
     platform_points,
@@ -95,6 +105,7 @@ def platform(  # noqa: PLR0913
     )
 
 
+@checked
 def parallel_pair_robot(
     spool_radius: float,
     platform_radius: float,
@@ -124,9 +135,6 @@ def parallel_pair_robot(
     Raises:
         InputError: a radius that is not positive, or what a robot file with these numbers would be refused for.
     """
-    for key, value in (("spool_radius", spool_radius), ("platform_radius", platform_radius)):
-        if not (np.isfinite(value) and value > 0.0):
-            raise InputError(key, value, "a finite number > 0, in m")
     places, half = 2.0 * np.pi / 3.0 * np.arange(3.0), 0.5 * platform_radius
     middles = spool_radius * np.stack([np.cos(places), np.sin(places), 0.0 * places], axis=1)
     high = np.sqrt(3.0) * half
@@ -145,6 +153,7 @@ def parallel_pair_robot(
     )
 
 
+@checked
 def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
     """The point mass on three cables that a platform on six in parallel pairs is; see `robots.parallel_pairs`.
 
@@ -161,7 +170,7 @@ def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
     if not isinstance(robot, PlatformRobot) or robot.pattern != RIGID or robot.pulleys is not None:
         raise InputError("robot", getattr(robot, "name", robot), "a rigid platform on six cables without pulleys")
     pairs = parallel_pairs(robot.base_points, robot.platform_points)
-    return point_mass_robot(
+    return _point_mass_robot(
         pairs.exit_points,
         mass=float(robot.mass),
         gravity=float(robot.gravity),

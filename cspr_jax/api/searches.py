@@ -3,24 +3,30 @@
 In the axes of the robot, and in float64 whatever jax is set to. They give NumPy arrays, which cannot be differentiated.
 """
 
+from functools import partial
+
 import numpy as np
 
 from cspr_jax.api.answers import ArcsAnswers, TransitionAnswers
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
+from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
-from cspr_jax.search.answers import pick
+from cspr_jax.search.answers import Answers, pick
 from cspr_jax.search.oscillations import minimum_oscillations as search_oscillations
 from cspr_jax.search.oscillations import transitions_to
 from cspr_jax.search.point_mass_arcs import minimum_arcs as search_arcs
 from cspr_jax.search.point_mass_arcs import segments_between
 from cspr_jax.trajectories.amplitudes import Amplitude
-from cspr_jax.trajectories.hypocycloid import Hypocycloid
+from cspr_jax.trajectories.hypocycloid import Hypocycloid, Segment
 from cspr_jax.trajectories.motion import Placed
 
 
+@checked
 def minimum_arcs(
     robot: PointMassRobot,
     targets: np.ndarray,
@@ -63,15 +69,18 @@ def minimum_arcs(
         starts = rest_point(depth) if given is None else frame.inward(points_of("start", np.atleast_2d(given)))
         given_points = (np.broadcast_to(starts, ends.shape).copy(), frame.inward(ends), depth)
         answers = search_arcs(problem, *given_points, max_arcs=max_arcs)
-
-    def motions() -> Placed[Hypocycloid]:
-        parities, _ = segments_between(problem, *given_points)
-        chosen = pick(parities, np.arange(len(ends)), answers.tried_arcs)
-        return batched(Hypocycloid, chosen, problem, answers, frame)
-
-    return ArcsAnswers(**vars(answers), make=motions)
+    return ArcsAnswers(**vars(answers), make=partial(_motions_between, problem, frame, given_points))
 
 
+def _motions_between(
+    problem: Problem, frame: Frame, given_points: tuple[np.ndarray, ...], answers: Answers
+) -> Placed[Hypocycloid]:
+    parities, _ = segments_between(problem, *given_points)
+    chosen = pick(parities, np.arange(len(answers.tried_arcs)), answers.tried_arcs)
+    return batched(Hypocycloid, chosen, problem, answers, frame)
+
+
+@checked
 def minimum_oscillations(
     robot: PointMassRobot,
     targets: np.ndarray,
@@ -105,8 +114,8 @@ def minimum_oscillations(
         problem, frame = kernel_problem(robot, amplitude, limits, free_end=True, families=("transition",))
         segments = transitions_to(problem, frame.inward(ends), depth)
         answers = search_oscillations(problem, segments, depth, max_arcs=max_arcs)
+    return TransitionAnswers(**vars(answers), make=partial(_transitions, problem, frame, segments))
 
-    def motions() -> Placed[Hypocycloid]:
-        return batched(Hypocycloid, segments, problem, answers, frame)
 
-    return TransitionAnswers(**vars(answers), make=motions)
+def _transitions(problem: Problem, frame: Frame, segments: Segment, answers: Answers) -> Placed[Hypocycloid]:
+    return batched(Hypocycloid, segments, problem, answers, frame)

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
@@ -29,6 +30,7 @@ class Sensitivity:
     sigma_p: np.ndarray
     sigma_r: np.ndarray
 
+    @checked
     def errors(self, cable_error) -> tuple[np.ndarray, np.ndarray]:
         """Bounds of the errors of the pose, to first order.
 
@@ -42,11 +44,12 @@ class Sensitivity:
             InputError: another shape, not finite, or negative.
         """
         error = np.asarray(cable_error, float)
-        if error.shape not in ((), self.sigma_p.shape) or not (np.isfinite(error) & (error >= 0.0)).all():
+        if error.shape not in ((), self.sigma_p.shape):
             raise InputError("cable_error", cable_error, f"a number >= 0, in m, or {len(self.sigma_p)} of them")
         return self.sigma_p * error, self.sigma_r * error
 
 
+@checked
 def sensitivity(robot: PointMassRobot | PlatformRobot, positions, orientations=None) -> Sensitivity:
     """Sensitivities of a robot to errors of its cable lengths.
 
@@ -79,6 +82,7 @@ def sensitivity(robot: PointMassRobot | PlatformRobot, positions, orientations=N
     return Sensitivity(places, np.asarray(found.sigma_p), np.asarray(found.sigma_r))
 
 
+@checked
 def encoder_error(drum_radius: float, pulses: float) -> float:
     """Error of a cable's length from the resolution of its winch's encoder, 2 pi r / pulses.
 
@@ -92,7 +96,4 @@ def encoder_error(drum_radius: float, pulses: float) -> float:
     Raises:
         InputError: a number that is not positive.
     """
-    for key, value in (("drum_radius", drum_radius), ("pulses", pulses)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(key, value, "a finite number > 0")
     return 2.0 * math.pi * drum_radius / pulses

@@ -4,9 +4,11 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax import bench
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.arithmetic.elementary import double_precision
 
 
+@checked
 def benchmark(kernels: str | Path | None = None) -> dict[str, Any]:
     """Measure checks per second, beside a NumPy version of the same check; it takes a minute.
 

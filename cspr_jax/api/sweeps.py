@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.given import plain, text_of
 from cspr_jax.config.hints import robot_hints, sweep_hints
 from cspr_jax.errors import ConfigError
@@ -127,6 +128,7 @@ def sweep_given(given: str | Path | Mapping[str, Any]) -> Sweep:
     return sweep_of(data, NAME, text=text_of(data))
 
 
+@checked
 def run(
     given: str | Path | Mapping[str, Any],
     directory: str | Path | None = None,
@@ -169,6 +171,7 @@ def run(
     return job.finished() or job.go()
 
 
+@checked
 def compute(given: str | Path | Mapping[str, Any]) -> "xarray.Dataset":
     """Compute a small sweep and keep no file; `run` is for those that take long, since it can resume.
 

@@ -1,5 +1,6 @@
 """Published tables from Python, computed again as by `cspr table`."""
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.table_layout import Cell
@@ -16,6 +17,7 @@ def table_names() -> dict[str, str]:
     return {name: source.title for name, source in tables.TABLES.items()}
 
 
+@checked
 def table(
     name: str,
     *,

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import templates
 
@@ -9,6 +10,7 @@ from cspr_jax.outputs import templates
 KINDS = ("robot", "sweep", "plan")
 
 
+@checked
 def new_file(
     what: str,
     path: str | Path,

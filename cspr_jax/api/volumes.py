@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.store.result import Result, open_result
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["WorkspaceVolume", "workspace_volume"]
 
 
+@checked
 def workspace_volume(result: "Result | xarray.Dataset | str | Path") -> WorkspaceVolume:
     """Volume of the workspace that a map has found, or its area where the map is a section.
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
@@ -22,6 +23,7 @@ __all__ = ["WorkspaceAnswers", "workspace"]
 PRECISIONS = ("float64", "float32")
 
 
+@checked
 def workspace(  # noqa: PLR0913
     robot: PointMassRobot | PlatformRobot,
     positions,
@@ -80,10 +82,6 @@ def workspace(  # noqa: PLR0913
     for key, value in (*asked.items(), ("capacity_length", capacity_length)):
         if value is not None and condition != FEASIBLE:
             raise InputError(key, value, f'None with condition "{condition}"')
-    if capacity_length is not None:
-        length = numbers("capacity_length", capacity_length, "a number > 0, in m")
-        if length.ndim or not 0.0 < length < np.inf:
-            raise InputError("capacity_length", capacity_length, "a number > 0, in m")
     places = _places(robot, positions)
     with double_precision():
         own, frame = centred(robot)

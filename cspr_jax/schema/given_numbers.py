@@ -1,14 +1,24 @@
-"""Numbers as somebody gives them from Python."""
+"""Numbers as somebody gives them from Python: one check of what is no real number, of shapes and of ranges."""
 
+import dataclasses
+import math
+import numbers as kinds
+import operator
 from typing import Any
 
 import numpy as np
 
 from cspr_jax.errors import InputError
 
+# What a shape has in place of a length that may be any from 1 on.
+ANY = None
+
 
 def numbers(key: str, given: Any, allowed: str) -> np.ndarray:
-    """Numbers that somebody gave.
+    """Real numbers that somebody gave.
+
+    Strings, truth values and complex numbers are refused: NumPy would read the first two as numbers, and drop the
+    imaginary part of the last.
 
     Args:
         key: named in errors.
@@ -19,9 +29,99 @@ def numbers(key: str, given: Any, allowed: str) -> np.ndarray:
         float64 array.
 
     Raises:
-        InputError: no numbers, or rows of several lengths.
+        InputError: no real numbers, or rows of several lengths.
     """
     try:
-        return np.asarray(given, float)
-    except (TypeError, ValueError) as error:
+        values = np.asarray(given)
+        if values.dtype.kind in "iuf":
+            return values.astype(float)
+        if values.dtype.kind == "V" and values.dtype.names is None and np.can_cast(values.dtype, float):
+            return values.astype(float)  # bfloat16 and its like
+        if values.dtype.kind == "O" and all(_is_real(value) for value in values.flat):
+            return np.array([float(value) for value in values.flat]).reshape(values.shape)
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(key, given, allowed) from error
+    raise InputError(key, given, allowed)
+
+
+def whole(key: str, given: Any, least: int, largest: int) -> int:
+    """Integer that somebody gave.
+
+    Args:
+        key: named in errors.
+        given: Python's, NumPy's, or an array of one.
+        least: smallest that is allowed.
+        largest: largest that is allowed.
+
+    Returns:
+        Python's integer.
+
+    Raises:
+        InputError: no integer, or out of the range.
+    """
+    allowed = f"an integer from {least} to {largest}"
+    try:
+        number = operator.index(given)
+    except TypeError as error:
+        raise InputError(key, given, allowed) from error
+    if isinstance(given, bool) or not least <= number <= largest:
+        raise InputError(key, given, allowed)
+    return number
+
+
+@dataclasses.dataclass(frozen=True)
+class Numbers:
+    """What an argument of real numbers may be.
+
+    Fields:
+        allowed: in words, for errors.
+        shapes: that are allowed; `ANY` is a length from 1 on. None: all.
+        least: smallest number.
+        largest: largest number; inf: none, and infinite ones are taken only with `infinite`.
+        above: whether the smallest one itself is refused.
+        infinite: whether inf is taken.
+    """
+
+    allowed: str
+    shapes: tuple[tuple[int | None, ...], ...] | None = ((),)
+    least: float = -math.inf
+    largest: float = math.inf
+    above: bool = False
+    infinite: bool = False
+
+    def array(self, key: str, given: Any) -> np.ndarray:
+        """The numbers.
+
+        Args:
+            key: named in errors.
+            given: number or nested sequence.
+
+        Returns:
+            float64 array.
+
+        Raises:
+            InputError: no real numbers, another shape, or a number out of the range.
+        """
+        values = numbers(key, given, self.allowed)
+        if self.shapes is not None and not any(_fits(values.shape, shape) for shape in self.shapes):
+            if not values.ndim:
+                raise InputError(key, given, self.allowed)
+            raise InputError(key, None, f"must be {self.allowed}", fault=f"an array of shape {values.shape}")
+        inside = (values > self.least if self.above else values >= self.least) & (values <= self.largest)
+        inside &= ~np.isnan(values) if self.infinite else np.isfinite(values)
+        if not inside.all():
+            # One row of points, or one number, is enough to show.
+            at = tuple(np.argwhere(~inside)[0][: 1 if values.ndim == 2 else values.ndim])
+            raise InputError(key, values[at].tolist(), self.allowed)
+        return values
+
+
+def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(wanted) and all(
+        size >= 1 if length is ANY else size == length for size, length in zip(shape, wanted, strict=True)
+    )
+
+
+def _is_real(value: object) -> bool:
+    is_number = isinstance(value, kinds.Real) or type(value).__name__ == "Decimal"
+    return is_number and not isinstance(value, bool | np.bool_)

@@ -18,10 +18,13 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.robots.force_balance import cable_motion
 from cspr_jax.robots.point_mass import PointMassRobot, is_planar
+from cspr_jax.schema.given_numbers import Numbers, whole
 from cspr_jax.trajectories.bezier import Bezier
 from cspr_jax.trajectories.launch import flown
 
 BATCH, NEWTON = 1024, 12
+# As in the keys of a plan file.
+LARGEST_ERROR, MOST_THROWS, LARGEST_SEED = 1e3, 1_000_000, 2**63 - 1
 
 
 class Throw(NamedTuple):
@@ -57,6 +60,13 @@ class LaunchErrors:
     encoder: float = 0.0
     throws: int = 10_000
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse sizes that are none."""
+        for name in ("release", "cable_length", "cable_speed", "encoder"):
+            Numbers("a number from 0 to 1000", least=0.0, largest=LARGEST_ERROR).array(name, getattr(self, name))
+        whole("throws", self.throws, 2, MOST_THROWS)
+        whole("seed", self.seed, 0, LARGEST_SEED)
 
 
 @dataclasses.dataclass(frozen=True)

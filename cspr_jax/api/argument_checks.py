@@ -1,0 +1,230 @@
+"""One check of the arguments of all public functions, by their names: kinds, shapes and ranges, before anything runs.
+
+What depends on several arguments, on a robot or on a file is checked by the function itself. Arguments of the functions
+that jax may trace pass where jax traces them.
+"""
+
+import functools
+import inspect
+import os
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+from cspr_jax.api import argument_rules
+from cspr_jax.api.argument_rules import Rule, choice, integer, kind_of, many, real
+from cspr_jax.config.trajectory import LARGEST_MAX_ARCS
+from cspr_jax.schema.given_numbers import ANY
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+LARGEST_LENGTH = 1e6  # m
+LARGEST_POPULATION, LARGEST_DIVISIONS, LARGEST_SAMPLES = 4096, 128, 1_000_000
+MOST = 10**9  # of what functions bound more narrowly by themselves
+
+
+def checked(function: Function, name: str = "", module: str = "") -> Function:
+    """A function that checks its arguments first.
+
+    Args:
+        function: each of its parameters has a rule.
+        name: that it has from now on, with the module; "": its own.
+        module: that holds it under this name.
+
+    Returns:
+        the function; its signature and docstring stay.
+    """
+    signature = inspect.signature(function)
+    rules = {key: _rule(function.__qualname__, key) for key in signature.parameters if key != "self"}
+
+    @functools.wraps(function)
+    def with_checks(*arguments: Any, **keywords: Any) -> Any:
+        try:
+            bound = signature.bind(*arguments, **keywords).arguments
+        except TypeError:
+            return function(*arguments, **keywords)  # which says what is missing, or too many, in its own name
+        for key, value in bound.items():
+            if key in rules:
+                rules[key](key, value)
+        return function(*arguments, **keywords)
+
+    if name:
+        with_checks.__name__, with_checks.__qualname__, with_checks.__module__ = name, name, module
+    return with_checks  # type: ignore[return-value]
+
+
+def _rule(function: str, key: str) -> Rule:
+    special = OF_FUNCTIONS.get(f"{function}.{key}")
+    return special or ARGUMENTS[key]
+
+
+_NUMBER = real("a number", (), infinite=True)
+_NUMBER_OR_NONE = real("a number, or None", (), none=True, infinite=True)
+_TEXT = kind_of("a string", str)
+_TEXT_OR_NONE = kind_of("a string, or None", str, none=True)
+_FLAG = kind_of("True or False", bool, np.bool_)
+_PATH = kind_of("a path", str, os.PathLike)
+_PATH_OR_NONE = kind_of("a path, or None", str, os.PathLike, none=True)
+_FILE = kind_of("the path of a file, or a dictionary of what it holds", str, os.PathLike, Mapping)
+_PLAN = ("answers", "points", "spec")  # attributes of a plan
+_MOTION = ("state", "duration")
+_POSITIVE = real("a finite number > 0", (), least=0.0, above=True)
+_POSITIVE_OR_NONE = real("a finite number > 0, or None", (), least=0.0, above=True, none=True)
+_TIME = real("a finite number > 0, s", (), least=0.0, above=True, traced=True, none=True)
+_LENGTHS: dict[str, Any] = {"least": -LARGEST_LENGTH, "largest": LARGEST_LENGTH}
+_POINT = real("three finite numbers, at most 1e6 m", (3,), traced=True, **_LENGTHS)
+_POINT_OR_NONE = real("three finite numbers, at most 1e6 m, or None", (3,), traced=True, none=True, **_LENGTHS)
+_POINTS_WORDS = "finite numbers of shape (n, 3), n >= 1, at most 1e6 m"
+_POINTS = real(_POINTS_WORDS, (ANY, 3), **_LENGTHS)
+_POINTS_OR_NONE = real(f"{_POINTS_WORDS}, or None", (ANY, 3), none=True, **_LENGTHS)
+_STARTS = real("finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), **_LENGTHS)
+_STARTS_OR_NONE = real(
+    "None, or finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), none=True, **_LENGTHS
+)
+_GEOMETRY = real("finite numbers of shape (n, 3), one row a cable, at most 1e6 m", (ANY, 3), traced=True, **_LENGTHS)
+_DEPTH: dict[str, Any] = {"least": 0.0, "above": True, "largest": LARGEST_LENGTH}
+_DEPTH_WORDS = "a number > 0, at most 1e6 m"
+_QUATERNIONS = real("None, or unit quaternions of shape (n, 4), scalar first", (ANY, 4), none=True)
+_TENSIONS = real("a number in N, or one a cable", (), (ANY,), none=True, infinite=True)
+_RANGE = real("[least, largest], at most 1e6 m", (2,), none=True, **_LENGTHS)
+_AMPLITUDE = kind_of("the name of an amplitude function, or one of amplitude(...)", str, has=("coefficients", "knots"))
+_ARCS = integer(1, LARGEST_MAX_ARCS)
+_WORKERS = integer(-MOST, MOST, none=True)
+
+# By the name of the argument; what is there is checked in all functions that have one of this name.
+ARGUMENTS: dict[str, Rule] = {
+    "acceleration": real("a number >= 0, in m/s^2, or None", (), least=0.0, none=True),
+    "acceleration_time": _TIME,
+    "accelerations": _POINTS_OR_NONE,
+    "accept_environment_change": _FLAG,
+    "amplitude": _AMPLITUDE,
+    "anyway": _FLAG,
+    "arcs": real("a whole number from 1 on", (), least=1.0, largest=MOST, traced=True),
+    "at": argument_rules.coordinates,
+    "base_points": _GEOMETRY,
+    "beta_hat": choice(
+        real('a finite number, "preferred", or None', (), least=-100.0, largest=100.0), "preferred", None
+    ),
+    "cable_diameter": real("a number >= 0, in m, or None", (), least=0.0, none=True),
+    "cable_error": real("a number >= 0, in m, or one a place", (), (ANY,), least=0.0),
+    "cable_set": _TEXT_OR_NONE,
+    "capacity_length": real("a number > 0, in m, or None", (), least=0.0, above=True, none=True),
+    "cells": many(argument_rules.coordinates, "a list of coordinates by axis"),
+    "centre_of_mass": real("three coordinates, at most 1e6 m, or None", (3,), none=True, **_LENGTHS),
+    "condition": _TEXT,
+    "control_point": _POINT,
+    "control_points": _POINTS_OR_NONE,
+    "definition": _TEXT,
+    "directory": _PATH_OR_NONE,
+    "divisions": integer(4, LARGEST_DIVISIONS),
+    "dpi": _NUMBER_OR_NONE,
+    "drum_radius": _POSITIVE,
+    "duration": real("a finite number > 0, s", (), least=0.0, above=True, traced=True),
+    "durations": real("finite numbers > 0 of shape (n,), s", (ANY,), least=0.0, above=True),
+    "end": _POINT,
+    "ends": _POINTS,
+    "envelope": _FLAG,
+    "epsilon": _NUMBER_OR_NONE,
+    "errors": kind_of("LaunchErrors(...)", has=("throws", "encoder", "seed")),
+    "family": _TEXT,
+    "fine": _FLAG,
+    "folder": _PATH,
+    "font_size": _NUMBER_OR_NONE,
+    "given": _FILE,
+    "gravity": _POSITIVE,
+    "inertia": real("three rows of three finite numbers, kg m^2", (3, 3), traced=True),
+    "kernels": _PATH_OR_NONE,
+    "law": _TEXT,
+    "like": _TEXT,
+    "limits": argument_rules.limits,
+    "lines": _TEXT_OR_NONE,
+    "map": _TEXT,
+    "mass": _POSITIVE,
+    "max_acceleration": _POSITIVE_OR_NONE,
+    "max_arcs": _ARCS,
+    "max_duration": _POSITIVE_OR_NONE,
+    "motion": kind_of("a motion, as hypocycloid, a plan or answers give it", has=_MOTION),
+    "name": _TEXT,
+    "names": argument_rules.names,
+    "on_tile": kind_of("a function, or None", none=True, has=("__call__",)),
+    "orientations": _QUATERNIONS,
+    "oscillations": real("a number > 0", (), least=0.0, above=True, largest=MOST, traced=True),
+    "output": _PATH_OR_NONE,
+    "path": _PATH,
+    "pattern": _TEXT_OR_NONE,
+    "place": real("three finite numbers, at most 1e6 m", (3,), **_LENGTHS),
+    "planar": _FLAG,
+    "platform_points": _GEOMETRY,
+    "platform_radius": _POSITIVE,
+    "population": integer(16, LARGEST_POPULATION),
+    "positions": _POINTS,
+    "precision": _TEXT,
+    "problem": kind_of("a problem, as make_problem gives it", has=("robot", "limits", "amplitude")),
+    "prune": _FLAG,
+    "pulley_axes": real("a vector [x, y, z], or one a cable, or None", (3,), (ANY, 3), none=True),
+    "pulley_radius": real("a number >= 0, in m, or one a cable, or None", (), (ANY,), least=0.0, none=True),
+    "pulses": _POSITIVE,
+    "quantity": _TEXT_OR_NONE,
+    "rate": _NUMBER_OR_NONE,
+    "reference": _PATH,
+    "release_x": _RANGE,
+    "release_y": _RANGE,
+    "release_z": _RANGE,
+    "result": argument_rules.result,
+    "results": argument_rules.results,
+    "robot": argument_rules.robot,
+    "rule": _TEXT,
+    "samples": integer(1, LARGEST_SAMPLES),
+    "scheduler": _TEXT_OR_NONE,
+    "size": argument_rules.size,
+    "solid": _FLAG,
+    "speed": _NUMBER,
+    "spool_radius": _POSITIVE,
+    "start": _POINT_OR_NONE,
+    "starts": _POINTS,
+    "state": argument_rules.state,
+    "step": _NUMBER,
+    "target": _POINT,
+    "targets": _POINTS,
+    "tau": real("a number from 0 to 1", (), least=0.0, largest=1.0, traced=True),
+    "tension_max": _TENSIONS,
+    "tension_min": _TENSIONS,
+    "trajectories": integer(-MOST, MOST),
+    "variable": _FLAG,
+    "what": _TEXT,
+    "workers": _WORKERS,
+    "wrench_box": real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
+    "wrench_ellipsoid": real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
+    "wrenches": real("finite numbers of shape (k, dof), or None", (ANY, ANY), none=True),
+    "z0": real(f"{_DEPTH_WORDS}, or (n,) of them", (), (ANY,), **_DEPTH),
+    "z_axis": _TEXT,
+}
+# Where a function has another argument of that name.
+_ONE_DEPTH = real(_DEPTH_WORDS, (), traced=True, **_DEPTH)
+OF_FUNCTIONS: dict[str, Rule] = {
+    "AvailableAccelerations.margin.accelerations": real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
+    "AvailableAccelerations.verdict.accelerations": real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
+    "attainable.z0": real(f"{_DEPTH_WORDS}, or None", (), none=True, **_DEPTH),
+    "bezier.start": _POINT,
+    "hypocycloid.z0": _ONE_DEPTH,
+    "keep_compiled_code.folder": _PATH_OR_NONE,
+    "launch_range.start": _STARTS,
+    "least_time.start": _STARTS,
+    "minimum_arcs.amplitude": choice(_AMPLITUDE, None),
+    "minimum_arcs.start": _STARTS_OR_NONE,
+    "minimum_pose_arcs.start": choice(argument_rules.pose, None),
+    "parallel_pair_robot.inertia": real("three rows of three finite numbers, kg m^2, or None", (3, 3), none=True),
+    "platform.pattern": _TEXT,
+    "platform_motion.beta_hat": real("two finite numbers", (2,), traced=True),
+    "platform_motion.orientations": real("two unit quaternions, scalar first", (2, 4), traced=True),
+    "platform_motion.z0": _ONE_DEPTH,
+    "replay.given": kind_of("a plan, its file, or a dictionary of that", str, os.PathLike, Mapping, has=_PLAN),
+    "report.given": kind_of("a result, a plan, or the path of one", str, os.PathLike, has=("to_xarray",)),
+    "report.output": _PATH,
+    "status.directory": _PATH,
+    "straight_line.start": _POINT,
+    "table.amplitude": _TEXT_OR_NONE,
+    "table.definition": _TEXT_OR_NONE,
+    "transition.z0": _ONE_DEPTH,
+}

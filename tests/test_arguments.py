@@ -1,0 +1,231 @@
+"""Arguments of all public functions: what no function can use is one line that names the argument, before it runs."""
+
+import copy
+import inspect
+import pickle
+from fractions import Fraction
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import cspr_jax
+from cspr_jax.api import accelerations, imports, plans, replays, sensitivities
+from cspr_jax.errors import CsprError, InputError
+from cspr_jax.schema.given_numbers import numbers
+
+PUBLIC = {name: getattr(cspr_jax, name) for name in cspr_jax.__all__}
+METHODS = {
+    "AvailableAccelerations.margin": accelerations.AvailableAccelerations.margin,
+    "AvailableAccelerations.verdict": accelerations.AvailableAccelerations.verdict,
+    "ImportedRobot.save": imports.ImportedRobot.save,
+    "Plan.animate": plans.Plan.animate,
+    "Plan.rows": plans.Plan.rows,
+    "Plan.save": plans.Plan.save,
+    "Plan.save_mjcf": plans.Plan.save_mjcf,
+    "Plan.scatter": plans.Plan.scatter,
+    "Plan.to_xarray": plans.Plan.to_xarray,
+    "Replay.plot": replays.Replay.plot,
+    "Sensitivity.errors": sensitivities.Sensitivity.errors,
+}
+FUNCTIONS = {name: one for name, one in PUBLIC.items() if not inspect.isclass(one)} | METHODS
+TAKING = {name: one for name, one in FUNCTIONS.items() if set(inspect.signature(one).parameters) - {"self"}}
+
+LOOP: list = [0.5]
+LOOP.append(LOOP)
+DEEP: dict = {}
+DEEP["robot"] = DEEP
+BAD = {
+    "no number": object(),
+    "bytes": b"1.0",
+    "very large": 10**400,
+    "in itself": LOOP,
+    "complex": 1.0 + 2.0j,
+    "complex array": np.array([[0.4, 0.1, 1.5 + 0.1j]]),
+    "ragged": [[0.4, 0.1, 1.5], [0.4, 0.1]],
+    "strings": [["0.4", "0.1", "1.5"]],
+    "none inside": [None, 0.1, 1.5],
+    "shape": np.zeros((2, 3, 2)),
+    "string": "0.5",
+    "None": None,
+    "a set": {0.5},
+}
+TEXTS = {"amplitude", "cable_set", "condition", "definition", "family", "law", "like", "lines", "map", "name", "names"}
+TEXTS |= {"pattern", "precision", "quantity", "rule", "scheduler", "size", "what", "z_axis"}
+PATHS = {"directory", "folder", "given", "kernels", "output", "path", "reference", "result", "results"}
+# Whole numbers, which are bounded: what would take all memory.
+WHOLE = {"divisions", "max_arcs", "population", "samples", "trajectories", "workers"}
+
+# Where None has a meaning without being the default.
+NONE = (("hypocycloid", "start"), ("platform_motion", "start"), ("run", "workers"), ("table", "workers"))
+
+
+def is_good(function: str, key: str, kind: str) -> bool:
+    """Whether a value of `BAD` is one that the argument takes, or one that the function refuses by itself."""
+    parameter = inspect.signature(TAKING[function]).parameters[key]
+    if kind == "None":
+        return parameter.default is None or (function, key) in NONE
+    return kind == "string" and key in TEXTS | PATHS
+
+
+@pytest.fixture(scope="module")
+def good():
+    """Values that functions take, by the name of the argument."""
+    robot = cspr_jax.load_robot("prototype")
+    point, many = [0.4, 0.1, 1.5], [[0.4, 0.1, 1.5]]
+    motion = cspr_jax.hypocycloid(robot, None, point, z0=1.7, arcs=8)
+    state = jax.eval_shape(motion.state, jnp.asarray(0.5))
+    zeros = type(state)(*(None if part is None else np.zeros(part.shape) for part in state))
+    values = {"robot": robot, "problem": cspr_jax.make_problem(robot), "motion": motion, "state": zeros, "tau": 0.5}
+    values |= dict.fromkeys(("start", "end", "control_point", "target", "place"), point)
+    values |= dict.fromkeys(("targets", "positions", "starts", "ends", "control_points", "accelerations"), many)
+    values |= dict.fromkeys(("mass", "gravity", "duration", "z0", "arcs", "oscillations", "max_acceleration"), 1.0)
+    values |= dict.fromkeys(("spool_radius", "platform_radius", "drum_radius", "pulses", "cable_error"), 1.0)
+    values |= {"base_points": robot.base_points, "platform_points": robot.base_points, "inertia": np.eye(3)}
+    values |= dict.fromkeys(("given", "path", "output", "results", "result", "directory", "names", "reference"), "a")
+    values |= {"durations": [1.0], "name": "quintic", "what": "robot", "errors": cspr_jax.LaunchErrors()}
+    return values
+
+
+@pytest.mark.parametrize("function", TAKING)
+def test_bad_arguments(function, good, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    parameters = inspect.signature(TAKING[function]).parameters
+    needed = {key: None for key, one in parameters.items() if one.default is inspect.Parameter.empty}
+    count = 0
+    for key in parameters:
+        bad = BAD | ({"memory": 10**10, "none at all": -(10**10)} if key in WHOLE else {})
+        for kind, value in bad.items():
+            if key == "self" or is_good(function, key, kind):
+                continue
+            given = {name: None if name == "self" else good[name] for name in needed} | {key: value}
+            with pytest.raises(InputError) as raised:
+                TAKING[function](**given)
+            line = str(raised.value)
+            assert line.startswith(key) and len(line.splitlines()) == 1 and len(line) < 400, (key, kind, line)
+            count += 1
+    assert count >= 10 and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("function", ["plan", "run", "compute", "replay"])
+def test_dictionaries_that_hold_themselves(function):
+    with pytest.raises(CsprError, match=r"given: nested too deep|mujoco") as raised:
+        TAKING[function](DEEP)
+    assert len(str(raised.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "value", [10**400, LOOP, 1.0 + 2.0j, np.array([1j]), "1.7\n", float("nan"), object(), {1, 2}], ids=repr
+)
+def test_values_of_files_from_python(value):
+    """The schema of the file refuses them, in one line."""
+    keys = {"schema": 1, "robot": "prototype", "pose": [{"rest": True}, {"position": [0.4, 0.1, 1.5]}], "z0": value}
+    with pytest.raises(CsprError) as raised:
+        cspr_jax.plan(keys)
+    assert len(str(raised.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "bad", [value for kind, value in BAD.items() if kind != "None"], ids=[kind for kind in BAD if kind != "None"]
+)
+@pytest.mark.parametrize("field", ["tension_min", "floor", "cable_speed_max", "uncertainty"])
+def test_bad_limits(field, bad, good):
+    limits = cspr_jax.Limits(**{field: bad})
+    for function in ("minimum_arcs", "make_problem", "least_time"):
+        given = {name: good[name] for name in ("robot", "targets", "start", "z0")}
+        known = inspect.signature(TAKING[function]).parameters
+        with pytest.raises(InputError, match=rf"^limits\.{field}") as raised:
+            TAKING[function](**{name: value for name, value in given.items() if name in known}, limits=limits)
+        assert len(str(raised.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("field", ["release", "cable_length", "cable_speed", "encoder", "throws", "seed"])
+@pytest.mark.parametrize(
+    "bad", [value for kind, value in BAD.items() if kind != "shape"], ids=[kind for kind in BAD if kind != "shape"]
+)
+def test_bad_errors_of_launches(field, bad):
+    with pytest.raises(InputError, match=f"^{field}") as raised:
+        cspr_jax.LaunchErrors(**{field: bad})
+    assert len(str(raised.value).splitlines()) == 1
+
+
+def test_unknown_names_name_their_argument(good):
+    for function, key in (("minimum_arcs", "amplitude"), ("hypocycloid", "amplitude"), ("workspace", "condition")):
+        given = {name: good[name] for name in ("robot", "targets", "positions", "end", "start", "z0", "arcs")}
+        known = inspect.signature(TAKING[function]).parameters
+        with pytest.raises(InputError, match=f'^{key} = "nothing": must be'):
+            TAKING[function](**{name: one for name, one in given.items() if name in known} | {key: "nothing"})
+
+
+def test_numbers_of_all_kinds():
+    """What counts as a real number, exactly as its value."""
+    good = [1, 1.5, np.float32(1.5), np.int8(3), Fraction(3, 2), [1, 2.5], (1, 2), jnp.arange(3), 10**30, [Fraction(1)]]
+    for value in [*good, jnp.ones(2, jnp.bfloat16), np.array([1, Fraction(1, 4)], object)]:
+        np.testing.assert_array_equal(numbers("x", value, ""), np.asarray(value, float))
+    for value in (
+        True,
+        [True, 1.0] * 0 + [True],
+        np.bool_(True),
+        "1",
+        ["1"],
+        1j,
+        np.datetime64(1, "s"),
+        None,
+        [[1], 2],
+    ):
+        with pytest.raises(InputError, match=r"^x = .*: must be a number"):
+            numbers("x", value, "a number")
+
+
+def test_traced_arguments_pass(good):
+    """Gradients and maps of jax go through the check of one motion."""
+    robot = good["robot"]
+
+    def margin(target, z0):
+        motion = cspr_jax.hypocycloid(robot, None, jnp.stack([target[0], target[1], target[2]]), z0=z0, arcs=8)
+        return motion.state(0.5).position[2]
+
+    shapes = jax.eval_shape(jax.grad(margin, argnums=(0, 1)), jnp.array([0.4, 0.1, 1.5]), 1.7)
+    assert [shape.shape for shape in shapes] == [(3,), ()]
+    targets = jnp.ones((5, 3))
+    assert jax.eval_shape(jax.vmap(lambda target: margin(target, 1.7)), targets).shape == (5,)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_functions_can_be_pickled(name):
+    """Processes that are given one find it again under its name."""
+    assert pickle.loads(pickle.dumps(FUNCTIONS[name])) is FUNCTIONS[name]
+    assert FUNCTIONS[name].__doc__
+
+
+def test_too_few_arguments_are_pythons_own_error():
+    with pytest.raises(TypeError, match=r"minimum_arcs\(\) missing"):
+        cspr_jax.minimum_arcs()
+
+
+def test_public_names_are_listed():
+    assert set(cspr_jax.__all__) <= set(dir(cspr_jax))
+
+
+def answers(kind, robot):
+    """Answers of a search, with what their motions begin at."""
+    targets, options = [[0.4, 0.1, 1.5], [-0.3, 0.5, 2.0]], {"z0": 1.7, "max_arcs": 8}
+    if kind == "oscillations":
+        return cspr_jax.minimum_oscillations(robot, targets, **options)
+    if kind == "arcs":
+        return cspr_jax.minimum_arcs(robot, targets, start=[0.2, 0.1, 1.6], **options)
+    platform = cspr_jax.load_robot("laval-mssm")
+    return cspr_jax.minimum_pose_arcs(platform, [[0.3, 0.2, 1.4]], z0=1.4, beta_hat="preferred", max_arcs=4)
+
+
+@pytest.mark.parametrize(
+    "kind", ["arcs", *(pytest.param(kind, marks=pytest.mark.thorough) for kind in ("oscillations", "poses"))]
+)
+def test_answers_can_be_pickled_and_copied(kind, good):
+    first = answers(kind, good["robot"])
+    motions = jax.tree.leaves(first.motions())
+    for again in (pickle.loads(pickle.dumps(first)), copy.deepcopy(first), copy.copy(first)):
+        np.testing.assert_array_equal(again.arcs, first.arcs)
+        for one, other in zip(jax.tree.leaves(again.motions()), motions, strict=True):
+            np.testing.assert_array_equal(one, other)
