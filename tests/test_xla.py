@@ -1,5 +1,6 @@
 """What the command line sets before jax starts: flags, kept compiled code, device. In processes of their own."""
 
+import errno
 import json
 import os
 import platform
@@ -243,6 +244,168 @@ def test_what_killed_runs_left_is_swept(tmp_path, monkeypatch):
     compile_cache.hand_over()
     names = {entry.name.partition("~")[0] for entry in (tmp_path / "whole").iterdir()}
     assert names == {"known", "new"} and not own.exists()
+
+
+@pytest.fixture
+def entries(tmp_path, monkeypatch):
+    """A folder of kept code with two whole entries, and what opens it."""
+    folder = tmp_path / "kept"
+    (folder / "whole").mkdir(parents=True, mode=0o700)
+    folder.chmod(0o700)
+    for name in ("one-cache", "two-cache"):
+        data = zlib.compress(name.encode())
+        (folder / "whole" / f"{name}~{zlib.crc32(data):08x}").write_bytes(data)
+    monkeypatch.setattr(compile_cache, "_quiet", lambda *_: None)
+    monkeypatch.setattr(compile_cache, "_pending", [])
+    lines: list[str] = []
+
+    def opened():
+        own = compile_cache.opened(folder, lines.append)
+        return own, lines
+
+    return types.SimpleNamespace(folder=folder, whole=folder / "whole", opened=opened)
+
+
+@pytest.mark.parametrize("code", [errno.EPERM, errno.ENOTSUP, errno.EMLINK])
+def test_entries_are_copied_where_there_are_no_links(entries, monkeypatch, code):
+    """As on exFAT: nothing is compiled anew, and new entries are handed over all the same."""
+
+    def refused(*_):
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(os, "link", refused)
+    own, lines = entries.opened()
+    assert sorted(entry.name for entry in own.iterdir()) == ["one-cache", "two-cache"] and not lines
+    assert (own / "one-cache").read_bytes() == zlib.compress(b"one-cache")
+    (own / "new-cache").write_bytes(zlib.compress(b"new"))
+    compile_cache.hand_over()
+    assert {entry.name.partition("~")[0] for entry in entries.whole.iterdir()} == {
+        "one-cache",
+        "two-cache",
+        "new-cache",
+    }
+
+
+def test_what_jax_notes_beside_entries_is_no_entry(entries, monkeypatch):
+    """With a largest size jax notes when each entry was used, in a file that it needs and writes again."""
+    monkeypatch.setattr(compile_cache, "largest_size", lambda: 1_000_000)
+    monkeypatch.setattr(compile_cache.importlib.util, "find_spec", lambda name: name)
+    for old in ("one-atime~12345678", "gone-atime~00000000"):  # as earlier versions kept them
+        (entries.whole / old).write_bytes(b"12345678")
+    own, lines = entries.opened()
+    assert not lines and len(list(entries.whole.iterdir())) == 2
+    assert sorted(entry.name for entry in own.iterdir()) == ["one-atime", "one-cache", "two-atime", "two-cache"]
+    used = int.from_bytes((own / "one-atime").read_bytes(), "little")
+    assert used == next(entries.whole.glob("one-cache~*")).stat().st_mtime_ns
+    (own / "one-atime").write_bytes(b"87654321")
+    (own / ".lockfile").touch()
+    compile_cache.hand_over()
+    assert {entry.name.partition("~")[0] for entry in entries.whole.iterdir()} == {"one-cache", "two-cache"}
+    entries.opened()
+    assert not lines
+
+
+def test_a_largest_size_is_that_of_all_that_is_kept(entries, monkeypatch):
+    """The oldest entries go first; without filelock, which jax needs for it, one line says so."""
+    old = next(entries.whole.glob("one-cache~*"))
+    os.utime(old, (1.0, 1.0))
+    monkeypatch.setattr(compile_cache, "largest_size", lambda: old.stat().st_size + 3)
+    monkeypatch.setattr(compile_cache.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(OSError, match="jax needs filelock for JAX_COMPILATION_CACHE_MAX_SIZE"):
+        entries.opened()
+    monkeypatch.setattr(compile_cache.importlib.util, "find_spec", lambda name: name)
+    entries.opened()
+    compile_cache.hand_over()
+    assert [entry.name.partition("~")[0] for entry in entries.whole.iterdir()] == ["two-cache"]
+
+
+def test_pipes_and_links_in_the_folder_hold_up_nobody(entries, tmp_path):
+    """Each is removed; a folder that lies there is left alone."""
+    os.mkfifo(entries.whole / "pipe-cache~00000000")
+    (entries.whole / "link-cache~00000000").symlink_to("/dev/zero")
+    (entries.whole / "folder-cache~00000000").mkdir()
+    with (entries.whole / "large-cache~00000000").open("wb") as file:
+        file.truncate(compile_cache.LARGEST_ENTRY + 1)
+    own, lines = entries.opened()
+    assert len(lines) == 1 and "3 damaged entries of compiled code removed" in lines[0]
+    assert sorted(entry.name for entry in own.iterdir()) == ["one-cache", "two-cache"]
+    os.mkfifo(own / "pipe-cache")
+    compile_cache.hand_over()
+    names = {entry.name.partition("~")[0] for entry in entries.whole.iterdir()}
+    assert {"one-cache", "two-cache"} <= names and "pipe-cache" not in names and not own.exists()
+
+
+@pytest.mark.parametrize("record", ["pipe", "deep", "large", "list"])
+def test_a_record_of_flags_that_is_none(tmp_path, record, monkeypatch):
+    """It is made again."""
+    path = tmp_path / "flags.json"
+    if record == "pipe":
+        os.mkfifo(path)
+    else:
+        path.write_text({"deep": "[" * 50_000, "large": " " * 100_000 + "{}", "list": "[1]"}[record])
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: types.SimpleNamespace(returncode=0))
+    assert xla._is_known(tmp_path, "--xla_flag=1") and json.loads(path.read_text()) == {"--xla_flag=1": True}
+
+
+@pytest.mark.parametrize("which", ["CSPR_CACHE_DIR", "key", "whole"])
+@pytest.mark.parametrize("fault", ["group", "all", "owner", "link"])
+def test_a_folder_of_others_is_refused(tmp_path, monkeypatch, which, fault):
+    """Entries are code that is executed: one line, and nothing is kept there or taken from there."""
+    monkeypatch.setenv("CSPR_CACHE_DIR", str(tmp_path / "kept"))
+    monkeypatch.delenv("JAX_COMPILATION_CACHE_DIR", raising=False)
+    monkeypatch.setattr(compile_cache, "_pending", [])
+    monkeypatch.setattr(compile_cache, "_quiet", lambda *_: None)
+    lines: list[str] = []
+    folder = xla._folder(None, lines.append)
+    assert folder is not None and not lines
+    (folder / "whole").mkdir(mode=0o700)
+    bad = {"CSPR_CACHE_DIR": tmp_path / "kept", "key": folder, "whole": folder / "whole"}[which]
+    if fault == "owner":
+        status = os.stat(bad)
+        monkeypatch.setattr(os, "geteuid", lambda: status.st_uid + 1)
+    elif fault == "link":
+        if which == "CSPR_CACHE_DIR":  # a link of the user's own choice
+            return
+        bad.rename(tmp_path / "elsewhere")
+        bad.symlink_to(tmp_path / "elsewhere")
+    else:
+        bad.chmod(0o770 if fault == "group" else 0o757)
+    found = xla._folder(None, lines.append)
+    kept = None if found is None else xla._keep(found, lines.append)
+    words = {"owner": "belongs to another user", "link": "is no folder"}.get(fault, "others may write into")
+    assert kept is None and len(lines) == 1 and words in lines[0] and "compiled code cannot be kept" in lines[0]
+    assert "JAX_COMPILATION_CACHE_DIR" not in os.environ
+
+
+def test_a_folder_for_all_like_tmp_is_taken(tmp_path, monkeypatch):
+    """There nobody can replace the folder inside it, which is ours alone whatever the umask."""
+    (tmp_path / "tmp").mkdir()
+    (tmp_path / "tmp").chmod(0o1777)
+    monkeypatch.setenv("CSPR_CACHE_DIR", str(tmp_path / "tmp"))
+    before = os.umask(0)
+    try:
+        lines: list[str] = []
+        folder = xla._folder(None, lines.append)
+    finally:
+        os.umask(before)
+    assert folder is not None and folder.stat().st_mode & 0o777 == 0o700 and not lines
+
+
+def test_the_folder_is_that_of_the_jaxlib_that_runs(tmp_path, monkeypatch):
+    """By its own version, not by what an installer has noted, which may be missing."""
+    import jaxlib.version
+
+    monkeypatch.setenv("CSPR_CACHE_DIR", str(tmp_path))
+    here = xla._folder(None, print)
+    monkeypatch.setattr(jaxlib.version, "__version__", "0.0.1")
+    other = xla._folder(None, print)
+    assert here != other
+
+    def missing(name):
+        raise xla.importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(xla.importlib.metadata, "version", missing)
+    assert xla._folder(None, print) not in (here, other, None)
 
 
 def test_a_device_that_is_not_there_is_refused(monkeypatch):

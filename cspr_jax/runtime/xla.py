@@ -5,6 +5,7 @@ What the user has set wins. The library itself comes here only where its user as
 """
 
 import ctypes
+import errno
 import hashlib
 import importlib.metadata
 import json
@@ -30,7 +31,7 @@ QUICK = (
     "--xla_cpu_use_fusion_emitters=false",
     "--xla_cpu_parallel_codegen_split_count=1",
 )
-PROBE_SECONDS = 120
+PROBE_SECONDS, LARGEST_RECORD = 120, 1 << 16
 # glibc gives each thread memory of its own, and XLA has many threads: what one frees, the others cannot use. With four
 # arenas a long sweep needs half the memory; with one, threads that compile would wait for each other. The last number
 # is M_ARENA_MAX of malloc.h.
@@ -69,7 +70,7 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
     if device == "cpu":
         os.environ["JAX_PLATFORMS"] = "cpu"
     _few_arenas()
-    folder = _folder()
+    folder = _folder(None, warn)
     if folder is None:
         return
     os.environ["XLA_FLAGS"] = _flags(folder, os.environ.get("XLA_FLAGS", ""), quick=quick)
@@ -89,12 +90,12 @@ def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
         where the entries of this process are; None where jax keeps its own already, CSPR_CACHE_DIR is empty, or nothing
         can be written.
     """
-    place = _folder(folder)
+    place = _folder(folder, _warn_of_python)
     loaded = sys.modules.get("jax")
     if place is None or CACHE in os.environ or (loaded is not None and loaded.config.jax_compilation_cache_dir):
         return None
     before = set(os.environ)
-    own = _keep(place, lambda line: warnings.warn(line, stacklevel=2))
+    own = _keep(place, _warn_of_python)
     if own is not None and loaded is not None:
         # It has read the environment when it was imported.
         for name in {CACHE, *_KEPT} - before:
@@ -103,6 +104,10 @@ def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
 
         compilation_cache.reset_cache()  # else who has compiled without one goes on without
     return own
+
+
+def _warn_of_python(line: str) -> None:
+    warnings.warn(line, stacklevel=2)
 
 
 def _keep(folder: Path, warn: Callable[[str], None]) -> Path | None:
@@ -165,19 +170,36 @@ def _few_arenas() -> None:
     ctypes.CDLL(None).mallopt(_ARENA_MAX, _FEW)
 
 
-def _folder(given: str | Path | None = None) -> Path | None:
+def _folder(given: str | Path | None, warn: Callable[[str], None]) -> Path | None:
     # Of this processor, this jaxlib and this Python: code compiled for another one must not run here.
     given = os.environ.get("CSPR_CACHE_DIR") if given is None else given
     if given == "":
         return None
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    here = (importlib.metadata.version("jax"), importlib.metadata.version("jaxlib"), sys.version, *_processor())
-    folder = Path(given or Path(home) / "cspr_jax") / hashlib.sha256(repr(here).encode()).hexdigest()[:16]
+    here = (*_versions(), sys.version, *_processor())
+    shared = Path(given or Path(home) / "cspr_jax")
+    folder = shared / hashlib.sha256(repr(here).encode()).hexdigest()[:16]
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
+        shared.parent.mkdir(parents=True, exist_ok=True)
+        for place in (shared, folder):
+            place.mkdir(mode=compile_cache.PRIVATE, exist_ok=True)
+            compile_cache.check_owner(place, may_be_shared=place is shared)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError(errno.EACCES, "nothing can be written there")
+    except OSError as error:
+        warn(f"{shared}: compiled code cannot be kept: {error.strerror or error}")
         return None
-    return folder if os.access(folder, os.W_OK) else None
+    return folder
+
+
+def _versions() -> tuple[str, str]:
+    # Of jaxlib as it says itself: what an installer has noted may be of another one, or missing.
+    import jaxlib.version
+
+    try:
+        return importlib.metadata.version("jax"), jaxlib.version.__version__
+    except importlib.metadata.PackageNotFoundError:
+        return "", jaxlib.version.__version__
 
 
 def _processor() -> tuple[str, ...]:
@@ -202,8 +224,8 @@ def _is_known(folder: Path, flag: str) -> bool:
     # XLA ends the process that names a flag it does not know: another one tries, once.
     record = folder / "flags.json"
     try:
-        known = json.loads(record.read_text("utf-8"))
-    except (OSError, ValueError):
+        known = json.loads(compile_cache.plain_bytes(record, LARGEST_RECORD))
+    except (OSError, ValueError, RecursionError):
         known = {}
     known = known if isinstance(known, dict) else {}
     if isinstance(known.get(flag), bool):
@@ -221,7 +243,9 @@ def _is_known(folder: Path, flag: str) -> bool:
         return False
     partial = record.with_suffix(f".{os.getpid()}")
     try:
-        partial.write_text(json.dumps(known | {flag: done.returncode == 0}), "utf-8")
+        partial.unlink(missing_ok=True)
+        with partial.open("x", encoding="utf-8") as file:
+            file.write(json.dumps(known | {flag: done.returncode == 0}))
         partial.replace(record)
     except OSError:
         return False
