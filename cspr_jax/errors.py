@@ -50,7 +50,7 @@ class InputError(CsprError, ValueError):
 
     def __init__(self, key: str, value: object, allowed: str, *, fault: str = "") -> None:
         """Keep the parts, so that a reader of files can add its name."""
-        line = f"{key}: {fault}: {allowed}" if fault else f"{key} = {shown(value)}: must be {allowed}"
+        line = f"{key}: {fault}: {allowed}" if fault else f"{key} = {shown(value)}: {demand(allowed)}"
         super().__init__(one_line(line))
         self.key, self.value, self.allowed, self.fault = key, value, allowed, fault
 
@@ -120,6 +120,18 @@ class StoppedError(CsprError):
 
 # Containers are cut before they are written out: a user's may be nested thousands deep.
 DEEPEST, LONGEST = 3, 12
+
+
+def demand(allowed: str) -> str:
+    """What a message asks for.
+
+    Args:
+        allowed: what would be right, or, from "cannot" on, what is wrong.
+
+    Returns:
+        the words behind the value.
+    """
+    return allowed if allowed.startswith("cannot ") else f"must be {allowed}"
 
 
 def one_line(text: str) -> str:

@@ -15,6 +15,7 @@ from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, Traj
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.feasibility.given_limits import check_bounded, check_certain, limits_of
 from cspr_jax.feasibility.problem import Problem
+from cspr_jax.feasibility.workspace.standing import slack_at_rest
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
@@ -169,17 +170,17 @@ def fault_at_rest(spec: RobotFile) -> str | None:
     """Reason why a robot cannot hang still in its reference orientation, if it cannot.
 
     Args:
-        spec: the robot; a platform is tried as deep below the centroid of its spools as these are away from it.
+        spec: the robot; a platform is tried as deep below the centroid of its spools as these are away from it, one
+            on more cables at many depths, `feasibility.workspace.standing`.
 
     Returns:
         the reason; None if it hangs with every cable taut.
     """
     spec = spec.equivalent() if spec.translation_only else spec
-    if spec.own_pattern not in MOVED:
-        return f"not known: nobody asked where {spec.kind} hangs still"
-    if len(spec.base_points) > spec.dof:
-        return "not known: more cables than degrees of freedom share the weight in many ways"
     try:
+        if len(spec.base_points) > spec.dof or spec.own_pattern not in MOVED:
+            shared: Any = build_robot(spec, TrajectoryKeys(), spec.name)
+            return slack_at_rest(centred(shared)[0], shared.limits)
         if spec.is_platform:
             robot = kernel_robot(spec, TrajectoryKeys(), spec.name)
             reference_pose(robot, float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean()))

@@ -115,6 +115,7 @@ def test_every_command_has_its_function():
             "plan": {"output": "path", "mjcf": "path", "animate": "path"},
         }.get(name, {})
         own |= {"name": "names", "output": "folder"} if name == "examples" else {}
+        own |= {"names": "names"} if name == "robots" else {}
         own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}
         own |= {"result": "given", "cell": "cells"} if name == "report" else {}
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
@@ -336,7 +337,7 @@ def test_without_xarray(tmp_path, monkeypatch):
         (
             lambda plan, sweep: cspr_jax.run(sweep, workers=2, scheduler="b"),
             ConfigError,
-            "--workers: 2: must be absent",
+            "--workers: 2: cannot be combined with --scheduler",
         ),
         (lambda plan, sweep: cspr_jax.status("a"), StoreError, "a: is not a run directory"),
         (lambda plan, sweep: cspr_jax.verify("a"), StoreError, "a: is not a run directory"),

@@ -417,7 +417,7 @@ def test_tables_of_obstacles():
         ({"kind": "sphere", "center": [0.0, 0.0, 0.0]}, "did you mean centre?"),
         ({"kind": "box", "centre": [0.0, 0.0, 0.0]}, "size is missing: a box needs centre and size, or corners"),
         ({"kind": "box", "corners": [[0.0, 0.0, 1.0], [1.0, 1.0, 0.0]]}, "[least, largest]"),
-        ({"kind": "box", "corners": [[0.0] * 3] * 2, "size": [1.0] * 3}, "absent beside corners"),
+        ({"kind": "box", "corners": [[0.0] * 3] * 2, "size": [1.0] * 3}, "cannot be combined with corners"),
         ({"kind": "box", "centre": [0.0] * 3, "size": [1.0] * 3, "quaternion": [1.0] * 4}, "a unit quaternion"),
         ({"kind": "cylinder", "start": [0.0] * 3, "end": [1.0] * 3, "radius": 1.0, "size": [1.0] * 3}, "has none"),
     ],
@@ -433,7 +433,10 @@ def test_obstacles_that_are_refused(table, words):
     [
         ({"platform_hull": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]]}, "not all in a plane"),
         ({"platform_box": [[1.0] * 3, [0.0] * 3]}, "[least, largest]"),
-        ({"platform_box": [[0.0] * 3, [1.0] * 3], "platform_hull": [[0.0] * 3] * 4}, "absent beside platform_box"),
+        (
+            {"platform_box": [[0.0] * 3, [1.0] * 3], "platform_hull": [[0.0] * 3] * 4},
+            "cannot be combined with platform_box",
+        ),
     ],
 )
 def test_platform_shapes_that_are_refused(keys, words):

@@ -300,7 +300,7 @@ def test_one_limit_in_two_places(tmp_path, key, first, second):
         "[[pose]]\nrest", f"[limits]\n{key} = {second}\n[[pose]]\nrest"
     )
     line = plan_line(tmp_path, text)
-    assert line == f"limits.{key} = {second}: must be absent beside {key} = {first}"
+    assert line == f"limits.{key} = {second}: cannot be combined with {key} = {first}"
 
 
 def test_a_small_tile_is_blamed_only_where_the_usual_one_would_do(tmp_path):

@@ -426,7 +426,7 @@ def test_jumps_are_named(tmp_path):
     ("change", "words"),
     [
         (('"hypocycloid"', '"transition"'), 'family = "transition": must be'),
-        (("tilt_torsion", "quaternion = [1.0, 0.0, 0.0, 0.0]\ntilt_torsion"), "must be absent beside tilt_torsion"),
+        (("tilt_torsion", "quaternion = [1.0, 0.0, 0.0, 0.0]\ntilt_torsion"), "cannot be combined with tilt_torsion"),
         (("rest = true", "rest = true\ntilt_torsion = [0.0, 0.1, 0.0]"), "reference orientation at rest"),
         (("rest = true", "rest = true\nposition = [0.1, 0.0, 1.4]"), "must be P0"),
         (("[0.0, 1.732, 1.7]", "[0.0, 1.732, -0.1]"), "pose[1].position: must be below the spool plane"),

@@ -5,7 +5,8 @@ import io
 import pytest
 from rich.console import Console
 
-from cspr_jax.outputs.table_layout import LEGEND, Cell, grid
+from cspr_jax.outputs.table_layout import LEGEND, Cell, grid, two_digits
+from cspr_jax.published.tables import TABLES, table_for_people
 
 
 def lines_of(cells, **options) -> list[list[str]]:
@@ -67,3 +68,30 @@ def test_a_transposed_table_and_its_readings():
     found = lines_of(cells, transposed=True)
     assert found[:9] == [["Table 9.9"], ["first"], *block, ["second"], *block]
     assert " ".join(parts[0] for parts in found[9:]) == LEGEND
+
+
+@pytest.mark.parametrize(
+    ("name", "head"), [("2.1", "p"), ("3.2", "p"), ("4.1", "acceleration (s)"), ("4.3", "acceleration (s)")]
+)
+def test_p_is_the_number_of_arcs_in_every_table(name, head):
+    """What the S-model calls p is a time, and is named so for people; programs get the printed name."""
+    console = Console(file=io.StringIO(), width=140)
+    console.print(table_for_people(name, [Cell("1", "p", 2.24, "2.240"), Cell("1", "T", 4.377, "4.377")]))
+    (line,) = (line for line in console.file.getvalue().splitlines() if "T (s)" in line)
+    assert [part.strip() for part in line.strip("┃").split("┃")][1:] == [head, "T (s)"] and name in TABLES
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (5.4, "5.4"),
+        (5.44e-3, "0.0054"),
+        (123.4, "123"),
+        (98765.0, "98765"),
+        (-0.62, "-0.62"),
+        (3.2e-7, "3.2e-07"),
+        (0.0, "0"),
+    ],
+)
+def test_two_digits(value, text):
+    assert two_digits(value) == text

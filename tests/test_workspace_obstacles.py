@@ -397,7 +397,7 @@ def test_what_nobody_asks_changes_no_identity():
     [
         ({"end": "[[workspace.obstacle]]\nkind = 'ball'"}, "workspace.obstacle[3].kind"),
         ({"end": "[[workspace.obstacle]]\nkind = 'sphere'\nradius = 1.0"}, "workspace.obstacle[3].centre is missing"),
-        ({"shape": "box", "more": "platform_hull = true"}, "workspace.platform_hull = true: must be absent beside"),
+        ({"shape": "box", "more": "platform_hull = true"}, "workspace.platform_hull = true: cannot be combined with"),
         ({"shape": "none", "more": "platform_hull = false"}, "workspace.platform_hull = false: must be true, a list"),
         ({"shape": "none", "more": "platform_hull = 3"}, "workspace.platform_hull = 3"),
         ({"shape": "none", "more": "platform_hull = [[0, 0, 0]]"}, "workspace.platform_hull"),

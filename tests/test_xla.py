@@ -420,7 +420,7 @@ def test_a_device_that_is_not_there_is_refused(monkeypatch):
 def test_workers_of_a_scheduler_choose_their_device(capsys):
     sweep = ROOT / "sweeps" / "demo.toml"
     assert main(["run", str(sweep), "--scheduler", "tcp://localhost:1", "--device", "cpu"]) == 2
-    assert capsys.readouterr().err.startswith("cspr: --device: cpu: must be absent beside --scheduler")
+    assert capsys.readouterr().err.startswith("cspr: --device: cpu: cannot be combined with --scheduler")
 
 
 @pytest.mark.parametrize(("backend", "length"), [("cpu", 32), ("gpu", 512)])

@@ -126,7 +126,7 @@ def bezier_durations(
     check_point_mass(robot)
     check_determined(robot)
     if control_points is not None and accelerations is not None:
-        raise InputError("accelerations", "given", "absent beside control_points")
+        raise InputError("accelerations", "given", "cannot be combined with control_points")
     given = {"starts": starts, "ends": ends}
     given |= {} if control_points is None else {"control_points": control_points}
     given |= {} if accelerations is None else {"accelerations": accelerations}

@@ -52,7 +52,7 @@ class Job:
         """Refuse workers that cannot be."""
         check_count(self.workers)
         if self.scheduler is not None and self.workers not in (1, None):
-            raise ConfigError("--workers", f"{self.workers}: must be absent beside --scheduler")
+            raise ConfigError("--workers", f"{self.workers}: cannot be combined with --scheduler")
 
     @functools.cached_property
     def _run(self) -> engine.Run:

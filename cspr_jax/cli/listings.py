@@ -35,11 +35,28 @@ def _add_list(parser: argparse.ArgumentParser) -> None:
     add_json(parser, "array")
 
 
-def _robots(options: argparse.Namespace) -> int:
-    from cspr_jax.api import lists
-    from cspr_jax.outputs.listings import robots_table
+def _add_robots(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="show all about these, of the catalogue or robot files (default: list)"
+    )
+    add_json(parser, "array")
 
-    return _listed(options, lists.list_robots(), robots_table)
+
+def _robots(options: argparse.Namespace) -> int:
+    from cspr_jax.outputs import listings
+
+    if not options.names and not options.json:  # what takes long to import is not needed
+        print_table(listings.catalogue_table())
+        return ExitCode.DONE
+    from cspr_jax.api import lists
+
+    listed = lists.list_robots(options.names)
+    if options.json:
+        print_json(listed)
+    else:
+        for robot in listed:
+            print_table(listings.robot_details(robot))
+    return ExitCode.DONE
 
 
 def _quantities(options: argparse.Namespace) -> int:
@@ -94,7 +111,7 @@ def _new(options: argparse.Namespace) -> int:
 COMMANDS = (
     Command("new", "write a robot, sweep or plan file to begin with, every key explained", _add_new, _new),
     Command("import", "read a robot of CASPR, cdpyr or WireX as a robot file", _add_import, _import),
-    Command("robots", "list the catalogue of robots", _add_list, _robots),
+    Command("robots", "list the catalogue of robots, or show all about some", _add_robots, _robots),
     Command("quantities", "list the quantities that a result can hold", _add_list, _quantities),
     Command("examples", "list sweep and plan files to start from, or copy them", _add_examples, _examples),
 )

@@ -46,7 +46,7 @@ def _run(options: argparse.Namespace) -> int:
     from cspr_jax.sweep import engine
 
     if options.scheduler is not None and options.device is not None:
-        raise ConfigError("--device", f"{options.device}: must be absent beside --scheduler, whose workers choose")
+        raise ConfigError("--device", f"{options.device}: cannot be combined with --scheduler, whose workers choose")
     sweep = sweeps.sweep_given(options.sweep)
     directory = options.output or sweeps.run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))

@@ -54,7 +54,7 @@ class LaunchTable(Table):
         if self.point is not None and self.velocity is not None:
             for name in ("time", "choose"):
                 if getattr(self, name) is not None:
-                    raise fault(name, getattr(self, name), "absent beside point and velocity, which tell it")
+                    raise fault(name, getattr(self, name), "cannot be combined with point and velocity, which tell it")
             return self
         if (self.time is None) == (self.choose is None):
             allowed = 'a time of flight, or choose = "energy" or "time": one of them'

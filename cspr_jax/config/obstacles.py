@@ -75,7 +75,7 @@ class ObstacleTable(Table):
         else:
             for name in ("centre", "size", "quaternion"):
                 if getattr(self, name) is not None:
-                    raise fault(name, getattr(self, name), "absent beside corners")
+                    raise fault(name, getattr(self, name), "cannot be combined with corners")
             _check_corners("corners", self.corners)
         if self.quaternion is not None and not _is_unit(self.quaternion):
             raise fault("quaternion", self.quaternion, "a unit quaternion, scalar first")
@@ -116,7 +116,7 @@ class PlatformShapeKeys(Table):
     @model_validator(mode="after")
     def _one_shape(self) -> "PlatformShapeKeys":
         if self.platform_box is not None and self.platform_hull is not None:
-            raise fault("platform_hull", self.platform_hull, "absent beside platform_box")
+            raise fault("platform_hull", self.platform_hull, "cannot be combined with platform_box")
         if self.platform_box is not None:
             _check_corners("platform_box", self.platform_box)
         if self.platform_hull is False:

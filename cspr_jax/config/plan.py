@@ -145,7 +145,9 @@ class PlanFile(TrajectoryKeys, LimitTable):
         if self.first_control_point is not None or self.least == "each":
             key = "least" if self.first_control_point is None else "first_control_point"
             raise fault(
-                key, shown(getattr(self, key)), "absent beside [launch], from which accelerations and durations follow"
+                key,
+                shown(getattr(self, key)),
+                "cannot be combined with [launch], from which accelerations and durations follow",
             )
         return self
 
@@ -156,7 +158,7 @@ class PlanFile(TrajectoryKeys, LimitTable):
         given = {name: getattr(self.limits, name) for name in sorted(self.limits.model_fields_set)}
         for name, value in given.items():
             if getattr(self, name) is not None:
-                raise fault(f"limits.{name}", value, f"absent beside {name} = {shown(getattr(self, name))}")
+                raise fault(f"limits.{name}", value, f"cannot be combined with {name} = {shown(getattr(self, name))}")
         # The rest of the program finds limits in one place.
         return self.model_copy(update={"limits": None, **given})
 

@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from cspr_jax.config.catalogue import CATALOGUE as CATALOGUE
+from cspr_jax.config.catalogue import catalogue_names as catalogue_names
 from cspr_jax.config.formats.table import ENDINGS, Imported, format_of, parted, read
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.limits import (
@@ -21,12 +23,10 @@ from cspr_jax.config.limits import (
 from cspr_jax.config.reading import checked, other_case, read_toml
 from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import fault
-from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.errors import ConfigError, InputError, demand, shown
 from cspr_jax.robots.parallel_pairs import ParallelPairs, parallel_pairs
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
-
-CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 LEAST = "least numbers of cables are " + ", ".join(f"{row.dof} ({row.description})" for row in PATTERNS.values())
 BODIES = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if row.is_body)
@@ -91,6 +91,11 @@ class RobotFile(LimitKeys):
     def notes(self) -> tuple[str, ...]:
         """What was left out of a file of another program, one line each."""
         return self._notes
+
+    @property
+    def file(self) -> Path | None:
+        """The file that it was read from; None for a table of another file."""
+        return self._file
 
     @property
     def is_platform(self) -> bool:
@@ -245,7 +250,7 @@ class RobotFile(LimitKeys):
         value = getattr(self, error.key, None)
         if error.fault or value is None:
             return f"robot.{error}"
-        return f"robot.{error.key} = {shown(value)}: must be {error.allowed}"
+        return f"robot.{error.key} = {shown(value)}: {demand(error.allowed)}"
 
 
 def _check_level(points: list[Point]) -> None:
@@ -253,15 +258,6 @@ def _check_level(points: list[Point]) -> None:
     if abs(z2 - z1) > LEVEL * abs(x2 - x1):
         heights = f"spools at heights z = {z1:g} and {z2:g}"
         raise fault("base_points", heights, "level in a planar robot: give both spools the same z")
-
-
-def catalogue_names() -> list[str]:
-    """Names of the robots that come with the package.
-
-    Returns:
-        the names, sorted.
-    """
-    return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
 
 
 def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from cspr_jax.config.suggestions import look_alike, nearest
-from cspr_jax.errors import shown
+from cspr_jax.errors import demand, shown
 
 # Names of the variants of a union; they are part of pydantic's location of an error, not of the user's key.
 VARIANT = "~"
@@ -98,7 +98,7 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
         parts += [context["key"]] if context["key"] else []
         if context["given"] == shown(None):
             return f"{_key(at, parts)} is missing: {context['allowed']}"
-        return f"{_key(at, parts)} = {context['given']}: must be {context['allowed']}"
+        return f"{_key(at, parts)} = {context['given']}: {demand(context['allowed'])}"
     if error["type"] == "extra_forbidden":
         return f"unknown key {_key(at, parts)} = {shown(error['input'])}: {_suggestion(model, parts)}"
     if error["type"] == "missing":

@@ -93,7 +93,7 @@ class PoseConditions(Table):
         if is_of_some and (self.tilt_max is None) == (self.quaternions is None):
             raise fault("tilt_max", self.tilt_max, f'given, or quaternions, one of them, with "{self.orientations}"')
         if self.prove and self.orientations is not None:
-            raise fault("prove", True, "absent beside workspace.orientations")
+            raise fault("prove", True, "cannot be combined with workspace.orientations")
         if self.torsion_max is not None and self.tilt_max is None:
             raise fault("torsion_max", self.torsion_max, "absent without tilt_max")
         if self.divisions is not None and (self.orientations is None or self.quaternions is not None):

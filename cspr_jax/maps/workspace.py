@@ -185,10 +185,10 @@ class WorkspaceMap(GridMap):
         if turning and not row.is_body:
             raise ConfigError(self._file, f"axes.{turning[0]}: must be absent: a point mass has no orientation")
         if turning and self._samples is not None:
-            raise ConfigError(self._file, f"axes.{turning[0]}: must be absent beside workspace.orientations")
+            raise ConfigError(self._file, f"axes.{turning[0]}: cannot be combined with workspace.orientations")
         if self._asked.prove and (turning or "radius" in grid.axes):
             name = turning[0] if turning else "radius"
-            raise ConfigError(self._file, f"axes.{name}: must be absent beside workspace.prove")
+            raise ConfigError(self._file, f"axes.{name}: cannot be combined with workspace.prove")
         if row.is_planar and turning not in ([], ["tilt"]):
             raise ConfigError(self._file, f"axes.{turning[0]}: must be tilt alone for a planar robot, about y")
 

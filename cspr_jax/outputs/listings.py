@@ -1,48 +1,110 @@
 """Lists of what there is: the catalogue of robots, the quantities of results. Plain values, and tables for people."""
 
 import dataclasses
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.config.robot import catalogue_names, resolve_robot
-from cspr_jax.problem import fault_at_rest
+from cspr_jax.config.catalogue import CATALOGUE, FAULTS, catalogue_keys, catalogue_names
+from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.motion_quantities import FLIGHT, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.quantities import AXES, QUANTITIES
 
-
-def robots() -> list[dict[str, Any]]:
-    """The robots of the catalogue.
-
-    Returns:
-        the keys of each one's file, and why it cannot hang still, if it cannot.
-    """
-    specs = [resolve_robot(name, "catalogue", Path()) for name in catalogue_names()]
-    return [spec.model_dump(exclude_none=True) | {"fault": fault_at_rest(spec)} for spec in specs]
+PLACEHOLDER = "placeholder"
 
 
-def robots_table(listed: list[dict[str, Any]]):
-    """The robots for a terminal.
+def robots(names: Iterable[str | Path] = ()) -> list[dict[str, Any]]:
+    """The robots of the catalogue, or those that are named.
 
     Args:
-        listed: as `robots.point_mass` gives them.
+        names: of the catalogue, or paths of robot files; none: all of the catalogue.
+
+    Returns:
+        the keys of each one's file, and "fault": why it cannot hang still with every cable taut, or None.
+
+    Raises:
+        ConfigError: no such robot, or a mistake in its file.
+    """
+    from cspr_jax.config.robot import resolve_robot  # takes longer than the list for people
+
+    listed = []
+    for name in list(names) or catalogue_names():
+        spec = resolve_robot(str(name), "robots", Path())
+        is_known = spec.file is not None and spec.file.parent == CATALOGUE
+        if is_known:
+            fault = FAULTS.get(spec.name)
+        else:
+            from cspr_jax.problem import fault_at_rest  # imports jax
+
+            fault = fault_at_rest(spec)
+        listed.append(spec.model_dump(exclude_none=True) | {"fault": fault})
+    return listed
+
+
+def catalogue_table():
+    """The catalogue for a terminal, one line a robot.
 
     Returns:
         a rich table.
     """
     rows = [
         (
-            robot["name"],
-            str(len(robot["base_points"])),
-            f"{robot['mass']:g}",
-            robot["z_axis"],
-            ", ".join(row.name for row in LIMITS if row.name in robot),
-            robot["source"],
-            robot["fault"] or "taut",
+            keys["name"],
+            str(len(keys["base_points"])),
+            _pattern(keys),
+            f"{keys['mass']:g}",
+            keys.get("z_axis", "down"),
+            ", ".join(_remarks(keys)),
         )
-        for robot in listed
+        for keys in catalogue_keys()
     ]
-    return _table(("name", "cables", "mass (kg)", "z axis", "limits", "source", "at rest"), rows)
+    table = _table(("name", "cables", "moves", "mass (kg)", "z axis", "remarks"), rows, wraps=False)
+    table.caption, table.caption_justify = "cspr robots NAME shows all about one", "left"
+    return table
+
+
+def _pattern(keys: dict[str, Any]) -> str:
+    usual = "3R3T" if "platform_points" in keys else "2T" if keys.get("planar") else "3T"
+    return str(keys.get("pattern", usual))
+
+
+def _remarks(keys: dict[str, Any]) -> list[str]:
+    remarks = [PLACEHOLDER] if keys.get("source", "").startswith(PLACEHOLDER) else []
+    remarks += ["only translates"] if keys.get("translation_only") else []
+    return remarks + (["cannot hang taut"] if keys["name"] in FAULTS else [])
+
+
+def robot_details(robot: dict[str, Any]):
+    """All about a robot for a terminal.
+
+    Args:
+        robot: as `robots` gives it.
+
+    Returns:
+        a rich table.
+    """
+    pattern = _pattern(robot)
+    shown = {"source": robot["source"], "moves": f"{pattern}, {_motion(pattern)}"}
+    shown |= {"cables": str(len(robot["base_points"])), "mass (kg)": f"{robot['mass']:g}"}
+    limits = {row.name: _written(robot[row.name]) for row in LIMITS if row.name in robot}
+    left_out = {*shown, *limits, "name", "mass", "pattern", "planar", "fault"}
+    shown |= {key: _written(value) for key, value in robot.items() if key not in left_out}
+    shown |= limits | {"at rest": robot["fault"] or "hangs still with every cable taut"}
+    return _table((robot["name"], ""), list(shown.items()))
+
+
+def _motion(pattern: str) -> str:
+    row = PATTERNS[pattern]
+    return "a point mass in the plane y = 0" if pattern == "2T" else row.description.partition(",")[0]
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return "\n".join(", ".join(f"{number:.6g}" for number in row) for row in value)
+    if isinstance(value, list):
+        return ", ".join(f"{number:.6g}" for number in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def quantities() -> list[dict[str, Any]]:
@@ -68,10 +130,14 @@ def quantities_table(listed: list[dict[str, Any]]):
     return _table(heads, [tuple(row[head] for head in heads) for row in listed])
 
 
-def _table(heads: tuple[str, ...], rows: list[tuple]):
-    from rich.table import Table  # only a terminal needs it
+def _table(heads: tuple[str, ...], rows: list[tuple], *, wraps: bool = True):
+    from rich import box  # only a terminal needs it
+    from rich.table import Table
+    from rich.text import Text
 
-    table = Table(*heads)
+    table = Table() if wraps else Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for head in heads:
+        table.add_column(Text(head), no_wrap=not wraps)
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(Text, row))  # what files say is no markup
     return table

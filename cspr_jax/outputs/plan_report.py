@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import Plan
 from cspr_jax.plans.released import released
 from cspr_jax.schema.verdicts import Verdict
@@ -184,10 +185,10 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
 
 def _times() -> dict[str, Column]:
     return {
-        "p (s)": _of("acceleration_time", ".4f"),
+        "acceleration (s)": _of("acceleration_time", ".4f"),
         "T (s)": _of("duration", ".4f"),
         "least (s)": _of("least_duration", ".4f"),
-        "margin (m/s²)": _of("margin", ".1e"),
+        "margin (m/s²)": _two_digits("margin"),
     }
 
 
@@ -198,7 +199,7 @@ def _durations() -> dict[str, Column]:
         ]
         return ", ".join(f"{low} .. {high}" for low, high in ends) or "none"
 
-    return {"T (s)": _of("duration", ".4f"), "taut for T (s)": taut, "margin": _of("margin", ".1e")}
+    return {"T (s)": _of("duration", ".4f"), "taut for T (s)": taut, "margin": _two_digits("margin")}
 
 
 def _counts(swings: bool) -> dict[str, Column]:
@@ -215,6 +216,10 @@ def _counts(swings: bool) -> dict[str, Column]:
 
 def _of(name: str, form: str) -> Column:
     return lambda segment: _number(segment[name], form)
+
+
+def _two_digits(name: str) -> Column:
+    return lambda segment: "-" if segment[name] is None else two_digits(segment[name])
 
 
 def _caption(plan: Plan) -> str:

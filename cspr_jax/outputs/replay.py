@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.mjcf import model_xml
 from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended, upward
+from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import Plan
 
 _LENT = threading.Lock()
@@ -104,10 +105,10 @@ class Replay:
         text = [f"{self.robot}: {self.time[-1]:.2f} s in {self.steps} steps of MuJoCo {self.mujoco}"]
         for name, how in (("", "each segment from its start"), ("_in_one_go", "all in one go")):
             far, turn = found[f"path{name}"], found[f"turn{name}"]
-            angle = f" and {turn['value']:.1e} rad" if self.played.turned.any() else ""
-            text.append(f"path, {how}: at most {far['value']:.1e} m{angle} off the plan, {_place(far)}")
+            angle = f" and {two_digits(turn['value'])} rad" if self.played.turned.any() else ""
+            text.append(f"path, {how}: at most {two_digits(far['value'])} m{angle} off the plan, {_place(far)}")
         most = found["tension"]
-        text.append(f"tensions: at most {most['value']:.1e} N off, cable {most['cable']}, {_place(most)}")
+        text.append(f"tensions: at most {two_digits(most['value'])} N off, cable {most['cable']}, {_place(most)}")
         return text
 
 

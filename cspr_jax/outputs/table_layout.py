@@ -1,7 +1,8 @@
 """A published table as printed: its rows and columns, published and computed numbers in one cell."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 MISMATCH, UNKNOWN, NOTHING = "!=", "?", "none"
@@ -50,13 +51,16 @@ class Cell:
         return self.computed is None or abs(self.computed - self.published) > half * (1.0 + ROUNDING) + ROUNDING
 
 
-def grid(title: str, cells: Sequence[Cell], *, transposed: bool = False) -> Any:
+def grid(
+    title: str, cells: Sequence[Cell], *, transposed: bool = False, heads: Mapping[str, str] = MappingProxyType({})
+) -> Any:
     """A table for a terminal, one block for each reading of the source.
 
     Args:
         title: of the table, with its source.
         cells: its cells.
         transposed: whether rows are printed as columns.
+        heads: names of rows and columns that are others in this table, as people read them.
 
     Returns:
         a rich renderable.
@@ -74,11 +78,11 @@ def grid(title: str, cells: Sequence[Cell], *, transposed: bool = False) -> Any:
         for first in range(0, len(across), step):
             some = across[first : first + step]
             part = [cell for cell in own if (cell.row if transposed else cell.column) in some]
-            blocks.append(_block(part, transposed))
+            blocks.append(_block(part, transposed, _HEADS | dict(heads)))
     return Group(Text(title, style="italic"), *blocks, Text(LEGEND, style="dim"))
 
 
-def _block(cells: list[Cell], transposed: bool) -> Any:
+def _block(cells: list[Cell], transposed: bool, heads: Mapping[str, str]) -> Any:
     from rich.table import Table
 
     table = Table()
@@ -86,10 +90,10 @@ def _block(cells: list[Cell], transposed: bool) -> Any:
     rows, columns = (list(dict.fromkeys(key[i] for key in by)) for i in (0, 1))
     table.add_column("")
     for name in columns:
-        table.add_column(_HEADS.get(name, name), justify="right", no_wrap=True)
+        table.add_column(heads.get(name, name), justify="right", no_wrap=True)
     for row in rows:
         texts = [_text(by[row, column], cells) if (row, column) in by else "" for column in columns]
-        table.add_row(_HEADS.get(row, row), *texts)
+        table.add_row(heads.get(row, row), *texts)
     return table
 
 
@@ -115,6 +119,19 @@ def computed_text(cell: Cell, cells: list[Cell]) -> str:
         places = _decimals(cell.printed) if cell.printed else min(map(_decimals, printed))
         return f"{round(cell.computed, places) + 0.0:.{places}f}"  # no -0
     return f"{cell.computed:.0f}" if abs(cell.computed) >= 1000.0 else f"{cell.computed:.4g}"
+
+
+def two_digits(value: float) -> str:
+    """A number with two digits that count.
+
+    Args:
+        value: any.
+
+    Returns:
+        the number; large ones with all digits before the point, and only those below 0.0001 with an exponent.
+    """
+    text = f"{value:.2g}"
+    return f"{value:.0f}" if "e+" in text else text
 
 
 def _decimals(printed: str) -> int:

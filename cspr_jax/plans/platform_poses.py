@@ -200,7 +200,7 @@ def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
     # Of a pose in the file's axes; that of tilt and torsion follows from the place.
     reference = np.array([1.0, 0.0, 0.0, 0.0])
     if pose.tilt_torsion is not None and pose.quaternion is not None:
-        raise ConfigError(path, f"{name}.quaternion: must be absent beside tilt_torsion")
+        raise ConfigError(path, f"{name}.quaternion: cannot be combined with tilt_torsion")
     if pose.rest:
         turned = pose.quaternion is not None and np.abs(np.asarray(pose.quaternion) - reference).max() > 1e-9
         if turned or (pose.tilt_torsion is not None and (pose.tilt_torsion[1] != 0.0 or pose.tilt_torsion[2] != 0.0)):

@@ -1,7 +1,7 @@
 """Published tables beside the same cells computed. The published numbers are compared with, never computed with."""
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ class Source:
             processes, too, then.
         by_processes: whether several compute it where nobody says how many.
         transposed: whether the source prints these rows as columns.
+        heads: names of rows and columns that mean something else in this source than in the others.
     """
 
     title: str
@@ -38,6 +39,7 @@ class Source:
     with_choice: bool = False
     by_processes: bool = False
     transposed: bool = False
+    heads: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
 def _table_2_1() -> dict[Key, float | None]:
@@ -59,6 +61,8 @@ _PUBLISHED_2_1 = {
     "6": ("0.5425", "6", "7.85"),
 }
 
+# In tables p is the number of arcs; what the S-model calls p, a time, is named.
+ACCELERATION = {"p": "acceleration (s)"}
 TABLES = {
     "1.1": Source(
         "Dion-Gauvin thesis, Table 1.1: oscillations needed at a distance of four radii, horizontal, A1",
@@ -107,6 +111,7 @@ TABLES = {
         "Boralugoda thesis, Table 4.1: solutions of (28) and (29), s",
         boralugoda.PUBLISHED["4.1"],
         boralugoda.table_4_1,
+        heads=ACCELERATION,
     ),
     "4.2": Source(
         "Boralugoda thesis, Table 4.2: path acceleration, slope (1/s^3) and intercept (1/s^2) of each range",
@@ -117,6 +122,7 @@ TABLES = {
         "Boralugoda thesis, Table 4.3: how far the S-model passes its boundaries, 1/s^2, and the first node without",
         boralugoda.PUBLISHED["4.3"],
         boralugoda.table_4_3,
+        heads=ACCELERATION,
     ),
     "peers": Source(
         "Workspaces in papers on other tools: poses, and microseconds a pose here (compiling included), by linear "
@@ -182,7 +188,7 @@ def table_for_people(name: str, cells: list[Cell]) -> Any:
     Returns:
         a rich renderable.
     """
-    return grid(TABLES[name].title, cells, transposed=TABLES[name].transposed)
+    return grid(TABLES[name].title, cells, transposed=TABLES[name].transposed, heads=TABLES[name].heads)
 
 
 def chosen(name: str, given: dict[str, Any]) -> Choice | None:

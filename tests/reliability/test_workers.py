@@ -193,7 +193,7 @@ def test_ctrl_c_while_no_worker_is_there(file, tmp_path):
     ("options", "code", "words"),
     [
         (("--workers", "0"), 2, "must be an integer from 1"),
-        (("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), 2, "must be absent beside --scheduler"),
+        (("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), 2, "cannot be combined with --scheduler"),
         (("--scheduler", "not an address"), 2, "must be an address"),
         (("--scheduler", "tls://127.0.0.1:1"), 2, "must fit dask's TLS settings"),
     ],

@@ -9,6 +9,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from cspr_jax.outputs.plots.labels import COLOURS, line_look
 from cspr_jax.outputs.replay import Replay
+from cspr_jax.outputs.table_layout import two_digits
 
 # Share of the length of the path that typed digits may leave across a plane.
 ONE_PLANE = 1e-9
@@ -43,7 +44,7 @@ def replay_figure(replay: Replay) -> Figure:
     path, tension = replay.path_deviation.max(), np.abs(replay.tension_deviation).max()
     figure.suptitle(
         f"{replay.robot}: played in MuJoCo {replay.mujoco}, each segment from its start; z axis {replay.z_axis}"
-        f"\npath within {path:.1e} m, tensions within {tension:.1e} N"
+        f"\npath within {two_digits(path)} m, tensions within {two_digits(tension)} N"
     )
     return figure
 

@@ -1,0 +1,38 @@
+"""Whether a robot on any number of cables can hang still with all of them taut: single poses by a linear program."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.feasibility.workspace.programs import by_program
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.wrench_balance import at_rest
+
+# Depths that are tried, over the mean distance of the spools from their centroid.
+DEPTHS = np.linspace(-0.95, 1.0, 40)
+
+
+def slack_at_rest(robot: AnyRobot, limits: Limits) -> str | None:
+    """Reason why a robot cannot hang still with every cable taut; several cables share its weight in many ways.
+
+    Args:
+        robot: centred; a platform keeps the orientation of its file, on the vertical through the centroid.
+        limits: its tensions are kept.
+
+    Returns:
+        the reason; None if it can at some of the depths that are tried.
+    """
+    size = float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean())
+    low = np.zeros(robot.n_cables) if limits.tension_min is None else np.asarray(limits.tension_min)
+    high = np.full(robot.n_cables, np.inf) if limits.tension_max is None else np.asarray(limits.tension_max)
+    with double_precision():
+        for depth in DEPTHS * size:
+            still = at_rest(jnp.array([0.0, 0.0, depth]), jnp.eye(3))
+            matrix, wrench = np.asarray(robot.wrench_matrix(still)), np.asarray(robot.inertial_wrench(still))
+            if np.isfinite(matrix).all() and by_program(matrix, wrench, low, high):
+                return None
+    return (
+        f"at no depth down to {size:.4g} m below the centroid of its spools, in the orientation of its file, do "
+        "tensions within its limits hold it with every cable taut"
+    )
