@@ -179,8 +179,7 @@ def fault_at_rest(spec: RobotFile) -> str | None:
     spec = spec.equivalent() if spec.translation_only else spec
     try:
         if len(spec.base_points) > spec.dof or spec.own_pattern not in MOVED:
-            shared: Any = build_robot(spec, TrajectoryKeys(), spec.name)
-            return slack_at_rest(centred(shared)[0], shared.limits)
+            return slack_at_rest(centred(shared := build_robot(spec, TrajectoryKeys(), spec.name))[0], shared.limits)
         if spec.is_platform:
             robot = kernel_robot(spec, TrajectoryKeys(), spec.name)
             reference_pose(robot, float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean()))

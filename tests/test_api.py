@@ -5,6 +5,7 @@ import importlib
 import inspect
 import json
 import re
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -18,6 +19,7 @@ from test_outputs import cspr, made, strict_json
 import cspr_jax
 from cspr_jax import cli
 from cspr_jax.api import plans
+from cspr_jax.config.catalogue import catalogue_names
 from cspr_jax.errors import ConfigError, CsprError, InputError, RefusedError, StoreError
 from cspr_jax.published.tables import table_object
 from cspr_jax.schema.quantities import AXES, QUANTITIES
@@ -226,6 +228,29 @@ def test_lists(capsys, tmp_path):
 
 
 @pytest.mark.thorough
+def test_the_list_of_robots(capsys, tmp_path):
+    """One line a robot, without jax; all about one by its name or file, and what it is where it cannot hang taut."""
+    assert cli.main(["robots"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    for name in catalogue_names():
+        assert len([line for line in lines if line.split()[:1] == [name]]) == 1
+    assert not any("not known" in line or len(line.rstrip()) > 80 for line in lines)
+    code = "import sys; from cspr_jax import cli; cli.main(['robots']); print({'jax', 'pydantic'} & {*sys.modules})"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.endswith("set()\n")
+    path = tmp_path / "low.toml"
+    spools = "[[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 9.0]]"
+    path.write_text(f'name = "low [b]x"\nplanar = true\nmass = 1.0\ntension_min = 50.0\nbase_points = {spools}\n')
+    assert cli.main(["robots", "cogiro", str(path)]) == 0
+    text = capsys.readouterr().out
+    assert "hangs still with every cable taut" in text and "low [b]x" in text and "CoGiRo" in text
+    listed = strict_json(cspr(capsys, "robots", "cogiro", str(path), "--json"))
+    assert [robot["name"] for robot in listed] == ["cogiro", "low [b]x"] and listed == cspr_jax.list_robots(
+        ["cogiro", path]
+    )
+    assert cli.main(["robots", "nobody"]) == 2
+    assert capsys.readouterr().err.startswith('cspr: robots: robot = "nobody": must be one of')
+
+
 def test_the_benchmark(small_bench):
     with jax.enable_x64(False):
         found = cspr_jax.benchmark()

@@ -10,9 +10,9 @@ from conftest import TILTED, equilateral
 from oracles import platform as oracle
 
 import cspr_jax
-from cspr_jax.config.catalogue import CATALOGUE, FAULTS, catalogue_names
 from cspr_jax.arithmetic import minima, rotations
 from cspr_jax.cli import main
+from cspr_jax.config.catalogue import CATALOGUE, FAULTS, catalogue_names
 from cspr_jax.config.limits import LimitKeys, LimitTable
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile, read_robot

@@ -11,6 +11,7 @@ from cspr_jax.cli import main
 from cspr_jax.config.plan import read_plan
 from cspr_jax.config.robot import RobotFile, catalogue_names, read_robot
 from cspr_jax.errors import ConfigError
+from cspr_jax.outputs import templates
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.sweep.definition import read_sweep
@@ -102,3 +103,9 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
     for shell in ("zsh", "tcsh"):
         assert main(["completion", shell]) == 0
         assert "verify" in capsys.readouterr().out
+
+
+def test_a_new_robot_begins_with_what_every_robot_has():
+    text = templates.robot_template("prototype")
+    keys = re.findall(r"^(?:# )?(\w+) = ", text, re.MULTILINE)
+    assert keys[:4] == ["name", "base_points", "mass", "z_axis"]

@@ -27,6 +27,8 @@ from cspr_jax.store.publishing import make_folders
 TABLES = ("axes", "trajectory", "orientations", "launch", "workspace", "limits", "run", "pose")
 MANY = "pose"
 WIDTH = 100
+# Every robot has these, whatever else its file holds.
+FIRST = ("name", "base_points", "mass", "z_axis")
 # Keys of families that others of the same kind refuse.
 OWN = {"rule": ("s-curve",)}
 
@@ -145,7 +147,8 @@ def _examples(key: str) -> dict[str, dict[str, Any]]:
 def _section(at: str, model: type[Table], values: Mapping[str, Any], refused: frozenset[str]) -> str:
     # Plain keys first: behind the head of a table they would be its own.
     plain, tables = [], []
-    for name, field in model.model_fields.items():
+    for name in _ordered(model):
+        field = model.model_fields[name]
         key = field.alias or name
         if (f"{at}.{key}" if at else key) in refused:
             continue
@@ -154,6 +157,11 @@ def _section(at: str, model: type[Table], values: Mapping[str, Any], refused: fr
         else:
             plain.append(_key(key, field, values.get(key)))
     return "\n".join([*plain, *tables])
+
+
+def _ordered(model: type[Table]) -> list[str]:
+    first = [name for name in FIRST if name in model.model_fields] if model is RobotFile else []
+    return [*first, *(name for name in model.model_fields if name not in first)]
 
 
 def _tables(key: str, field: FieldInfo, model: type[Table], value: Any, refused: frozenset[str]) -> str:
