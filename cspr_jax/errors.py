@@ -21,9 +21,12 @@ class ExitCode(enum.IntEnum):
 
 
 class CsprError(Exception):
-    """An error that a user can act on: one line, an exit code."""
+    """An error that a user can act on: a line, or several, and an exit code."""
 
     exit_code = ExitCode.INTERNAL
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.args))
 
     def __reduce__(self) -> tuple:
         """Errors come whole out of worker processes, whatever their constructor takes."""
@@ -74,10 +77,10 @@ class ConfigError(CsprError):
         """Join the file's name and the message."""
         count = max(count, len(others))
         more = f" (and {count} more: --all-errors shows them)" if count else ""
-        super().__init__(one_line(f"{file}: {message}{more}"))
-        self.lines = [one_line(f"{file}: {text}") for text in (message, *others)]
+        super().__init__(printable(f"{file}: {message}{more}"))
+        self.lines = [printable(f"{file}: {text}") for text in (message, *others)]
         if count > len(others):
-            self.lines.append(one_line(f"{file}: and {count - len(others)} more"))
+            self.lines.append(printable(f"{file}: and {count - len(others)} more"))
 
 
 class RefusedError(CsprError):
@@ -93,7 +96,7 @@ class StoreError(CsprError):
 
 
 class ResourceError(CsprError):
-    """Memory or workers that do not suffice."""
+    """Memory, threads, processes or workers that do not suffice."""
 
     exit_code = ExitCode.INPUT_OUTPUT
 
@@ -134,16 +137,23 @@ def demand(allowed: str) -> str:
     return allowed if allowed.startswith("cannot ") else f"must be {allowed}"
 
 
-def one_line(text: str) -> str:
-    """Text with line breaks and other control characters written out, as it may hold what a user typed.
+def printable(text: object) -> str:
+    """Text that neither breaks a line nor commands a terminal, whoever wrote it: names, paths, records, logs.
+
+    Line breaks, escapes, other control characters, marks that turn the direction of writing, and halves of surrogate
+    pairs are written out, as in a string of Python. Text that is printable already stays as it is.
 
     Args:
         text: anything.
 
     Returns:
-        the text, all of it printable.
+        one line.
     """
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in str(text))
+
+
+# The name by which older modules know it.
+one_line = printable
 
 
 def shown(value: object) -> str:

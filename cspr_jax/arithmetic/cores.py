@@ -1,19 +1,65 @@
 """Cores of this machine that a process computes on: all that it may use, or a share where several work beside it."""
 
+import math
 import os
+from pathlib import Path, PurePosixPath
 
 # How many; XLA starts as many threads.
 SHARE = "NPROC"
+_GROUPS, _MOUNTED = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 
 
 def cores() -> int:
     """Number of cores that this process computes on.
 
     Returns:
-        the number, at least 1: what the environment variable `SHARE` says, else all that it may use.
+        the number, at least 1: what the environment variable `SHARE` says, else all that it may use, within the quota
+        of its container or job.
     """
-    given = os.environ.get(SHARE, "")
-    if given.isascii() and given.isdigit() and int(given) > 0:
-        return int(given)
-    allowed = getattr(os, "sched_getaffinity", None)  # not on macOS
-    return len(allowed(0)) if allowed is not None else os.cpu_count() or 1
+    share = os.environ.get(SHARE, "")
+    if share.isascii() and share.isdigit() and int(share) > 0:
+        return int(share)
+    affinity = getattr(os, "sched_getaffinity", None)  # not on macOS
+    count = len(affinity(0)) if affinity is not None else os.cpu_count() or 1
+    return max(1, math.ceil(min(count, quota())))
+
+
+def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
+    """Cores' worth of time that the control groups of this process grant it, of versions 1 and 2 of Linux's.
+
+    Args:
+        groups: file that names them.
+        mounted: folder in which they lie.
+
+    Returns:
+        the least of all levels; infinite where there is none.
+    """
+    try:
+        lines = groups.read_text("utf-8", "replace").splitlines()
+    except OSError:
+        return math.inf
+    least = math.inf
+    for line in lines:
+        _, _, rest = line.partition(":")
+        controllers, _, place = rest.partition(":")
+        if controllers and "cpu" not in controllers.split(","):
+            continue
+        # In a container the path may be the machine's, of which only the end, or nothing, lies in the folder. Version 1
+        # has a folder for its controllers, and where both are in use version 2 has one, too.
+        for root in [mounted / controllers, mounted / "cpu"] if controllers else [mounted, mounted / "unified"]:
+            path = PurePosixPath(place.lstrip("/"))
+            for level in (path, *path.parents):
+                least = min(least, _granted(root / level))
+    return least
+
+
+def _granted(folder: Path) -> float:
+    for names in (("cpu.max",), ("cpu.cfs_quota_us", "cpu.cfs_period_us")):
+        try:
+            words = " ".join((folder / name).read_text("ascii") for name in names).split()
+            time, period = float(words[0]), float(words[1])
+        except (OSError, ValueError, IndexError):  # not there, or "max"
+            continue
+        if time > 0.0 and period > 0.0:
+            return time / period
+    return math.inf

@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import os
 from collections.abc import Iterator
 from typing import cast
 
@@ -83,12 +84,31 @@ def length(vector: Array) -> Array:
     return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), square)
 
 
+# The process that has started jax for this package.
+_users: list[int] = []
+
+
+def _refuse_fork() -> None:
+    # What jax computes there would wait for ever.
+    if not _users:
+        _users.append(os.getpid())
+    if _users[0] != os.getpid():
+        raise RuntimeError(
+            "this process was forked from one that had used jax, and would wait for ever: start processes by "
+            'multiprocessing.get_context("spawn") or "forkserver", or fork before the first call'
+        )
+
+
 @contextlib.contextmanager
 def double_precision() -> Iterator[None]:
     """Settings of jax under which this package computes, whatever the caller's are; these come back afterwards.
 
     64 bits above all: verdicts are float64's. NaN is an answer in places, so that it is no error.
+
+    Raises:
+        RuntimeError: this process was forked from one that had used jax, whose threads a fork does not take along.
     """
+    _refuse_fork()
     with contextlib.ExitStack() as stack:
         for setting in (
             jax.enable_x64(True),
@@ -97,6 +117,7 @@ def double_precision() -> Iterator[None]:
             jax.default_matmul_precision("highest"),
             jax.debug_nans(False),
             jax.debug_infs(False),
+            jax.transfer_guard("allow"),
         ):
             stack.enter_context(setting)
         yield

@@ -3,18 +3,17 @@
 import argparse
 import contextlib
 import gc
-import io
 import os
 import sys
 import traceback
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import IO, NoReturn
 
 from cspr_jax import __version__
 from cspr_jax.cli import listings, pictures, plans, runs, tables
-from cspr_jax.cli.command import Command
-from cspr_jax.errors import ConfigError, CsprError, ExitCode
-from cspr_jax.runtime import compile_cache
+from cspr_jax.cli.command import Command, printing, warn, write
+from cspr_jax.errors import ConfigError, CsprError, ExitCode, StoreError, printable
+from cspr_jax.runtime import compile_cache, surroundings, terminal
 from cspr_jax.sweep.signals import Prompt, prompt_end
 
 EPILOGUE = (
@@ -29,7 +28,14 @@ FEWER_COLLECTIONS = (200_000, 20, 50)
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """One line for a mistake, instead of the usage."""
-        self.exit(ExitCode.BAD_INPUT, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        self.exit(ExitCode.BAD_INPUT, f"{printable(f'{self.prog}: {message} (see {self.prog} --help)')}\n")
+
+    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+        # Of help and versions; the usual one says nothing where it cannot print.
+        if file is sys.stdout:
+            write(message)
+        else:
+            super()._print_message(message, file)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -43,38 +49,57 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is None:
         gc.set_threshold(*FEWER_COLLECTIONS)
+        surroundings.settle()
     _mend_streams()
     if sys.platform == "win32":
         sys.stderr.write("cspr: Linux and macOS are supported, Windows is not; its subsystem for Linux will do\n")
         return int(ExitCode.BAD_INPUT)
-    options = _parser().parse_args(arguments)
+    try:
+        options = _parser().parse_args(arguments)
+        surroundings.check_threads()
+    except SystemExit as end:
+        raise SystemExit(_flushed(int(end.code or 0))) from end
+    except BrokenPipeError:
+        return _flushed(ExitCode.DONE)
+    except CsprError as error:
+        warn(error)
+        return _flushed(error.exit_code)
     with prompt_end(compile_cache.hand_over if arguments is None else None) as prompt:
-        return _exit_code(options, prompt)
+        code = _answered(options, prompt)
+    return _flushed(code)
 
 
-def _exit_code(options: argparse.Namespace, prompt: Prompt) -> int:
+def _answered(options: argparse.Namespace, prompt: Prompt) -> int:
     try:
         return int(options.command(options))
     except CsprError as error:
-        every = error.lines if isinstance(error, ConfigError) and getattr(options, "all_errors", False) else None
-        sys.stderr.write("".join(f"cspr: {line}\n" for line in every or str(error).splitlines()))
+        with_all = isinstance(error, ConfigError) and getattr(options, "all_errors", False)
+        for line in error.lines if with_all else error.args:
+            warn(line)
         return int(error.exit_code)
     except KeyboardInterrupt:
         prompt.tell()
         return int(ExitCode.INTERRUPTED)
     except BrokenPipeError:
-        # The reader of our output has gone; there is nobody left to tell.
-        with contextlib.suppress(OSError):
-            sys.stdout.close()
+        _close_output()  # its reader has gone; there is nobody left to tell
         return int(ExitCode.DONE)
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        sys.stderr.write(f"cspr: {place}{error.strerror or error}\n")
+        warn(surroundings.shortage(error) or f"{place}{error.strerror or error}")
         return int(ExitCode.INPUT_OUTPUT)
-    except Exception:
-        traceback.print_exc()
+    except Exception as error:
+        return _unexpected(error)
+
+
+def _unexpected(error: Exception) -> int:
+    lacking = surroundings.shortage(error)
+    if lacking is not None:
+        warn(lacking)
+        return int(ExitCode.INPUT_OUTPUT)
+    with contextlib.suppress(OSError, ValueError):
+        sys.stderr.write("".join(f"{printable(line)}\n" for line in traceback.format_exc().splitlines()))
         sys.stderr.write(f"cspr {__version__}: internal error; please report it with the lines above and your file\n")
-        return int(ExitCode.INTERNAL)
+    return int(ExitCode.INTERNAL)
 
 
 def _mend_streams() -> None:
@@ -84,8 +109,31 @@ def _mend_streams() -> None:
             with contextlib.suppress(OSError):
                 os.open(os.devnull, os.O_RDWR)
             setattr(sys, name, open(os.devnull, "r" if number == 0 else "w", encoding="utf-8"))  # noqa: SIM115
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="surrogateescape")  # a path is printed as it is
+    for stream in (sys.stdout, sys.stderr):
+        terminal.encodable(stream)
+
+
+def _flushed(code: int) -> int:
+    # Python would write what is left at its end, where it is too late for a line and an exit code of ours.
+    try:
+        with printing():
+            sys.stdout.flush()
+    except BrokenPipeError:
+        _close_output()
+    except StoreError as error:
+        _close_output()
+        if code in (ExitCode.DONE, ExitCode.NOT_FEASIBLE):
+            warn(error)
+            return int(error.exit_code)
+    except ValueError:  # it was closed before
+        return int(code)
+    return int(code)
+
+
+def _close_output() -> None:
+    # What is left in its buffer would be tried once more.
+    with contextlib.suppress(OSError):
+        sys.stdout.close()
 
 
 def _add_completion(parser: argparse.ArgumentParser) -> None:
@@ -95,7 +143,7 @@ def _add_completion(parser: argparse.ArgumentParser) -> None:
 def _completion(options: argparse.Namespace) -> int:
     from cspr_jax.api.completions import completion
 
-    sys.stdout.write(completion(options.shell, _parser()))
+    write(completion(options.shell, _parser()))
     return ExitCode.DONE
 
 

@@ -1,11 +1,15 @@
 """A command as a row, and what commands have in common: JSON, tables, warnings, options, the way to jax."""
 
 import argparse
+import contextlib
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from cspr_jax.errors import StoreError, printable
+from cspr_jax.runtime import terminal
 
 
 class Command(NamedTuple):
@@ -71,14 +75,48 @@ def prepare_jax(options: argparse.Namespace, *, quick: bool = False) -> None:
         quick: whether little is computed; see `xla.prepare`.
 
     Raises:
-        InputError: no such device.
+        ConfigError: no such device, or settings of jax that cannot be used.
+        ResourceError: its threads could not be started.
     """
-    from cspr_jax.runtime import xla
+    from cspr_jax.runtime import surroundings, xla
 
+    surroundings.check_threads_of_jax()
     if getattr(options, "scheduler", None) is None:  # its workers have settings of their own
         xla.prepare(options.device, warn, quick=quick)
     xla.check_device(options.device)
     xla.tell_compiling()
+
+
+@contextlib.contextmanager
+def printing() -> Iterator[None]:
+    """Name standard output where it takes nothing more.
+
+    Yields:
+        nothing; it is written to inside.
+
+    Raises:
+        StoreError: it is full.
+        BrokenPipeError: its reader has gone.
+    """
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise StoreError(f"standard output: {error.strerror or error}") from error
+
+
+def write(text: str) -> None:
+    """Write to standard output.
+
+    Args:
+        text: of ours, with its line breaks.
+
+    Raises:
+        StoreError: it is full.
+    """
+    with printing():
+        sys.stdout.write(text)
 
 
 def print_json(value: Any) -> None:
@@ -87,7 +125,7 @@ def print_json(value: Any) -> None:
     Args:
         value: of numbers, words, lists and dictionaries.
     """
-    sys.stdout.write(json.dumps(value, allow_nan=False) + "\n")
+    write(json.dumps(value, allow_nan=False) + "\n")
 
 
 def print_table(renderable: Any) -> None:
@@ -96,16 +134,33 @@ def print_table(renderable: Any) -> None:
     Args:
         renderable: the table.
     """
-    from rich.console import Console
-
-    # A pipe gets lines of a width of their own, so that no column is folded.
-    Console(width=None if sys.stdout.isatty() else 140, highlight=False).print(renderable)
+    with printing():
+        terminal.print_table(renderable, sys.stdout)
 
 
-def warn(line: str) -> None:
-    """Say something on standard error.
+def print_line(text: object) -> None:
+    """Print a line for people.
+
+    Args:
+        text: the line; a name in it may be anybody's.
+    """
+    write(f"{printable(text)}\n")
+
+
+def print_path(path: Path | str) -> None:
+    """Print the path of a file, for people or for a program that opens it.
+
+    Args:
+        path: of the file.
+    """
+    write(f"{printable(path) if sys.stdout.isatty() else path}\n")
+
+
+def warn(line: object) -> None:
+    """Say something on standard error; where that takes nothing more, there is nobody to be told.
 
     Args:
         line: what.
     """
-    sys.stderr.write(f"cspr: {line}\n")
+    with contextlib.suppress(OSError, ValueError):
+        sys.stderr.write(f"cspr: {printable(line)}\n")

@@ -1,12 +1,11 @@
 """Commands about files to start from, and what there is: new, import, robots, quantities, examples."""
 
 import argparse
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.cli.command import Command, add_json, add_output, print_json, print_table, warn
+from cspr_jax.cli.command import Command, add_json, add_output, print_json, print_path, print_table, warn, write
 from cspr_jax.errors import ConfigError, ExitCode
 
 
@@ -25,9 +24,9 @@ def _import(options: argparse.Namespace) -> int:
     for line in found.warnings:
         warn(f"{options.file}: {line}")
     if options.output is None:
-        sys.stdout.write(found.to_toml())
+        write(found.to_toml())
     else:
-        sys.stdout.write(f"{found.save(options.output)}\n")
+        print_path(found.save(options.output))
     return ExitCode.DONE
 
 
@@ -85,7 +84,11 @@ def _examples(options: argparse.Namespace) -> int:
     names = list(known) if options.all else options.name
     shown = [str(path) for path in examples.copy_examples(names, options.output)] if names else known
     lines = shown if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
-    print_json(shown) if options.json else sys.stdout.write("".join(f"{line}\n" for line in lines))
+    if options.json:
+        print_json(shown)
+    else:
+        for line in lines:
+            print_path(line)
     return ExitCode.DONE
 
 
@@ -104,7 +107,7 @@ def _new(options: argparse.Namespace) -> int:
 
     names = ("like", "map", "family")
     path = new_file(options.what, options.path, **{name: getattr(options, name) for name in names})
-    sys.stdout.write(f"{path}\n")
+    print_path(path)
     return ExitCode.DONE
 
 

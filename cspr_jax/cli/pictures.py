@@ -1,10 +1,9 @@
 """Commands about pictures and pages of results: plot, report."""
 
 import argparse
-import sys
 from pathlib import Path
 
-from cspr_jax.cli.command import Command, add_all_errors, add_device, add_output, prepare_jax, warn
+from cspr_jax.cli.command import Command, add_all_errors, add_device, add_output, prepare_jax, print_path, warn
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.options import ACCELERATION, add_best, add_plot
 from cspr_jax.runtime.progress import waiting
@@ -24,7 +23,7 @@ def _plot(options: argparse.Namespace) -> int:
     names = ("quantity", "best", "lines", "envelope", "solid", "size", "dpi", "font_size")
     with waiting():
         plot(results, at=at, output=output, **{name: getattr(options, name) for name in names})
-    sys.stdout.write(f"{output}\n")
+    print_path(output)
     return ExitCode.DONE
 
 
@@ -61,7 +60,7 @@ def _report(options: argparse.Namespace) -> int:
         warnings = report(given, output, cells=cells, **some)
     for line in warnings:
         warn(line)
-    sys.stdout.write(f"{output}\n")
+    print_path(output)
     return ExitCode.DONE
 
 

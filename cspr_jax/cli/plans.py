@@ -1,7 +1,6 @@
 """Commands about sequences of poses: plan, and replay, which plays one in MuJoCo."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from cspr_jax.cli.command import (
     add_output,
     prepare_jax,
     print_json,
+    print_line,
     print_table,
     warn,
 )
@@ -90,10 +90,15 @@ def _planned(options: argparse.Namespace) -> Any:
 def _plan(options: argparse.Namespace) -> int:
     _check_plan(options)
     plan = _planned(options)
-    if options.json:
-        print_json(plan.to_dict())
-    else:
-        print_table(plan.to_table())
+    # Files are what took long: no table that cannot be printed stands before them.
+    try:
+        _write(plan, options)
+    finally:
+        print_json(plan.to_dict()) if options.json else print_table(plan.to_table())
+    return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
+
+
+def _write(plan: Any, options: argparse.Namespace) -> None:
     of_mjcf = {} if options.step is None else {"step": options.step}
     for path, save in (
         (options.output, lambda path: plan.save(path, options.rate, anyway=True)),
@@ -109,7 +114,6 @@ def _plan(options: argparse.Namespace) -> int:
                 warn(f"{path}: not proved feasible; the file says so")
         else:
             warn(f"{path}: not written, since a segment is not proved feasible (--anyway writes it)")
-    return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
 
 
 def _add_replay(parser: argparse.ArgumentParser) -> None:
@@ -145,7 +149,8 @@ def _replay(options: argparse.Namespace) -> int:
     if options.json:
         print_json(found.to_dict())
     else:
-        sys.stdout.write("".join(f"{line}\n" for line in found.lines()))
+        for line in found.lines():
+            print_line(line)
     return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
 
 

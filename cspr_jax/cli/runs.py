@@ -14,9 +14,12 @@ from cspr_jax.cli.command import (
     add_output,
     prepare_jax,
     print_json,
+    print_line,
+    print_path,
     warn,
 )
-from cspr_jax.errors import ConfigError, ExitCode, one_line
+from cspr_jax.errors import ConfigError, ExitCode
+from cspr_jax.runtime import surroundings
 from cspr_jax.runtime.progress import progress
 from cspr_jax.sweep.signals import stop_signals
 
@@ -47,6 +50,8 @@ def _run(options: argparse.Namespace) -> int:
 
     if options.scheduler is not None and options.device is not None:
         raise ConfigError("--device", f"{options.device}: cannot be combined with --scheduler, whose workers choose")
+    if options.scheduler is not None:
+        surroundings.quiet_scheduler()
     sweep = sweeps.sweep_given(options.sweep)
     directory = options.output or sweeps.run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
@@ -57,8 +62,8 @@ def _run(options: argparse.Namespace) -> int:
         if path is None:
             path = job.go(lambda: prepare_jax(options))
         else:
-            sys.stdout.write("already finished; nothing was computed\n")
-    sys.stdout.write(f"{path}\n")
+            print_line("already finished; nothing was computed")
+    print_path(path)
     return ExitCode.DONE
 
 
@@ -76,19 +81,20 @@ def _status(options: argparse.Namespace) -> int:
         return ExitCode.DONE
     last, share = state["last"] or {}, 100.0 * state["cells_done"] / state["cells"]
     cells = f"{state['cells_done']:,} of {state['cells']:,} cells, {state['shards']} of {state['tiles']} tiles"
-    sys.stdout.write(
-        f"{state['directory']}: {one_line(state['sweep'])}, identity {state['identity'][:12]}\n"
-        f"  {share:.0f} % done: {cells}\n"
-        f"{_pace(state)}"
-        f"  result: {state['result'] or 'not yet'}\n"
-        f"  last: {one_line(last.get('event', '-'))} at {one_line(last.get('time', '-'))}\n"
-    )
+    for line in (
+        f"{state['directory']}: {state['sweep']}, identity {state['identity'][:12]}",
+        f"  {share:.0f} % done: {cells}",
+        *_pace(state),
+        f"  result: {state['result'] or 'not yet'}",
+        f"  last: {last.get('event', '-')} at {last.get('time', '-')}",
+    ):
+        print_line(line)
     return ExitCode.DONE
 
 
-def _pace(state: dict[str, Any]) -> str:
+def _pace(state: dict[str, Any]) -> list[str]:
     # What only some runs have to say.
-    lines = []
+    lines = list[str]()
     if state["cells_per_second"] is not None and state["result"] is None:
         left = datetime.timedelta(seconds=round(state["seconds_left"]))
         lines.append(f"{state['cells_per_second']:,.3g} cells/s; at this rate {left} left")
@@ -96,7 +102,7 @@ def _pace(state: dict[str, Any]) -> str:
         lines.append(f"damaged files moved to quarantine/: {state['quarantined']}")
     if state["unfinished"]:
         lines.append(f"half-written files, which the next run removes: {state['unfinished']}")
-    return "".join(f"  {line}\n" for line in lines)
+    return [f"  {line}" for line in lines]
 
 
 def _add_verify(parser: argparse.ArgumentParser) -> None:
@@ -112,13 +118,13 @@ def _verify(options: argparse.Namespace) -> int:
         print_json(report)
     else:
         counts = ", ".join(f"{key} {report[key]}" for key in VERIFIED if key in report)
-        sys.stdout.write(f"{report['path']}: {counts}\n")
+        print_line(f"{report['path']}: {counts}")
     again = "run the sweep" if "shards" in report else "run or plan it"
     for fault in report["faults"]:
-        sys.stderr.write(f"cspr: {fault}: {again} again to make it anew\n")
+        warn(f"{fault}: {again} again to make it anew")
     unreadable = report.get("unreadable", [])
     for line in unreadable:
-        sys.stderr.write(f"cspr: {line}\n")
+        warn(line)
     return ExitCode.INPUT_OUTPUT if report["faults"] or unreadable else ExitCode.DONE
 
 
@@ -132,9 +138,11 @@ def _volume(options: argparse.Namespace) -> int:
     from cspr_jax.outputs.plots.selection import result_at
 
     found = volumes.workspace_volume(result_at(options.path))
-    sys.stdout.write("" if options.json else "".join(f"{line}\n" for line in found.lines()))
     if options.json:
         print_json(found.to_dict())
+    else:
+        for line in found.lines():
+            print_line(line)
     return ExitCode.DONE
 
 

@@ -1,10 +1,9 @@
 """Commands about published figures and speed: table, bench."""
 
 import argparse
-import sys
 from pathlib import Path
 
-from cspr_jax.cli.command import Command, add_device, add_json, prepare_jax, print_json, print_table
+from cspr_jax.cli.command import Command, add_device, add_json, prepare_jax, print_json, print_line, print_table
 from cspr_jax.errors import ExitCode
 from cspr_jax.runtime.progress import waiting
 
@@ -33,7 +32,8 @@ def _table(options: argparse.Namespace) -> int:
         from cspr_jax.published.tables import table_for_people, table_object
 
     if options.list:
-        sys.stdout.write("".join(f"{name}  {title}\n" for name, title in tables.table_names().items()))
+        for name, title in tables.table_names().items():
+            print_line(f"{name}  {title}")
         return ExitCode.DONE
     choices = {
         name: getattr(options, name) for name in ("definition", "amplitude", "fine", "max_arcs", "values", "workers")
@@ -64,7 +64,8 @@ def _bench(options: argparse.Namespace) -> int:
     if options.json:
         print_json(report)
     else:
-        sys.stdout.write("\n".join(lines(report)) + "\n")
+        for line in lines(report):
+            print_line(line)
     return ExitCode.DONE
 
 

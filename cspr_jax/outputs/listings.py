@@ -7,6 +7,7 @@ from typing import Any
 
 from cspr_jax.config.catalogue import CATALOGUE, FAULTS, catalogue_keys, catalogue_names
 from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.motion_quantities import FLIGHT, SEGMENTS, TRAJECTORY
 from cspr_jax.schema.quantities import AXES, QUANTITIES
@@ -133,11 +134,10 @@ def quantities_table(listed: list[dict[str, Any]]):
 def _table(heads: tuple[str, ...], rows: list[tuple], *, wraps: bool = True):
     from rich import box  # only a terminal needs it
     from rich.table import Table
-    from rich.text import Text
 
     table = Table() if wraps else Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for head in heads:
-        table.add_column(Text(head), no_wrap=not wraps)
+        table.add_column(cell(head), no_wrap=not wraps)
     for row in rows:
-        table.add_row(*map(Text, row))  # what files say is no markup
+        table.add_row(*map(cell, row))
     return table

@@ -7,6 +7,7 @@ from typing import Any
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import Plan
 from cspr_jax.plans.released import released
+from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.verdicts import Verdict
 
 SCHEMA = 1
@@ -139,12 +140,13 @@ def plan_table(plan: Plan):
     title = f"{plan.spec.name}: {', '.join(filter(None, words))}"
     whole = plan_object(plan)
     caption, segments = _caption(plan) + _launch(whole.get("launch")), whole["segments"]
-    table = Table(title=title, caption=caption, title_justify="left", caption_justify="left")
+    table = Table(title=cell(title, style="table.title"), title_justify="left", caption_justify="left")
+    table.caption = cell(*caption.splitlines(), style="table.caption")
     columns = {**_places(plan), **_numbers(segments), "verdict": lambda segment: segment["verdict"]}
     for head in columns:
-        table.add_column(head, justify="left" if head in ("position (m)", "held back by", "verdict") else "right")
+        table.add_column(cell(head), justify="left" if head in ("position (m)", "held back by", "verdict") else "right")
     for segment in segments:
-        table.add_row(*(column(segment) for column in columns.values()))
+        table.add_row(*(cell(column(segment)) for column in columns.values()))
     return table
 
 

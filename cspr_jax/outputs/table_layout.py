@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from cspr_jax.runtime import terminal
+
 MISMATCH, UNKNOWN, NOTHING = "!=", "?", "none"
 LEGEND = (
     f"Each cell: published / computed, with as many digits as printed. {MISMATCH}: they differ by more than the "
@@ -65,13 +67,12 @@ def grid(
     Returns:
         a rich renderable.
     """
-    from rich.console import Group  # only a terminal needs them
-    from rich.text import Text
+    from rich.console import Group  # only a terminal needs it
 
     variants = dict.fromkeys(cell.variant for cell in cells)
     blocks: list[Any] = []
     for name in variants:
-        blocks += [Text(name, style="bold")] if name else []
+        blocks += [terminal.cell(name, style="bold")] if name else []
         own = [cell for cell in cells if cell.variant == name]
         across = list(dict.fromkeys(cell.row if transposed else cell.column for cell in own))
         step = SIDE_BY_SIDE if len(across) > WIDEST else len(across)
@@ -79,7 +80,7 @@ def grid(
             some = across[first : first + step]
             part = [cell for cell in own if (cell.row if transposed else cell.column) in some]
             blocks.append(_block(part, transposed, _HEADS | dict(heads)))
-    return Group(Text(title, style="italic"), *blocks, Text(LEGEND, style="dim"))
+    return Group(terminal.cell(title, style="italic"), *blocks, terminal.cell(LEGEND, style="dim"))
 
 
 def _block(cells: list[Cell], transposed: bool, heads: Mapping[str, str]) -> Any:
@@ -90,16 +91,16 @@ def _block(cells: list[Cell], transposed: bool, heads: Mapping[str, str]) -> Any
     rows, columns = (list(dict.fromkeys(key[i] for key in by)) for i in (0, 1))
     table.add_column("")
     for name in columns:
-        table.add_column(heads.get(name, name), justify="right", no_wrap=True)
+        table.add_column(terminal.cell(heads.get(name, name)), justify="right", no_wrap=True)
     for row in rows:
-        texts = [_text(by[row, column], cells) if (row, column) in by else "" for column in columns]
-        table.add_row(heads.get(row, row), *texts)
+        texts = [_text(by[row, column], cells) if (row, column) in by else terminal.cell("") for column in columns]
+        table.add_row(terminal.cell(heads.get(row, row)), *texts)
     return table
 
 
-def _text(cell: Cell, cells: list[Cell]) -> str:
+def _text(cell: Cell, cells: list[Cell]) -> Any:
     text = f"{cell.printed or UNKNOWN} / {computed_text(cell, cells)}"
-    return f"[bold red]{text} {MISMATCH}[/]" if cell.differs else text
+    return terminal.cell(f"{text} {MISMATCH}", style="bold red") if cell.differs else terminal.cell(text)
 
 
 def computed_text(cell: Cell, cells: list[Cell]) -> str:

@@ -18,6 +18,7 @@ from typing import Any
 
 from cspr_jax.arithmetic.cores import SHARE, cores
 from cspr_jax.errors import ConfigError, ResourceError
+from cspr_jax.runtime.surroundings import check_threads_of_jax
 
 SAFE_PATH = "PYTHONSAFEPATH"
 # So many workers at most; and where nobody says how many, since each takes a GB.
@@ -63,10 +64,14 @@ class Workers:
         count: how many.
         begin: called first in each; None: nothing is.
         given: what it is called with.
+
+    Raises:
+        ResourceError: their threads could not be started.
     """
 
     def __init__(self, count: int, begin: Callable[..., None] | None = None, *given: Any) -> None:
         """Start nothing yet."""
+        check_threads_of_jax(count)
         # A second Ctrl-C ends everything at once; what then cleans up behind Python need not complain about it.
         if _NO_COMPLAINT not in sys.warnoptions:
             sys.warnoptions.append(_NO_COMPLAINT)
@@ -153,7 +158,9 @@ class Spread:
                 for k, one in zip(group, own.result(), strict=True)
             }
         except BrokenProcessPool as error:
-            raise ResourceError("a worker died, perhaps for want of memory: --workers must be smaller") from error
+            raise ResourceError(
+                "a worker died, perhaps for want of memory or threads: --workers must be smaller"
+            ) from error
         return [found[k] for k in range(len(items))]
 
 

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 
+from cspr_jax.errors import printable
 from cspr_jax.runtime import stages
 
 # Between two lines where standard error is no terminal.
@@ -90,7 +91,7 @@ def progress() -> Iterator[Callable[[int, int], None]]:
             pace.told(done, total)
             bar.update(task, completed=done, total=total)
 
-        with stages.heard(lambda text: bar.update(task, description=text or "computing")):
+        with stages.heard(lambda text: bar.update(task, description=printable(text) or "computing")):
             yield on_tile
 
 
@@ -134,7 +135,7 @@ def waiting() -> Iterator[None]:
 
     with _bar(SpinnerColumn("line"), TextColumn("{task.description}", markup=False), TimeElapsedColumn()) as bar:
         task = bar.add_task("starting", total=None)
-        with stages.heard(lambda text: bar.update(task, description=text or "computing")):
+        with stages.heard(lambda text: bar.update(task, description=printable(text) or "computing")):
             yield
 
 

@@ -9,6 +9,7 @@ import errno
 import hashlib
 import importlib.metadata
 import json
+import math
 import os
 import platform
 import re
@@ -20,7 +21,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.errors import ConfigError
+from cspr_jax.arithmetic.cores import SHARE, cores, quota
+from cspr_jax.errors import ConfigError, printable, shown
 from cspr_jax.runtime import compile_cache, stages
 
 # Twice as fast where the processor has it; XLA's own choice is half of it.
@@ -36,6 +38,7 @@ PROBE_SECONDS, LARGEST_RECORD = 120, 1 << 16
 # arenas a long sweep needs half the memory; with one, threads that compile would wait for each other. The last number
 # is M_ARENA_MAX of malloc.h.
 ARENAS, _FEW, _ARENA_MAX = "MALLOC_ARENA_MAX", 4, -8
+_LONGEST_REASON = 200
 _PROBE = "import jax; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
 # jax tells when it has lowered a function, which it then compiles, and when that is done.
 _LOWERED = "/jax/core/compile/jaxpr_to_mlir_module_duration"
@@ -62,6 +65,9 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
         device: "cpu"; "gpu" and None leave the choice to jax.
         warn: called with a line for people where compiled code cannot be kept.
         quick: whether little is computed, so that compiling in less time is worth more than faster code.
+
+    Raises:
+        ConfigError: XLA ends the process that has the user's XLA_FLAGS.
     """
     if "jax" in sys.modules:
         return
@@ -70,10 +76,14 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
     if device == "cpu":
         os.environ["JAX_PLATFORMS"] = "cpu"
     _few_arenas()
-    folder = _folder(None, warn)
+    if math.isfinite(quota()):
+        os.environ.setdefault(SHARE, str(cores()))  # XLA would start a thread for each core of the machine
+    folder, flags = _folder(None, warn), os.environ.get("XLA_FLAGS", "")
+    if flags.strip():
+        _check_flags(folder, flags)
     if folder is None:
         return
-    os.environ["XLA_FLAGS"] = _flags(folder, os.environ.get("XLA_FLAGS", ""), quick=quick)
+    os.environ["XLA_FLAGS"] = _flags(folder, flags, quick=quick)
     if CACHE not in os.environ:
         _keep(folder, warn)
 
@@ -123,19 +133,29 @@ def _keep(folder: Path, warn: Callable[[str], None]) -> Path | None:
 
 
 def check_device(device: str | None) -> None:
-    """Refuse a device that is not there; starts jax where one is asked for.
+    """Refuse a device that is not there; starts jax where one is asked for, by the user or by JAX_PLATFORMS.
 
     Args:
         device: "cpu", "gpu" or None.
 
     Raises:
-        ConfigError: jax has none.
+        ConfigError: jax has none, or refuses a setting in the environment.
     """
+    try:
+        import jax
+    except ValueError as error:
+        raise ConfigError("environment", f"holds a variable that jax refuses: {error}") from error
+
+    platforms = os.environ.get("JAX_PLATFORMS", "")
+    if device != "gpu" and platforms in ("", "cpu"):
+        return
+    try:
+        kind = jax.devices()[0].platform
+    except (RuntimeError, AssertionError) as error:  # jax asserts that what it is to start can be started
+        named = f"{platforms}: must name what jax finds here, such as cpu"
+        raise ConfigError("JAX_PLATFORMS", f"{named}: {error}" if str(error) else named) from error
     if device != "gpu":
         return
-    import jax
-
-    kind = jax.devices()[0].platform
     if kind != "gpu":
         raise ConfigError("--device", f"gpu: must be cpu here, since jax finds no GPU (it has {kind})")
 
@@ -175,7 +195,10 @@ def _folder(given: str | Path | None, warn: Callable[[str], None]) -> Path | Non
     given = os.environ.get("CSPR_CACHE_DIR") if given is None else given
     if given == "":
         return None
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    try:
+        home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    except RuntimeError:  # a user without a name, as in a container
+        home = os.devnull
     here = (*_versions(), sys.version, *_processor())
     shared = Path(given or Path(home) / "cspr_jax")
     folder = shared / hashlib.sha256(repr(here).encode()).hexdigest()[:16]
@@ -211,6 +234,9 @@ def _processor() -> tuple[str, ...]:
 
 
 def _flags(folder: Path, given: str, *, quick: bool = False) -> str:
+    # XLA reads what does not begin with a dash as the name of a file of flags: there is no place for ours.
+    if given.strip() and not given.lstrip().startswith("-"):
+        return given
     # Of two settings of one flag XLA takes the last: those of the user. They are not set twice, since all of the words
     # are part of what compiled code is known by.
     ours = [WIDE] if NEEDS in _processor() else []
@@ -220,33 +246,56 @@ def _flags(folder: Path, given: str, *, quick: bool = False) -> str:
     return f"{wanted} {given}".strip() if ours and _is_known(folder, wanted) else given
 
 
-def _is_known(folder: Path, flag: str) -> bool:
-    # XLA ends the process that names a flag it does not know: another one tries, once.
-    record = folder / "flags.json"
+def _check_flags(folder: Path | None, flags: str) -> None:
+    # In a file they may change from one time to the next.
+    place = folder if flags.lstrip().startswith("-") else None
+    reason = _refusal(place, flags)
+    if reason:
+        raise ConfigError("XLA_FLAGS", f"{shown(flags)}: must be flags that this XLA knows: {reason}")
+
+
+def _is_known(folder: Path, flags: str) -> bool:
+    return _refusal(folder, flags) == ""
+
+
+def _refusal(folder: Path | None, flags: str) -> str | None:
+    # XLA ends the process that names a flag it does not know: another one tries, once. "" where it takes them, None
+    # where there was no answer.
+    record = None if folder is None else folder / "flags.json"
     try:
-        known = json.loads(compile_cache.plain_bytes(record, LARGEST_RECORD))
+        known = {} if record is None else json.loads(compile_cache.plain_bytes(record, LARGEST_RECORD))
     except (OSError, ValueError, RecursionError):
         known = {}
     known = known if isinstance(known, dict) else {}
-    if isinstance(known.get(flag), bool):
-        return known[flag]
-    settings = os.environ | {"XLA_FLAGS": flag, "JAX_PLATFORMS": "cpu"}
+    if known.get(flags) is True:
+        return ""
+    if isinstance(known.get(flags), str) and known[flags]:
+        return known[flags]
+    settings = os.environ | {"XLA_FLAGS": flags, "JAX_PLATFORMS": "cpu", "TF_CPP_MIN_LOG_LEVEL": "2"}
     # -P: nothing that lies in the working folder is executed. A session of its own: Ctrl-C is for us, not an answer.
-    words, silent = [sys.executable, "-P", "-c", _PROBE], subprocess.DEVNULL
+    words, silent, pipe = [sys.executable, "-P", "-c", _PROBE], subprocess.DEVNULL, subprocess.PIPE
     try:
         done = subprocess.run(
-            words, env=settings, stdout=silent, stderr=silent, timeout=PROBE_SECONDS, start_new_session=True
+            words, env=settings, stdout=silent, stderr=pipe, timeout=PROBE_SECONDS, start_new_session=True
         )
     except (OSError, subprocess.TimeoutExpired):
-        return False
+        return None
     if done.returncode in (-signal.SIGINT, -signal.SIGTERM, -signal.SIGKILL):  # somebody ended it: it has not answered
-        return False
-    partial = record.with_suffix(f".{os.getpid()}")
-    try:
-        partial.unlink(missing_ok=True)
-        with partial.open("x", encoding="utf-8") as file:
-            file.write(json.dumps(known | {flag: done.returncode == 0}))
-        partial.replace(record)
-    except OSError:
-        return False
-    return done.returncode == 0
+        return None
+    reason = _reason(done.stderr.decode("utf-8", "replace")) if done.returncode else ""
+    if record is not None:
+        partial = record.with_suffix(f".{os.getpid()}")
+        try:
+            partial.unlink(missing_ok=True)
+            with partial.open("x", encoding="utf-8") as file:
+                file.write(json.dumps(known | {flags: reason or True}))
+            partial.replace(record)
+        except OSError:
+            return None
+    return reason
+
+
+def _reason(log: str) -> str:
+    # Its log says why in the first line of an error, after its place in XLA's code.
+    lines = [line.partition("] ")[2] for line in log.splitlines() if line[:1] in ("E", "F")]
+    return printable(next(filter(None, lines), "it ends the process"))[:_LONGEST_REASON]

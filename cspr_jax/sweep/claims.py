@@ -30,13 +30,13 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder, reader: Reader) -> None:
     record = _record(folder.record)
     if record is not None:
         if record.identity != sweep.identity:
-            raise RefusedError(differing(sweep, folder, record.settings))
+            raise RefusedError(*differing(sweep, folder, record.settings))
         return
     # Without a record that can be believed, shards and results say whose they are.
     for path in sorted(folder.path.glob("*.h5")):
         content = content_at(path, reader)
         if isinstance(content, Content) and content.identity != sweep.identity:
-            raise RefusedError(differing(sweep, folder, content.settings))
+            raise RefusedError(*differing(sweep, folder, content.settings))
     if {identity for identity, _ in _owners(folder, reader)} - {sweep.identity}:
         raise RefusedError(one_line(f"{folder.path}: holds shards of another sweep: choose another -o"))
 
@@ -60,7 +60,7 @@ def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
         raise RefusedError(one_line(f"{strangers[0]}: is somebody's file, not of a run of cspr: choose another -o"))
 
 
-def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> str:
+def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> list[str]:
     """Differences between a sweep and the one that a directory belongs to.
 
     Args:
@@ -72,7 +72,7 @@ def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> str:
         a line for each key.
     """
     lines = differences(sweep.settings, settings) or ["the format of the run differs"]
-    return "\n".join(one_line(f"{folder.path}: {line}: must be equal, or another -o") for line in lines)
+    return [one_line(f"{folder.path}: {line}: must be equal, or another -o") for line in lines]
 
 
 def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], accept: bool, reader: Reader) -> None:
@@ -96,7 +96,7 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
             raise RefusedError(one_line(f"{folder.path}: its shards were computed in another environment: {advice}"))
         return
     lines = differences(environment, record.environment)
-    raise RefusedError("\n".join(one_line(f"{folder.path}: {line}: {advice}") for line in lines))
+    raise RefusedError(*(one_line(f"{folder.path}: {line}: {advice}") for line in lines))
 
 
 def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
@@ -113,7 +113,7 @@ def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
         return
     advice = "--accept-environment-change takes it"
     lines = differences(actual, expected)
-    raise RefusedError("\n".join(one_line(f"a worker differs from the run: {line}: {advice}") for line in lines))
+    raise RefusedError(*(one_line(f"a worker differs from the run: {line}: {advice}") for line in lines))
 
 
 def damage(path: Path) -> str | None:

@@ -115,7 +115,7 @@ class Scheduler:
             lines = differences(environments[0], other)
             if lines and not self._accept:
                 raise RefusedError(
-                    "\n".join(f"workers differ: {line}: --accept-environment-change takes them" for line in lines)
+                    *(f"workers differ: {line}: --accept-environment-change takes them" for line in lines)
                 )
         here = environment()
         if environments[0]["package"] != here["package"] and not self._accept:

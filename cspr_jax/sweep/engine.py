@@ -117,7 +117,7 @@ class Run:
                 raise RefusedError(one_line(f"{self._folder.result}: is there, and {content}: choose another -o"))
             return None
         if content.identity != self._sweep.identity:
-            raise RefusedError(claims.differing(self._sweep, self._folder, content.settings))
+            raise RefusedError(*claims.differing(self._sweep, self._folder, content.settings))
         if self._options.prune and self._folder.shards.is_dir():
             with self._folder.locked():
                 self._prune()

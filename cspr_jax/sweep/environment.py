@@ -61,10 +61,10 @@ def _git() -> dict[str, Any]:
     # Of the checkout that holds the package, if it is one.
     def ask(*words: str) -> str | None:
         try:
-            done = subprocess.run(("git", "-C", str(PACKAGE), *words), capture_output=True, text=True, timeout=60)
+            done = subprocess.run(("git", "-C", str(PACKAGE), *words), capture_output=True, timeout=60)
         except (OSError, subprocess.TimeoutExpired):
             return None
-        return done.stdout.strip() if done.returncode == 0 else None
+        return done.stdout.decode("utf-8", "replace").strip() if done.returncode == 0 else None
 
     if ask("ls-files", "--error-unmatch", "__init__.py") is None:
         return {"git_commit": None, "git_dirty": None}

@@ -1,0 +1,104 @@
+"""What surrounds a process of the command line: settings of other libraries, and how many threads it may have."""
+
+import contextlib
+import errno
+import logging
+import os
+import sys
+import threading
+from pathlib import Path
+
+from cspr_jax.arithmetic.cores import cores
+from cspr_jax.errors import ResourceError
+
+# Threads that a command needs whatever it does: for signals, and those of NumPy's library, one a core. Then for jax: of
+# XLA's own pools some have one a core.
+FEW, OF_JAX, OF_JAX_PER_CORE = 4, 16, 4
+_SMALL_STACK = 1 << 16  # bytes
+_LARGER = "or the limit of a container or a job, must be larger"
+_THREADS = f"no more threads can be started: `ulimit -u`, {_LARGER}"
+_PROCESSES = f"no more processes can be started: `ulimit -u`, {_LARGER}"
+_MEMORY = f"memory does not suffice: `ulimit -v`, {_LARGER}"
+
+
+def settle() -> None:
+    """Keep settings that others made for their own programs from this process and those that it starts.
+
+    The command line opens no window, and its pictures do not depend on matplotlib's settings.
+    """
+    os.environ["MPLBACKEND"] = "Agg"
+    logging.getLogger("matplotlib").setLevel(logging.CRITICAL)
+    try:
+        Path.home()
+    except RuntimeError:
+        # A user without a name, as in a container. Where folders of the home folder are made, this fails in the usual
+        # way, and everybody does without them.
+        os.environ["HOME"] = os.devnull
+
+
+def check_threads(count: int = 0) -> None:
+    """Refuse to begin where libraries could not start their threads: they end the process, or send it a Ctrl-C.
+
+    Args:
+        count: how many more than every command needs.
+
+    Raises:
+        ResourceError: they cannot be started.
+    """
+    over, started = threading.Event(), list[threading.Thread]()
+    size = threading.stack_size(_SMALL_STACK)
+    try:
+        for _ in range(FEW + cores() + count):
+            thread = threading.Thread(target=over.wait, daemon=True)
+            thread.start()
+            started.append(thread)
+    except RuntimeError as error:
+        raise ResourceError(_THREADS) from error
+    finally:
+        threading.stack_size(size)
+        over.set()
+        for thread in started:
+            thread.join()
+
+
+def check_threads_of_jax(processes: int = 0) -> None:
+    """Refuse to begin where jax could not start its threads.
+
+    Args:
+        processes: how many share the cores, each with a jax of its own; 0: this process computes.
+
+    Raises:
+        ResourceError: they cannot be started.
+    """
+    if processes or "jax" not in sys.modules:
+        check_threads((OF_JAX + FEW) * max(processes, 1) + OF_JAX_PER_CORE * max(cores(), processes))
+
+
+def shortage(error: Exception) -> str | None:
+    """What the machine lacks, where that is why something failed.
+
+    Args:
+        error: what was raised.
+
+    Returns:
+        a line; None for any other failure.
+    """
+    text = str(error)
+    if isinstance(error, MemoryError) or (isinstance(error, RuntimeError) and "RESOURCE_EXHAUSTED" in text):
+        return _MEMORY
+    if isinstance(error, RuntimeError) and "can't start new thread" in text:
+        return _THREADS
+    if isinstance(error, OSError) and error.errno in (errno.EAGAIN, errno.ENOMEM) and not error.filename:
+        return _PROCESSES if error.errno == errno.EAGAIN else _MEMORY
+    return None
+
+
+def quiet_scheduler() -> None:
+    """Keep the log of dask.distributed from standard error: what matters of it becomes a line of ours."""
+    with contextlib.suppress(ImportError):
+        import distributed  # sets its loggers up when it is imported
+
+        del distributed
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] in ("distributed", "tornado", "asyncio"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)

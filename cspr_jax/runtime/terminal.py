@@ -1,0 +1,111 @@
+"""Text on a terminal, or where its output goes: signs that its encoding lacks, tables, and what others have written.
+
+Whoever writes a name decides neither what a terminal does nor how a table looks: all of it passes
+`cspr_jax.errors.printable`, and none of it is parsed as markup.
+"""
+
+import codecs
+import io
+from typing import IO, TYPE_CHECKING, Any
+
+from cspr_jax.errors import printable
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+_PLAINER = "cspr_jax.plainer"
+# What is written for signs that units, tables and progress use, where the encoding lacks them.
+_PLAIN = {
+    **{"→": "->", "∞": "inf", "±": "+-", "−": "-", "–": "-", "—": "-", "·": "*", "×": "x", "≤": "<=", "≥": ">="},
+    **{"²": "^2", "³": "^3", "°": " deg", "Δ": "d", "…": "...", "’": "'", "‘": "'", "“": '"', "”": '"'},
+}
+
+
+def _plainer(error: UnicodeError) -> tuple[str | bytes, int]:
+    # An error handler of codecs: one sign at a time.
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    sign = error.object[error.start]
+    if "\udc80" <= sign <= "\udcff":  # a byte of a file's name, which is printed as it is
+        return bytes([ord(sign) - 0xDC00]), error.start + 1
+    return _PLAIN.get(sign) or sign.encode("ascii", "backslashreplace").decode("ascii"), error.start + 1
+
+
+codecs.register_error(_PLAINER, _plainer)
+
+
+def encodable(stream: IO[str]) -> None:
+    """Have a stream write whatever is printed: signs that its encoding lacks become plainer ones, or escapes.
+
+    Args:
+        stream: such as standard output.
+    """
+    if isinstance(stream, io.TextIOWrapper):
+        stream.reconfigure(errors=_PLAINER)
+
+
+def plainer(text: str, encoding: str | None) -> str:
+    """Text as a stream of an encoding shows it.
+
+    Args:
+        text: anything without surrogates.
+        encoding: of the stream; None: one that has all signs.
+
+    Returns:
+        the text, with plainer signs where the encoding lacks some.
+    """
+    return text.encode(encoding, _PLAINER).decode(encoding) if encoding else text
+
+
+def cell(*lines: object, style: str = "") -> "Text":
+    """A cell, a head, a title or a note of a table of rich, in which nothing is markup.
+
+    Args:
+        lines: anything; each becomes one line.
+        style: of rich.
+
+    Returns:
+        the text.
+    """
+    from rich.text import Text  # only a terminal needs it
+
+    return Text("\n".join(map(printable, lines)), style=style)
+
+
+def print_table(renderable: Any, file: IO[str]) -> None:
+    """Print a table of rich whose texts are its `Text`; it is changed where the encoding lacks signs.
+
+    Args:
+        renderable: a table, a text, or a group of them.
+        file: where it goes.
+    """
+    from rich.console import Console as Usual
+
+    class Console(Usual):
+        def on_broken_pipe(self) -> None:
+            # The usual one ends the process, with an exit code that means something else here.
+            raise BrokenPipeError
+
+    _fit(renderable, file.encoding)
+    # A pipe gets lines of a width of its own, so that no column is folded.
+    width = None if file.isatty() else 140
+    Console(file=file, width=width, highlight=False, markup=False, emoji=False).print(renderable)
+
+
+def _fit(part: Any, encoding: str | None) -> None:
+    # Before columns get their widths, since a plainer sign may be longer.
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    if isinstance(part, Text):
+        part.plain = plainer(part.plain, encoding)
+    elif isinstance(part, Group):
+        for inner in part.renderables:
+            _fit(inner, encoding)
+    elif isinstance(part, Table):
+        for inner in (part.title, part.caption):
+            _fit(inner, encoding)
+        for column in part.columns:
+            for inner in (column.header, *column.cells):
+                _fit(inner, encoding)

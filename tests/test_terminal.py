@@ -1,0 +1,209 @@
+"""Text on terminals of any encoding, foreign names, full and closed outputs, and what surrounds a process."""
+
+import io
+import math
+import multiprocessing
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import jax
+import pytest
+from rich.table import Table
+
+from cspr_jax.arithmetic import cores, elementary
+from cspr_jax.errors import RefusedError, ResourceError, printable
+from cspr_jax.runtime import surroundings, terminal, xla
+
+HOSTILE = [
+    "Halle [nord] v2",
+    "[/x]",
+    "[link=a]b[/link]",
+    "\x1b]0;pwn\x07red",
+    "\x9b31m",
+    "two\nlines",
+    "a\u202eb",
+    "\udc9b",
+]
+
+
+def cspr(words, **settings):
+    """Exit code, bytes of standard output and of standard error of a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-m", "cspr_jax", *words], capture_output=True, env=os.environ | settings, timeout=300
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_foreign_text_is_one_plain_line(name):
+    """No control character is left, nothing is markup, and what is safe stays as it is."""
+    text = printable(name)
+    assert text.isprintable() and printable(text) == text
+    file = io.StringIO()
+    table = Table(title=terminal.cell(name, style="table.title"))
+    table.add_column(terminal.cell(name))
+    table.add_row(terminal.cell(name))
+    terminal.print_table(table, file)
+    assert file.getvalue().count(text) == 3 and file.getvalue().replace("\n", "").isprintable()
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "iso-8859-15", "utf-8"])
+def test_tables_fit_the_encoding(encoding):
+    """Signs become plainer, columns stay straight, and bytes of file names pass."""
+    raw = io.BytesIO()
+    file = io.TextIOWrapper(raw, encoding=encoding, errors="strict")
+    terminal.encodable(file)
+    table = Table()
+    for head in ("p → ∞", "margin (m/s²)", "H\u00fclle \u4e2d"):
+        table.add_column(terminal.cell(head))
+    table.add_row(*map(terminal.cell, ("1 ± 2", "∞", "x")))
+    terminal.print_table(table, file)
+    file.write("caf\udce9\n")
+    file.flush()
+    lines = raw.getvalue().splitlines()
+    assert lines[-1] == b"caf\xe9"
+    texts = [line.decode(encoding) for line in lines[:-1]]
+    if encoding != "utf-8":
+        assert "p -> inf" in texts[1] and len({len(text) for text in texts}) == 1
+
+
+@pytest.mark.parametrize("words", [["robots"], ["quantities"], ["examples"], ["--help"], ["table", "--list"]])
+@pytest.mark.parametrize(
+    "settings", [{"PYTHONIOENCODING": "latin-1:strict"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
+)
+def test_commands_print_in_any_encoding(words, settings):
+    code, out, err = cspr(words, **settings)
+    assert (code, err) == (0, b"") and out
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux")
+@pytest.mark.parametrize("words", [["robots"], ["examples"], ["--help"], ["--version"], ["robots", "--json"]])
+def test_a_full_output_is_one_line(words):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "cspr_jax", *words], stdout=full, stderr=subprocess.PIPE, timeout=300
+        )
+    assert (done.returncode, done.stderr) == (4, b"cspr: standard output: No space left on device\n")
+
+
+@pytest.mark.parametrize("words", [["robots"], ["quantities"], ["--help"], ["robots", "--json"]])
+def test_a_closed_pipe_is_silent(words):
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, "w") as pipe:
+        done = subprocess.run(
+            [sys.executable, "-m", "cspr_jax", *words], stdout=pipe, stderr=subprocess.PIPE, timeout=300
+        )
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_each_line_of_an_error_is_an_argument():
+    error = RefusedError("a", "b")
+    assert (str(error), error.args) == ("a\nb", ("a", "b"))
+
+
+def test_quotas_of_control_groups(tmp_path):
+    """The least of all levels counts, of both versions; paths of the machine are not found in a container."""
+    groups = tmp_path / "groups"
+    assert cores.quota(groups, tmp_path) == math.inf
+    (tmp_path / "job" / "step").mkdir(parents=True)
+    groups.write_text("0::/job/step\n")
+    (tmp_path / "job" / "step" / "cpu.max").write_text("max 100000\n")
+    assert cores.quota(groups, tmp_path) == math.inf
+    (tmp_path / "job" / "cpu.max").write_text("150000 100000\n")
+    assert cores.quota(groups, tmp_path) == 1.5
+    first = tmp_path / "cpu,cpuacct"
+    first.mkdir()
+    groups.write_text("4:memory:/x\n3:cpu,cpuacct:/docker/abc\n")
+    (first / "cpu.cfs_quota_us").write_text("-1\n")
+    (first / "cpu.cfs_period_us").write_text("100000\n")
+    assert cores.quota(groups, tmp_path) == math.inf
+    (first / "cpu.cfs_quota_us").write_text("50000\n")
+    assert cores.quota(groups, tmp_path) == 0.5
+
+
+def test_a_quota_bounds_the_cores(monkeypatch):
+    monkeypatch.delenv(cores.SHARE, raising=False)
+    monkeypatch.setattr(cores, "quota", lambda: 0.5)
+    assert cores.cores() == 1
+
+
+def test_threads_that_cannot_be_started(monkeypatch):
+    """A line before anything is computed, since libraries would end the process."""
+
+    def start(thread):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    with pytest.raises(ResourceError, match="no more threads can be started"):
+        surroundings.check_threads()
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (MemoryError(), "memory"),
+        (RuntimeError("can't start new thread"), "threads"),
+        (BlockingIOError(11, "Resource temporarily unavailable"), "processes"),
+        (ValueError("a mistake of ours"), None),
+    ],
+)
+def test_what_the_machine_lacks(error, words):
+    line = surroundings.shortage(error)
+    assert line is None if words is None else words in line
+
+
+def _forked(queue):
+    try:
+        with elementary.double_precision():
+            queue.put("computed")
+    except RuntimeError as error:
+        queue.put(str(error))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_call_in_a_forked_child_fails_at_once():
+    with elementary.double_precision():
+        pass
+    context = multiprocessing.get_context("fork")
+    queue = context.SimpleQueue()
+    child = context.Process(target=_forked, args=(queue,))
+    child.start()
+    child.join()
+    assert "was forked from one that had used jax" in queue.get()
+
+
+def test_flags_of_the_user_that_xla_refuses(tmp_path, monkeypatch):
+    with pytest.raises(xla.ConfigError, match=r"XLA_FLAGS.*no_such_flag"):
+        xla._check_flags(tmp_path, "--xla_no_such_flag=1")
+    with pytest.raises(xla.ConfigError, match=r"XLA_FLAGS.*no_such_flag"):  # from the record
+        monkeypatch.setattr(subprocess, "run", None)
+        xla._check_flags(tmp_path, "--xla_no_such_flag=1")
+    assert xla._flags(tmp_path, "flags.txt", quick=True) == "flags.txt"
+
+
+def test_a_platform_that_is_not_there(monkeypatch):
+    def devices():
+        raise AssertionError
+
+    monkeypatch.setattr(jax, "devices", devices)
+    monkeypatch.setenv("JAX_PLATFORMS", "cuda")
+    with pytest.raises(xla.ConfigError, match="JAX_PLATFORMS: cuda"):
+        xla.check_device(None)
+
+
+def test_settings_of_a_notebook_and_no_home(monkeypatch):
+    def home():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
+    monkeypatch.setenv("HOME", "/nowhere")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.delenv("CSPR_CACHE_DIR", raising=False)
+    monkeypatch.setattr(Path, "home", home)
+    surroundings.settle()
+    assert os.environ["MPLBACKEND"] == "Agg" and os.environ["HOME"] == os.devnull
+    assert xla._folder() is None
