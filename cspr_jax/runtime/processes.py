@@ -159,7 +159,7 @@ class Spread:
             }
         except BrokenProcessPool as error:
             raise ResourceError(
-                "a worker died, perhaps for want of memory or threads: --workers must be smaller"
+                "a worker died, perhaps for want of memory: --workers must be smaller"
             ) from error
         return [found[k] for k in range(len(items))]
 

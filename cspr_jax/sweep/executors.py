@@ -126,7 +126,7 @@ class Processes:
                 deaths += 1
                 if deaths >= DEATHS:
                     raise ResourceError(
-                        f"workers died {deaths} times without finishing a tile, perhaps for want of memory or threads: "
+                        f"workers died {deaths} times without finishing a tile, perhaps for want of memory: "
                         "--workers or run.tile must be smaller"
                     ) from error
 
