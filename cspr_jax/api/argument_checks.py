@@ -163,7 +163,7 @@ ARGUMENTS: dict[str, Rule] = {
     "problem": kind_of("a problem, as make_problem gives it", has=("robot", "limits", "amplitude")),
     "prune": _FLAG,
     "pulley_axes": real("a vector [x, y, z], or one a cable, or None", (3,), (ANY, 3), none=True),
-    "pulley_radius": real("a number >= 0, in m, or one a cable, or None", (), (ANY,), least=0.0, none=True),
+    "pulley_radius": real("a number >= 0, in m, or one a cable, or None", (), (ANY,), none=True),
     "pulses": _POSITIVE,
     "quantity": _TEXT_OR_NONE,
     "rate": _NUMBER_OR_NONE,
