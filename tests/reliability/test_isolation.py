@@ -51,12 +51,12 @@ def spoiled_runs(folder, tiles):
 
 
 def test_mutated_shards(tmp_path):
-    assert spoiled_runs(tmp_path, 40) > 15
+    assert spoiled_runs(tmp_path, 40) > 5
 
 
 @pytest.mark.soak
 def test_mutated_shards_all(tmp_path):
-    assert spoiled_runs(tmp_path, 3000) > 2000
+    assert spoiled_runs(tmp_path, 3000) > 500
 
 
 def test_one_without_end_among_others(finished, tmp_path, monkeypatch):
