@@ -16,9 +16,10 @@ from cspr_jax.errors import InputError
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
-from cspr_jax.search.answers import Answers, pick
+from cspr_jax.search.answers import Answers
 from cspr_jax.search.oscillations import minimum_oscillations as search_oscillations
 from cspr_jax.search.oscillations import transitions_to
+from cspr_jax.search.parities import pick
 from cspr_jax.search.point_mass_arcs import minimum_arcs as search_arcs
 from cspr_jax.search.point_mass_arcs import segments_between
 from cspr_jax.trajectories.amplitudes import Amplitude

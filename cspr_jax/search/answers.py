@@ -1,8 +1,9 @@
 """Answers from upper bounds of the margin, one for each number of arcs: proofs first, margins after.
 
 The candidates of a point mass that the bounds leave are proved or refuted in increasing order, until one is proved
-feasible. Never by bisection: more arcs can lose margin (tests). Where none is feasible, the candidate with the largest
-margin is reported. Answers of platforms are those of `search.platform_answers`.
+feasible. Never by bisection: more arcs can lose margin (tests). Where none is feasible, `search.refusals` says which
+limits refuse those whose cables stay taut, and one of these is reported; where there is none, the candidate with the
+largest margin is. Answers of platforms are those of `search.platform_answers`.
 """
 
 import dataclasses
@@ -14,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass import criteria
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, prove
 from cspr_jax.feasibility.point_mass.enclosures import tolerated_by_point_masses
@@ -22,6 +24,8 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.tolerances import Tolerated
 from cspr_jax.schema.labelled import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.search.parities import pick, rows_of
+from cspr_jax.search.refusals import BASIC, refusals, unavoidable
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -38,7 +42,8 @@ class Answers(Columns):
 
     Fields:
         arcs: (n,) smallest number of arcs proved feasible, on more than six cables found so at samples; 0: none.
-        tried_arcs: (n,) the number of arcs that duration and margins belong to: `arcs`, else the best candidate.
+        tried_arcs: (n,) the number of arcs that duration and margins belong to: `arcs`, else that of the candidate that
+            a limit alone refuses, if there is one, else of that with the largest margin.
         verdict: (n,) `Verdict` flags; 0 is feasible.
         duration: (n,) s.
         margin: (n,) smallest normalised pseudotension, or depth below the spools over z0.
@@ -110,8 +115,10 @@ def decided(
     problem: Problem,
     parities: dict[int, Segment],
     upper: np.ndarray,
+    at_ends: np.ndarray,
     infinity: np.ndarray,
     *,
+    arcs: np.ndarray | None = None,
     known: Known | None = None,
     measure: Callable[[Problem, Segment, np.ndarray], np.ndarray] = margins,
 ) -> tuple[Answers, Segment]:
@@ -120,8 +127,11 @@ def decided(
     Args:
         problem: robot, limits and amplitude.
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
-        upper: (n, max_arcs) upper bounds of the margin, column p - 1 for p arcs; -inf where it is out of the question.
+        upper: (n, max_arcs) upper bounds of the slack of the cables and of the depth, column p - 1 for p arcs; -inf
+            where it is out of the question.
+        at_ends: (n, n_criteria) of `end_slacks`.
         infinity: (n,) left-hand side of (2.55).
+        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
         known: what is proved already; None: nothing.
         measure: finds the margins, as `margins` does.
 
@@ -129,24 +139,27 @@ def decided(
         the answers; the segments that durations and margins belong to, leaves (n, ...).
     """
     known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
-    smallest, doubtful, bound = _search(problem, parities, upper, known)
-    tried, slack = _best(problem, parities, upper, smallest, measure)
+    every = only(np.minimum(upper, at_ends.min(1)[:, None] + SMALLEST_MARGIN), arcs)
+    basic = only(np.minimum(upper, at_ends[:, :BASIC].min(1)[:, None] + SMALLEST_MARGIN), arcs)
+    search = _search(problem, parities, every, known)
+    smallest, bound = search.smallest, search.bound
+    tried, slack, broken = _shown(problem, parities, search, every, basic, measure)
     chosen = pick(parities, np.arange(len(smallest)), tried)
     duration = in_batches(_durations, (chosen, tried.astype(float)), size=BATCH)
     none = np.flatnonzero(smallest == 0)
     is_feasible = smallest > 0
     if len(none):
         proof = prove(problem, pick(parities, none, tried[none]), tried[none])
-        bound[none], is_feasible[none] = proof.bound[:, :2].min(1), proof.feasible
+        bound[none], is_feasible[none] = proof.bound[:, :BASIC].min(1), proof.feasible
     multiples = _tolerated(problem, chosen, tried, np.flatnonzero(is_feasible))
     answers = Answers(
         smallest,
         tried,
-        _verdicts(problem, smallest, doubtful, slack, multiples),
+        _verdicts(problem, search, slack, broken, multiples),
         duration,
-        slack[:, :2].min(1),
+        slack[:, :BASIC].min(1),
         bound,
-        slack[:, 2:].min(1, initial=np.inf),
+        slack[:, BASIC:].min(1, initial=np.inf),
         infinity,
         *multiples,
     )
@@ -155,7 +168,7 @@ def decided(
 
 @jax.jit
 def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
-    """Smallest slack at the two ends.
+    """Smallest slack of each criterion at the two ends.
 
     There the velocity is zero and the acceleration a pendulum's, whatever the number of arcs.
 
@@ -165,14 +178,14 @@ def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
         segments: leaves (n, ...).
 
     Returns:
-        (n,).
+        (n, n_criteria) in the order of `criteria.flags`.
     """
 
     def one(segment):
         at_ends = jax.vmap(lambda t: jnp.stack(criteria.slacks(*problem, segment, jnp.asarray(arcs), t)))(
             jnp.asarray([0.0, 1.0])
         )
-        return jnp.min(at_ends)
+        return jnp.min(at_ends, axis=0)
 
     return jax.vmap(one)(segments)
 
@@ -193,37 +206,23 @@ def only(upper: np.ndarray, arcs) -> np.ndarray:
     return np.where((fixed == 0) | (fixed == np.arange(1, upper.shape[1] + 1)), upper, -np.inf)
 
 
-def pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Segment:
-    """Some segments, each of the parity of its number of arcs.
-
-    Args:
-        parities: as `segments_between` gives them.
-        rows: (m,) which segments.
-        arcs: (m,) number of arcs of each.
-
-    Returns:
-        leaves (m, ...).
-    """
-    if parities[0] is parities[1]:
-        return jax.tree.map(lambda leaf: np.asarray(leaf)[rows], parities[0])
-    is_odd = arcs % 2 == 1
-
-    def choose(even, odd):
-        return np.where(is_odd.reshape(-1, *[1] * (even.ndim - 1)), odd[rows], even[rows])
-
-    return jax.tree.map(choose, parities[0], parities[1])
+class _Search(NamedTuple):
+    # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, the proved margin, and
+    # whether some number of arcs is feasible as it is planned, if not for every robot within the uncertainty.
+    smallest: np.ndarray
+    doubtful: np.ndarray
+    bound: np.ndarray
+    is_planned: np.ndarray
 
 
-def _search(
-    problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: Known
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, and the proved margin.
+def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: Known) -> _Search:
     smallest, doubtful, bound = np.zeros(len(upper), int), np.zeros(len(upper), bool), np.full(len(upper), -np.inf)
+    is_planned = np.zeros(len(upper), bool)
     alive = upper >= -SMALLEST_MARGIN
     while True:
         rows = np.flatnonzero((smallest == 0) & alive.any(1))
         if not len(rows):
-            return smallest, doubtful, bound
+            return _Search(smallest, doubtful, bound, is_planned)
         arcs = np.argmax(alive[rows], axis=1) + 1
         given = arcs == known.arcs[rows]
         smallest[rows[given]], bound[rows[given]] = arcs[given], known.bound[rows[given]]
@@ -232,6 +231,7 @@ def _search(
             continue
         proof = prove(problem, pick(parities, rows, arcs), arcs)
         is_feasible, is_refuted = proof.feasible.copy(), proof.infeasible.copy()
+        is_planned[rows] |= is_feasible
         if problem.limits.uncertainty is not None:
             some = np.flatnonzero(is_feasible)
             found = tolerated_by_point_masses(problem, pick(parities, rows[some], arcs[some]), arcs[some], whole=False)
@@ -242,14 +242,57 @@ def _search(
         alive[rows, arcs - 1] = False
 
 
+class _Shown(NamedTuple):
+    # Numbers of arcs that are shown (n,), their smallest slacks, and what stands in the way, (n, n_criteria) each.
+    tried: np.ndarray
+    slack: np.ndarray
+    broken: np.ndarray
+
+
+def _shown(
+    problem: Problem,
+    parities: dict[int, Segment],
+    search: _Search,
+    every: np.ndarray,
+    basic: np.ndarray,
+    measure: Callable,
+) -> _Shown:
+    # Upper bounds (n, max_arcs) of all criteria, and of those that are no limits.
+    fixed, by_cables = search.smallest.copy(), np.zeros(len(every), bool)
+    # Without limits, or near to zero, the largest margin says enough.
+    is_refused = (fixed == 0) & ~search.doubtful & ~search.is_planned
+    refused = np.flatnonzero(is_refused & bool(given(problem.limits)))
+    why = refusals(problem, rows_of(parities, refused), basic[refused])
+    fixed[refused], by_cables[refused] = why.arcs, why.arcs == 0
+    upper = np.where(by_cables[:, None], basic, every)
+    tried, slack = _best(problem, parities, upper, fixed, by_cables, measure)
+    broken = slack <= 0.0
+    broken[refused] = why.broken
+    # Where no candidate is taut: a cable or the spools, and limits that no number of arcs keeps.
+    rows, is_limit = np.flatnonzero(by_cables), np.arange(slack.shape[1]) >= BASIC
+    broken[rows] = slack[rows] <= 0.0
+    suspects = broken[rows] & is_limit
+    broken[rows] &= unavoidable(problem, rows_of(parities, rows), upper[rows], suspects) | ~is_limit
+    return _Shown(tried, slack, broken)
+
+
 def _best(
-    problem: Problem, parities: dict[int, Segment], upper: np.ndarray, smallest: np.ndarray, measure: Callable
+    problem: Problem,
+    parities: dict[int, Segment],
+    upper: np.ndarray,
+    fixed: np.ndarray,
+    by_cables: np.ndarray,
+    measure: Callable,
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Margins at the number of arcs found, else at the candidate with the largest; upper bounds say where to look next.
-    tried = np.where(smallest > 0, smallest, np.argmax(upper, axis=1) + 1)
-    slack = measure(problem, pick(parities, np.arange(len(smallest)), tried), tried)
-    best = slack.min(1)
-    rest = np.where(smallest[:, None] > 0, -np.inf, upper)
+    # Slacks at the fixed number of arcs, else at that with the largest margin, of the cables alone or of all criteria;
+    # upper bounds say where to look next.
+    def margin(slack: np.ndarray, rows) -> np.ndarray:
+        return np.where(by_cables[rows], slack[:, :BASIC].min(1), slack.min(1))
+
+    tried = np.where(fixed > 0, fixed, np.argmax(upper, axis=1) + 1)
+    slack = measure(problem, pick(parities, np.arange(len(fixed)), tried), tried)
+    best = margin(slack, slice(None))
+    rest = np.where(fixed[:, None] > 0, -np.inf, upper)
     rest[np.arange(len(rest)), tried - 1] = -np.inf
     while True:
         rows = np.flatnonzero(rest.max(1) > np.where(np.isnan(best), -np.inf, best) + TIE * (1.0 + np.abs(best)))
@@ -258,9 +301,10 @@ def _best(
         arcs = np.argmax(rest[rows], axis=1) + 1
         candidate = measure(problem, pick(parities, rows, arcs), arcs)
         rest[rows, arcs - 1] = -np.inf
-        better = candidate.min(1) > best[rows]
+        reached = margin(candidate, rows)
+        better = reached > best[rows]
         tried[rows[better]], slack[rows[better]] = arcs[better], candidate[better]
-        best[rows[better]] = candidate.min(1)[better]
+        best[rows[better]] = reached[better]
 
 
 def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, which: np.ndarray) -> Tolerated:
@@ -274,12 +318,12 @@ def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, which: np.
 
 
 def _verdicts(
-    problem: Problem, smallest: np.ndarray, doubtful: np.ndarray, slack: np.ndarray, multiples: Tolerated
+    problem: Problem, search: _Search, slack: np.ndarray, broken: np.ndarray, multiples: Tolerated
 ) -> np.ndarray:
-    broken = np.where(multiples.refuted <= 1.0, Verdict.UNCERTAINTY.value, 0).astype(FLAGS)
-    for flag, column in zip(criteria.flags(problem.limits), slack.T, strict=True):
-        broken |= np.where(column <= 0.0, flag.value, 0).astype(FLAGS)
-    broken |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(FLAGS)
-    none = np.where(doubtful, Verdict.UNDECIDED.value, Verdict.NO_ARCS.value | broken)
-    some = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
-    return np.where(smallest > 0, some, none).astype(FLAGS)
+    flags = np.where(multiples.refuted <= 1.0, Verdict.UNCERTAINTY.value, 0).astype(FLAGS)
+    for flag, column in zip(criteria.flags(problem.limits), broken.T, strict=True):
+        flags |= np.where(column, flag.value, 0).astype(FLAGS)
+    flags |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(FLAGS)
+    none = np.where(search.doubtful, Verdict.UNDECIDED.value, Verdict.NO_ARCS.value | flags)
+    some = np.where(search.doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
+    return np.where(search.smallest > 0, some, none).astype(FLAGS)

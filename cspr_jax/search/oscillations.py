@@ -15,14 +15,14 @@ from jax import lax
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.limits import given
-from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, tolerance
+from cspr_jax.feasibility.point_mass.certificate import tolerance
 from cspr_jax.feasibility.point_mass.transition_margins import transition_margins
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.feasibility.transition.envelopes import proved_envelope
 from cspr_jax.runtime.stages import stage
-from cspr_jax.search.answers import BATCH, Answers, Known, decided, end_slacks, only
+from cspr_jax.search.answers import BATCH, Answers, Known, decided, end_slacks
 from cspr_jax.search.point_mass_arcs import check_numbers
 from cspr_jax.trajectories import transition
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
@@ -201,16 +201,16 @@ def minimum_oscillations(
     at_ends = in_batches(partial(end_slacks, problem, 4.0), segments, size=BATCH)
     if steady is not None:
         upper[steady, 1::2], real[steady], gain[steady] = np.inf, 0.0, 0.0
-    upper = np.minimum(upper, at_ends[:, None] + SMALLEST_MARGIN)
     infinity = 1.0 - np.abs(v) * max(abs(float(problem.amplitude.lowest)), float(problem.amplitude.highest))
     allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
-    parities, wanted = {0: segments, 1: segments}, only(upper, arcs)
+    parities = {0: segments, 1: segments}
     if steady is None:
         is_plain = not given(problem.limits) and problem.limits.uncertainty is None
         known = _known(problem, segments, (weights, v), allowed) if is_plain else None
-        answers, _ = decided(problem, parities, wanted, infinity, known=known, measure=transition_margins)
+        how: dict[str, Any] = {"known": known, "measure": transition_margins}
     else:
-        answers, _ = decided(problem, parities, wanted, infinity)
+        how = {}
+    answers, _ = decided(problem, parities, upper, at_ends, infinity, arcs=arcs, **how)
     return OscillationAnswers(
         **vars(answers),
         oscillations=answers.arcs // 2,

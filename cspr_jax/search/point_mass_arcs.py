@@ -11,12 +11,11 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts, room
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.runtime.stages import stage
 from cspr_jax.search import arc_sieve
-from cspr_jax.search.answers import Answers, decided, end_slacks, joined, only
+from cspr_jax.search.answers import Answers, decided, end_slacks, joined
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.amplitudes import boundary_errors
 from cspr_jax.trajectories.hypocycloid import Segment
@@ -128,8 +127,8 @@ def arcs_and_segments(
         )
     stage(f"numbers of arcs, 1 to {max_arcs}")
     parities, infinity = segments_between(problem, starts, ends, z0)
-    upper = _sieved(problem, parities[0], parities[1], max_arcs, dtype)
-    return decided(problem, parities, only(upper, arcs), infinity)
+    upper, at_ends = _sieved(problem, parities[0], parities[1], max_arcs, dtype)
+    return decided(problem, parities, upper, at_ends, infinity, arcs=arcs)
 
 
 def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
@@ -156,10 +155,10 @@ def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
         raise InputError("z0", float(np.asarray(z0)[~fits][0]), "a number > 0, at most 1e6 m")
 
 
-def _sieved(problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype: str) -> np.ndarray:
-    # Upper bounds (n, max_arcs): of the sieve, and of the two ends, where every slack is known.
+def _sieved(problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype: str) -> tuple[np.ndarray, np.ndarray]:
+    # Upper bounds (n, max_arcs) of the sieve, and slacks (n, n_criteria) at the two ends, where every one is known.
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
     kernel = partial(arc_sieve.upper_bounds, max_arcs=max_arcs)
     upper = in_batches(lambda pair: kernel(problem.amplitude, *pair), cast, size=arc_sieve.BATCH).astype(float)
     at_ends = in_batches(partial(end_slacks, problem, 3.0), odd, size=arc_sieve.BATCH)
-    return np.where(np.isnan(upper), -np.inf, np.minimum(upper, at_ends[:, None] + SMALLEST_MARGIN))
+    return np.where(np.isnan(upper), -np.inf, upper), at_ends

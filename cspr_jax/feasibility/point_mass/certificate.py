@@ -40,14 +40,18 @@ class Proof:
     """Proofs of n segments. `feasible` and `infeasible` exclude each other; neither is undecided.
 
     Fields:
-        feasible: (n,) every criterion is met at every instant.
-        infeasible: (n,) some criterion is broken at some instant.
-        sampled: (n, n_criteria) smallest slack that a sample attains.
+        feasible: (n,) every criterion that counts is met at every instant.
+        infeasible: (n,) some criterion that counts is broken at some instant.
+        met: (n, n_criteria) the criterion is met at every instant; False where that is not known.
+        broken: (n, n_criteria) the criterion is broken at some instant; False where that is not known.
+        sampled: (n, n_criteria) smallest slack that a sample of a first look attains.
         bound: (n, n_criteria) what a first look proves that no slack falls below.
     """
 
     feasible: np.ndarray
     infeasible: np.ndarray
+    met: np.ndarray
+    broken: np.ndarray
     sampled: np.ndarray
     bound: np.ndarray
 
@@ -111,8 +115,36 @@ def _closer_look(problem: Problem, arguments) -> tuple[Array, Array]:
     return sampled.T, proved.T
 
 
-def prove(problem: Problem, segments: Segment, arcs: np.ndarray) -> Proof:
+def prove(problem: Problem, segments: Segment, arcs: np.ndarray, *, ignored: np.ndarray | None = None) -> Proof:
     """Decide segments, each with a given number of arcs.
+
+    Args:
+        problem: robot, limits and amplitude.
+        segments: leaves (n, ...), of the parity of `arcs`; float64.
+        arcs: (n,) number of arcs, 1 or more.
+        ignored: (n, n_criteria) criteria that do not count; None: all do.
+
+    Returns:
+        the proofs.
+    """
+    arcs = np.asarray(arcs, float)
+    table = blocks(problem.amplitude, int(arcs.max()))
+    sampled, bound, near = _looked_at(problem, segments, arcs, table)
+    allowed = _allowance(sampled.shape[1], near)
+    counted = np.ones_like(sampled, bool) if ignored is None else ~ignored
+    met, broken = bound + allowed > near[:, None], ~(sampled + allowed >= -near[:, None])
+    feasible, infeasible = (met | ~counted).all(1), (broken & counted).any(1)
+    open_ones = np.flatnonzero(~feasible & ~infeasible)
+    if len(open_ones):
+        some_segments, some_arcs = jax.tree.map(lambda x: x[open_ones], (segments, arcs))
+        parts = near[open_ones], counted[open_ones]
+        feasible[open_ones], refuted = _cut(problem, some_segments, some_arcs, *parts, table)
+        infeasible[open_ones], broken[open_ones] = refuted.any(1), broken[open_ones] | refuted
+    return Proof(feasible, infeasible, met | (feasible[:, None] & counted), broken, sampled, bound)
+
+
+def is_met_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
+    """Criteria that no sample of a first look breaks.
 
     Args:
         problem: robot, limits and amplitude.
@@ -120,24 +152,20 @@ def prove(problem: Problem, segments: Segment, arcs: np.ndarray) -> Proof:
         arcs: (n,) number of arcs, 1 or more.
 
     Returns:
-        the proofs.
+        (n, n_criteria): False is a proof that the criterion is broken, True is none that it is met.
     """
     arcs = np.asarray(arcs, float)
-    edges, counts = blocks(problem.amplitude, int(arcs.max()))
+    sampled, _, near = _looked_at(problem, segments, arcs, blocks(problem.amplitude, int(arcs.max())))
+    return sampled + _allowance(sampled.shape[1], near) >= -near[:, None]
+
+
+def _looked_at(problem: Problem, segments: Segment, arcs: np.ndarray, table) -> tuple[np.ndarray, ...]:
+    # Smallest samples and proved bounds (n, n_criteria), tolerances (n,).
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    look = in_batches(partial(_first_look, problem, edges, counts), arguments, size=BATCH)
-    sampled, bound, near = jax.tree.map(lambda x: x[back], look)
-    allowed = _allowance(sampled.shape[1], near)
-    feasible = (bound + allowed > near[:, None]).all(1)
-    infeasible = ~(sampled + allowed >= -near[:, None]).all(1)
-    open_ones = np.flatnonzero(~feasible & ~infeasible)
-    if len(open_ones):
-        some_segments, some_arcs = jax.tree.map(lambda x: x[open_ones], (segments, arcs))
-        table = (edges, counts)
-        feasible[open_ones], infeasible[open_ones] = _cut(problem, some_segments, some_arcs, near[open_ones], table)
-    return Proof(feasible, infeasible, sampled, bound)
+    look = in_batches(partial(_first_look, problem, *table), arguments, size=BATCH)
+    return jax.tree.map(lambda x: x[back], look)
 
 
 def _allowance(n_criteria: int, near: np.ndarray) -> np.ndarray:
@@ -147,11 +175,12 @@ def _allowance(n_criteria: int, near: np.ndarray) -> np.ndarray:
 
 
 def _cut(
-    problem: Problem, segments: Segment, arcs: np.ndarray, near: np.ndarray, table
+    problem: Problem, segments: Segment, arcs: np.ndarray, near: np.ndarray, counted: np.ndarray, table
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Items are blocks of segments that are still open: owner, start, stop.
+    # Which segments are proved (n,), and which criteria that count are broken (n, n_criteria). Items are
+    # blocks of segments that are still open: owner, start, stop.
     edges, counts = table
-    refuted, stuck = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool)
+    broken, stuck = np.zeros(counted.shape, bool), np.zeros(len(arcs), bool)
     count = counts[arcs.astype(int)]
     owner = np.repeat(np.arange(len(arcs)), count)
     place = np.concatenate([np.arange(c) for c in count])
@@ -161,16 +190,19 @@ def _cut(
         items = (*jax.tree.map(lambda x, o=owner: x[o], (segments, arcs)), start, stop)
         sampled, proved = in_batches(partial(_closer_look, problem), items, size=BATCH)
         limit, allowed = near[owner, None], _allowance(sampled.shape[1], near[owner])
-        np.logical_or.at(refuted, owner, ~(sampled + allowed >= -limit).all(1))
-        unproved = ~(proved + allowed > limit)
+        fails = ~(sampled + allowed >= -limit) & counted[owner]
+        failing = np.flatnonzero(fails.any(1))
+        np.logical_or.at(broken, owner[failing], fails[failing])
+        refuted = broken.any(1)
+        unproved = ~(proved + allowed > limit) & counted[owner]
         closed = (unproved & (sampled - proved <= 0.5 * limit)).any(1)
         np.logical_or.at(stuck, owner, closed)
         keep = unproved.any(1) & ~refuted[owner] & ~stuck[owner]
         if not keep.any():
-            return ~refuted & ~stuck, refuted
+            return ~refuted & ~stuck, broken
         owner, start, stop = _quarters(owner[keep], start[keep], stop[keep])
     stuck[owner] = True
-    return ~refuted & ~stuck, refuted
+    return ~broken.any(1) & ~stuck, broken
 
 
 def _quarters(owner: np.ndarray, start: np.ndarray, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

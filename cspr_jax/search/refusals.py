@@ -1,0 +1,122 @@
+"""Why no number of arcs is feasible: the criterion that alone stands in the way, if there is one.
+
+More candidates fail by a limit than by a cable that would have to push: a limit can be raised, and a cable cannot push.
+So candidates whose cables stay taut below the spools come first. Of these the first one that breaks a single limit, and
+is proved but for that, says what is missing. Where there is none, the one that breaks the fewest limits does; what all
+of them break is then named alone, if these are several limits. Where no cable-taut candidate exists, cables are what
+fails, and with them the limits that are broken with every number of arcs.
+"""
+
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.feasibility.limits import given
+from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, is_met_at_samples, prove
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.search.parities import pick
+from cspr_jax.trajectories.hypocycloid import Segment
+
+# Criteria that are no limits: taut cables, and the depth below the spools.
+BASIC = 2
+
+
+class Refusals(NamedTuple):
+    """Why n segments are refused.
+
+    Fields:
+        arcs: (n,) number of arcs of the candidate that only limits refuse; 0: there is none.
+        broken: (n, n_criteria) criteria that stand in the way of it.
+    """
+
+    arcs: np.ndarray
+    broken: np.ndarray
+
+
+class _Fewest:
+    # Of n segments the candidate that breaks the fewest limits, and the limits that all candidates break.
+
+    def __init__(self, count: int, n_criteria: int) -> None:
+        self.arcs, self.broken = np.zeros(count, int), np.zeros((count, n_criteria), bool)
+        self._least = np.full(count, n_criteria + 1)
+        self._common = np.ones((count, n_criteria), bool)
+
+    def take(self, rows: np.ndarray, arcs: np.ndarray, broken: np.ndarray) -> None:
+        # Candidates of some segments, one each.
+        counts = broken.sum(1)
+        better = counts < self._least[rows]
+        self.arcs[rows[better]], self.broken[rows[better]] = arcs[better], broken[better]
+        self._least[rows[better]] = counts[better]
+        self._common[rows] &= broken
+
+    @property
+    def is_single(self) -> np.ndarray:
+        return self._least <= 1
+
+    def refusals(self) -> Refusals:
+        is_common = (self._common.sum(1) > 1) & (self.arcs > 0)
+        return Refusals(self.arcs, np.where(is_common[:, None], self._common, self.broken))
+
+
+def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray) -> Refusals:
+    """Limits that refuse segments whose cables some number of arcs keeps taut.
+
+    Args:
+        problem: robot, limits and amplitude.
+        parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...); none is feasible.
+        upper: (n, max_arcs) upper bounds of the slack of the cables and of the depth; -inf where out of the question.
+
+    Returns:
+        the refusals.
+    """
+    is_limit = np.arange(BASIC + len(given(problem.limits))) >= BASIC
+    fewest, alive = _Fewest(len(upper), len(is_limit)), upper >= -SMALLEST_MARGIN
+    while True:
+        rows = np.flatnonzero(~fewest.is_single & alive.any(1))
+        if not len(rows):
+            return fewest.refusals()
+        arcs = np.argmax(alive[rows], axis=1) + 1
+        alive[rows, arcs - 1] = False
+        is_taut, broken = _limits_of(problem, pick(parities, rows, arcs), arcs, is_limit)
+        fewest.take(rows[is_taut], arcs[is_taut], broken[is_taut])
+
+
+def _limits_of(
+    problem: Problem, segments: Segment, arcs: np.ndarray, is_limit: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    # Which candidates are proved but for the limits that they break, and these limits (n, n_criteria).
+    proof = prove(problem, segments, arcs, ignored=np.tile(is_limit, (len(arcs), 1)))
+    is_proved, broken = proof.feasible.copy(), proof.broken & is_limit
+    unclear = np.flatnonzero(is_proved & (~broken & ~proof.met).any(1))
+    for _ in range(int(is_limit.sum()) + 1):
+        if not len(unclear):
+            break
+        part = jax.tree.map(lambda leaf, rows=unclear: leaf[rows], segments)
+        again = prove(problem, part, arcs[unclear], ignored=broken[unclear])
+        is_proved[unclear] = again.feasible
+        broken[unclear] |= again.broken & is_limit
+        unclear = unclear[again.infeasible]
+    return is_proved, broken
+
+
+def unavoidable(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, suspects: np.ndarray) -> np.ndarray:
+    """Criteria that every number of arcs breaks.
+
+    Args:
+        problem: robot, limits and amplitude.
+        parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
+        upper: (n, max_arcs) -inf at numbers of arcs that are out of the question.
+        suspects: (n, n_criteria) criteria that are asked about, which some number of arcs breaks.
+
+    Returns:
+        (n, n_criteria), proved.
+    """
+    suspects, left = suspects.copy(), upper > -np.inf
+    while True:
+        rows = np.flatnonzero(suspects.any(1) & left.any(1))
+        if not len(rows):
+            return suspects
+        arcs = np.argmax(left[rows], axis=1) + 1
+        left[rows, arcs - 1] = False
+        suspects[rows] &= ~is_met_at_samples(problem, pick(parities, rows, arcs), arcs)
