@@ -80,17 +80,37 @@ def narrowed(function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, valu
     Returns:
         (n_motions, n_functions) values that they attain.
     """
+    return narrowed_places(function, tau, values)[0]
+
+
+def narrowed_places(
+    function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest value of each function along each of several motions, and when it is attained.
+
+    Args:
+        function: as for `narrowed`.
+        tau: likewise.
+        values: likewise.
+
+    Returns:
+        (n_motions, n_functions) values, and the instants at which the functions have them.
+    """
     padded = np.pad(values, ((0, 0), (1, 1), (0, 0)), constant_values=np.inf)
     lows = np.where((values <= padded[:, :-2]) & (values <= padded[:, 2:]), values, np.inf)
     place = tau[np.argsort(lows, axis=1)[:, :PLACES]]  # (n_motions, PLACES, n_functions)
     smallest, width = values.min(1), tau[1] - tau[0]
+    when = tau[values.argmin(1)]
     column = np.arange(values.shape[2])
     for _ in range(ROUNDS):
         points = np.clip(place[..., None] + width * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
         samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
         # Of each place of a function its own values alone: (n_motions, PLACES, n_functions, POINTS).
         own = np.moveaxis(samples[:, :, column, :, column], 0, 2)
-        smallest = np.minimum(smallest, own.min((1, 3)))
+        lowest = own.min((1, 3))
         place = np.take_along_axis(points, own.argmin(3)[..., None], axis=3)[..., 0]
+        best = np.take_along_axis(place, own.min(3).argmin(1)[:, None], axis=1)[:, 0]
+        when = np.where(lowest < smallest, best, when)
+        smallest = np.minimum(smallest, lowest)
         width = 2.0 * width / (POINTS - 1)
-    return smallest
+    return smallest, when

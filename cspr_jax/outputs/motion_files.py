@@ -15,6 +15,7 @@ import numpy as np
 from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.accelerations import along
+from cspr_jax.plans.causes import cause_columns
 from cspr_jax.plans.planning import Plan
 from cspr_jax.plans.released import released
 from cspr_jax.robots import cables
@@ -309,6 +310,7 @@ def segments(plan: Plan) -> dict[str, np.ndarray]:
         "segment_tried_arcs": answers.tried_arcs,
         "segment_verdict": answers.verdict,
         "segment_margin": answers.margin,
+        **cause_columns(plan.causes),
     }
     return {
         name: np.asarray(values, "float64" if (kind := SEGMENTS[name].kind) == "float" else kind)

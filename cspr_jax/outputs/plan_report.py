@@ -97,6 +97,7 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
         "tension_margin": _tension_margin(plan, i),
         "det_sign_constant": bool(asked.depth_min[i] > 0.0),
         "verdict": verdict_text(answers.verdict[i], bool(plan.is_feasible[i])),
+        "cause": None if plan.is_feasible[i] else [cause.to_dict() for cause in plan.causes[i]],
         "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
         "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
         "z_lowest": float(asked.lowest[i]),
@@ -232,8 +233,14 @@ def _caption(plan: Plan) -> str:
     if pairs is not None:
         named = ", ".join("-".join(map(str, pair)) for pair in (pairs.cables + 1).tolist())
         total += f"; tensions of the pairs of cables {named}"
-    note = "; in brackets: none found, the numbers are those of the best candidate" if numbered else ""
-    return f"{total}{note}"
+    note = "; in brackets: none found, the numbers are those of the motion that comes nearest" if numbered else ""
+    return f"{total}{note}{_causes(plan)}"
+
+
+def _causes(plan: Plan) -> str:
+    # A line for each segment that is not feasible, after its number in the table.
+    lines = [(i + 1, [cause.text for cause in own]) for i, own in enumerate(plan.causes) if own]
+    return "".join(f"\nto {to}: {'; '.join(words)}" for to, words in lines)
 
 
 def _launch(launch: dict[str, Any] | None) -> str:

@@ -19,6 +19,7 @@ from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError
 from cspr_jax.feasibility.demands import SAMPLES, Demands, demands
 from cspr_jax.feasibility.problem import Problem
+from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
 from cspr_jax.plans.sequence import Sequence
 from cspr_jax.problem import build_problem
@@ -64,6 +65,7 @@ class Plan:
         points: (n + 1, 3) in the axes of the robot file, m.
         legs: consecutive segments of one family each, n segments in all.
         demands: of the n segments; `lowest` is z in the axes of the robot file.
+        causes: of the n segments, why each is not feasible, the worst cause first.
         warnings: what its user should know, one line each.
         text: of the plan file; empty for a plan that has none.
     """
@@ -76,6 +78,7 @@ class Plan:
     points: np.ndarray
     legs: tuple[JoinedLeg, ...]
     demands: Demands
+    causes: tuple[tuple[Cause, ...], ...] = ()
     warnings: tuple[str, ...] = ()
     text: str = ""
 
@@ -162,6 +165,7 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     legs = tuple(JoinedLeg(leg.stops.family, *leg.join(problem, z0)) for leg in sequence.legs)
     _refuse_jumps(problem, sequence, legs)
     frame = sequence.stops.frame
+    why = [causes(problem, frame, leg.answers, leg.motions, _counts(leg, keys)) for leg in legs]
     asked = _demands(problem, legs, keys)
     asked = dataclasses.replace(asked, lowest=frame.height(asked.lowest))
     points = np.array(frame.outward(sequence.stops.points(z0)))
@@ -172,7 +176,8 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
     lines += nearly_resting(sequence.stops, z0)
     lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), asked)
-    return Plan(spec, keys, problem, z0, frame, points, legs, asked, tuple(dict.fromkeys(lines)))
+    every = tuple(itertools.chain.from_iterable(why))
+    return Plan(spec, keys, problem, z0, frame, points, legs, asked, every, tuple(dict.fromkeys(lines)))
 
 
 def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:
@@ -206,11 +211,16 @@ def _missed(keys: PlanFile, is_feasible: np.ndarray, asked: Demands) -> list[str
 
 def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile) -> Demands:
     motions = [motion for leg in legs for motion in leg.motions]
-    arcs = np.concatenate([leg.answers.tried_arcs for leg in legs])
+    counts = np.concatenate([_counts(leg, keys) for leg in legs])
     # Of redundant cables alone the tensions depend on limits, and what is compiled on which are given.
     is_redundant = problem.robot.n_cables > problem.robot.dof
     limits = problem.limits if is_redundant else NO_LIMITS
-    return demands(problem.robot, motions, np.maximum(SAMPLES * arcs, keys.samples) + 1, limits, keys.tension_rule)
+    return demands(problem.robot, motions, counts, limits, keys.tension_rule)
+
+
+def _counts(leg: JoinedLeg, keys: PlanFile) -> np.ndarray:
+    # Of instants to begin with, where extremes are looked for.
+    return np.maximum(SAMPLES * leg.answers.tried_arcs, keys.samples) + 1
 
 
 @jax.jit

@@ -27,8 +27,9 @@ from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.search.beta_hat import BEYOND, cheapest_path, options
+from cspr_jax.search.fewest_limits import Refused
 from cspr_jax.search.platform_answers import PoseAnswers, settled
-from cspr_jax.search.platform_arcs import Candidates, Found, smallest_arcs
+from cspr_jax.search.platform_arcs import Candidates, Found, refused_by_limits, smallest_arcs
 from cspr_jax.search.pose_checkers import pose_checker
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.motion import Motion
@@ -37,6 +38,8 @@ from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, PoseSeg
 # A third derivative that changes more than this, relative to its largest value, just beside a knot makes tensions jump.
 JUMP, NEAR_KNOT = 1e-6, 1e-12
 _JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
+# Arcs that a motion that limits alone refuse counts for, beside its own: more than a sequence of feasible ones has.
+REFUSED = 100_000
 # Up to so many segments compiling for large batches takes longer than it saves.
 SOME = 1000
 
@@ -113,9 +116,21 @@ class _Poses(Leg):
         trial = self._candidates(points, quaternions, z0, motion, (first, last))
         fixed, largest = np.tile(self.stops.arcs, len(depths)), self.stops.max_arcs
         of_trials = smallest_arcs(checker, trial, max_arcs=largest, fixed=fixed, beyond=BEYOND)
-        path = _best_paths(of_trials.arcs, pairs)
+        refused = self._refused(checker, trial, of_trials, fixed)
+        path = _best_paths(of_trials.arcs, refused.arcs, pairs)
         best = Found(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.rows(path))
-        return settled(checker, trial.rows(path), best, max_arcs=largest, fixed=fixed)
+        why = Refused(refused.arcs[path], refused.broken[path])
+        return settled(checker, trial.rows(path), best, refused=why, max_arcs=largest, fixed=fixed)
+
+    def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: Found, fixed: np.ndarray) -> Refused:
+        # Of candidates of segments of which none is feasible, or nearly so.
+        is_open = np.ones(len(trial.z0), bool)
+        is_open[trial.motion[(of_trials.arcs > 0) | (of_trials.undecided > 0)]] = False
+        rows, count = np.flatnonzero(is_open[trial.motion]), len(trial.motion)
+        part = refused_by_limits(checker, trial.rows(rows), max_arcs=self.stops.max_arcs, fixed=fixed)
+        refused = Refused(np.zeros(count, int), np.zeros((count, len(checker.flags)), bool))
+        refused.arcs[rows], refused.broken[rows] = part.arcs, part.broken
+        return refused
 
     def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Values at both ends of segment i, (n_first, n_last) each.
@@ -180,8 +195,10 @@ class VariablePoses(_Poses):
     variable = True
 
 
-def _best_paths(arcs: np.ndarray, pairs: list) -> np.ndarray:
-    # Which candidate of each segment of each depth, (n_depths * n_segments,).
+def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarray:
+    # Which candidate of each segment of each depth, (n_depths * n_segments,); rather one that limits alone refuse than
+    # another one that fails.
+    arcs = np.where(arcs > 0, arcs, np.where(refused > 0, refused + REFUSED, 0))
     places, last = [], 0
     for own in pairs:
         costs, starts = [], []

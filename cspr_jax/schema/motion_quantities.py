@@ -80,6 +80,15 @@ SEGMENTS = {
         ),
         Quantity("segment_verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint32"),
         Quantity("segment_margin", "1", "margin", MARGIN),
+        Quantity("segment_cause", "1", "cause", "Flag of the worst of what stands in the way; 0: nothing.", "uint32"),
+        Quantity(
+            "segment_cause_cable", "1", "cable of the cause", "In cable order from 1 on; 0: no single cable.", "int16"
+        ),
+        Quantity(
+            "segment_cause_time", "s", "time of the cause", "Since the start of the segment; NaN where it is not known."
+        ),
+        Quantity("segment_needed", "1", "needed", "What the segment has there: N, m, m/s or m/s^2, by its cause."),
+        Quantity("segment_allowed", "1", "allowed", "The most, or the least, that is allowed, in the same unit."),
     )
 }
 # What it holds of an object that the plan releases, and the dimensions of each.

@@ -13,6 +13,7 @@ from cspr_jax.feasibility.point_mass.bezier_margins import smallest_margins
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.force_balance import adjugate
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, spool_radius
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.bezier_verdicts import BATCH, verdicts
 from cspr_jax.search.proved_verdicts import Verdicts
 from cspr_jax.trajectories.bezier import Bezier
@@ -113,7 +114,8 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
         z0: m.
 
     Returns:
-        s; if there is none, the duration with the largest margin of those tried.
+        s; if there is none, of those tried one that keeps every cable taut and breaks the fewest limits, if there is
+        one, else that with the largest margin.
     """
     if len(intervals) and not given(problem.limits):
         return float(intervals[0, 0])
@@ -135,7 +137,14 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
     times = np.concatenate([np.geomspace(0.1, 100.0, 4 * TRIED) * unit, intervals.ravel()])
     times = times[np.isfinite(times)]
     own = judged(times)
-    return float(times[np.argmax(np.nan_to_num(np.minimum(own.margin, own.room), nan=-np.inf))])
+    return float(times[_nearest(own) if given(problem.limits) else np.argmax(np.nan_to_num(own.margin, nan=-np.inf))])
+
+
+def _nearest(own: Verdicts) -> int:
+    # First those that keep cables taut below the spools, then those that break the fewest limits by the least.
+    margin = np.nan_to_num(np.minimum(own.margin, own.room), nan=-np.inf)
+    counts = np.sum([(own.verdict & flag.value) > 0 for flag in Verdict], axis=0)
+    return int(np.lexsort((-margin, counts, ~(own.margin > 0.0)))[0])
 
 
 def slowest(problem: Problem, points: np.ndarray) -> float:

@@ -1,5 +1,6 @@
 """Fastest motions along straight lines with their verdicts: formulas first, a search where these break a limit."""
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
@@ -11,6 +12,8 @@ from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
 from cspr_jax.feasibility.point_mass.line_search import LONGER
 from cspr_jax.feasibility.problem import Problem
+from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.line_durations import Durations, Rule, by_cells, by_formula, by_search, moving
 from cspr_jax.search.line_verdicts import TOLERANCE, acceleration_slack, limits_at_rest, verdicts
@@ -24,7 +27,10 @@ SAME_PLACE = 1e-12
 # Likewise: lines that pass a spool nearer than this go through it.
 THROUGH = 1e-9
 # What rest at an end already breaks: no motion has it there, or starts there.
+OF_PLACES = sum({row.flag.value for row in LIMITS if not row.of_motion})
 NO_MOTION = (Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.SINGULAR).value
+# Times that a weight takes to fall by the size of a robot, after which a motion counts as standing still.
+STILL = 1e4
 # Parts of a duration below which their digits are lost in what the formulas promise.
 SHORT = 1e-6
 
@@ -106,7 +112,8 @@ def _fastest(
     if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(some) > 0:
         before, places = found.part(some), (starts[some], ends[some])
         searched = by_search(problem, *places, before, law=law, max_acceleration=max_acceleration)
-        durations, part = _proved(judged, *places, searched, own.verdict[some])
+        reasons = _without_motion(problem, judged, *places, searched, own.verdict[some])
+        durations, part = _proved(judged, *places, searched, reasons)
         own.replace(some, part)
         found.replace(some, durations)
     moves = may_move & np.isfinite(found.duration)
@@ -126,7 +133,8 @@ def _at_rest(
     is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * size
     above, slack = ~(found.depth > 0.0), found.rest < -doubt
     flags = np.where(above, Verdict.ABOVE_SPOOLS.value, 0) | np.where(above | slack, Verdict.SLACK_CABLE.value, 0)
-    flags |= np.where(flags == 0, limits_at_rest(problem, starts, ends), 0)
+    # Where cables are slack, limits of their tensions say nothing more.
+    flags |= limits_at_rest(problem, starts, ends) & np.where(flags == 0, ~0, OF_PLACES)
     flags |= np.where(_touches(problem, starts, ends), Verdict.SINGULAR.value, 0)
     rests = (flags == 0) & (found.rest > doubt)
     open_ended = np.where(found.is_bounded, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value)
@@ -148,10 +156,31 @@ def _touches(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np.ndarr
     return (apart <= THROUGH * np.abs(spools).max()).any(1)
 
 
+def _without_motion(
+    problem: Problem,
+    judged: Callable[..., Verdicts],
+    starts: np.ndarray,
+    ends: np.ndarray,
+    found: Durations,
+    before: np.ndarray,
+) -> np.ndarray:
+    # Flags of lines along which a search finds no motion: what one breaks that is as slow as if it stood still, else
+    # those of the motion by formulas.
+    flags, some = before.copy(), np.flatnonzero(~np.isfinite(found.duration))
+    if len(some):
+        long = np.linalg.norm(ends - starts, axis=1) + float(spool_radius(problem.robot))
+        still = np.sqrt(long / float(np.asarray(problem.robot.gravity))) * STILL
+        slow = dataclasses.replace(found, duration=still, ratio=np.full(len(still), 0.5)).part(some)
+        slower = judged(starts[some], ends[some], slow).verdict
+        is_telling = (slower != 0) & (slower != Verdict.UNDECIDED.value)
+        flags[some] = np.where(is_telling, slower, flags[some])
+    return flags
+
+
 def _proved(
     judged: Callable[..., Verdicts], starts: np.ndarray, ends: np.ndarray, found: Durations, before: np.ndarray
 ) -> tuple[Durations, Verdicts]:
-    # What a search found is made longer until it is proved; without a motion, the flags of the one by formulas stand.
+    # What a search found is made longer until it is proved; without a motion, the flags from before stand.
     nothing = np.full(len(starts), np.nan)
     flags = np.where(before > 0, before, Verdict.UNDECIDED.value).astype(FLAGS)
     own = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))

@@ -1,6 +1,5 @@
 """Verdicts of motions along straight lines: proved where every slack has a bound above zero, refuted by one below."""
 
-import dataclasses
 from functools import partial
 from typing import Any
 
@@ -136,15 +135,22 @@ def limits_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np
         (n,) flags of `Verdict`.
     """
     _, flags, _ = _at_ends(problem, starts, ends)
-    gravity, known = float(np.asarray(problem.robot.gravity)), Limits()
-    for name in ("tension_min", "tension_max"):
-        if getattr(problem.limits, name) is not None:
-            known = dataclasses.replace(known, **{name: getattr(problem.limits, name)})
-            own = problem._replace(limits=known)
-            margins = [in_batches(partial(_at_rest, own), places, size=BATCH) for places in (starts, ends)]
-            row = next(row for row in LIMITS if row.name == name)
-            flags |= np.where(np.min(margins, axis=0) < -TOLERANCE * gravity, row.flag.value, 0)
+    limits = {row.name: getattr(problem.limits, row.name) for row in given(problem.limits) if row.quantity == "tension"}
+    fails = partial(_fails_at_rest, problem, starts, ends)
+    alone = {name: fails({name: limit}) for name, limit in limits.items()}
+    for row in given(problem.limits):
+        flags |= np.where(alone.get(row.name, False), row.flag.value, 0)
+    if len(limits) > 1:  # of two that only fail together one may go
+        together = fails(limits) & ~np.any(list(alone.values()), axis=0)
+        flags |= np.where(together, Verdict.OVER_TENSION.value, 0)
     return flags
+
+
+def _fails_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, limits: dict[str, Any]) -> np.ndarray:
+    # Whether rest at either end breaks limits of the tensions, or taut cables, (n,).
+    own = problem._replace(limits=Limits(**limits))
+    margins = [in_batches(partial(_at_rest, own), places, size=BATCH) for places in (starts, ends)]
+    return np.min(margins, axis=0) < -TOLERANCE * float(np.asarray(problem.robot.gravity))
 
 
 @jax.jit

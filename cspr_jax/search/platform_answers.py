@@ -1,17 +1,27 @@
 """Answers about motions between poses, once their numbers of arcs are known."""
 
 import dataclasses
+import itertools
 import math
 from typing import Any
 
 import numpy as np
 
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
-from cspr_jax.feasibility.platform.motion_checker import MotionChecker
+from cspr_jax.feasibility.platform.motion_checker import MotionChecker, PoseChecks
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.answers import Answers
-from cspr_jax.search.platform_arcs import Candidates, Found, best_candidates, segments_with, smallest_arcs
+from cspr_jax.search.fewest_limits import Refused
+from cspr_jax.search.platform_arcs import (
+    Candidates,
+    Found,
+    best_candidates,
+    refused_by_limits,
+    segments_with,
+    smallest_arcs,
+    unavoidable,
+)
 from cspr_jax.trajectories.platform_segment import PoseSegment
 
 NEVER = np.iinfo(int).max
@@ -58,6 +68,7 @@ def settled(
     candidates: Candidates,
     smallest: Found,
     *,
+    refused: Refused,
     max_arcs: int,
     fixed: np.ndarray | None = None,
     margins: bool = True,
@@ -68,6 +79,7 @@ def settled(
         checker: of the robot.
         candidates: one of each of n motions.
         smallest: of these; its checks are completed.
+        refused: those of them that only limits refuse.
         max_arcs: largest number tried.
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
         margins: whether those of motions without a number of arcs are wanted, and not only why they fail.
@@ -75,9 +87,10 @@ def settled(
     Returns:
         the answers; (2.55) does not apply: NaN. The segments that they belong to.
     """
-    tried = smallest.arcs if fixed is None else np.where(smallest.arcs > 0, smallest.arcs, fixed)
+    tried = np.where(smallest.arcs > 0, smallest.arcs, refused.arcs)
+    if fixed is not None:
+        tried = np.where(tried > 0, tried, fixed)
     none = np.flatnonzero(tried == 0)
-    tried = tried.copy()
     tried[none] = best_candidates(checker, candidates.rows(none), max_arcs=max_arcs)
     segments, checks = segments_with(checker.problem.robot, candidates, tried), smallest.checks
     others = np.flatnonzero(smallest.arcs == 0)
@@ -91,13 +104,15 @@ def settled(
     if checker.kind.plain:  # (3.66) has the one that its cosine has
         beta_hats = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
     doubtful = (smallest.undecided > 0) & ((smallest.arcs == 0) | (smallest.undecided < smallest.arcs))
-    refused = np.where(doubtful, Verdict.UNDECIDED.value, checks.verdict | Verdict.NO_ARCS.value)
+    asked = {"max_arcs": max_arcs, "fixed": fixed}
+    reasons = _reasons(checker, candidates, smallest, refused, checks, margins=margins, **asked)
+    none = np.where(doubtful, Verdict.UNDECIDED.value, reasons | Verdict.NO_ARCS.value)
     less = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
     nothing = np.full(len(tried), np.nan)
     answers = PoseAnswers(
         arcs=smallest.arcs,
         tried_arcs=tried,
-        verdict=np.where(smallest.arcs > 0, less, refused).astype(FLAGS),
+        verdict=np.where(smallest.arcs > 0, less, none).astype(FLAGS),
         duration=duration,
         margin=np.minimum(checks.slack[:, 0], checks.slack[:, 2]),
         margin_bound=checks.bound,
@@ -111,6 +126,36 @@ def settled(
         refuted_at=checks.instant * duration,
     )
     return answers, segments
+
+
+def _reasons(
+    checker: MotionChecker,
+    candidates: Candidates,
+    smallest: Found,
+    refused: Refused,
+    checks: PoseChecks,
+    *,
+    margins: bool,
+    max_arcs: int,
+    fixed: np.ndarray | None,
+) -> np.ndarray:
+    # Flags of what stands in the way of motions without a number of arcs.
+    limits = sum({flag.value for flag in itertools.compress(checker.flags, checker.is_limit)})
+    basic = checks.verdict & ~(limits & ~Verdict.SLACK_CABLE.value)
+    by_limits = refused.arcs > 0
+    broken = refused.broken.copy()
+    if margins:
+        others = np.flatnonzero((smallest.arcs == 0) & ~by_limits & (basic != checks.verdict))
+        suspects = checker.breaks(checks.slack[others]) & checker.is_limit
+        part = None if fixed is None else fixed[others]
+        motions = candidates.motions(others)
+        broken[others] = unavoidable(checker, motions, suspects, max_arcs=max_arcs, fixed=part)
+    named = np.zeros(len(basic), int)
+    for flag, column in zip(checker.flags, broken.T, strict=True):
+        named |= np.where(column, flag.value, 0)
+    # Proved but for limits, or for what a closer look at all of the robots within the uncertainty says.
+    alone = named | (checks.verdict & (Verdict.UNCERTAINTY | Verdict.UNDECIDED).value)
+    return np.where(by_limits, alone, basic | named)
 
 
 def trials(motions: Candidates, values: np.ndarray, *, same: bool = False) -> tuple[np.ndarray, Candidates]:
@@ -160,7 +205,18 @@ def reached(
     checks.put(cell[best], of_trials.checks.rows(best))
     np.minimum.at(undecided, cell, np.where(of_trials.undecided > 0, of_trials.undecided, NEVER))
     smallest = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
-    return settled(checker, _with_ends(motions, beta_hats, same=same), smallest, max_arcs=max_arcs, margins=margins)[0]
+    # Where there is none, the value at which the fewest limits refuse the motion, if there is one.
+    open_ones = np.flatnonzero(((arcs == 0) & (undecided == NEVER))[cell])
+    of_limits = refused_by_limits(checker, trial.rows(open_ones), max_arcs=max_arcs)
+    refused = Refused(np.zeros(len(values), int), np.zeros((len(values), len(checker.flags)), bool))
+    counts = np.where(of_limits.arcs > 0, of_limits.broken.sum(1), NEVER)
+    best = np.lexsort((of_limits.arcs, counts))[::-1]  # written last: the fewest limits, then the fewest arcs
+    best = best[of_limits.arcs[best] > 0]
+    which = cell[open_ones[best]]
+    refused.arcs[which], refused.broken[which] = of_limits.arcs[best], of_limits.broken[best]
+    beta_hats[which] = trial.beta_hats[1][open_ones[best]]
+    chosen = _with_ends(motions, beta_hats, same=same)
+    return settled(checker, chosen, smallest, refused=refused, max_arcs=max_arcs, margins=margins)[0]
 
 
 def _with_ends(motions: Candidates, beta_hats: np.ndarray, *, same: bool) -> Candidates:

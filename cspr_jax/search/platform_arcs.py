@@ -14,6 +14,7 @@ from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.search.fewest_limits import FewestLimits, Refused
 from cspr_jax.trajectories.platform_segment import PoseSegment, pose_segment
 
 BATCH = 2048
@@ -157,11 +158,103 @@ def _instants(arcs: int, before: np.ndarray) -> np.ndarray:
     return np.maximum(1.0 - before / arcs, 0.0)
 
 
-def _sieved(checker: MotionChecker, segments: _Segments, arcs: int, alive: np.ndarray, tau: np.ndarray) -> np.ndarray:
+def _sieved(
+    checker: MotionChecker,
+    segments: _Segments,
+    arcs: int,
+    alive: np.ndarray,
+    tau: np.ndarray,
+    *,
+    limits: bool = True,
+) -> np.ndarray:
     # Those that some instants do not refute.
     if not len(alive):
         return alive
-    return alive[~checker.prefilter.refuted(segments(arcs, alive), arcs, tau)]
+    return alive[~checker.prefilter.refuted(segments(arcs, alive), arcs, tau, limits=limits)]
+
+
+def refused_by_limits(
+    checker: MotionChecker, candidates: Candidates, *, max_arcs: int, fixed: np.ndarray | None = None
+) -> Refused:
+    """Candidates of motions, none of which is feasible, that only limits refuse.
+
+    Args:
+        checker: of the robot.
+        candidates: n of them.
+        max_arcs: largest number tried.
+        fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
+
+    Returns:
+        one for each candidate.
+    """
+    motion, count = candidates.motion, len(candidates.motion)
+    fewest, is_limit = FewestLimits(count, len(checker.flags)), checker.is_limit
+    if not count or not is_limit.any():
+        return fewest.refused()
+    only = np.zeros(len(candidates.z0), int) if fixed is None else fixed
+    segments = _Segments(checker.problem.robot, candidates)
+    for arcs in range(1, max_arcs + 1):
+        stage(f"why not, arcs {arcs} of {max_arcs}")
+        alive = np.flatnonzero(~fewest.is_single & ((only == 0) | (only == arcs))[motion])
+        for tau in (TELLING, OTHERS):
+            alive = _sieved(checker, segments, arcs, alive, _instants(arcs, tau), limits=False)
+        if len(alive):
+            is_proved, broken = _but_for_limits(checker, segments(arcs, alive), arcs)
+            fewest.take(alive[is_proved], np.full(is_proved.sum(), arcs), broken[is_proved])
+    return fewest.refused()
+
+
+def _but_for_limits(checker: MotionChecker, segments: PoseSegment, arcs: int) -> tuple[np.ndarray, np.ndarray]:
+    # Which motions are proved but for the limits that they break, (n,), and these limits, (n, n_criteria).
+    each, is_limit = np.full(len(segments.rate), arcs), checker.is_limit
+    first = checker.check(segments, each, whole=False, margins=False, ignored=is_limit)
+    is_proved, broken = first.verdict == 0, checker.breaks(first.slack) & is_limit
+    unclear = np.flatnonzero(is_proved & ~(broken == is_limit).all(1))
+    for _ in range(int(is_limit.sum())):
+        if not len(unclear):
+            break
+        left = []
+        for ignored in np.unique(broken[unclear], axis=0):
+            alike = unclear[(broken[unclear] == ignored).all(1)]
+            again = checker.check(rows(segments, alike), each[alike], margins=False, ignored=ignored)
+            is_proved[alike] = again.verdict == 0
+            more = checker.breaks(again.slack) & is_limit & ~ignored & (again.verdict != 0)[:, None]
+            broken[alike] |= more
+            left.append(alike[more.any(1)])
+        unclear = np.concatenate(left)
+        is_proved[unclear] = True  # but for more limits
+    is_proved[unclear] &= (broken[unclear] == is_limit).all(1)
+    return is_proved, broken
+
+
+def unavoidable(
+    checker: MotionChecker, candidates: Candidates, suspects: np.ndarray, *, max_arcs: int, fixed: np.ndarray | None
+) -> np.ndarray:
+    """Criteria that every number of arcs breaks.
+
+    Args:
+        checker: of the robot.
+        candidates: n of them, one of each motion.
+        suspects: (n, n_criteria) criteria that are asked about, which some number of arcs breaks.
+        max_arcs: largest number tried.
+        fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
+
+    Returns:
+        (n, n_criteria): no instant that was looked at says otherwise of these, and some instant says it of each.
+    """
+    if not suspects.any():
+        return suspects
+    only = np.zeros(len(suspects), int) if fixed is None else fixed
+    segments, ends = _Segments(checker.problem.robot, candidates), np.array([0.0, 1.0])
+    # What is broken at an end of a motion is so with every number of arcs.
+    certain = suspects & checker.breaks(checker.sampled(segments(2, np.arange(len(only))), 2, ends))
+    suspects = suspects & ~certain
+    for arcs in range(1, max_arcs + 1):
+        alive = np.flatnonzero(suspects.any(1) & ((only == 0) | (only == arcs)))
+        if len(alive):
+            tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
+            suspects[alive] &= checker.breaks(checker.sampled(segments(arcs, alive), arcs, tau))
+    return suspects | certain
 
 
 def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from cspr_jax.arithmetic.minima import narrowed
 from cspr_jax.feasibility.platform.crossings import CableVectors, passed_over
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.feasibility.platform.motion_checker import (
+    BASIC,
     BESIDE_KNOT,
     FEW,
     TOLERANCE,
@@ -58,7 +59,7 @@ class MarginLook:
         """Smallest margin over some instants; see `FirstLook.lowest`."""
         return self._least(segments, arcs, tau)[:, 0]
 
-    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
         """Motions that some instants refute; see `FirstLook.refuted`."""
         is_refuted = np.zeros(len(segments.rate), bool)
         for start in range(0, len(tau), CHUNK):
@@ -66,7 +67,7 @@ class MarginLook:
             if not len(alive):
                 break
             least = self._least(rows(segments, alive), arcs, tau[start : start + CHUNK])
-            is_refuted[alive] = ~(least > -TOLERANCE).all(1)
+            is_refuted[alive] = ~(least[:, : None if limits else 1] > -TOLERANCE).all(1)
         return is_refuted
 
     def _least(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
@@ -144,7 +145,24 @@ class RedundantChecker(MotionChecker):
         lowest, highest = zero[slope > 0.0].max(initial=-np.inf), zero[slope < 0.0].min(initial=np.inf)
         return 0.5 * (low + high), *((lowest, highest) if is_held else NONE)
 
-    def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True, margins: bool = True) -> PoseChecks:
+    def breaks(self, slack: np.ndarray) -> np.ndarray:
+        """Criteria that are broken for certain; see `MotionChecker.breaks`."""
+        return slack <= -TOLERANCE
+
+    def sampled(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slacks at some instants; see `MotionChecker.sampled`."""
+        motions = Motions(segments, np.full(len(segments.rate), arcs))
+        return _in_order(self.values(motions, np.tile(tau, (len(motions.arcs), 1))).min(1))
+
+    def check(
+        self,
+        segments: PoseSegment,
+        arcs: np.ndarray,
+        *,
+        whole: bool = True,
+        margins: bool = True,
+        ignored: np.ndarray | None = None,
+    ) -> PoseChecks:
         """Check motions in full, by samples: nothing is proved; see `MotionChecker.check`."""
         checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         for count in np.unique(arcs).tolist():
@@ -153,13 +171,15 @@ class RedundantChecker(MotionChecker):
             size = max(ROOM // (SAMPLES * count), 1)
             for start in range(0, len(alike), size):
                 some = alike[start : start + size]
-                checks.put(some, self._checked(motions.rows(some), count, whole))
+                checks.put(some, self._checked(motions.rows(some), count, whole, ignored))
         return checks
 
-    def _checked(self, motions: Motions, count: int, whole: bool) -> PoseChecks:
+    def _checked(self, motions: Motions, count: int, whole: bool, ignored: np.ndarray | None) -> PoseChecks:
         tau = np.linspace(0.0, 1.0, SAMPLES * count + 1)
         samples = self.values(motions, np.tile(tau, (len(motions.arcs), 1)))
-        is_open = np.logical_or(whole, (samples[:, :, :-1].min((1, 2)) > -TOLERANCE))
+        counted = np.ones(len(self.flags), bool) if ignored is None else ~ignored
+        first = samples[:, :, :-1][:, :, np.append(True, counted[BASIC:])]
+        is_open = np.logical_or(whole, (first.min((1, 2)) > -TOLERANCE))
         checks = self.nothing(len(motions.arcs))
         checks.verdict[~is_open] = Verdict.WRENCH_INFEASIBLE.value
         if not is_open.any():
@@ -168,7 +188,7 @@ class RedundantChecker(MotionChecker):
         least = narrowed(partial(self.values, motions), tau, samples)
         if len(self._knots):  # the motion may jump there
             least = np.minimum(least, self.values(motions, np.tile(self._knots, (len(least), 1))).min(1))
-        judged = self._judged(least, self._met(motions, tau), self.durations(*motions))
+        judged = self._judged(least, self._met(motions, tau), self.durations(*motions), counted[BASIC:])
         checks.put(np.flatnonzero(is_open), judged)
         return checks
 
@@ -186,7 +206,7 @@ class RedundantChecker(MotionChecker):
             return np.zeros(many, bool)
         return passed_over(vectors, None, row, (ends[0], ends[1]), many)[0]
 
-    def _judged(self, least: np.ndarray, met: np.ndarray, duration: np.ndarray) -> PoseChecks:
+    def _judged(self, least: np.ndarray, met: np.ndarray, duration: np.ndarray, counted: np.ndarray) -> PoseChecks:
         margin, nearest, others = least[:, 0], least[:, -1], least[:, 1:-1]
         free = nearest - self._diameter
         verdict = Verdict.CABLE_CABLE.value * (met | (free <= -self._touch))
@@ -194,20 +214,24 @@ class RedundantChecker(MotionChecker):
         verdict |= np.where(np.isneginf(margin), Verdict.SINGULAR.value, 0)
         is_short = np.isfinite(margin) & (margin <= -TOLERANCE)
         verdict |= np.where(is_short, Verdict.WRENCH_INFEASIBLE.value, 0)
-        for row, value in zip(self._rows, others.T, strict=True):
-            verdict |= np.where(value <= -TOLERANCE, row.flag.value, 0)
-        close = np.abs(least[:, :-1]) <= TOLERANCE
+        for row, value, counts in zip(self._rows, others.T, counted, strict=True):
+            verdict |= np.where(counts & (value <= -TOLERANCE), row.flag.value, 0)
+        close = (np.abs(least[:, :-1]) <= TOLERANCE) & np.append(True, counted)
         verdict |= np.where(close.any(1), Verdict.UNDECIDED.value, 0)
         # What is broken for certain is said alone.
         reasons = verdict & ~Verdict.UNDECIDED.value
         verdict = np.where(reasons != 0, reasons, verdict)
         is_finite = ~np.isnan(least).any(1) & (duration > 0.0)
-        # There is no determinant, and no side of the spools to be on.
-        nothing, always = np.full((len(margin), 1), np.nan), np.full((len(margin), 1), np.inf)
-        slacks = np.concatenate([margin[:, None], nothing, always, others], axis=1)
         return PoseChecks(
             np.where(is_finite, verdict, Verdict.NOT_FINITE.value),
-            np.where(is_finite[:, None], slacks, np.nan),
+            np.where(is_finite[:, None], _in_order(least), np.nan),
             np.where(is_finite, nearest, np.nan),
             *(np.full(len(margin), np.nan) for _ in range(4)),
         )
+
+
+def _in_order(values: np.ndarray) -> np.ndarray:
+    # Of margin, other limits and distance those that have a flag (n, n_criteria): there is no determinant, and no side
+    # of the spools to be on.
+    nothing, always = np.full((len(values), 1), np.nan), np.full((len(values), 1), np.inf)
+    return np.concatenate([values[:, :1], nothing, always, values[:, 1:-1]], axis=1)

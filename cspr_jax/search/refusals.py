@@ -1,13 +1,4 @@
-"""Why no number of arcs is feasible: the criterion that alone stands in the way, if there is one.
-
-More candidates fail by a limit than by a cable that would have to push: a limit can be raised, and a cable cannot push.
-So candidates whose cables stay taut below the spools come first. Of these the first one that breaks a single limit, and
-is proved but for that, says what is missing. Where there is none, the one that breaks the fewest limits does; what all
-of them break is then named alone, if these are several limits. Where no cable-taut candidate exists, cables are what
-fails, and with them the limits that are broken with every number of arcs.
-"""
-
-from typing import NamedTuple
+"""Limits that refuse every number of arcs of a point mass; see `search.fewest_limits`."""
 
 import jax
 import numpy as np
@@ -15,6 +6,7 @@ import numpy as np
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, is_met_at_samples, prove
 from cspr_jax.feasibility.problem import Problem
+from cspr_jax.search.fewest_limits import FewestLimits, Refused
 from cspr_jax.search.parities import pick
 from cspr_jax.trajectories.hypocycloid import Segment
 
@@ -22,44 +14,7 @@ from cspr_jax.trajectories.hypocycloid import Segment
 BASIC = 2
 
 
-class Refusals(NamedTuple):
-    """Why n segments are refused.
-
-    Fields:
-        arcs: (n,) number of arcs of the candidate that only limits refuse; 0: there is none.
-        broken: (n, n_criteria) criteria that stand in the way of it.
-    """
-
-    arcs: np.ndarray
-    broken: np.ndarray
-
-
-class _Fewest:
-    # Of n segments the candidate that breaks the fewest limits, and the limits that all candidates break.
-
-    def __init__(self, count: int, n_criteria: int) -> None:
-        self.arcs, self.broken = np.zeros(count, int), np.zeros((count, n_criteria), bool)
-        self._least = np.full(count, n_criteria + 1)
-        self._common = np.ones((count, n_criteria), bool)
-
-    def take(self, rows: np.ndarray, arcs: np.ndarray, broken: np.ndarray) -> None:
-        # Candidates of some segments, one each.
-        counts = broken.sum(1)
-        better = counts < self._least[rows]
-        self.arcs[rows[better]], self.broken[rows[better]] = arcs[better], broken[better]
-        self._least[rows[better]] = counts[better]
-        self._common[rows] &= broken
-
-    @property
-    def is_single(self) -> np.ndarray:
-        return self._least <= 1
-
-    def refusals(self) -> Refusals:
-        is_common = (self._common.sum(1) > 1) & (self.arcs > 0)
-        return Refusals(self.arcs, np.where(is_common[:, None], self._common, self.broken))
-
-
-def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray) -> Refusals:
+def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray) -> Refused:
     """Limits that refuse segments whose cables some number of arcs keeps taut.
 
     Args:
@@ -71,11 +26,11 @@ def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray) 
         the refusals.
     """
     is_limit = np.arange(BASIC + len(given(problem.limits))) >= BASIC
-    fewest, alive = _Fewest(len(upper), len(is_limit)), upper >= -SMALLEST_MARGIN
+    fewest, alive = FewestLimits(len(upper), len(is_limit)), upper >= -SMALLEST_MARGIN
     while True:
         rows = np.flatnonzero(~fewest.is_single & alive.any(1))
         if not len(rows):
-            return fewest.refusals()
+            return fewest.refused()
         arcs = np.argmax(alive[rows], axis=1) + 1
         alive[rows, arcs - 1] = False
         is_taut, broken = _limits_of(problem, pick(parities, rows, arcs), arcs, is_limit)

@@ -94,7 +94,13 @@ class Certifier:
         self._parts = WITH_MARGINS[not kind.from_rest], growing(problem.amplitude, ramp, ramp)
 
     def prove(
-        self, segments: PoseSegment, arcs: np.ndarray, *, near: float = 0.0, margins: bool = False
+        self,
+        segments: PoseSegment,
+        arcs: np.ndarray,
+        *,
+        near: float = 0.0,
+        margins: bool = False,
+        ignored: np.ndarray | None = None,
     ) -> TensionProof:
         """Prove motions, or refute them.
 
@@ -103,6 +109,7 @@ class Certifier:
             arcs: (n,).
             near: part of the smallest slack that is attained of taut cables below which no bound of it may stay.
             margins: whether the nodes of the normalised determinant are wanted.
+            ignored: (n_criteria,) whether each criterion does not count; None: all do.
 
         Returns:
             the proofs.
@@ -116,7 +123,7 @@ class Certifier:
             nodes, bound = np.asarray(found.nodes), np.asarray(found.bound)
             return Looked(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[some.row, 0], 0.0))
 
-        work = WorkList(arcs, self._limits)
+        work = WorkList(arcs, self._limits, ignored)
         first = work.work_off(blocks, look)
         is_proved = ~work.is_refuted & ~work.is_stuck
         return TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.instant, blocks.row, first)

@@ -35,6 +35,8 @@ from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
 
 # Blocks of a call at most; so many arcs are held at a time.
 BLOCKS, ARCS = 1024, 32 * MANY
+# Instants that are looked at together.
+SAMPLES = 1 << 18
 # Where margins are asked for no bound is less than this part of what is attained.
 NEAR = 0.5
 
@@ -86,27 +88,54 @@ class PoseChecker(MotionChecker):
         end = _end(self.problem.robot, position, quaternion, jnp.asarray(z0))
         return float(end.preferred), float(end.lowest), float(end.highest)
 
-    def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True, margins: bool = True) -> PoseChecks:
+    def breaks(self, slack: np.ndarray) -> np.ndarray:
+        """Criteria that are broken for certain; see `MotionChecker.breaks`."""
+        return slack + self._allowed < -TOLERANCE
+
+    def sampled(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slacks at some instants; see `MotionChecker.sampled`."""
+        motions, size = Motions(segments, np.full(len(segments.rate), arcs)), max(SAMPLES // len(tau), 1)
+        kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
+        least = []
+        for start in range(0, len(motions.arcs), size):
+            row = np.repeat(np.arange(start, min(start + size, len(motions.arcs))), len(tau))
+            instants = np.tile(tau, len(row) // len(tau))
+            every = in_batches(kernel, (*motions.items(row), instants), size=self.batch)
+            least.append(np.stack(every[:-1], axis=1).reshape(-1, len(tau), len(self.flags)).min(1))
+        return np.concatenate(least)
+
+    def check(
+        self,
+        segments: PoseSegment,
+        arcs: np.ndarray,
+        *,
+        whole: bool = True,
+        margins: bool = True,
+        ignored: np.ndarray | None = None,
+    ) -> PoseChecks:
         """Check motions in full; see `MotionChecker.check`."""
         checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         self._count("motions", len(arcs))
         size = max(ARCS // max(arcs, default=1), 1)
         for start in range(0, len(arcs), size):
             piece = np.arange(start, min(start + size, len(arcs)))
-            checks.put(piece, self._checked(motions.rows(piece), whole=whole, margins=margins))
+            checks.put(piece, self._checked(motions.rows(piece), whole=whole, margins=margins, ignored=ignored))
         return checks
 
-    def _checked(self, motions: Motions, *, whole: bool, margins: bool) -> PoseChecks:
+    def _checked(self, motions: Motions, *, whole: bool, margins: bool, ignored: np.ndarray | None) -> PoseChecks:
         checks = self.nothing(len(motions.arcs))
         self._compile(motions, margins=margins)
-        tensions = self._tensions.prove(*motions, near=NEAR if margins else 0.0, margins=margins)
+        moving, still = self._narrowed_criteria()
+        moving_ignored, still_ignored = (None if ignored is None else ignored[x] for x in (moving, still[:-1]))
+        near = NEAR if margins else 0.0
+        tensions = self._tensions.prove(*motions, near=near, margins=margins, ignored=moving_ignored)
         checks.verdict[:] = np.where(tensions.is_refuted, Verdict.SLACK_CABLE.value, Verdict.UNDECIDED.value)
         checks.instant[:] = np.where(tensions.is_refuted, tensions.instant, np.nan)
         some = np.flatnonzero(np.logical_or(whole, ~tensions.is_refuted))
         if not len(some):
             return checks
         part = motions.rows(some)
-        places = self._places.prove(*part, margins=margins)
+        places = self._places.prove(*part, margins=margins, ignored=still_ignored)
         checks.instant[some] = np.where(tensions.is_refuted[some], tensions.instant[some], places.instant)
         is_finite = ~np.isnan(tensions.attained[some]).any(1) & ~np.isnan(places.attained).any(1)
         is_finite &= self.durations(*part) > 0.0
@@ -114,11 +143,11 @@ class PoseChecker(MotionChecker):
         checks.bound[some] = np.where(is_proved, np.minimum(tensions.bound[some, 0], places.bound[:, 0]), np.nan)
         least = self._attained(tensions.attained[some], places.attained)
         if margins:
-            moving, still = self._narrowed_criteria()
             samples = _samples(moving, tensions, some), _samples(still, places, np.arange(len(some)))
             self._narrow(least, part, samples, np.logical_or(whole, is_proved))
-        verdict = self._verdict(least[:-1], is_proved, places)
-        self._weigh(checks, some, part, verdict)
+        verdict = self._verdict(least[:-1], is_proved, places, ignored)
+        if ignored is None:
+            self._weigh(checks, some, part, verdict)
         checks.verdict[some] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
         checks.slack[some] = np.where(is_finite, least[:-1], np.nan).T
         checks.gap[some] = np.where(is_finite, least[-1], np.nan)
@@ -148,11 +177,14 @@ class PoseChecker(MotionChecker):
         open_ones = np.where(found.refuted <= 1.0, Verdict.UNCERTAINTY.value, Verdict.UNDECIDED.value)
         verdict[which] = np.where(found.proved >= 1.0, Verdict.FEASIBLE.value, open_ones)
 
-    def _verdict(self, least: np.ndarray, is_proved: np.ndarray, places: PlaceProof) -> np.ndarray:
+    def _verdict(
+        self, least: np.ndarray, is_proved: np.ndarray, places: PlaceProof, ignored: np.ndarray | None
+    ) -> np.ndarray:
         # What is broken for certain is said alone.
         verdict = Verdict.CABLE_CABLE.value * places.met | Verdict.CABLE_PLATFORM.value * places.hit
-        for flag, allowed, value in zip(self.flags, self._allowed, least, strict=True):
-            verdict |= np.where(value + allowed < -TOLERANCE, flag.value, 0)
+        broken = self.breaks(least.T) & (True if ignored is None else ~ignored)
+        for flag, column in zip(self.flags, broken.T, strict=True):
+            verdict |= np.where(column, flag.value, 0)
         return np.where(is_proved | (verdict != 0), verdict, Verdict.UNDECIDED.value)
 
     def _attained(self, moving: np.ndarray, still: np.ndarray) -> np.ndarray:

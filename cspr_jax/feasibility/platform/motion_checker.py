@@ -18,6 +18,7 @@ FEW, MANY = 256, 2048
 TOLERANCE = 1e-7
 TOUCH = 1e-6  # of the platform's size: poses nearer to a contact cannot be asked for
 BESIDE_KNOT = 1e-12
+BASIC = 3  # criteria that are no limits
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,13 +84,14 @@ class FirstLook(Protocol):
         """
         ...
 
-    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
         """Motions that some instants refute.
 
         Args:
             segments: leaves (n, ...), all of this number of arcs.
             arcs: the number.
             tau: (m,) instants, the most telling ones first.
+            limits: whether limits may refute them, too.
 
         Returns:
             (n,).
@@ -159,8 +161,45 @@ class MotionChecker(abc.ABC):
         """
         return Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
 
+    @property
+    def is_limit(self) -> np.ndarray:
+        """Whether each criterion of `flags` is one of a limit, (n_criteria,)."""
+        return np.arange(len(self.flags)) >= BASIC
+
     @abc.abstractmethod
-    def check(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True, margins: bool = True) -> PoseChecks:
+    def breaks(self, slack: np.ndarray) -> np.ndarray:
+        """Criteria that slacks break for certain.
+
+        Args:
+            slack: (n, n_criteria).
+
+        Returns:
+            (n, n_criteria).
+        """
+
+    @abc.abstractmethod
+    def sampled(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slacks at some instants.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) the instants.
+
+        Returns:
+            (n, n_criteria) in the order of `flags`.
+        """
+
+    @abc.abstractmethod
+    def check(
+        self,
+        segments: PoseSegment,
+        arcs: np.ndarray,
+        *,
+        whole: bool = True,
+        margins: bool = True,
+        ignored: np.ndarray | None = None,
+    ) -> PoseChecks:
         """Check motions in full.
 
         Args:
@@ -168,6 +207,8 @@ class MotionChecker(abc.ABC):
             arcs: (n,).
             whole: whether to go on where the motion itself is infeasible; else the rest is NaN there.
             margins: whether more than the verdict is wanted; else slacks and gaps are ignored.
+            ignored: (n_criteria,) whether each criterion has no part in the verdict, nor has the uncertainty; None:
+                all have.
 
         Returns:
             the checks.

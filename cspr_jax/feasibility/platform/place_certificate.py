@@ -106,18 +106,21 @@ class PlaceCertifier:
         self._limits = np.arange(1 + len(of_pose(problem))) >= 1
         self._parts = PARTS, growing(problem.amplitude, *(FROM_REST if kind.from_rest else BETWEEN))
 
-    def prove(self, segments: PoseSegment, arcs: np.ndarray, *, margins: bool = False) -> PlaceProof:
+    def prove(
+        self, segments: PoseSegment, arcs: np.ndarray, *, margins: bool = False, ignored: np.ndarray | None = None
+    ) -> PlaceProof:
         """Prove motions clear, or that something meets or is broken.
 
         Args:
             segments: leaves (n, ...), of the parity of `arcs`.
             arcs: (n,).
             margins: whether distances between cables are wanted.
+            ignored: (n_criteria,) whether each criterion does not count; None: all do.
 
         Returns:
             the proofs.
         """
-        blocks, work = parts_of_arcs(arcs, self._knots, self._parts[not margins]), WorkList(arcs, self._limits)
+        blocks, work = parts_of_arcs(arcs, self._knots, self._parts[not margins]), WorkList(arcs, self._limits, ignored)
         met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
 
         def look(some: Blocks, level: int) -> Looked:

@@ -156,17 +156,19 @@ class Prefilter(NamedTuple):
             lowest = np.minimum(lowest, self._lowest(segments, arcs, chunk))
         return np.where(np.isnan(lowest), -np.inf, lowest)
 
-    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
         """Motions that some instants refute.
 
         Args:
             segments: leaves (n, ...), all of this number of arcs.
             arcs: the number.
             tau: (m,) instants, the most telling ones first.
+            limits: whether limits may refute them, which are not looked at here.
 
         Returns:
             (n,) where a tension is, or is none, or the determinant has changed its sign.
         """
+        del limits
         is_refuted = np.zeros(len(segments.rate), bool)
         for chunk in _chunks(tau):
             alive = np.flatnonzero(~is_refuted)

@@ -39,6 +39,7 @@ class WorkList:
     Args:
         arcs: (n,) numbers of arcs.
         limits: (n_criteria,) whether each slack is one of a limit, which may be touched.
+        ignored: (n_criteria,) whether each neither refutes nor need be proved; None: none is.
 
     Fields:
         is_refuted: (n,) an instant breaks a criterion, or `refute` was called.
@@ -49,9 +50,10 @@ class WorkList:
             does.
     """
 
-    def __init__(self, arcs: np.ndarray, limits: np.ndarray) -> None:
+    def __init__(self, arcs: np.ndarray, limits: np.ndarray, ignored: np.ndarray | None = None) -> None:
         """Nothing is known yet."""
-        self._arcs, self._allowed = arcs, allowance(limits)
+        self._ignored = np.zeros(len(limits), bool) if ignored is None else ignored
+        self._arcs, self._allowed = arcs, np.where(self._ignored, np.inf, allowance(limits))
         self.is_refuted, self.is_stuck = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool)
         self.bound, self.instant = np.full((len(arcs), len(limits)), np.inf), np.full(len(arcs), np.nan)
         self.attained, self._worst = np.zeros((len(arcs), 0)), np.full(len(arcs), -TOLERANCE)
@@ -102,7 +104,7 @@ class WorkList:
         # NaN refutes nothing, and proves nothing.
         self._note_instants(blocks, found)
         self.is_refuted[blocks.row[(slack + self._allowed < -TOLERANCE).any(1)]] = True
-        is_above = low > TOLERANCE - self._allowed
+        is_above = (low > TOLERANCE - self._allowed) | self._ignored
         is_proved = is_above.all(1) & found.is_enough(self.attained)
         with np.errstate(invalid="ignore"):  # of infinities: singular poses, blocks without a bound
             is_known = ((slack - low <= 0.5 * TOLERANCE) & ~is_above).any(1)

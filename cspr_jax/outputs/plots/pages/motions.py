@@ -10,6 +10,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.moving import limits_of, moving
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
+from cspr_jax.plans.causes import cause_text
 from cspr_jax.schema.verdicts import Verdict
 
 # Rows of a motion in a page, at most.
@@ -66,6 +67,7 @@ def _segments(segments: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
     rows = []
     for i, end in enumerate(np.asarray(segments.get("segment_end", ())).tolist()):
         code = int(segments["segment_verdict"][i])
+        words = Verdict(code).text.replace("_", " ").replace("+", ", ")
         colour = next((REASONS[flag][1] for flag in REASONS if code & flag.value), FEASIBLE_COLOUR)
         rows.append(
             {
@@ -74,7 +76,7 @@ def _segments(segments: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
                 "arcs": int(segments["segment_tried_arcs"][i]),
                 "margin": _number(segments["segment_margin"][i]),
                 "isFeasible": int(segments["segment_arcs"][i]) > 0 or code == 0,
-                "verdict": Verdict(code).text.replace("_", " ").replace("+", ", "),
+                "verdict": ": ".join(filter(None, (words, cause_text(segments, i)))),
                 "colour": colour,
             }
         )
