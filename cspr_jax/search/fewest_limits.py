@@ -2,14 +2,18 @@
 
 A limit can be raised, but a cable cannot push, and two cables cannot pass through each other. So candidates that only
 limits refuse come first. Of these the first one that breaks a single limit, and is proved but for that, says what is
-missing. Where there is none, the one that breaks the fewest does; of several limits those that all candidates break are
+missing: rather one that keeps the smallest tension, for a cable that is called slack is to be slack with any other
+limit. Where there is none, the one that breaks the fewest does; of several limits those that all candidates break are
 named, if these are more than one. Where limits alone refuse no candidate, what is no limit is the reason, and with it
 the limits that every number of arcs breaks.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+
+from cspr_jax.schema.verdicts import Verdict
 
 
 class Refused(NamedTuple):
@@ -24,19 +28,33 @@ class Refused(NamedTuple):
     broken: np.ndarray
 
 
+def rank(flags: Sequence[Verdict], broken: np.ndarray) -> np.ndarray:
+    """Rank of candidates by the limits that they break.
+
+    Args:
+        flags: of the criteria.
+        broken: (n, n_criteria) the limits.
+
+    Returns:
+        (n,) twice their number, and one more if a tension is below the smallest one: the less, the better.
+    """
+    is_slack = np.array([flag == Verdict.SLACK_CABLE for flag in flags])
+    return 2 * broken.sum(1) + (broken & is_slack).any(1)
+
+
 class FewestLimits:
     """Of n motions the candidate that breaks the fewest limits, and the limits that all candidates break.
 
     Args:
         count: of motions.
-        n_criteria: of each.
+        flags: of the criteria.
     """
 
-    def __init__(self, count: int, n_criteria: int) -> None:
+    def __init__(self, count: int, flags: Sequence[Verdict]) -> None:
         """There is no candidate yet."""
-        self._arcs, self._broken = np.zeros(count, int), np.zeros((count, n_criteria), bool)
-        self._least = np.full(count, n_criteria + 1)
-        self._common = np.ones((count, n_criteria), bool)
+        self._flags, shape = flags, (count, len(flags))
+        self._arcs, self._broken, self._common = np.zeros(count, int), np.zeros(shape, bool), np.ones(shape, bool)
+        self._least = np.full(count, 2 * len(flags) + 2)
 
     def take(self, rows: np.ndarray, arcs: np.ndarray, broken: np.ndarray) -> None:
         """Take in candidates that are proved but for limits.
@@ -46,16 +64,16 @@ class FewestLimits:
             arcs: (m,) numbers of arcs.
             broken: (m, n_criteria) the limits that each breaks.
         """
-        counts = broken.sum(1)
-        better = counts < self._least[rows]
+        ranks = rank(self._flags, broken)
+        better = ranks < self._least[rows]
         self._arcs[rows[better]], self._broken[rows[better]] = arcs[better], broken[better]
-        self._least[rows[better]] = counts[better]
+        self._least[rows[better]] = ranks[better]
         self._common[rows] &= broken
 
     @property
-    def is_single(self) -> np.ndarray:
-        """Whether one limit at most refuses a candidate, so that no other one is better, (n,)."""
-        return self._least <= 1
+    def is_best(self) -> np.ndarray:
+        """Whether one limit at most refuses a candidate, and no other one is better, (n,)."""
+        return self._least <= 2
 
     def refused(self) -> Refused:
         """What was found.

@@ -12,7 +12,7 @@ from cspr_jax.feasibility.platform.motion_checker import MotionChecker, PoseChec
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.answers import Answers
-from cspr_jax.search.fewest_limits import Refused
+from cspr_jax.search.fewest_limits import Refused, rank
 from cspr_jax.search.platform_arcs import (
     Candidates,
     Found,
@@ -209,8 +209,8 @@ def reached(
     open_ones = np.flatnonzero(((arcs == 0) & (undecided == NEVER))[cell])
     of_limits = refused_by_limits(checker, trial.rows(open_ones), max_arcs=max_arcs)
     refused = Refused(np.zeros(len(values), int), np.zeros((len(values), len(checker.flags)), bool))
-    counts = np.where(of_limits.arcs > 0, of_limits.broken.sum(1), NEVER)
-    best = np.lexsort((of_limits.arcs, counts))[::-1]  # written last: the fewest limits, then the fewest arcs
+    ranks = rank(checker.flags, of_limits.broken)
+    best = np.lexsort((of_limits.arcs, ranks))[::-1]  # written last: the fewest limits, then the fewest arcs
     best = best[of_limits.arcs[best] > 0]
     which = cell[open_ones[best]]
     refused.arcs[which], refused.broken[which] = of_limits.arcs[best], of_limits.broken[best]

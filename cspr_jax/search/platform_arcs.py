@@ -188,14 +188,14 @@ def refused_by_limits(
         one for each candidate.
     """
     motion, count = candidates.motion, len(candidates.motion)
-    fewest, is_limit = FewestLimits(count, len(checker.flags)), checker.is_limit
+    fewest, is_limit = FewestLimits(count, checker.flags), checker.is_limit
     if not count or not is_limit.any():
         return fewest.refused()
     only = np.zeros(len(candidates.z0), int) if fixed is None else fixed
     segments = _Segments(checker.problem.robot, candidates)
     for arcs in range(1, max_arcs + 1):
         stage(f"why not, arcs {arcs} of {max_arcs}")
-        alive = np.flatnonzero(~fewest.is_single & ((only == 0) | (only == arcs))[motion])
+        alive = np.flatnonzero(~fewest.is_best & ((only == 0) | (only == arcs))[motion])
         for tau in (TELLING, OTHERS):
             alive = _sieved(checker, segments, arcs, alive, _instants(arcs, tau), limits=False)
         if len(alive):

@@ -5,6 +5,7 @@ import numpy as np
 
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, is_met_at_samples, prove
+from cspr_jax.feasibility.point_mass.criteria import flags
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.search.fewest_limits import FewestLimits, Refused
 from cspr_jax.search.parities import pick
@@ -26,9 +27,9 @@ def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray) 
         the refusals.
     """
     is_limit = np.arange(BASIC + len(given(problem.limits))) >= BASIC
-    fewest, alive = FewestLimits(len(upper), len(is_limit)), upper >= -SMALLEST_MARGIN
+    fewest, alive = FewestLimits(len(upper), flags(problem.limits)), upper >= -SMALLEST_MARGIN
     while True:
-        rows = np.flatnonzero(~fewest.is_single & alive.any(1))
+        rows = np.flatnonzero(~fewest.is_best & alive.any(1))
         if not len(rows):
             return fewest.refused()
         arcs = np.argmax(alive[rows], axis=1) + 1
