@@ -157,8 +157,8 @@ def _of_segment(
     numbered = flags & ~Verdict.SLACK_CABLE if Verdict.ABOVE_SPOOLS in flags else flags
     rows = [_of_need(need, frame, duration) for need in numbers if need.criterion in numbered and need.slack < MET]
     known = {row.criterion for row in rows}
-    others = [flag for flag in flags if flag.text not in known]
-    return (*rows, *(_of_flag(flag, answers, i) for flag in others))
+    others = (flag for flag in flags if flag.text not in known)
+    return (*rows, *(_of_flag(flag, problem, answers, i) for flag in others))
 
 
 def _of_need(need: Need, frame: Frame, duration: float) -> Cause:
@@ -170,10 +170,13 @@ def _of_need(need: Need, frame: Frame, duration: float) -> Cause:
     return Cause(need.criterion.text, need.cables, t, needed, allowed, need.unit)
 
 
-def _of_flag(flag: Verdict, answers: Answers, i: int) -> Cause:
-    # What no instant says.
+def _of_flag(flag: Verdict, problem: Problem, answers: Answers, i: int) -> Cause:
+    # What no instant says, or a choice of tensions.
     if flag == Verdict.UNCERTAINTY:
         stands = np.fmin(answers.tolerated[i], answers.not_tolerated[i])
-        return Cause(flag.text, needed=1.0, allowed=float(stands), unit="1")
+        return Cause(flag.text, needed=1.0, allowed=float(stands), unit=UNITS[flag])
     refuted = answers.details(i).get("refuted_at", math.nan)
+    if flag == Verdict.WRENCH_INFEASIBLE:
+        weight = float(problem.robot.mass * problem.robot.gravity) / problem.robot.n_cables
+        return Cause(flag.text, (), refuted, float(answers.margin[i]) * weight, 0.0, UNITS[flag])
     return Cause(flag.text, t=refuted) if flag == Verdict.CABLE_PLATFORM else Cause(flag.text)

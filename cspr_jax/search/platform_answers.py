@@ -37,7 +37,7 @@ class PoseAnswers(Answers):
             none, and cables are not held against the platform.
         cable_distance: (n,) smallest distance between cables that can meet, m.
         refuted_at: (n,) time at which the motion of `tried_arcs` is refuted, s: by its tensions, else by limits or
-            contacts; NaN where it is not, or was only sampled.
+            contacts; NaN where it is not, and of contacts where they were only sampled.
     """
 
     beta_hat: np.ndarray

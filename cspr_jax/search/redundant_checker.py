@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.arithmetic.minima import narrowed
+from cspr_jax.arithmetic.minima import narrowed_places
 from cspr_jax.feasibility.platform.crossings import CableVectors, passed_over
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.feasibility.platform.motion_checker import (
@@ -185,10 +185,13 @@ class RedundantChecker(MotionChecker):
         if not is_open.any():
             return checks
         motions, samples = motions.rows(is_open), samples[is_open]
-        least = narrowed(partial(self.values, motions), tau, samples)
+        least, when = narrowed_places(partial(self.values, motions), tau, samples)
         if len(self._knots):  # the motion may jump there
-            least = np.minimum(least, self.values(motions, np.tile(self._knots, (len(least), 1))).min(1))
+            beside = self.values(motions, np.tile(self._knots, (len(least), 1)))
+            when = np.where(beside.min(1) < least, self._knots[beside.argmin(1)], when)
+            least = np.minimum(least, beside.min(1))
         judged = self._judged(least, self._met(motions, tau), self.durations(*motions), counted[BASIC:])
+        judged.instant[:] = _refuted_at(least[:, :-1], when[:, :-1])
         checks.put(np.flatnonzero(is_open), judged)
         return checks
 
@@ -228,6 +231,13 @@ class RedundantChecker(MotionChecker):
             np.where(is_finite, nearest, np.nan),
             *(np.full(len(margin), np.nan) for _ in range(4)),
         )
+
+
+def _refuted_at(least: np.ndarray, when: np.ndarray) -> np.ndarray:
+    # Of smallest values (n, n_values), the margin first, when the margin is below zero, else the worst of the others.
+    worst = np.where(least[:, 0] <= -TOLERANCE, 0, least.argmin(1))
+    row = np.arange(len(least))
+    return np.where(least[row, worst] <= -TOLERANCE, when[row, worst], np.nan)
 
 
 def _in_order(values: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ class PoseChecks:
         bound: (n,) proved lower bound of the slack of taut cables and of the depth below the spools; NaN where nothing
             is proved.
         instant: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a small
-            step of it); NaN where it is not, or was only sampled.
+            step of it); NaN where it is not, and of contacts where they were only sampled.
         tolerated: (n,) multiple of the uncertainty that it is proved to stand, 1 or 0 as far as verdicts need it; NaN
             where none is given, or the motion is not feasible as planned.
         not_tolerated: (n,) one that it does not, likewise; infinite where none was found.
