@@ -94,7 +94,8 @@ JSON), `robot`, `robot_settings` (the robot, as JSON), `base_points` (the spools
 `feasible`, 1 or 0. It carries a checksum like a result: `cspr verify FILE.h5` and `cspr plot FILE.h5` detect any
 changed byte.
 
-An infeasible or undecided plan is written only with `--anyway`, with the best candidate's motion for each such segment.
+An infeasible or undecided plan is written only with `--anyway`, with the motion that the verdict of
+each such segment speaks of.
 Its picture says NOT PROVED FEASIBLE and for which segments; its HDF5 file has `feasible = 0` and the verdicts of its
 segments; its CSV file has a last column `feasible`, 1 in the rows of feasible segments and 0 in the others. CSV files
 of feasible plans do not have that column.

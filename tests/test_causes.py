@@ -1,12 +1,14 @@
 """What stands between a motion and feasible: the limit without which there is one, with its numbers."""
 
 import h5py
+import jax
 import numpy as np
 import pytest
 from support.commands import cspr, plan, planned
 from test_random_segments import LIMITS, answered, limited, problem
 
 import cspr_jax
+from cspr_jax.robots.cables import cable_motion
 from cspr_jax.schema.verdicts import Verdict
 
 LAB = """schema = 1
@@ -74,6 +76,20 @@ def test_a_segment_that_is_only_too_fast_is_not_called_slack(tmp_path):
     page = tmp_path / "page.html"
     assert cspr("report", path, "-o", page)[0] == 0
     assert page.read_text().count(" m/s at t = ") == 2
+
+
+def test_searches_from_python_say_the_same():
+    base = [[0.05, 0.10, 2.85], [3.40, 0.22, 3.10], [1.60, 2.95, 2.60]]
+    robot, limits = cspr_jax.point_mass(base, mass=1.2, z_axis="up"), cspr_jax.Limits(cable_speed_max=np.full(3, 2.5))
+    answers = cspr_jax.minimum_arcs(robot, [[3.3, 1.2, 1.3], [2.6, 1.4, 1.4]], z0=1.5, limits=limits, max_arcs=25)
+    rate = jax.vmap(lambda motion, tau: cable_motion(robot, motion.state(tau))[1])
+    for i, own in enumerate(answers.causes()):
+        assert len(own) == (answers.arcs[i] == 0)
+        for cause in own:
+            tau = np.full(2, cause.t / answers.duration[i])
+            assert np.abs(rate(answers.motions(), tau)[i, cause.cables[0]]) == pytest.approx(cause.needed, rel=1e-9)
+            assert cause.needed > cause.allowed == 2.5
+    assert (answers.arcs == 0).any()
 
 
 def dropped(cases, flags):

@@ -4,6 +4,13 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.feasibility.demands import SAMPLES
+from cspr_jax.feasibility.problem import Problem
+from cspr_jax.plans.causes import Cause, causes
+from cspr_jax.plans.leg import each
 from cspr_jax.search.answers import Answers
 from cspr_jax.search.oscillations import OscillationAnswers
 from cspr_jax.search.platform_answers import PoseAnswers
@@ -14,14 +21,29 @@ from cspr_jax.trajectories.motion import Placed
 class _WithMotions:
     # Of a module and with its arguments, so that answers can be pickled and copied.
     make: Callable[[Any], Placed] = dataclasses.field(kw_only=True, repr=False, compare=False)
+    problem: Problem = dataclasses.field(kw_only=True, repr=False, compare=False)
 
     def motions(self) -> Any:
-        """Motions that the answers belong to: of the number of arcs found, else of the best candidate.
+        """Motions that the answers belong to: of the number of arcs found, else of the one that comes nearest.
 
         Returns:
             one motion whose leaves have a leading dimension (n,), in the robot's axes: `jax.vmap` takes it apart.
         """
         return self.make(self)
+
+    def causes(self: Any) -> list[tuple[Cause, ...]]:
+        """What stands between motions and feasible, in numbers.
+
+        Returns:
+            of each of the n motions its causes, the worst one first; none of a feasible one.
+        """
+        with double_precision():
+            placed, count = self.make(self), len(self.verdict)
+            if not count:
+                return []
+            frame = each(placed.frame, count)[0]
+            samples = SAMPLES * np.maximum(self.tried_arcs, 1) + 1
+            return causes(self.problem, frame, self, each(placed.motion, count), samples)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -84,7 +84,8 @@ def minimum_pose_arcs(  # noqa: PLR0913
         trial = Candidates(first, ends, depth, np.arange(len(depth)), (beta_hats, beta_hats))
         value = float(beta_hat) if isinstance(beta_hat, int) else beta_hat
         answers = pose_arcs(checker, trial, beta_hat=value, max_arcs=max_arcs)
-    return PlatformAnswers(**vars(answers), make=partial(_motions, problem, frame, trial, Kind(variable)))
+    make = partial(_motions, problem, frame, trial, Kind(variable))
+    return PlatformAnswers(**vars(answers), make=make, problem=problem)
 
 
 def _motions(

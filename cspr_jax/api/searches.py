@@ -70,7 +70,8 @@ def minimum_arcs(
         starts = rest_point(depth) if given is None else frame.inward(points_of("start", np.atleast_2d(given)))
         given_points = (np.broadcast_to(starts, ends.shape).copy(), frame.inward(ends), depth)
         answers = search_arcs(problem, *given_points, max_arcs=max_arcs)
-    return ArcsAnswers(**vars(answers), make=partial(_motions_between, problem, frame, given_points))
+    make = partial(_motions_between, problem, frame, given_points)
+    return ArcsAnswers(**vars(answers), make=make, problem=problem)
 
 
 def _motions_between(
@@ -115,7 +116,8 @@ def minimum_oscillations(
         problem, frame = kernel_problem(robot, amplitude, limits, free_end=True, families=("transition",))
         segments = transitions_to(problem, frame.inward(ends), depth)
         answers = search_oscillations(problem, segments, depth, max_arcs=max_arcs)
-    return TransitionAnswers(**vars(answers), make=partial(_transitions, problem, frame, segments))
+    make = partial(_transitions, problem, frame, segments)
+    return TransitionAnswers(**vars(answers), make=make, problem=problem)
 
 
 def _transitions(problem: Problem, frame: Frame, segments: Segment, answers: Answers) -> Placed[Hypocycloid]:

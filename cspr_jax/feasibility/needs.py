@@ -10,6 +10,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.minima import narrowed_places
 from cspr_jax.feasibility.limits import given, scales, slack, values
 from cspr_jax.feasibility.problem import Problem
@@ -92,8 +93,9 @@ def _with_tensions(robot: AnyRobot, limits: Limits) -> Limits:
     # Cables may not push where no smallest tension is given; redundant ones leave a choice.
     if robot.n_cables > robot.dof:
         return dataclasses.replace(limits, tension_min=None, tension_max=None)
-    least = np.zeros(robot.n_cables) if limits.tension_min is None else limits.tension_min
-    return dataclasses.replace(limits, tension_min=least)
+    if limits.tension_min is not None:
+        return limits
+    return dataclasses.replace(limits, tension_min=leaf(np.zeros(robot.n_cables)))
 
 
 def _pairs(robot: AnyRobot) -> tuple[tuple[int, int], ...]:
@@ -135,9 +137,9 @@ def _values(
             share = here / wrench_balance.normalised_determinant(robot, rest_point(z0), jnp.eye(3))
             reached.append(jnp.atleast_1d(share))
             slacks.append(jnp.atleast_1d(share))
-        if pairs:
+        if pairs and isinstance(robot, PlatformRobot):
             thick = 0.0 if robot.cable_diameter is None else robot.cable_diameter
-            apart = jnp.sqrt(jnp.sum(gaps(robot, np.array(pairs), state.position, state.rotation) ** 2, axis=1))
+            apart = jnp.sqrt(jnp.sum(gaps(robot, jnp.asarray(pairs), state.position, state.rotation) ** 2, axis=1))
             reached.append(apart)
             slacks.append((apart - thick) / z0)
         now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)

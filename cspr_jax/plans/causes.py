@@ -114,9 +114,9 @@ def cause_text(columns: Mapping[str, np.ndarray], i: int) -> str:
     flag = Verdict(int(columns["segment_cause"][i])) if "segment_cause" in columns else Verdict.FEASIBLE
     if flag.name is None or not flag:
         return ""
-    numbers = (float(columns[f"segment_{name}"][i]) for name in ("cause_time", "needed", "allowed"))
+    t, needed, allowed = (float(columns[f"segment_{name}"][i]) for name in ("cause_time", "needed", "allowed"))
     cable = int(columns["segment_cause_cable"][i])
-    return Cause(flag.text, (cable - 1,) if cable else (), *numbers, UNITS.get(flag, "m")).text
+    return Cause(flag.text, (cable - 1,) if cable else (), t, needed, allowed, UNITS.get(flag, "m")).text
 
 
 def _told_apart(first: float, second: float) -> tuple[str, str]:

@@ -211,7 +211,7 @@ def _missed(keys: PlanFile, is_feasible: np.ndarray, asked: Demands) -> list[str
 
 def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile) -> Demands:
     motions = [motion for leg in legs for motion in leg.motions]
-    counts = np.concatenate([_counts(leg, keys) for leg in legs])
+    counts = np.concatenate([_counts(leg, keys) for leg in legs]).tolist()
     # Of redundant cables alone the tensions depend on limits, and what is compiled on which are given.
     is_redundant = problem.robot.n_cables > problem.robot.dof
     limits = problem.limits if is_redundant else NO_LIMITS

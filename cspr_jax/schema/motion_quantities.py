@@ -75,7 +75,7 @@ SEGMENTS = {
             "segment_tried_arcs",
             "1",
             "number of arcs of the motion",
-            "Equal to `segment_arcs` where it is positive, else that of the best candidate.",
+            "Equal to `segment_arcs` where it is positive, else that of the motion that comes nearest.",
             "int16",
         ),
         Quantity("segment_verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint32"),

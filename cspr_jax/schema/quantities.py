@@ -61,8 +61,9 @@ QUANTITIES = {
         Quantity(
             "tried_arcs",
             "1",
-            "number of arcs of the best candidate",
-            "Equal to `arcs` where it is positive, else the number of arcs with the largest margin.",
+            "number of arcs of the motion",
+            "Equal to `arcs` where it is positive, else the smallest number that a single limit refuses; "
+            "if there is none, that with the largest margin.",
             "int16",
         ),
         Quantity(
@@ -98,8 +99,9 @@ QUANTITIES = {
         Quantity(
             "tried_oscillations",
             "1",
-            "number of oscillations of the best candidate",
-            "Equal to `oscillations` where it is positive, else the number with the largest margin.",
+            "number of oscillations of the motion",
+            "Equal to `oscillations` where it is positive, else the smallest number that a single limit refuses, or, "
+            "where there is none, that with the largest margin.",
             "int16",
         ),
         Quantity(

@@ -49,7 +49,7 @@ SENTENCES = {
     Verdict.BELOW_FLOOR: "The effector goes through the floor.",
     Verdict.CABLE_TOO_LONG: "A cable exceeds its largest length.",
     Verdict.CABLE_TOO_FAST: "A cable exceeds its largest speed.",
-    Verdict.NO_ARCS: "No number of arcs up to the largest is feasible; the other flags are the best candidate's.",
+    Verdict.NO_ARCS: "No number of arcs up to the largest is feasible; the other flags say what stands in the way.",
     Verdict.NOT_FINITE: "The numbers overflowed or are undefined.",
     Verdict.UNDECIDED: "The margin is within the stated tolerance of zero: neither proved nor refuted.",
     Verdict.CABLE_OVER_ACCELERATION: "A cable exceeds its largest acceleration.",

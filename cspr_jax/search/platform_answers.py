@@ -104,8 +104,8 @@ def settled(
     if checker.kind.plain:  # (3.66) has the one that its cosine has
         beta_hats = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
     doubtful = (smallest.undecided > 0) & ((smallest.arcs == 0) | (smallest.undecided < smallest.arcs))
-    asked = {"max_arcs": max_arcs, "fixed": fixed}
-    reasons = _reasons(checker, candidates, smallest, refused, checks, margins=margins, **asked)
+    parts = checker, candidates, smallest, refused, checks
+    reasons = _reasons(*parts, margins=margins, max_arcs=max_arcs, fixed=fixed)
     none = np.where(doubtful, Verdict.UNDECIDED.value, reasons | Verdict.NO_ARCS.value)
     less = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
     nothing = np.full(len(tried), np.nan)

@@ -131,7 +131,7 @@ def prove(problem: Problem, segments: Segment, arcs: np.ndarray, *, ignored: np.
     table = blocks(problem.amplitude, int(arcs.max()))
     sampled, bound, near = _looked_at(problem, segments, arcs, table)
     allowed = _allowance(sampled.shape[1], near)
-    counted = np.ones_like(sampled, bool) if ignored is None else ~ignored
+    counted = ~(np.zeros(sampled.shape, bool) if ignored is None else ignored)
     met, broken = bound + allowed > near[:, None], ~(sampled + allowed >= -near[:, None])
     feasible, infeasible = (met | ~counted).all(1), (broken & counted).any(1)
     open_ones = np.flatnonzero(~feasible & ~infeasible)
@@ -190,7 +190,7 @@ def _cut(
         items = (*jax.tree.map(lambda x, o=owner: x[o], (segments, arcs)), start, stop)
         sampled, proved = in_batches(partial(_closer_look, problem), items, size=BATCH)
         limit, allowed = near[owner, None], _allowance(sampled.shape[1], near[owner])
-        fails = ~(sampled + allowed >= -limit) & counted[owner]
+        fails: np.ndarray = ~(sampled + allowed >= -limit) & counted[owner]
         failing = np.flatnonzero(fails.any(1))
         np.logical_or.at(broken, owner[failing], fails[failing])
         refuted = broken.any(1)
