@@ -212,6 +212,7 @@ def kind_text(kind: MapKind) -> str:
         "takes": _names(kind.takes),
         "quantities": ", ".join(f"**`{name}`**" if name in kind.stored else f"`{name}`" for name in kind.quantities),
         "stored besides": "; ".join(f"with `{key}`: {_names(names)}" for key, names in kind.stored_with),
+        "only there": "; ".join(f"with {_names(keys)}: {_names(names)}" for names, keys in kind.only_with),
     }
     lines = [textwrap.fill(f"- {words}: {text}", 120, subsequent_indent="  ") for words, text in asked.items() if text]
     return f"`{kind.name}`: {kind.description}\n\n" + "".join(f"{line}\n" for line in lines)

@@ -299,7 +299,7 @@ def test_workspaces_are_compared_by_their_outlines():
             sides = Sides(
                 [AXES["x"], AXES["y"][::-1]], *(one.data[n][:, ::-1, k] for n in ("verdict", "wrench_margin"))
             )
-            wanted = outlines(sides._replace(margins=[sides.margins]))
+            wanted = outlines(sides._replace(margins=[]))  # half-way, as volumes count: scales of margins differ
             assert len(lines) == len(wanted)
             for found, (line, _) in zip(lines, wanted, strict=True):
                 np.testing.assert_array_equal(found, line)
@@ -309,7 +309,10 @@ def test_workspaces_are_compared_by_their_outlines():
     assert (panel.get_xlabel(), panel.get_ylabel(), panel.yaxis_inverted()) == ("x (m)", "z (m)", True)
     assert "y = 0.24 m (nearest to 0.3 m)" in upright.get_suptitle()
     near = cspr_jax.plot([ball(robot=ROBOT | {"base_points": CUBE.tolist()})] * 2)
-    assert words(near) == [f"wrench-feasible 1 to 50 N (result {k})" for k in (1, 2)] + ["spools"]
+    assert words(near) == [f"wrench-feasible 1 to 50 N (result {k})" for k in (1, 2)] + [
+        "spools",
+        "band: step of the grid",
+    ]
     # Over one axis they are lines, as other maps.
     lines = panels(cspr_jax.plot(list(SHAPES.values()), at={"y": 0.24, "z": 1.25}))[0]
     assert lines.get_ylabel() == "margin of the tensions (N)"
@@ -399,4 +402,4 @@ def test_a_legend_that_is_too_wide_is_broken(tmp_path):
         figure = cspr_jax.plot(list(SHAPES.values()), at={"z": 1.25}, size=size, output=tmp_path / "a.png")
         (legend,) = figure.legends
         assert legend.get_window_extent().width <= figure.bbox.width
-        assert legend.get_texts()[0].get_text() == "static" and len(legend.get_texts()) == 3
+        assert legend.get_texts()[0].get_text() == "static" and len(legend.get_texts()) == 4

@@ -8,6 +8,7 @@ import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.best import best_of, check_axis
+from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
 from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT_DIMS, PARTS, SEGMENTS
 from cspr_jax.schema.quantities import EVERY, flag_attributes
@@ -182,6 +183,6 @@ class Columns:
 def _described(name: str, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
     if name not in EVERY:
         return {}
-    quantity = EVERY[name]
+    quantity = quantity_of((settings or {}).get("map"), name)
     attributes = {"units": quantity.units, "long_name": quantity.long_name, "description": quantity.description}
     return attributes | (flag_attributes() if name.endswith("verdict") else value_attributes(quantity, settings))

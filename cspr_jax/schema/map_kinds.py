@@ -13,7 +13,9 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 from cspr_jax.errors import InputError
-from cspr_jax.schema.quantities import QUANTITIES, REFUSALS
+from cspr_jax.schema import workspace_columns as of_workspaces
+from cspr_jax.schema.pose_quantities import POSE_VERDICT
+from cspr_jax.schema.quantities import EVERY, QUANTITIES, REFUSALS
 from cspr_jax.schema.quantities import register as register_quantity
 from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.tiles import LARGEST_TILE, ORDINARY_COST, CellCost
@@ -32,6 +34,9 @@ class MapKind:
         stored: those that are stored where the sweep file does not say.
         stored_with: by key, those that are stored besides where that key is given. A key that came later than its map
             leaves what is stored without it, and so the identities of older sweeps, as they were.
+        only_with: quantities, and the keys without which they are no numbers: stored only where one of these is given.
+            A condition of a workspace is a key, too: "workspace.conditions.static".
+        own: rows of quantities that say of this kind more than those of the table; names, units and types are the same.
         planned: whether a cell is the motion of a plan of two poses, which `plans.of_cells` writes.
         pictured: those of which a picture shows the first that there is, where nobody says which.
         motionless: those that belong to a place or an instant, not to a motion.
@@ -71,6 +76,8 @@ class MapKind:
     cost: CellCost = ORDINARY_COST
     patterns: tuple[str, ...] = ()
     stored_with: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    only_with: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
+    own: tuple[Quantity, ...] = ()
     planned: bool = False
     by_processes: bool = False
 
@@ -78,6 +85,10 @@ class MapKind:
     def keys(self) -> tuple[str, ...]:
         """Keys that may be given, of those that only some kinds have."""
         return (*self.needs, *self.takes, *self.one_of)
+
+    def keys_of(self, quantity: str) -> tuple[str, ...]:
+        """Keys without which a quantity is no number, of which one must be given; empty where none is needed."""
+        return next((keys for names, keys in self.only_with if quantity in names), ())
 
     def load(self) -> Any:
         """The class that computes it, imported now.
@@ -117,13 +128,6 @@ _OF_LAUNCHES = (
     *("release_x", "release_y", "release_z"),
 )
 _OF_LENGTHS = ("sigma_p", "sigma_r")
-_OF_WORKSPACES = ("verdict", "wrench_margin", "closure_margin", "clearance", "orientation_fraction", "cell_side")
-_AMONG_OBSTACLES = ("nearest_bodies", "clearance_cables", "clearance_obstacles")
-_MORE_OF_WORKSPACES = (
-    *_AMONG_OBSTACLES,
-    *("clearance_platform", "length_margin", "speed_margin", "capacity_margin"),
-)
-_OF_SHAPES = ("nearest_bodies", "clearance_cables", "clearance_platform")
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 
@@ -263,6 +267,7 @@ MAP_KINDS: dict[str, MapKind] = {
             cost=CellCost(limits=0.0),
             quantities=_OF_ACCELERATIONS,
             stored=_OF_ACCELERATIONS,
+            own=(POSE_VERDICT,),
             pictured=("acceleration_margin",),
             motionless=_OF_ACCELERATIONS,
             families=(),
@@ -317,23 +322,32 @@ MAP_KINDS: dict[str, MapKind] = {
             description="poses that a robot of any pattern can hold, or places at which it can hold sets of them",
             implementation="cspr_jax.maps.workspace:WorkspaceMap",
             cost=CellCost(seconds=2e-6, limits=0.0),
-            quantities=(*_OF_WORKSPACES, *_MORE_OF_WORKSPACES),
-            stored=_OF_WORKSPACES,
-            stored_with=(
-                ("workspace.obstacle", _AMONG_OBSTACLES),
-                ("workspace.platform_box", _OF_SHAPES),
-                ("workspace.platform_hull", _OF_SHAPES),
-                ("workspace.speed", ("speed_margin",)),
-                ("workspace.capacity_length", ("capacity_margin",)),
-                ("workspace.angular_speed", ("speed_margin",)),
-            ),
-            pictured=("wrench_margin", "closure_margin", "clearance"),
-            motionless=(*_OF_WORKSPACES, *_MORE_OF_WORKSPACES),
+            quantities=of_workspaces.QUANTITIES,
+            stored=of_workspaces.STORED,
+            stored_with=of_workspaces.STORED_WITH,
+            only_with=of_workspaces.ONLY_WITH,
+            own=(POSE_VERDICT,),
+            pictured=("wrench_margin", "closure_margin", "clearance", "verdict"),
+            motionless=of_workspaces.QUANTITIES,
             families=(),
             takes=("workspace", "limits", "axes.tilt_azimuth", "axes.tilt", "axes.torsion"),
         ),
     )
 }
+
+
+def quantity_of(kind: object, name: str) -> Quantity:
+    """The row of a quantity, as a kind of map says it.
+
+    Args:
+        kind: name of the kind; of anything else the row is that of the table.
+        name: of the quantity or axis.
+
+    Returns:
+        the row.
+    """
+    own = MAP_KINDS[kind].own if isinstance(kind, str) and kind in MAP_KINDS else ()
+    return next((row for row in own if row.name == name), EVERY[name])
 
 
 def register(kind: MapKind, *own: Quantity) -> None:
@@ -353,7 +367,9 @@ def register(kind: MapKind, *own: Quantity) -> None:
         if name not in QUANTITIES and name not in [quantity.name for quantity in own]:
             raise InputError("quantities", name, "a row of schema.quantities.QUANTITIES")
     rows = [("stored", kind.stored), ("pictured", kind.pictured), ("motionless", kind.motionless)]
-    for key, names in [*rows, *(("stored_with", names) for _, names in kind.stored_with)]:
+    rows += [("stored_with", names) for _, names in kind.stored_with]
+    rows += [("only_with", names) for names, _ in kind.only_with]
+    for key, names in [*rows, ("own", tuple(row.name for row in kind.own))]:
         for name in names:
             if name not in kind.quantities:
                 raise InputError(key, name, "one of the quantities of the map")

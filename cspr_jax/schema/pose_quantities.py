@@ -2,13 +2,22 @@
 
 from cspr_jax.schema.quantity import Quantity
 
+# In place of the row of motions.
+POSE_VERDICT = Quantity(
+    "verdict",
+    "1",
+    "verdict of the pose",
+    "Bit flags of what keeps the robot from resting there under all conditions; 0: nothing does.",
+    "uint32",
+    unflagged="inside",
+)
 POSES = (
     Quantity(
         "wrench_margin",
         "N",
         "margin of the tensions",
         "Largest distance that tensions which supply all wrenches can keep from their finite limits; negative "
-        "outside of the workspace, infinite where nothing bounds it.",
+        "outside of the workspace, infinite where nothing bounds it, -inf where the cables do not span the wrenches.",
         signed=True,
         better="larger",
     ),
@@ -17,7 +26,8 @@ POSES = (
         "N",
         "capacity margin",
         "Distance of the wrenches that must be supplied from the faces of all that the cables can supply, moments over "
-        "`workspace.capacity_length`; negative outside of the workspace.",
+        "`workspace.capacity_length`; negative outside of the workspace, -inf where the cables do not span the "
+        "wrenches.",
         signed=True,
     ),
     Quantity(
@@ -61,6 +71,13 @@ POSES = (
         "platform; 4: the platform and an obstacle; 0: nothing can meet, or not requested.",
         "int16",
         meanings="nearest-bodies",
+    ),
+    Quantity(
+        "floor_margin",
+        "m",
+        "height above the floor",
+        "Height above the floor of the mass centre, or of the joint of a body that turns about one; negative below it.",
+        signed=True,
     ),
     Quantity(
         "length_margin",

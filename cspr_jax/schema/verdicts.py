@@ -39,14 +39,16 @@ class Verdict(enum.IntFlag):
 
 # Flags that do not say what stands in the way.
 NO_REASON = Verdict.FEWER_ARCS_UNDECIDED | Verdict.NO_ARCS
+# Flags that leave a verdict open.
+OPEN = Verdict.UNDECIDED | Verdict.NOT_FINITE
 SENTENCES = {
     Verdict.SLACK_CABLE: "A cable would have to push, or falls below its smallest tension.",
     Verdict.OVER_TENSION: "A cable exceeds its largest tension.",
-    Verdict.SINGULAR: "The cables cannot carry every wrench at some pose on the way.",
+    Verdict.SINGULAR: "The cables cannot carry every wrench at the pose, or at some pose on the way.",
     Verdict.CABLE_CABLE: "Two cables touch.",
     Verdict.CABLE_PLATFORM: "A cable touches the platform.",
     Verdict.ABOVE_SPOOLS: "The effector is on or above the plane of the spools.",
-    Verdict.BELOW_FLOOR: "The effector goes through the floor.",
+    Verdict.BELOW_FLOOR: "The effector is below the floor, or goes through it.",
     Verdict.CABLE_TOO_LONG: "A cable exceeds its largest length.",
     Verdict.CABLE_TOO_FAST: "A cable exceeds its largest speed.",
     Verdict.NO_ARCS: "No number of arcs up to the largest is feasible; the other flags say what stands in the way.",
@@ -59,3 +61,16 @@ SENTENCES = {
     Verdict.OBSTACLE: "A cable or the platform touches an obstacle.",
     Verdict.UNCERTAINTY: "Feasible for the robot as it is described, but not for every robot within its uncertainty.",
 }
+
+
+def conjunction(flags: np.ndarray) -> np.ndarray:
+    """Verdict of several conditions that must all be met: one that is broken decides, whatever others leave open.
+
+    Args:
+        flags: (...) flags of all conditions together.
+
+    Returns:
+        (...) the same, without the flags that leave it open where another one is set.
+    """
+    refuted = flags & ~flags.dtype.type(OPEN.value)
+    return np.where(refuted != 0, refuted, flags)

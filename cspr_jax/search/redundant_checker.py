@@ -29,7 +29,7 @@ from cspr_jax.feasibility.platform.redundant_kernels import cable_vectors, end_w
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.workspace import exact
 from cspr_jax.robots.platform import pairs_apart
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import Verdict, conjunction
 from cspr_jax.search.beta_hat import LARGEST
 from cspr_jax.search.workspace_questions import FEASIBLE, question
 from cspr_jax.search.workspaces import WorkspaceSearch
@@ -221,9 +221,7 @@ class RedundantChecker(MotionChecker):
             verdict |= np.where(counts & (value <= -TOLERANCE), row.flag.value, 0)
         close = (np.abs(least[:, :-1]) <= TOLERANCE) & np.append(True, counted)
         verdict |= np.where(close.any(1), Verdict.UNDECIDED.value, 0)
-        # What is broken for certain is said alone.
-        reasons = verdict & ~Verdict.UNDECIDED.value
-        verdict = np.where(reasons != 0, reasons, verdict)
+        verdict = conjunction(verdict)
         is_finite = ~np.isnan(least).any(1) & (duration > 0.0)
         return PoseChecks(
             np.where(is_finite, verdict, Verdict.NOT_FINITE.value),

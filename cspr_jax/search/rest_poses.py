@@ -12,7 +12,7 @@ from cspr_jax.feasibility.workspace.geometry import mass_centres
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.limits import Limits
-from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.schema.verdicts import FLAGS, OPEN, Verdict, conjunction
 from cspr_jax.search.workspace_cells import WorkspaceCells
 from cspr_jax.search.workspace_clearances import at_rest, flags, nearest_bodies
 from cspr_jax.search.workspace_questions import CLOSURE
@@ -23,7 +23,7 @@ from cspr_jax.search.workspaces import WorkspaceSearch
 CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
 MARGINS = (
     *("wrench_margin", "closure_margin", "capacity_margin"),
-    *("clearance", *CLEARANCES, "length_margin", "speed_margin"),
+    *("clearance", *CLEARANCES, "floor_margin", "length_margin", "speed_margin"),
 )
 NEAREST = "nearest_bodies"
 BATCH = 4096
@@ -84,9 +84,8 @@ class RestPoses:
             verdict |= flags(every)
         for name, flag, slack in self._limited(origins, quaternions):
             verdict |= np.where((slack < 0.0).any(1), flag, 0).astype(FLAGS)
-            if name:
-                found[name] = slack.min(1)
-        return {"verdict": verdict, **found}
+            found[name] = slack.min(1)
+        return {"verdict": conjunction(verdict), **found}
 
     def sides(self, origins: np.ndarray, half: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
         """Which cells, at one orientation, are proved to lie wholly on one side of the workspace.
@@ -130,10 +129,10 @@ class RestPoses:
         return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
 
     def _limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
-        # Of each limit its quantity, or "", its flag, and (n, k) what is left of it.
+        # Of each limit its quantity, its flag, and (n, k) what is left of it.
         places = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
-            yield "", Verdict.BELOW_FLOOR, float(self.limits.floor) - places[:, 2:]
+            yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - places[:, 2:]
         if self.limits.cable_length_max is not None:
             slack = np.asarray(self.limits.cable_length_max) - self._lengths(places, quaternions)
             yield "length_margin", Verdict.CABLE_TOO_LONG, slack
@@ -173,14 +172,16 @@ def over_orientations(
 def _of_places(every: Answers, volume: np.ndarray, kind: OrientationSet) -> Answers:
     # (n_places, n_orientations) each.
     verdict = every["verdict"]
-    inside, is_open = verdict == 0, verdict == Verdict.UNDECIDED
+    inside = verdict == 0
+    is_open = ~inside & ((verdict & ~FLAGS(OPEN.value)) == 0)
     if kind == "inclusion":
         best, is_met = np.fmax.reduce, inside.any(1)
         may_be = ~is_met & is_open.any(1)
     else:
         best, is_met = np.fmin.reduce, inside.all(1)
         may_be = ~is_met & (inside | is_open).all(1)
-    reasons = np.where(is_met, 0, np.where(may_be, Verdict.UNDECIDED.value, _most_frequent(verdict)))
+    # A set that is refuted is so for the orientations that are refuted, however many others are open.
+    reasons = np.where(is_met, 0, _most_frequent(np.where(is_open == may_be[:, None], verdict, 0)))
     found = {name: best(every[name], axis=1) for name in MARGINS}
     at = (every["clearance"] == found["clearance"][:, None]).argmax(1)
     found[NEAREST] = every[NEAREST][np.arange(len(at)), at]
@@ -188,7 +189,7 @@ def _of_places(every: Answers, volume: np.ndarray, kind: OrientationSet) -> Answ
 
 
 def _most_frequent(verdict: np.ndarray) -> np.ndarray:
-    # Of each row the flags that most of those have that are not inside.
+    # Of each row the flags that most of those have that are not 0.
     values = np.unique(verdict[verdict != 0])
     if len(values) == 0:
         return np.zeros(len(verdict), FLAGS)

@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
 from cspr_jax.schema.quantities import AXES, QUANTITIES, flag_attributes
 from cspr_jax.schema.quantity import Quantity
@@ -96,7 +97,7 @@ def make_datasets(
     shape = tuple(len(points) for points in axes.values())
     for name in store:
         data = new_dataset(file, name, shape, dtype_of(name, dtype), tile)
-        describe(data, QUANTITIES[name])
+        describe(data, quantity_of((settings or {}).get("map"), name))
         if QUANTITIES[name].unflagged:
             set_attributes(data, flag_attributes())
         set_attributes(data, value_attributes(QUANTITIES[name], settings))

@@ -13,7 +13,7 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError, StoreError, one_line, shown
 from cspr_jax.schema import labelled
 from cspr_jax.schema.best import best_of, check_axis
-from cspr_jax.schema.map_kinds import MAP_KINDS
+from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
 from cspr_jax.schema.motion_quantities import FLIGHT_DIMS, PARTS, SEGMENTS
 from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES
 from cspr_jax.store.documents import plain_json
@@ -107,7 +107,7 @@ class Result:
             for name, choice in self.choices.items()
         }
         choices = earlier | {axis: Choice(points, places)}
-        units, labels = _described([*others, *choices, *data])
+        units, labels = _described(self.settings.get("map"), [*others, *choices, *data])
         return dataclasses.replace(self, axes=others, data=data, units=units, labels=labels, choices=choices)
 
     def place(self, index: tuple[int, ...]) -> dict[str, float]:
@@ -168,13 +168,14 @@ def open_result(path: Path) -> Result:
     except ConfigError as error:
         raise StoreError(str(error)) from error
     names = [*axes, *data]
-    units, labels = _described(names)
+    units, labels = _described(settings.get("map"), names)
     return Result(axes, data, units, labels, attributes, settings)
 
 
-def _described(names: list[str]) -> tuple[dict[str, str], dict[str, str]]:
-    # Units and long names.
-    return {name: EVERY[name].units for name in names}, {name: EVERY[name].long_name for name in names}
+def _described(kind: object, names: list[str]) -> tuple[dict[str, str], dict[str, str]]:
+    # Units and long names, as the kind of map says them.
+    rows = {name: quantity_of(kind, name) for name in names}
+    return {name: row.units for name, row in rows.items()}, {name: row.long_name for name, row in rows.items()}
 
 
 def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:

@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.config.reading import Table
+from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Axes, SweepFile
 from cspr_jax.config.wording import either
+from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, kinds_with
@@ -92,6 +94,50 @@ def is_given(keys: SweepFile, name: str) -> bool:
         whether it is there.
     """
     return _missing(keys, name) is None
+
+
+def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
+    """Whether a sweep, or its robot, asks for what a key stands for.
+
+    Args:
+        keys: the sweep.
+        robot: its robot, whose limits hold where the sweep gives none.
+        name: dotted; a condition of a workspace as "workspace.conditions.static".
+
+    Returns:
+        whether it does.
+    """
+    table, _, last = name.rpartition(".")
+    if table == "workspace.conditions":
+        return last in (keys.workspace or WorkspaceTable()).conditions
+    if table == "limits" and getattr(robot, last, None) is not None:
+        return True
+    return is_given(keys, name) and getattr(getattr(keys, table), last) is not False
+
+
+def check_store(kind: MapKind, keys: SweepFile, robot: RobotFile, path: Path) -> None:
+    """Refuse to store what the map does not give, or what nobody asks for.
+
+    Args:
+        kind: of the map.
+        keys: the sweep.
+        robot: its robot.
+        path: of the file.
+
+    Raises:
+        ConfigError: such a quantity.
+    """
+    for name in keys.run.store or ():
+        if name not in kind.quantities:
+            raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(kind.quantities)} in this map")
+        needed = kind.keys_of(name)
+        if needed and not any(is_asked(keys, robot, key) for key in needed):
+            raise ConfigError(path, f"run.store: {name}: must be absent without {either(map(_as_written, needed))}")
+
+
+def _as_written(name: str) -> str:
+    table, _, last = name.rpartition(".")
+    return f'"{last}" among workspace.conditions' if table == "workspace.conditions" else name
 
 
 def _missing(keys: SweepFile, name: str) -> str | None:

@@ -17,13 +17,14 @@ from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import checked, parse_toml, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_points
+from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
 from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
 from cspr_jax.store.netcdf import bytes_needed, dtype_of
 from cspr_jax.store.shards import Layout
-from cspr_jax.sweep.checks import check_map, check_points, is_given
+from cspr_jax.sweep.checks import check_map, check_points, check_store, is_asked, is_given
 from cspr_jax.sweep.tile_sizes import tile_cells
 
 # Each tile is a file.
@@ -115,11 +116,8 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     own = _orientation_axes(keys) if kind.is_over_orientations else {}
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
     counts |= {name: len(points) for name, points in own.items()}
-    more = [names for key, names in kind.stored_with if is_given(keys, key)]
-    store = list(keys.run.store or dict.fromkeys((*kind.stored, *itertools.chain(*more))))
-    for name in store:
-        if name not in kind.quantities:
-            raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(kind.quantities)} in this map")
+    check_store(kind, keys, robot, path)
+    store = list(keys.run.store or _usual(kind, keys, robot))
     shape = tuple(counts.values())
     usual = tile_shape(shape, tile_cells(kind, keys, math.prod(shape)))
     tile = usual if keys.run.tile is None else _tile(keys.run.tile, shape, path)
@@ -133,6 +131,14 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     settings["run"] |= {"tile": list(tile), "store": store}
     types = {name: dtype_of(name, keys.run.dtype) for name in store}
     return Sweep(path, kind, keys, robot, Grid(axes, tile), store, settings, text, types)
+
+
+def _usual(kind: MapKind, keys: SweepFile, robot: RobotFile) -> list[str]:
+    # What is stored where the file does not say.
+    more = [names for key, names in kind.stored_with if is_given(keys, key)]
+    names = dict.fromkeys((*kind.stored, *itertools.chain(*more)))
+    needed = {name: kind.keys_of(name) for name in names}
+    return [name for name in names if not needed[name] or any(is_asked(keys, robot, key) for key in needed[name])]
 
 
 def _count(axis: AxisRange | list[float]) -> int:
@@ -225,11 +231,14 @@ def attributes(sweep: Sweep) -> dict[str, Any]:
     Returns:
         attributes of the whole file.
     """
-    robot = sweep.robot
-    title = f"{sweep.kind.title}, robot {robot.name}, amplitude {sweep.settings['trajectory']['amplitude']}"
+    robot, words = sweep.robot, [sweep.kind.title, f"robot {sweep.robot.name}"]
+    if "workspace" in sweep.kind.takes:
+        words += (sweep.keys.workspace or WorkspaceTable()).conditions
+    if sweep.kind.families and sweep.keys.trajectory.takes_amplitude:
+        words.append(f"amplitude {sweep.settings['trajectory']['amplitude']}")
     return {
         "Conventions": "CF-1.11",
-        "title": title,
+        "title": ", ".join(words),
         "schema": FORMAT_VERSION,
         "map": sweep.kind.name,
         "identity": sweep.identity,

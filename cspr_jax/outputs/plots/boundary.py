@@ -10,8 +10,9 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
 
 # Where one of these is not positive, a pose is outside.
-MARGINS = ("wrench_margin", "closure_margin", "clearance")
-# Reasons to be outside that no margin tells.
+MARGINS = ("wrench_margin", "closure_margin", "clearance", "floor_margin", "length_margin", "speed_margin")
+# Reasons to be outside whose margins files of earlier versions do not hold.
+LATER = {"floor_margin": Verdict.BELOW_FLOOR, "length_margin": Verdict.CABLE_TOO_LONG}
 WITHOUT_MARGIN = (Verdict.BELOW_FLOOR | Verdict.CABLE_TOO_LONG).value
 # Of the way between two points: what keeps the boundary off the points themselves.
 OFF = 1e-6
@@ -33,11 +34,13 @@ class Sides(NamedTuple):
         points: of each of the d axes, rising.
         verdict: (n_1, ..., n_d) flags; 0: inside.
         margins: of that shape each, positive inside; NaN where nobody asks.
+        unmeasured: flags of reasons to be outside of which there is no margin.
     """
 
     points: list[np.ndarray]
     verdict: np.ndarray
     margins: list[np.ndarray]
+    unmeasured: int = WITHOUT_MARGIN
 
 
 class Boundary(NamedTuple):
@@ -75,7 +78,8 @@ def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Sides:
 
     points = [result.axes[axis][order] for axis, order in zip(axes, orders, strict=True)]
     margins = [part(name).astype(float) for name in MARGINS if name in result.data]
-    return Sides(points, part("verdict"), margins)
+    unmeasured = sum(flag.value for name, flag in LATER.items() if name not in result.data)
+    return Sides(points, part("verdict"), margins, unmeasured)
 
 
 def boundary(sides: Sides) -> Boundary:
@@ -139,7 +143,7 @@ def _cut(is_in: np.ndarray, simplices: np.ndarray, hand: int) -> np.ndarray:
 def _crossings(sides: Sides, pairs: np.ndarray) -> np.ndarray:
     # (n, d) of (n, 2) points, the first inside; -1 for one beyond the end of the grid, at the first.
     inner, outer = pairs[:, 0], np.where(pairs[:, 1] < 0, pairs[:, 0], pairs[:, 1])
-    part = np.where(sides.verdict.reshape(-1)[outer] & WITHOUT_MARGIN, 0.5, np.inf)
+    part = np.where(sides.verdict.reshape(-1)[outer] & sides.unmeasured, 0.5, np.inf)
     for margin in sides.margins:
         near, far = margin.reshape(-1)[inner], margin.reshape(-1)[outer]
         with np.errstate(all="ignore"):
@@ -148,6 +152,22 @@ def _crossings(sides: Sides, pairs: np.ndarray) -> np.ndarray:
     part = np.clip(np.where(np.isfinite(part), part, 0.5), OFF, 1.0 - OFF)
     grid = np.stack([x.reshape(-1) for x in np.meshgrid(*sides.points, indexing="ij")], axis=1)
     return grid[inner] + part[:, None] * (grid[outer] - grid[inner])
+
+
+def step_of(sides: Sides) -> np.ndarray:
+    """The part of a plane in which the boundary may lie: between neighbours on different sides.
+
+    Args:
+        sides: of the points of a grid over two axes.
+
+    Returns:
+        (n, 3, 2) triangles.
+    """
+    is_in = sides.verdict == 0
+    grid = np.stack([x.reshape(-1) for x in np.meshgrid(*sides.points, indexing="ij")], axis=1)
+    corners = np.concatenate([places for places, _ in _simplices(is_in)])
+    inside = is_in.reshape(-1)[corners]
+    return grid[corners[inside.any(1) & ~inside.all(1)]]
 
 
 def outlines(sides: Sides) -> list[tuple[np.ndarray, bool]]:

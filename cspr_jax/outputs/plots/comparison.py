@@ -8,14 +8,17 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path as Path2D
 
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.boundary import Sides, outlines, sides_of
+from cspr_jax.outputs.plots.boundary import Sides, outlines, sides_of, step_of
 from cspr_jax.outputs.plots.conditions import conditions
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import COLOURS, PANELS, STYLES, axis_label, chosen, robot_name, values
 from cspr_jax.outputs.plots.layout import columns_of, panels
 from cspr_jax.outputs.plots.marks import mark
+from cspr_jax.outputs.plots.obstacles import draw_obstacles
 from cspr_jax.outputs.plots.posed import robot_of
 from cspr_jax.outputs.plots.selection import SAME
 from cspr_jax.store.result import Result
@@ -25,6 +28,7 @@ SPACE = ("x", "y", "z")
 SIDE, ALONE = 3.1, 5.2  # inches, the longer side of a panel
 # Spools are shown if the panels do not get longer than this many times the grid.
 STRETCH, MARGIN = 1.5, 0.04
+BAND = 0.18  # opacity
 _END: dict[str, Any] = {"linestyle": ":", "linewidth": 0.7}
 
 
@@ -78,6 +82,8 @@ def comparison_figure(every: list[Compared], fixed: list[str]) -> Figure:
         panel.set_aspect("equal")
         panel.grid(alpha=0.3)
         place = every[0].place | ({} if over is None else {over: float(height)})
+        for one in every:
+            legend |= draw_obstacles(panel, one.result, plane, place)
         legend |= mark(panel, first, "verdict", plane, place)
         for i, one in enumerate(every):
             here = {} if over is None else {over: int(np.abs(one.result.axes[over] - height).argmin())}
@@ -88,6 +94,7 @@ def comparison_figure(every: list[Compared], fixed: list[str]) -> Figure:
         panel.set_xlabel(axis_label(first, plane[0]))
     for panel in left:
         panel.set_ylabel(axis_label(first, plane[1]))
+    legend["band: step of the grid"] = Patch(facecolor="black", alpha=BAND)
     _add_legend(figure, _names(every), legend)
     robots = list(dict.fromkeys(robot_name(one.result) for one in every))
     figure.suptitle("\n".join([f"{', '.join(robots)}: workspaces", ", ".join(fixed)]).strip())
@@ -162,11 +169,24 @@ def _size(box: np.ndarray, count: int, lines: int) -> tuple[float, float]:
 
 def _outline(panel: Axes, sides: Sides, number: int) -> dict[str, Artist]:
     # Along the end of the grid it is thin: nobody has asked what lies beyond.
-    ends = False
-    for corners, is_end in outlines(sides):
+    # Margins of different conditions have different scales, so that zeros between their values would not compare: the
+    # line runs half-way between points on different sides, as volumes count them, in a band as wide as that step.
+    plain, ends = sides._replace(margins=[]), False
+    _band(panel, plain, number)
+    for corners, is_end in outlines(plain):
         ends |= is_end
         panel.plot(*corners.T, color=COLOURS[number], **(_END if is_end else _look(number)))
     return {"end of the grid": Line2D([], [], color="black", **_END)} if ends else {}
+
+
+def _band(panel: Axes, sides: Sides, number: int) -> None:
+    # All triangles of the grid with corners on both sides: where the boundary may lie.
+    triangles = step_of(sides)
+    path = Path2D(
+        np.concatenate([triangles, triangles[:, :1]], axis=1).reshape(-1, 2),
+        np.tile([Path2D.MOVETO, Path2D.LINETO, Path2D.LINETO, Path2D.CLOSEPOLY], len(triangles)),
+    )
+    panel.add_patch(PathPatch(path, facecolor=COLOURS[number], alpha=BAND, linewidth=0.0))
 
 
 def _look(number: int) -> dict[str, Any]:

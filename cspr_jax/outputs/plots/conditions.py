@@ -6,9 +6,76 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.outputs.plots.notes import table
 from cspr_jax.outputs.plots.posed import asked, robot_of
+from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
 
+# Margins of the conditions of a workspace: a pose is inside where all that are asked for are positive.
+MARGINS = {
+    "static": "wrench_margin",
+    "wrench-feasible": "wrench_margin",
+    "wrench-closure": "closure_margin",
+    "interference-free": "clearance",
+}
 SETS = {"maximum": "some", "inclusion": "some", "dextrous": "every", "total": "every"}
+
+
+def is_workspace(result: Result) -> bool:
+    """Whether a result is a map of a workspace with its verdicts.
+
+    Args:
+        result: any.
+
+    Returns:
+        whether it is.
+    """
+    return result.attributes.get("map") == "workspace" and "verdict" in result.data
+
+
+def said(result: Result) -> list[str]:
+    """What the title of a picture of a map says of its conditions.
+
+    Args:
+        result: any map.
+
+    Returns:
+        the conditions of a workspace, as one phrase; empty of another map.
+    """
+    return [conditions(result)] if is_workspace(result) and result.settings else []
+
+
+def shown_first(result: Result) -> str:
+    """The quantity of a map that a picture shows where nobody says which.
+
+    Args:
+        result: the map.
+
+    Returns:
+        of a workspace with one margin that margin, with several the verdict, which alone counts all conditions; else
+        the one that its kind of map is about.
+    """
+    known = [name for name in MAP_KINDS[result.attributes["map"]].pictured if name in result.data]
+    if is_workspace(result) and len({MARGINS[name] for name in asked(result).conditions}) > 1:
+        return "verdict"
+    every = [*known, *result.data]
+    # Of a margin that nobody asks for there is no picture.
+    return next((name for name in every if not np.isnan(result.data[name]).all()), every[0])
+
+
+def excluded(result: Result, name: str, data: np.ndarray, verdict: np.ndarray) -> np.ndarray:
+    """Cells that a margin of a workspace counts as inside, but other conditions exclude.
+
+    Args:
+        result: the map.
+        name: of the quantity.
+        data: (...) the quantity.
+        verdict: (...) the verdicts of the same cells.
+
+    Returns:
+        (...) whether a cell is such a one; nowhere if the quantity is no margin of a workspace.
+    """
+    if not is_workspace(result) or not name.endswith(("_margin", "clearance")):
+        return np.zeros(data.shape, bool)
+    return (data > 0.0) & (verdict != 0)
 
 
 def conditions(result: Result) -> str:
@@ -29,6 +96,11 @@ def conditions(result: Result) -> str:
         given = limits.get(key, getattr(robot, key, None))
         if given is not None:
             words.append(text.format(_numbers(given)))
+    if wanted.speed is not None or wanted.angular_speed is not None:
+        given = ((wanted.speed, "m/s"), (wanted.angular_speed, "rad/s"))
+        words.append("moving at up to " + " and ".join(f"{value:.4g} {unit}" for value, unit in given if value))
+    if wanted.obstacle:
+        words.append("one obstacle" if len(wanted.obstacle) == 1 else f"{len(wanted.obstacle)} obstacles")
     return ", ".join(words + _orientations(wanted))
 
 

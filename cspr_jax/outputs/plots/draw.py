@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
+from cspr_jax.outputs.plots.conditions import excluded, is_workspace, said, shown_first
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
 from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, values
 from cspr_jax.outputs.plots.lines import Line, line_figure, lines_of, names_of, overlaid
@@ -18,11 +19,9 @@ from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.sections import POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.outputs.plots.solid import SPACE, solid_figure
-from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
 
 TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
-WORKSPACE = "workspace"
 
 
 class View(NamedTuple):
@@ -114,7 +113,7 @@ def _refuse(option: str, others: dict[str, str | bool | None]) -> None:
 def _solid(results: list[Result], at: dict[str, float]) -> Figure:
     result = results[0]
     counts = [len(np.unique(result.axes.get(axis, ()))) for axis in SPACE]
-    if len(results) > 1 or not _is_workspace(result) or min(counts) < 2:
+    if len(results) > 1 or not is_workspace(result) or min(counts) < 2:
         allowed = 'of one result of map = "workspace" that holds verdicts over two points or more of each of x, y and z'
         raise InputError("--solid", "no workspace in space", allowed)
     if set(at) & set(SPACE):
@@ -131,10 +130,6 @@ def _comparison(names: list[str], results: list[Result], at: dict[str, float]) -
         every.append(Compared(result, name, across, index))
         constant.append(notes(result, "", fixed, [*across, *index]))
     return comparison_figure(every, [note for note in constant[0] if all(note in other for other in constant)])
-
-
-def _is_workspace(result: Result) -> bool:
-    return result.attributes.get("map") == WORKSPACE and "verdict" in result.data
 
 
 def _varying(result: Result, at: dict[str, float]) -> list[str]:
@@ -159,7 +154,7 @@ def _overlay(
     if not any(result.is_map for result in results):
         _refuse("several motions", {"--quantity": quantity, "--at": bool(at)})
         return motion_comparison_figure(results, [str(path) for path in paths])
-    if quantity in (None, "verdict") and all(_is_workspace(one) and len(_varying(one, at)) > 1 for one in results):
+    if quantity in (None, "verdict") and all(is_workspace(one) and len(_varying(one, at)) > 1 for one in results):
         return _comparison([str(path) for path in paths], results, at)
     for path, result in zip(paths, results, strict=True):
         if not result.is_map:
@@ -194,12 +189,17 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     told = _told(result, at, order) if tuple(view.across[:2]) == POLAR else None
     if not panels:
         data, told = data[..., None], None if told is None else told[..., None]
-    section = Section(view.name, view.across[:2], panels, view.place, _constant(result, view))
+    hatched = np.zeros(data.shape, bool)
+    if is_workspace(result):
+        verdict = _panelled(result, _view(result, "verdict", at), order).data.reshape(data.shape)
+        hatched = excluded(result, view.name, data, verdict)
+    section = Section(view.name, view.across[:2], panels, view.place, _constant(result, view), hatched)
     return section_figure(result, section, data, told)
 
 
 def _constant(result: Result, view: View, name: str | None = None) -> list[str]:
-    return notes(result, view.name if name is None else name, view.fixed, [*view.across, *view.place])
+    fixed = notes(result, view.name if name is None else name, view.fixed, [*view.across, *view.place])
+    return [*said(result), *fixed]
 
 
 def _told(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
@@ -237,10 +237,7 @@ def _panelled(result: Result, view: View, order: list[str]) -> View:
 
 
 def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
-    pictured = MAP_KINDS[result.attributes["map"]].pictured
-    known = [name for name in (*pictured, *result.data) if name in result.data]
-    # Of a margin that nobody asks for there is no picture.
-    name = quantity or next((name for name in known if not np.isnan(result.data[name]).all()), known[0])
+    name = quantity or shown_first(result)
     if name not in result.data:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
     data, fixed, place = result.data[name], [], {}

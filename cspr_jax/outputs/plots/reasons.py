@@ -2,14 +2,12 @@
 
 import numpy as np
 
-from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 
-# In this order: what lies deeper comes first. The colours are Okabe and Ito's, and greys.
+# In this order: what lies deeper comes first, and what is refuted before what is left open. The colours are Okabe and
+# Ito's, and greys.
 REASONS = {
     Verdict.NOT_ACCESSIBLE: ("not accessible", "#f4f4f4"),
-    Verdict.UNDECIDED: ("undecided", "#F0E442"),
-    Verdict.NOT_FINITE: ("not finite", "#000000"),
     Verdict.ABOVE_SPOOLS: ("above the spools", "#9e9e9e"),
     Verdict.BELOW_FLOOR: ("below the floor", "#6f6f6f"),
     Verdict.SINGULAR: ("singular", "#D55E00"),
@@ -23,16 +21,18 @@ REASONS = {
     Verdict.CABLE_TOO_FAST: ("cable too fast", "#7b4173"),
     Verdict.CABLE_OVER_ACCELERATION: ("cable acceleration", "#bd9e39"),
     Verdict.UNCERTAINTY: ("not every robot", "#B3CDE3"),
+    Verdict.UNDECIDED: ("undecided", "#F0E442"),
+    Verdict.NOT_FINITE: ("not finite", "#000000"),
 }
 FEASIBLE_COLOUR = "#009E73"
 
 
-def reasons(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, list[str], list[str]]:
+def reasons(verdicts: np.ndarray, unflagged: str) -> tuple[np.ndarray, list[str], list[str]]:
     """Verdicts as numbers of reasons.
 
     Args:
         verdicts: (...) flags.
-        name: of the quantity.
+        unflagged: what is said where no flag is set.
 
     Returns:
         (...) number of the reason, from 0 on; the words of those that occur; their colours.
@@ -42,6 +42,6 @@ def reasons(verdicts: np.ndarray, name: str) -> tuple[np.ndarray, list[str], lis
     for number, flag in reversed(list(enumerate(REASONS, start=1))):
         numbers = np.where(flags & flag.value, number, numbers)
     used = np.unique(numbers)
-    every = [(QUANTITIES[name].unflagged, FEASIBLE_COLOUR), *REASONS.values()]
+    every = [(unflagged, FEASIBLE_COLOUR), *REASONS.values()]
     words, colours = zip(*(every[number] for number in used), strict=True)
     return np.searchsorted(used, numbers), list(words), list(colours)

@@ -6,13 +6,15 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
 from matplotlib.projections.polar import PolarAxes
 
 from cspr_jax.outputs.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar
 from cspr_jax.outputs.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
 from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
 from cspr_jax.outputs.plots.marks import mark, marked
+from cspr_jax.outputs.plots.obstacles import draw_obstacles
 from cspr_jax.outputs.plots.steps import edges, number_scale
 from cspr_jax.outputs.plots.worded import word_scale, worded
 from cspr_jax.schema.quantities import EVERY
@@ -23,6 +25,7 @@ from cspr_jax.store.result import Result
 POLAR = ("tilt_azimuth", "tilt")
 # A top view: straight from above, in true shape.
 AROUND = ("azimuth", "radius")
+HATCH = "////"
 PANEL, SINGLE = 3.1, 5.2  # inches, the longer side
 
 
@@ -35,6 +38,7 @@ class Section(NamedTuple):
         over: the axis that differs between the panels; None: there is one panel.
         place: axes fixed for the picture, and where.
         fixed: what is constant, in words.
+        excluded: (n_first, n_second, n_panels) cells that other conditions exclude than the quantity tells.
     """
 
     name: str
@@ -42,6 +46,7 @@ class Section(NamedTuple):
     over: str | None
     place: dict[str, float]
     fixed: list[str]
+    excluded: np.ndarray
 
 
 def section_figure(result: Result, section: Section, data: np.ndarray, told: np.ndarray | None = None) -> Figure:
@@ -70,17 +75,29 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
     orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in across]
     points = [as_drawn(result, axis, result.axes[axis][order]) for axis, order in zip(across, orders, strict=True)]
     data = as_drawn(result, name, data[np.ix_(*orders, shown)])
+    excluded = section.excluded[np.ix_(*orders, shown)]
+    # Beyond every scale: of an infinite deficit there is no colour.
+    endless = np.isneginf(data) if data.dtype.kind == "f" else np.zeros(data.shape, bool)
+    data = np.where(endless, np.nan, data) if endless.any() else data
     quantity = EVERY[name]
     found = worded(result, name, data)
     cells, scale = (data, number_scale(result, name, data)) if found is None else (found[0], word_scale(*found[1:]))
     titles = values(result, over, result.axes[over][shown]) if over is not None else []
-    legend: dict[str, Artist] = {"no value": Patch(color=NONE_COLOUR)} if scale.missing else {}
+    legend: dict[str, Artist] = {"no value": Patch(color=NONE_COLOUR)} if scale.missing and not endless.all() else {}
+    if endless.any():
+        legend = {
+            "−∞" if name != "wrench_margin" else "−∞: the cables do not span the wrench": Patch(color=NONE_COLOUR)
+        }
+    if excluded.any():
+        legend["excluded by other conditions"] = Patch(facecolor="white", hatch=HATCH, edgecolor="black")
     for k, panel in enumerate(every):
         image = _section(panel, result, cells[:, :, k], across, points, scale)
+        _hatch(panel, excluded[:, :, k], points)
         if quantity.contoured and not polar:
             _loci(panel, cells[:, :, k], points)
         place = alone | ({over: float(result.axes[over][shown[k]])} if over is not None else {})
-        legend |= mark(panel, result, name, across, {a: p for a, p in place.items() if a not in across})
+        elsewhere = {a: p for a, p in place.items() if a not in across}
+        legend |= draw_obstacles(panel, result, across, elsewhere) | mark(panel, result, name, across, elsewhere)
         if titles:
             panel.set_title(titles[k])
     words = list(section.fixed)
@@ -166,6 +183,18 @@ def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], 
     if across[1] == "z" and result.attributes.get("z_axis", "down") == "down":
         panel.yaxis.set_inverted(True)
     return image
+
+
+def _hatch(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
+    # One path of all cells, so that the lines of the hatch go on from one to the next.
+    if not cells.any():
+        return
+    x, y = map(_edges, points)
+    x, y = (np.radians(x), np.maximum(y, 0.0)) if isinstance(panel, PolarAxes) else (x, y)
+    i, j = np.nonzero(cells)
+    corners = np.stack([np.stack([x[i + a], y[j + b]], -1) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))], 1)
+    path = Path(corners.reshape(-1, 2), np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], len(i)))
+    panel.add_patch(PathPatch(path, facecolor="none", edgecolor="black", linewidth=0.0, hatch=HATCH))
 
 
 def _loci(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:

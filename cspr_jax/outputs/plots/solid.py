@@ -17,6 +17,8 @@ from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.boundary import Boundary, Sides, boundary, sides_of
 from cspr_jax.outputs.plots.conditions import conditions
 from cspr_jax.outputs.plots.labels import COLOURS, axis_label, robot_name
+from cspr_jax.outputs.plots.obstacles import COLOUR as OBSTACLE
+from cspr_jax.outputs.plots.obstacles import faces_of, obstacles
 from cspr_jax.outputs.plots.posed import Posed, posed
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.store.result import Result
@@ -59,13 +61,15 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
     surface = boundary(sides)
     angles = {axis: float(result.axes[axis][place]) for axis, place in index.items()}
     robot = posed(result, _middle(sides), angles)
-    every = np.concatenate([surface.corners, robot.base, robot.attached])
+    bodies = obstacles(result)
+    every = np.concatenate([surface.corners, robot.base, robot.attached, *bodies])
     box = np.stack([every.min(0), every.max(0)]) + np.array([[-1.0], [1.0]]) * MARGIN * np.ptp(every, axis=0).max()
     figure, panel = _panel(box[1] - box[0])
     eye = _axes(panel, result, box)
     _draw_surface(panel, surface, eye)
     _draw_robot(panel, robot)
-    figure.legend(*_legend(surface), loc="lower center", ncols=4)
+    _draw_obstacles(panel, bodies, eye, surface)
+    figure.legend(*_legend(surface, has_obstacles=bool(bodies)), loc="lower center", ncols=4)
     figure.suptitle(
         f"{robot_name(result)}: workspace, {conditions(result)}\n{', '.join([_volume(result, index), *fixed])}"
     )
@@ -191,10 +195,26 @@ def _draw_robot(panel: Axes3D, robot: Posed) -> None:
         panel.plot(*points.T, look, color="black", markersize=4.0 if look == "s" else 2.0, zorder=2.3)
 
 
-def _legend(surface: Boundary) -> tuple[list[Any], list[str]]:
+def _draw_obstacles(panel: Axes3D, bodies: list[np.ndarray], eye: _Eye, surface: Boundary) -> None:
+    # An obstacle whose middle is nearer to the eye than that of the workspace lies before it.
+    middle = surface.corners.mean(0) @ eye.towards
+    for points in bodies:
+        faces = faces_of(points)
+        normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+        turned = np.abs(normals @ eye.towards) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+        shades = 1.0 - (1.0 - np.array(to_rgb(OBSTACLE))) * (0.55 + 0.45 * turned[:, None])
+        layer = 3.5 if points.mean(0) @ eye.towards > middle else 0.8
+        panel.add_collection3d(
+            Poly3DCollection(faces, facecolors=shades, edgecolors=shades, linewidths=0.3, zorder=layer)
+        )
+
+
+def _legend(surface: Boundary, *, has_obstacles: bool = False) -> tuple[list[Any], list[str]]:
     every: dict[str, Any] = {"workspace": Patch(color=SURFACE, alpha=0.55)}
     if surface.is_end.any():
         every["end of the grid"] = Patch(color=END, alpha=0.55)
+    if has_obstacles:
+        every["obstacles"] = Patch(color=OBSTACLE)
     every["cables"] = Line2D([], [], color=CABLES, linewidth=1.1)
     every["spools"] = Line2D([], [], color="black", marker="s", markersize=4.0, linestyle="")
     return list(every.values()), list(every)

@@ -7,8 +7,8 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
 from cspr_jax.outputs.plots.colours import NONE_COLOUR, Scale
 from cspr_jax.outputs.plots.labels import COLOURS
 from cspr_jax.outputs.plots.reasons import reasons
+from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import meanings_of
-from cspr_jax.schema.quantities import EVERY
 from cspr_jax.store.result import Result
 
 # Okabe and Ito's, too; of more words the colours follow each other.
@@ -26,9 +26,9 @@ def worded(result: Result, name: str, values: np.ndarray) -> tuple[np.ndarray, l
     Returns:
         (...) numbers of the words, from 0 on; the words of those that occur; their colours. None: it has no words.
     """
-    quantity = EVERY[name]
+    quantity = quantity_of(result.attributes.get("map"), name)
     if quantity.unflagged:
-        return reasons(values, name)
+        return reasons(values, quantity.unflagged)
     words = meanings_of(quantity, result.settings)
     return _named(values, words) if words else None
 

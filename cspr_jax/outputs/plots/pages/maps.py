@@ -7,15 +7,15 @@ from matplotlib.colors import BoundaryNorm, to_hex
 
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.colours import Scale, scale_of
+from cspr_jax.outputs.plots.conditions import said, shown_first
 from cspr_jax.outputs.plots.labels import WORDS, as_drawn, axis_label, label, unit, value
 from cspr_jax.outputs.plots.notes import notes
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
 from cspr_jax.outputs.plots.worded import word_scale, worded
-from cspr_jax.schema.map_kinds import MAP_KINDS
-from cspr_jax.schema.quantities import EVERY
-from cspr_jax.schema.verdicts import SENTENCES, Verdict
+from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
+from cspr_jax.schema.verdicts import SENTENCES, Verdict, conjunction
 from cspr_jax.store.result import Result
 
 # Quantities that come first, and letters of all that a page may hold; the script of the charts has some five millions.
@@ -60,7 +60,7 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
     known = [name for name in dict.fromkeys((*kind.pictured, *FIRST, *result.data)) if name in result.data]
     if quantity is not None and quantity not in known:
         raise InputError("--quantity", quantity, "one of " + ", ".join(sorted(result.data)))
-    first = quantity or known[0]
+    first = quantity or shown_first(result)
     names, points = order_of(result)
     places = [list(result.axes).index(name) for name in names]
     shape = [len(chosen) for chosen in points]
@@ -80,8 +80,11 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
         "shape": shape,
         "axes": [_axis(result, name, result.axes[name][own]) for name, own in zip(names, points, strict=True)],
         "quantities": quantities,
-        "reasons": _reasons(arranged("verdict")) if "verdict" in result.data else None,
-        "notes": notes(result, "", [], [name for name, count in zip(names, shape, strict=True) if count > 1]),
+        "reasons": _reasons(arranged("verdict"), quantity_of(kind.name, "verdict").unflagged)
+        if "verdict" in result.data
+        else None,
+        "notes": said(result)
+        + notes(result, "", [], [name for name, count in zip(names, shape, strict=True) if count > 1]),
         "isDown": names[-2:-1] == ["z"] and result.attributes.get("z_axis", "down") == "down",
         "isEqual": len(names) > 1 and all(result.units[name] == "m" for name in names[-2:]),
     }, left
@@ -98,7 +101,7 @@ def _axis(result: Result, name: str, points: np.ndarray) -> dict[str, Any]:
 
 
 def _quantity(result: Result, name: str, data: np.ndarray) -> dict[str, Any]:
-    row = EVERY[name]
+    row = quantity_of(result.attributes["map"], name)
     found, drawn = worded(result, name, data), as_drawn(result, name, data)
     if found is not None:
         drawn, scale = found[0], word_scale(*found[1:])
@@ -145,18 +148,18 @@ def _hex(scale: Scale, place: float) -> str:
     return to_hex((red, green, blue, alpha))
 
 
-def _reasons(verdicts: np.ndarray) -> dict[str, Any]:
+def _reasons(verdicts: np.ndarray, unflagged: str) -> dict[str, Any]:
     # Each combination of flags that occurs, with its sentences and the colour of the first reason.
-    flags, index = np.unique(verdicts.astype(np.int64), return_inverse=True)
+    flags, index = np.unique(conjunction(verdicts.astype(np.int64)), return_inverse=True)
     entries = []
     for code in flags.tolist():
         own = [flag for flag in (*REASONS, *SENTENCES) if code & flag.value]
-        word, colour = next((REASONS[flag] for flag in own if flag in REASONS), ("feasible", FEASIBLE_COLOUR))
+        word, colour = next((REASONS[flag] for flag in own if flag in REASONS), (unflagged, FEASIBLE_COLOUR))
         entries.append(
             {
                 "word": word,
                 "colour": colour,
-                "text": Verdict(code).text.replace("_", " ").replace("+", ", "),
+                "text": Verdict(code).text.replace("_", " ").replace("+", ", ") if code else unflagged,
                 "sentences": [SENTENCES[flag] for flag in dict.fromkeys(own) if flag in SENTENCES],
             }
         )

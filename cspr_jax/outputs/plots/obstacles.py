@@ -1,0 +1,119 @@
+"""Obstacles of a map of a workspace in its pictures: their sections, their shadows, and their surfaces in space."""
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch, Polygon
+
+from cspr_jax.outputs.plots.posed import asked, hull_of
+from cspr_jax.robots.shapes import Box, Cylinder, Obstacle
+from cspr_jax.store.result import Result
+
+COLOUR = "#5c3d2e"
+# Directions of the points of a ball: of azimuths and of heights.
+AROUND, UPWARD = 64, 33
+CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
+
+
+def obstacles(result: Result) -> list[np.ndarray]:
+    """Obstacles of a map of a workspace; all are convex.
+
+    Args:
+        result: any map.
+
+    Returns:
+        (n, 3) of each, points in the axes of the file whose hull it is, m; none of another map.
+    """
+    if result.attributes.get("map") != "workspace" or not result.settings:
+        return []
+    return [_points(table.shape()) for table in asked(result).obstacle or ()]
+
+
+def _points(shape: Obstacle) -> np.ndarray:
+    if isinstance(shape, Box):
+        return shape.centre + (CORNERS * shape.half) @ shape.turn.T
+    around, upward = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False), np.linspace(-0.5, 0.5, UPWARD) * np.pi
+    azimuth, height = (x.reshape(-1) for x in np.meshgrid(around, upward))
+    ball = np.stack([np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height), np.sin(height)], axis=1)
+    centres = (shape.start, shape.end) if isinstance(shape, Cylinder) else (shape.centre,)
+    return np.concatenate([centre + shape.radius * ball for centre in centres])
+
+
+def outline(points: np.ndarray) -> np.ndarray:
+    """The hull of points in a plane.
+
+    Args:
+        points: (n, 2).
+
+    Returns:
+        (m, 2) its corners in order; empty where the points lie on a line.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return points[ConvexHull(points).vertices]
+    except (QhullError, ValueError):
+        return np.empty((0, 2))
+
+
+def section_of(points: np.ndarray, axis: int, place: float) -> np.ndarray:
+    """Section of a convex body with a plane across an axis.
+
+    Args:
+        points: (n, 3) whose hull it is, m.
+        axis: number of the axis.
+        place: of the plane on it, m.
+
+    Returns:
+        (m, 2) corners, coordinates of the other axes in their order; empty where they do not meet.
+    """
+    _, edges = hull_of(points)
+    start, end = edges[:, 0], edges[:, 1]
+    low, high = start[:, axis] - place, end[:, axis] - place
+    cut = low * high <= 0.0
+    part = (low / np.where(low == high, 1.0, low - high))[cut, None]
+    met = np.concatenate([start[cut] + part * (end - start)[cut], points[points[:, axis] == place]])
+    return outline(np.delete(met, axis, axis=1))
+
+
+def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
+    """Draw obstacles into a section over two of x, y and z: filled where it cuts them, dashed what it only hides.
+
+    Args:
+        panel: the section, with its cells.
+        result: the map.
+        across: the two axes of the section.
+        place: the other axes, and where the section is.
+
+    Returns:
+        what to show in the legend, by its words.
+    """
+    if not set(across) < set("xyz"):
+        return {}
+    limits, entries = (panel.get_xlim(), panel.get_ylim()), dict[str, Artist]()
+    columns, third = ["xyz".index(axis) for axis in across], next(axis for axis in "xyz" if axis not in across)
+    for points in obstacles(result):
+        shadow, cut = outline(points[:, columns]), np.empty((0, 2))
+        if third in place:
+            cut = section_of(points, "xyz".index(third), place[third])
+            cut = cut if columns == sorted(columns) else cut[:, ::-1]
+        if len(cut):
+            panel.add_patch(Polygon(cut, facecolor=COLOUR, edgecolor="white", linewidth=0.8))
+            entries["obstacle"] = Patch(facecolor=COLOUR)
+        elif len(shadow):
+            panel.add_patch(Polygon(shadow, fill=False, edgecolor=COLOUR, linewidth=1.2, linestyle="--"))
+            entries["obstacle beside the section"] = Patch(fill=False, edgecolor=COLOUR, linestyle="--")
+    panel.set(xlim=limits[0], ylim=limits[1])
+    return entries
+
+
+def faces_of(points: np.ndarray) -> np.ndarray:
+    """Surface of a convex body.
+
+    Args:
+        points: (n, 3) whose hull it is, m.
+
+    Returns:
+        (m, 3, 3) triangles, m.
+    """
+    return hull_of(points)[0]
