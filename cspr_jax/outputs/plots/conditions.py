@@ -61,6 +61,19 @@ def shown_first(result: Result) -> str:
     return next((name for name in every if not np.isnan(result.data[name]).all()), every[0])
 
 
+def is_margin(result: Result, name: str) -> bool:
+    """Whether a quantity is the margin of one condition of a workspace, positive inside.
+
+    Args:
+        result: any map.
+        name: of the quantity.
+
+    Returns:
+        whether it is.
+    """
+    return is_workspace(result) and name.endswith(("_margin", "clearance"))
+
+
 def excluded(result: Result, name: str, data: np.ndarray, verdict: np.ndarray) -> np.ndarray:
     """Cells that a margin of a workspace counts as inside, but other conditions exclude.
 
@@ -73,7 +86,7 @@ def excluded(result: Result, name: str, data: np.ndarray, verdict: np.ndarray) -
     Returns:
         (...) whether a cell is such a one; nowhere if the quantity is no margin of a workspace.
     """
-    if not is_workspace(result) or not name.endswith(("_margin", "clearance")):
+    if not is_margin(result, name):
         return np.zeros(data.shape, bool)
     return (data > 0.0) & (verdict != 0)
 

@@ -13,6 +13,12 @@ function hasValue(quantity, value) {
   return quantity.isCount ? value > 0 : !Number.isNaN(value);
 }
 
+// What has no place on the scale, or what other conditions exclude than a margin tells: there the reason is shown.
+function isHidden(quantity, value, flat) {
+  if (!map.reasons || quantity.words) return false;
+  return value < -2e38 || (quantity.isMargin && value > 0 && !reasonOf(flat).isInside);
+}
+
 function textOf(k, flat) {
   const quantity = content.map.quantities[k], value = map.values[k][flat];
   if (quantity.words) return quantity.words[value];
@@ -75,7 +81,7 @@ function planes() {
   for (let i = 0; i < rows; i++) {
     z.push([]); reason.push([]);
     for (let j = 0; j < columns; j++) {
-      const flat = start + i * columns + j, has = hasValue(quantity, values[flat]);
+      const flat = start + i * columns + j, has = hasValue(quantity, values[flat]) && !isHidden(quantity, values[flat], flat);
       z[i].push(has ? values[flat] : null);
       reason[i].push(has || !map.reasons ? null : map.reasons[flat]);
     }

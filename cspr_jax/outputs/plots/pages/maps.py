@@ -7,7 +7,7 @@ from matplotlib.colors import BoundaryNorm, to_hex
 
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.colours import Scale, scale_of
-from cspr_jax.outputs.plots.conditions import said, shown_first
+from cspr_jax.outputs.plots.conditions import is_margin, said, shown_first
 from cspr_jax.outputs.plots.labels import WORDS, as_drawn, axis_label, label, unit, value
 from cspr_jax.outputs.plots.notes import notes
 from cspr_jax.outputs.plots.pages.packing import packed
@@ -112,6 +112,7 @@ def _quantity(result: Result, name: str, data: np.ndarray) -> dict[str, Any]:
         "label": label(result, name),
         "unit": unit(result, name),
         "description": row.description,
+        "isMargin": is_margin(result, name),
         "isCount": drawn.dtype.kind in "iu" and found is None,
         "words": None if found is None else found[1],
         "values": packed(drawn),
@@ -159,6 +160,7 @@ def _reasons(verdicts: np.ndarray, unflagged: str) -> dict[str, Any]:
             {
                 "word": word,
                 "colour": colour,
+                "isInside": code == 0,
                 "text": Verdict(code).text.replace("_", " ").replace("+", ", ") if code else unflagged,
                 "sentences": [SENTENCES[flag] for flag in dict.fromkeys(own) if flag in SENTENCES],
             }
