@@ -1,5 +1,7 @@
 """Published tables from Python, computed again as by `cspr table`."""
 
+from typing import Any
+
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, shown
@@ -51,7 +53,7 @@ def table(
     if name not in tables.TABLES:
         raise ConfigError("table", f"{shown(name)}: must be one of {', '.join(tables.TABLES)}")
     check_count(workers)
-    given = {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None}
+    given: dict[str, Any] = {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None}
     given |= {"--max-arcs": max_arcs, "--values": values}
     choice = tables.chosen(name, given | {"--workers": None if workers == 1 else workers})
     if workers is None:

@@ -7,7 +7,7 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
-from typing import IO, NoReturn
+from typing import Any, NoReturn
 
 from cspr_jax import __version__
 from cspr_jax.cli import listings, pictures, plans, runs, tables
@@ -30,7 +30,7 @@ class _Parser(argparse.ArgumentParser):
         """One line for a mistake, instead of the usage."""
         self.exit(ExitCode.BAD_INPUT, f"{printable(f'{self.prog}: {message} (see {self.prog} --help)')}\n")
 
-    def _print_message(self, message: str, file: IO[str] | None = None) -> None:
+    def _print_message(self, message: str, file: Any = None) -> None:
         # Of help and versions; the usual one says nothing where it cannot print.
         if file is sys.stdout:
             write(message)
@@ -73,8 +73,8 @@ def _answered(options: argparse.Namespace, prompt: Prompt) -> int:
     try:
         return int(options.command(options))
     except CsprError as error:
-        with_all = isinstance(error, ConfigError) and getattr(options, "all_errors", False)
-        for line in error.lines if with_all else error.args:
+        every = error.lines if isinstance(error, ConfigError) and getattr(options, "all_errors", False) else None
+        for line in every or error.args:
             warn(line)
         return int(error.exit_code)
     except KeyboardInterrupt:

@@ -158,9 +158,7 @@ class Spread:
                 for k, one in zip(group, own.result(), strict=True)
             }
         except BrokenProcessPool as error:
-            raise ResourceError(
-                "a worker died, perhaps for want of memory: --workers must be smaller"
-            ) from error
+            raise ResourceError("a worker died, perhaps for want of memory: --workers must be smaller") from error
         return [found[k] for k in range(len(items))]
 
 

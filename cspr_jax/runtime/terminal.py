@@ -6,7 +6,7 @@ Whoever writes a name decides neither what a terminal does nor how a table looks
 
 import codecs
 import io
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, TextIO
 
 from cspr_jax.errors import printable
 
@@ -72,7 +72,7 @@ def cell(*lines: object, style: str = "") -> "Text":
     return Text("\n".join(map(printable, lines)), style=style)
 
 
-def print_table(renderable: Any, file: IO[str]) -> None:
+def print_table(renderable: Any, file: TextIO) -> None:
     """Print a table of rich whose texts are its `Text`; it is changed where the encoding lacks signs.
 
     Args:
@@ -104,8 +104,8 @@ def _fit(part: Any, encoding: str | None) -> None:
         for inner in part.renderables:
             _fit(inner, encoding)
     elif isinstance(part, Table):
-        for inner in (part.title, part.caption):
-            _fit(inner, encoding)
+        _fit(part.title, encoding)
+        _fit(part.caption, encoding)
         for column in part.columns:
             for inner in (column.header, *column.cells):
                 _fit(inner, encoding)

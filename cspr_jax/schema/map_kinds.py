@@ -13,9 +13,10 @@ from collections.abc import Iterator
 from typing import Any, Literal
 
 from cspr_jax.errors import InputError
+from cspr_jax.schema import map_columns as columns
 from cspr_jax.schema import workspace_columns as of_workspaces
 from cspr_jax.schema.pose_quantities import POSE_VERDICT
-from cspr_jax.schema.quantities import EVERY, QUANTITIES, REFUSALS
+from cspr_jax.schema.quantities import EVERY, QUANTITIES
 from cspr_jax.schema.quantities import register as register_quantity
 from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.tiles import LARGEST_TILE, ORDINARY_COST, CellCost
@@ -100,34 +101,6 @@ class MapKind:
         return getattr(importlib.import_module(module), name)
 
 
-_TOLERATED = ("tolerated", "not_tolerated")
-_UNCERTAIN = (("limits.uncertainty", _TOLERATED),)
-_COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
-_OF_TRANSITIONS = ("least_oscillations", "inclination_gain", "used_inclination", "used_z0")
-_OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
-_OF_POSES = (
-    *("arcs", "tried_arcs", "verdict", "duration", "margin", "margin_bound", "det_margin", "cable_distance"),
-    *("limit_margin", "refuted_at", "beta_hat", *_TOLERATED),
-)
-_POSES_STORED = ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat")
-_OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
-_OF_ATTAINED = (
-    *("attainable", "attainable_fraction", "attainable_volume", "attainable_error", "mean_arcs"),
-    *("undecided_fraction", "main_reason", *REFUSALS),
-)
-_OF_ACCELERATIONS = (
-    *("verdict", "acceleration_margin", "static_margin", "closure_margin", "level_acceleration"),
-    *("level_acceleration_max", "upward_acceleration", "downward_acceleration"),
-)
-_OF_LINES = (
-    *("verdict", "duration", "acceleration_time", "least_duration", "duration_ratio", "rest_margin"),
-    *("active_up", "active_down"),
-)
-_OF_LAUNCHES = (
-    *("verdict", "release_speed", "largest_margin", "duration", "release_time", "flight_time"),
-    *("release_x", "release_y", "release_z"),
-)
-_OF_LENGTHS = ("sigma_p", "sigma_r")
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 
@@ -140,7 +113,7 @@ MAP_KINDS: dict[str, MapKind] = {
             description="smallest number of arcs to each target",
             implementation="cspr_jax.maps.arcs:MinimumArcsMap",
             cost=CellCost(seconds=6e-5),
-            quantities=("arcs", "tried_arcs", *_COMMON, *_TOLERATED),
+            quantities=("arcs", "tried_arcs", *columns.COMMON, *columns.TOLERATED),
             stored=("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
             pictured=("arcs",),
             families=("hypocycloid-standard",),
@@ -149,7 +122,7 @@ MAP_KINDS: dict[str, MapKind] = {
             start="point",
             needs=("axes.z0",),
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "limits", "limits.uncertainty"),
-            stored_with=_UNCERTAIN,
+            stored_with=columns.UNCERTAIN,
         ),
         MapKind(
             name="minimum-oscillations",
@@ -158,8 +131,14 @@ MAP_KINDS: dict[str, MapKind] = {
             implementation="cspr_jax.maps.oscillations:MinimumOscillationsMap",
             cost=CellCost(seconds=1e-4, limits=0.3),
             quantities=(
-                *("oscillations", "tried_oscillations", "envelope_oscillations", *_OF_TRANSITIONS, *_COMMON),
-                *_TOLERATED,
+                *(
+                    "oscillations",
+                    "tried_oscillations",
+                    "envelope_oscillations",
+                    *columns.OF_TRANSITIONS,
+                    *columns.COMMON,
+                ),
+                *columns.TOLERATED,
             ),
             stored=(
                 *("oscillations", "envelope_oscillations", "least_oscillations", "verdict", "duration", "margin"),
@@ -170,7 +149,7 @@ MAP_KINDS: dict[str, MapKind] = {
             planned=True,
             patterns=("2T", "3T"),
             takes=("limits", "limits.uncertainty"),
-            stored_with=_UNCERTAIN,
+            stored_with=columns.UNCERTAIN,
             one_of=_DEPTHS,
         ),
         MapKind(
@@ -178,10 +157,10 @@ MAP_KINDS: dict[str, MapKind] = {
             title="Envelopes of the pseudotensions along transitions",
             description="oscillations that each instant of a transition from rest to each target requires",
             implementation="cspr_jax.maps.envelopes:TransitionEnvelopesMap",
-            quantities=_OF_INSTANTS,
-            stored=_OF_INSTANTS,
+            quantities=columns.OF_INSTANTS,
+            stored=columns.OF_INSTANTS,
             pictured=("lower_envelope",),
-            motionless=_OF_INSTANTS,
+            motionless=columns.OF_INSTANTS,
             families=("transition",),
             patterns=("2T", "3T"),
             needs=("axes.tau",),
@@ -194,8 +173,8 @@ MAP_KINDS: dict[str, MapKind] = {
             description="smallest number of arcs of a platform to each pose",
             implementation="cspr_jax.maps.poses:PosesMap",
             cost=CellCost(seconds=1.5e-3, limits=5.0),
-            quantities=_OF_POSES,
-            stored=_POSES_STORED,
+            quantities=columns.OF_POSES,
+            stored=columns.POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
             planned=True,
@@ -207,7 +186,7 @@ MAP_KINDS: dict[str, MapKind] = {
                 *("axes.tilt_azimuth", "axes.tilt", "axes.torsion", "trajectory.beta_hat", "trajectory.beat"),
                 *("limits", "limits.uncertainty"),
             ),
-            stored_with=_UNCERTAIN,
+            stored_with=columns.UNCERTAIN,
         ),
         MapKind(
             name="orientations",
@@ -215,15 +194,15 @@ MAP_KINDS: dict[str, MapKind] = {
             description="smallest number of arcs of a platform from rest to each orientation accessible at each place",
             implementation="cspr_jax.maps.orientations:OrientationsMap",
             cost=CellCost(seconds=3e-4, limits=5.0),
-            quantities=_OF_POSES,
-            stored=_POSES_STORED,
+            quantities=columns.OF_POSES,
+            stored=columns.POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
             planned=True,
             patterns=("3R3T",),
             by_processes=True,
             takes=("axes.z0", "orientations", "orientations.values", "limits", "limits.uncertainty"),
-            stored_with=_UNCERTAIN,
+            stored_with=columns.UNCERTAIN,
             definitions=("grid",),
             is_over_orientations=True,
         ),
@@ -233,10 +212,10 @@ MAP_KINDS: dict[str, MapKind] = {
             description="orientations of a platform that are accessible at each place",
             implementation="cspr_jax.maps.places:OrientationWorkspaceMap",
             cost=CellCost(orientation=3e-6),
-            quantities=_OF_PLACES,
-            stored=_OF_PLACES,
+            quantities=columns.OF_PLACES,
+            stored=columns.OF_PLACES,
             pictured=("accessible_volume",),
-            motionless=_OF_PLACES,
+            motionless=columns.OF_PLACES,
             families=_OF_PLATFORMS,
             patterns=("3R3T",),
             by_processes=True,
@@ -249,10 +228,10 @@ MAP_KINDS: dict[str, MapKind] = {
             description="orientations of a platform that are accessible at each place, and attained from rest",
             implementation="cspr_jax.maps.places:AttainabilityMap",
             cost=CellCost(orientation=6e-5, limits=5.0),
-            quantities=(*_OF_PLACES, *_OF_ATTAINED),
-            stored=(*_OF_PLACES, *_OF_ATTAINED),
+            quantities=(*columns.OF_PLACES, *columns.OF_ATTAINED),
+            stored=(*columns.OF_PLACES, *columns.OF_ATTAINED),
             pictured=("attainable_fraction", "accessible_volume"),
-            motionless=_OF_PLACES,
+            motionless=columns.OF_PLACES,
             families=_OF_PLATFORMS,
             patterns=("3R3T",),
             by_processes=True,
@@ -265,11 +244,11 @@ MAP_KINDS: dict[str, MapKind] = {
             description="accelerations that a point mass on any number of cables can have at each place",
             implementation="cspr_jax.maps.accelerations:FeasibleAccelerationMap",
             cost=CellCost(limits=0.0),
-            quantities=_OF_ACCELERATIONS,
-            stored=_OF_ACCELERATIONS,
+            quantities=columns.OF_ACCELERATIONS,
+            stored=columns.OF_ACCELERATIONS,
             own=(POSE_VERDICT,),
             pictured=("acceleration_margin",),
-            motionless=_OF_ACCELERATIONS,
+            motionless=columns.OF_ACCELERATIONS,
             families=(),
             patterns=("2T", "3T"),
             takes=("limits",),
@@ -280,8 +259,8 @@ MAP_KINDS: dict[str, MapKind] = {
             description="least duration of the S-model along the straight line to each target, beside the least of all",
             implementation="cspr_jax.maps.least_time:LeastTimeMap",
             cost=CellCost(limits=2.0),
-            quantities=_OF_LINES,
-            stored=_OF_LINES,
+            quantities=columns.OF_LINES,
+            stored=columns.OF_LINES,
             pictured=("duration",),
             families=("s-curve",),
             planned=True,
@@ -295,8 +274,8 @@ MAP_KINDS: dict[str, MapKind] = {
             description="least speed with which an object, released on one Bezier segment, reaches each landing place",
             implementation="cspr_jax.maps.launch_range:LaunchRangeMap",
             cost=CellCost(seconds=2e-2),
-            quantities=_OF_LAUNCHES,
-            stored=_OF_LAUNCHES,
+            quantities=columns.OF_LAUNCHES,
+            stored=columns.OF_LAUNCHES,
             pictured=("release_speed",),
             families=("bezier",),
             patterns=("2T", "3T"),
@@ -310,10 +289,10 @@ MAP_KINDS: dict[str, MapKind] = {
             description="largest displacement, and turn of a platform, that errors of the cable lengths cause",
             implementation="cspr_jax.maps.sensitivity:SensitivityMap",
             cost=CellCost(seconds=1e-6),
-            quantities=_OF_LENGTHS,
-            stored=_OF_LENGTHS,
+            quantities=columns.OF_LENGTHS,
+            stored=columns.OF_LENGTHS,
             pictured=("sigma_p",),
-            motionless=_OF_LENGTHS,
+            motionless=columns.OF_LENGTHS,
             families=(),
         ),
         MapKind(

@@ -189,7 +189,7 @@ def _hatch(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
     # One path of all cells, so that the lines of the hatch go on from one to the next.
     if not cells.any():
         return
-    x, y = map(_edges, points)
+    x, y = map(edges, points)
     x, y = (np.radians(x), np.maximum(y, 0.0)) if isinstance(panel, PolarAxes) else (x, y)
     i, j = np.nonzero(cells)
     corners = np.stack([np.stack([x[i + a], y[j + b]], -1) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))], 1)

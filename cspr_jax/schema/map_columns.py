@@ -1,0 +1,32 @@
+"""Columns that kinds of maps of motions and places have in common; those of workspaces are `workspace_columns`."""
+
+from cspr_jax.schema.quantities import REFUSALS
+
+TOLERATED = ("tolerated", "not_tolerated")
+UNCERTAIN = (("limits.uncertainty", TOLERATED),)
+COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
+OF_TRANSITIONS = ("least_oscillations", "inclination_gain", "used_inclination", "used_z0")
+OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
+OF_POSES = (
+    *("arcs", "tried_arcs", "verdict", "duration", "margin", "margin_bound", "det_margin", "cable_distance"),
+    *("limit_margin", "refuted_at", "beta_hat", *TOLERATED),
+)
+POSES_STORED = ("arcs", "verdict", "duration", "margin", "det_margin", "cable_distance", "beta_hat")
+OF_PLACES = ("accessible", "accessible_points", "accessible_volume", "accessible_error", "largest_tilt")
+OF_ATTAINED = (
+    *("attainable", "attainable_fraction", "attainable_volume", "attainable_error", "mean_arcs"),
+    *("undecided_fraction", "main_reason", *REFUSALS),
+)
+OF_ACCELERATIONS = (
+    *("verdict", "acceleration_margin", "static_margin", "closure_margin", "level_acceleration"),
+    *("level_acceleration_max", "upward_acceleration", "downward_acceleration"),
+)
+OF_LINES = (
+    *("verdict", "duration", "acceleration_time", "least_duration", "duration_ratio", "rest_margin"),
+    *("active_up", "active_down"),
+)
+OF_LAUNCHES = (
+    *("verdict", "release_speed", "largest_margin", "duration", "release_time", "flight_time"),
+    *("release_x", "release_y", "release_z"),
+)
+OF_LENGTHS = ("sigma_p", "sigma_r")
