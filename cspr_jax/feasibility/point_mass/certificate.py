@@ -193,7 +193,7 @@ def _cut(
         fails: np.ndarray = ~(sampled + allowed >= -limit) & counted[owner]
         failing = np.flatnonzero(fails.any(1))
         np.logical_or.at(broken, owner[failing], fails[failing])
-        refuted: np.ndarray = np.asarray(broken.any(1))
+        refuted = np.asarray(broken.any(1))
         unproved = ~(proved + allowed > limit) & counted[owner]
         closed = (unproved & (sampled - proved <= 0.5 * limit)).any(1)
         np.logical_or.at(stuck, owner, closed)
