@@ -1,6 +1,7 @@
 """Pages to explore: their content against what is stored, and in a real browser."""
 
 import dataclasses
+import html
 import json
 import re
 import shutil
@@ -22,6 +23,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.plots.pages.maps import map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import motion_content
 from cspr_jax.outputs.plots.pages.packing import packed, unpacked
+from cspr_jax.outputs.plots.pages.page import page_of
 from cspr_jax.outputs.plots.pages.telling import telling
 
 SWEEP = {
@@ -315,3 +317,73 @@ def test_a_plan_in_a_browser(folder):
         tab.click("#play")
         tab.wait_for_function(f"motion.row === {last} && motion.playing === null")
         assert told == []
+
+
+# Names that end a script element, open a comment in it, stand where a part of the page belongs, or are program code.
+HOSTILE = [
+    "<!-- scripts -->",
+    "<!-- content -->",
+    "<!-- charts --><!-- style -->",
+    "<!-- title -->",
+    "<!-- version -->",
+    "<!-- other -->",
+    "<!--<script>",
+    "<!--<script><!--<script>",
+    "<!--",
+    "-->",
+    "--!><script>",
+    "<script>",
+    "<script>alert(1)</script>",
+    "</script>",
+    "</SCRIPT >",
+    "</script\t/><script>throw 1</script>",
+    "</title><script>throw 1</script>",
+    "</style><style>body{display:none}</style>",
+    "<img src=x onerror=throw(1)>",
+    "<svg onload=throw(1)>",
+    "<![CDATA[<x>]]>",
+    "<?php ?>",
+    '"}</script>',
+    "\\u003c/script\\u003e",
+    "\\",
+    "\\1 \\g<0> $& $1",
+    "&lt;b&gt; &amp; &#60;",
+    "`${throw 1}`",
+    "line\u2028separator \u2029 \u202e turned",
+    "{{ x }} %s {0}",
+]
+
+
+def hostile_page(name: str) -> str:
+    return page_of(f"Motion of {name}", {"title": f"Motion of {name}", "map": None, "motions": [], "cells": {}})
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_name_leaves_a_page_whole(name):
+    """All parts of the page are there, each once, and its content is read back as it was."""
+    page, usual = hostile_page(name), hostile_page("rig")
+    content = re.search(r'<script type="application/json" id="content">(.*?)</script>', page, re.DOTALL)[1]
+    assert json.loads(content)["title"] == f"Motion of {name}" and "<" not in content
+    title = re.search("<title>(.*?)</title>", page, re.DOTALL)[1]
+    assert html.unescape(title) == f"Motion of {name}"
+    rest, usual_rest = (
+        re.sub("<title>.*?</title>", "", text, flags=re.DOTALL).replace(own, "")
+        for text, own in (
+            (page, content),
+            (usual, re.search(r'id="content">(.*?)</script>', usual, re.DOTALL)[1]),
+        )
+    )
+    assert rest == usual_rest
+
+
+@pytest.mark.thorough
+@BROWSER
+def test_hostile_names_in_a_browser(folder):
+    for number, name in enumerate(HOSTILE):
+        path = folder / f"hostile_{number}.html"
+        path.write_text(hostile_page(name), "utf-8")
+        with opened(path) as (tab, told):
+            assert tab.text_content("#title") == f"Motion of {name}"
+            assert tab.evaluate("document.title.replace(/\\s+/g, ' ')") == " ".join(f"Motion of {name}".split())
+            assert tab.evaluate("getComputedStyle(document.body).display") == "block"
+            assert told == []

@@ -12,6 +12,7 @@ from cspr_jax.api.plans import Plan, plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import motion_files
+from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.labels import heading, robot_name, value
 from cspr_jax.outputs.plots.pages.maps import map_content, order_of
@@ -97,7 +98,11 @@ def _loaded(given: str | Path | Result | Plan) -> Result | Plan:
 
 def _of_motion(given: Result | Plan, name: str) -> tuple[str, dict[str, Any], list[str]]:
     if isinstance(given, Plan):
-        robot, content, feasible = given.spec.name, _planned(given, f"{len(given.points) - 1} segments"), given.feasible
+        robot, content, feasible = (
+            shortened(given.spec.name),
+            _planned(given, f"{len(given.points) - 1} segments"),
+            given.feasible,
+        )
     else:
         spec, keys = kept(given, name, "report")
         columns, robot = given.axes | given.data, robot_name(given)

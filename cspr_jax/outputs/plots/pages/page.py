@@ -2,6 +2,7 @@
 
 import html
 import json
+import re
 from importlib.resources import files
 from typing import Any
 
@@ -11,6 +12,7 @@ from cspr_jax.errors import InputError
 # The page's own parts, in the order in which a browser reads them.
 SCRIPTS = ("page.js", "map.js", "motion.js", "start.js")
 STYLE, FRAME = "page.css", "page.html"
+PLACE = re.compile(r"<!-- (\w+) -->")
 
 
 def page_of(title: str, content: dict[str, Any]) -> str:
@@ -31,8 +33,8 @@ def page_of(title: str, content: dict[str, Any]) -> str:
         from plotly.offline import get_plotlyjs
     except ImportError as error:
         raise InputError("plotly", "absent", 'installed: pip install "cspr_jax[report]"') from error
-    # Within a script element only these letters could end it.
-    data = json.dumps(content, allow_nan=False, separators=(",", ":"), sort_keys=True).replace("</", "<\\/")
+    # Without "<" no text can end the script element, nor open a comment in it that hides its end.
+    data = json.dumps(content, allow_nan=False, separators=(",", ":"), sort_keys=True).replace("<", "\\u003c")
     parts = {
         "title": html.escape(title),
         "version": html.escape(__version__),
@@ -41,10 +43,8 @@ def page_of(title: str, content: dict[str, Any]) -> str:
         "content": data,
         "scripts": "\n".join(_part(name) for name in SCRIPTS),
     }
-    text = _part(FRAME)
-    for name, part in parts.items():
-        text = text.replace(f"<!-- {name} -->", part, 1)
-    return text
+    # In one pass: what is put in is not searched again.
+    return PLACE.sub(lambda match: parts[match[1]], _part(FRAME))
 
 
 def _part(name: str) -> str:
