@@ -223,7 +223,7 @@ def test_a_motion_file_is_a_page_too(folder):
     assert cspr_jax.report(file, folder / "motion.html") == []
     motion = content_of(folder / "motion.html")["motions"][0]
     assert [part["arcs"] for part in motion["segments"]] == [10, 6]
-    assert motion["limits"] == [{"words": "smallest allowed", "value": 0.1}]
+    assert motion["limits"]["tension"] == [{"words": "smallest allowed", "value": 0.1}]
     np.testing.assert_allclose(
         unpacked(motion["tension"]).reshape(-1, 3).min(), plan.rows()["tension"].min(), rtol=1e-4
     )
@@ -387,3 +387,52 @@ def test_hostile_names_in_a_browser(folder):
             assert tab.evaluate("document.title.replace(/\\s+/g, ' ')") == " ".join(f"Motion of {name}".split())
             assert tab.evaluate("getComputedStyle(document.body).display") == "block"
             assert told == []
+
+
+def test_a_page_of_a_workspace_has_spools_and_no_motions(folder):
+    sweep = {"schema": 1, "map": "workspace", "robot": "prototype", "workspace": {"conditions": ["wrench-feasible"]}}
+    sweep["axes"] = {"x": [0.0, 0.1], "y": [0.0, 0.1], "z": [1.0, 1.2]}
+    cspr_jax.report(cspr_jax.run(sweep, folder / "spools"), folder / "spools.html")
+    content = content_of(folder / "spools.html")["map"]
+    base = np.array(resolve_robot("prototype", "", Path()).base_points)
+    plane = [axis["name"] for axis in content["axes"][-2:]]
+    for key, name in zip(("up", "across"), plane, strict=True):
+        np.testing.assert_array_equal(content["spools"][key], base[:, "xyz".index(name)])
+    # What it was not asked for has no values, and is not listed.
+    assert all(np.isfinite(unpacked(q["values"])).any() for q in content["quantities"])
+    assert {q["name"] for q in content["quantities"]} == {"verdict", "wrench_margin"}
+
+
+@pytest.mark.thorough
+@BROWSER
+def test_a_workspace_in_a_browser(folder):
+    """Its outline parts cells inside from others, and no key for motions is offered."""
+    sweep = {"schema": 1, "map": "workspace", "robot": "prototype", "workspace": {"conditions": ["wrench-feasible"]}}
+    sweep["axes"] = {"x": [-0.4, -0.1, 0.0, 0.1, 0.4], "y": [-0.3, 0.0, 0.5], "z": [1.0]}
+    path = cspr_jax.run(sweep, folder / "outlined")
+    cspr_jax.report(path, folder / "outlined.html")
+    inside = cspr_jax.open_result(path).data["verdict"][:, :, 0].T == 0
+    padded = np.pad(inside.astype(int), 1)
+    edges = sum(int(np.abs(np.diff(padded, axis=axis)).sum()) for axis in (0, 1))
+    with opened(folder / "outlined.html") as (tab, told):
+        keys = tab.inner_text(".keys")
+        assert "cell" in keys and not any(word in keys for word in ("motion", "play", "Enter", "slice"))
+        assert "motion" not in tab.inner_text("#cell")
+        line = tab.evaluate("outline(reasonsHere()).x")
+        assert edges > 0 and len(line) == 3 * edges
+        assert told == []
+
+
+def test_a_page_says_robot_limits_and_duration(folder):
+    keys = plan_keys(PLAN | {"tension_max": 9.0, "cable_speed_max": 40.0, "floor": 3.0}, "plan")
+    spec = resolve_robot("prototype", "", Path())
+    rows = {name: np.zeros((3, width)) for name, width in {"position": 3, "length": 3, "rate": 3, "tension": 3}.items()}
+    motion = motion_content("motion", {"t": np.array([0.0, 1.0, 2.5])} | rows, {}, spec, keys)
+    said = dict(motion["facts"])
+    assert said["robot"].startswith("prototype, point mass of 0.198 kg on 3 cables")
+    assert said["limits"] == ("tension at least 0.1 and at most 9 N, floor at z = 3 m, cable speed at most 40 m/s")
+    assert said["duration"] == "2.5 s"
+    assert motion["limits"]["rate"] == [{"words": "largest allowed", "value": 40.0}]
+    assert motion["cables"] == ["cable 1", "cable 2", "cable 3"]
+    unknown = motion_content("motion", {"t": np.array([0.0, 1.0, 2.5])} | rows, {}, None, None)
+    assert unknown["base"] == [] and "--plan" in dict(unknown["facts"])["robot"]

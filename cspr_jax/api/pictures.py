@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs.plots.draw import drawn
+from cspr_jax.outputs.plots.kept import with_plan
 from cspr_jax.outputs.plots.selection import result_at
 from cspr_jax.outputs.plots.style import Style, in_style, laid_out, rendered, style_of
 from cspr_jax.runtime.stages import stage
@@ -29,6 +30,7 @@ def plot(  # noqa: PLR0913
     size: str | tuple[float, float] | None = None,
     dpi: float | None = None,
     font_size: float | None = None,
+    plan: str | Path | None = None,
     output: str | Path | None = None,
 ) -> Figure:
     """Draw one result, or several in one picture: maps as lines, workspaces as outlines, motions over time.
@@ -48,6 +50,7 @@ def plot(  # noqa: PLR0913
         size: width and height, cm, as (16, 10) or "16x10"; None: what suits the picture.
         dpi: pixels an inch of a file; None: 160.
         font_size: points; None: 10.
+        plan: plan file of motions in CSV, which keep neither robot nor limits; None: none.
         output: picture to write; its ending is the format. None: nothing is written.
 
     Returns:
@@ -65,6 +68,8 @@ def plot(  # noqa: PLR0913
     files = [one if isinstance(one, Result) else result_at(Path(one)) for one in given]
     loaded = [one if isinstance(one, Result) else open_result(one) for one in files]
     names = [f"result {i + 1}" if isinstance(one, Result) else str(one) for i, one in enumerate(files)]
+    if plan is not None:
+        loaded = [with_plan(one, name, Path(plan)) for one, name in zip(loaded, names, strict=True)]
 
     def draw() -> Figure:
         given_at = None if at is None else dict(at)

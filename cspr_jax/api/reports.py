@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.api import plans
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.pictures import names_of
-from cspr_jax.api.plans import Plan, plan
+from cspr_jax.api.plans import Plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import motion_files
 from cspr_jax.outputs.plots.fitting import shortened
-from cspr_jax.outputs.plots.kept import kept
+from cspr_jax.outputs.plots.kept import keeps_plan, kept, with_plan
 from cspr_jax.outputs.plots.labels import heading, robot_name, value
 from cspr_jax.outputs.plots.pages.maps import map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import MOST_ROWS, motion_content
@@ -40,6 +41,7 @@ def report(
     cells: Sequence[Mapping[str, float]] = (),
     quantity: str | None = None,
     best: str | Sequence[str] = (),
+    plan: str | Path | None = None,
 ) -> list[str]:
     """Write a page to explore a map, or a plan, in a browser: one file that needs no network.
 
@@ -55,6 +57,7 @@ def report(
             missing are at their first point.
         quantity: of a map, to show first; None: the one that its kind of map is about.
         best: axes of a map of which each cell shows the best point, such as "z0", as in `plot`.
+        plan: plan file of a motion in CSV, which keeps neither robot nor limits; None: none.
 
     Returns:
         warnings, one line each.
@@ -70,6 +73,10 @@ def report(
         raise ConfigError("--trajectories", f"{trajectories}: must be an integer from 0 to {MOST}")
     try:
         loaded = _loaded(given)
+        if plan is not None:
+            if not isinstance(loaded, Result):
+                raise InputError("--plan", str(plan), "absent but with a motion in CSV")
+            loaded = with_plan(loaded, str(given), Path(plan))
         if isinstance(loaded, Result) and loaded.is_map:
             shown = loaded.best(*names_of(best))
             title, content, warnings = _of_map(shown, trajectories, cells, quantity)
@@ -91,22 +98,18 @@ def _loaded(given: str | Path | Result | Plan) -> Result | Plan:
         return given
     path = Path(given)
     if path.suffix == ".toml":
-        return plan(path)
+        return plans.plan(path)
     stage("reading")
     return open_result(result_at(path))
 
 
 def _of_motion(given: Result | Plan, name: str) -> tuple[str, dict[str, Any], list[str]]:
     if isinstance(given, Plan):
-        robot, content, feasible = (
-            shortened(given.spec.name),
-            _planned(given, f"{len(given.points) - 1} segments"),
-            given.feasible,
-        )
+        robot, content, feasible = shortened(given.spec.name), _planned(given, "motion"), given.feasible
     else:
-        spec, keys = kept(given, name, "report")
-        columns, robot = given.axes | given.data, robot_name(given)
-        content = motion_content(f"{len(given.data['segment_end'])} segments", columns, given.data, spec, keys)
+        spec, keys = kept(given, name, "report") if keeps_plan(given) else (None, None)
+        robot, columns = robot_name(given), given.axes | given.data
+        content = motion_content("motion", columns, given.data, spec, keys)
         feasible = bool(given.attributes.get("feasible", 1))
     doubt = "" if feasible else "not proved feasible"
     page: dict[str, Any] = {
@@ -185,7 +188,7 @@ def _cell(result: Result, index: tuple[int, ...]) -> dict[str, Any] | None:
     if keys is None:
         return None
     stage("motions of cells")
-    planned = plan(keys)
+    planned = plans.plan(keys)
     if not np.isfinite(planned.answers.duration).all():
         return None
     return _planned(planned, _words(result, index))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from cspr_jax.cli.command import Command, add_all_errors, add_device, add_output, prepare_jax, print_path, warn
 from cspr_jax.errors import ConfigError, ExitCode
-from cspr_jax.outputs.plots.options import ACCELERATION, add_best, add_plot
+from cspr_jax.outputs.plots.options import ACCELERATION, add_best, add_motion_plan, add_plot
 from cspr_jax.runtime.progress import waiting
 
 
@@ -20,7 +20,7 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or results[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
-    names = ("quantity", "best", "lines", "envelope", "solid", "size", "dpi", "font_size")
+    names = ("quantity", "best", "lines", "envelope", "solid", "size", "dpi", "font_size", "plan")
     with waiting():
         plot(results, at=at, output=output, **{name: getattr(options, name) for name in names})
     print_path(output)
@@ -42,6 +42,7 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cell", action="append", default=[], metavar="AXIS=VALUE,...", help="also include the motion of this cell"
     )
+    add_motion_plan(parser)
     add_all_errors(parser)
     add_device(parser)
 
@@ -56,8 +57,8 @@ def _report(options: argparse.Namespace) -> int:
         prepare_jax(options, quick=True)
         from cspr_jax.api.reports import report
 
-        some = {"trajectories": options.trajectories, "quantity": options.quantity, "best": options.best}
-        warnings = report(given, output, cells=cells, **some)
+        choices = {name: getattr(options, name) for name in ("trajectories", "quantity", "best", "plan")}
+        warnings = report(given, output, cells=cells, **choices)
     for line in warnings:
         warn(line)
     print_path(output)

@@ -18,6 +18,7 @@ from cspr_jax.schema.motion_quantities import FLIGHT_DIMS, PARTS, SEGMENTS
 from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.isolated import Reader
+from cspr_jax.store.motion_table import read_table
 from cspr_jax.store.seal import DamagedError
 
 if TYPE_CHECKING:
@@ -141,7 +142,9 @@ class Result:
 def open_result(path: Path) -> Result:
     """Read a result of `cspr run` or a motion of `cspr plan -o`.
 
-    The file may come from anybody: another process reads it, within limits of memory and time, and what it finds
+    A motion that ends in .csv has neither robot nor plan nor segments; it is named after its file.
+
+    An HDF5 file may come from anybody: another process reads it, within limits of memory and time, and what it finds
     is checked like a sweep file.
 
     Args:
@@ -154,15 +157,15 @@ def open_result(path: Path) -> Result:
         StoreError: no such file, not HDF5, damaged, or not written by this program.
     """
     try:
-        with Reader() as reader:
-            attributes, arrays = reader.result(Path(path))
+        is_table = Path(path).suffix.lower() == ".csv"
+        attributes, arrays = read_table(Path(path)) if is_table else _content(Path(path))
         arrays = dict(sorted(arrays.items()))
         settings = _settings(attributes, path) if "map" in attributes else {}
         _check_robot(attributes, path)
         if settings:
             axes, data = _map(settings, arrays)
         else:
-            axes, data = _motion(attributes, arrays)
+            axes, data = _motion(attributes, arrays, keeps_robot=not is_table)
     except DamagedError as error:
         raise StoreError(one_line(f"{path}: cannot be read as a result: {error}")) from error
     except ConfigError as error:
@@ -170,6 +173,11 @@ def open_result(path: Path) -> Result:
     names = [*axes, *data]
     units, labels = _described(settings.get("map"), names)
     return Result(axes, data, units, labels, attributes, settings)
+
+
+def _content(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    with Reader() as reader:
+        return reader.result(path)
 
 
 def _described(kind: object, names: list[str]) -> tuple[dict[str, str], dict[str, str]]:
@@ -252,7 +260,7 @@ _OPEN = (
 
 
 def _motion(
-    attributes: dict[str, Any], arrays: dict[str, np.ndarray]
+    attributes: dict[str, Any], arrays: dict[str, np.ndarray], *, keeps_robot: bool
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     time, tension = arrays.get("t"), arrays.get("tension")
     if time is None or tension is None or "position" not in arrays or time.ndim != 1 or tension.ndim != 2:
@@ -260,7 +268,7 @@ def _motion(
     if not len(time) or time.dtype != np.float64 or not 2 <= tension.shape[1] <= MOST_CABLES:
         raise DamagedError("it is not a motion of two cables or more")
     # Motions of straight lines know no P0.
-    known = {"mass": LARGEST_MASS} | ({"z0": LARGEST_LENGTH} if "z0" in attributes else {})
+    known = ({"mass": LARGEST_MASS} if keeps_robot else {}) | ({"z0": LARGEST_LENGTH} if "z0" in attributes else {})
     for name, most in known.items():
         if not 1.0 / most <= attributes.get(name, 0.0) <= most:
             raise DamagedError(f"{name} = {shown(attributes.get(name))}: must be a number > 0")

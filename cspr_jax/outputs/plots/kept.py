@@ -1,13 +1,84 @@
-"""Robot and plan that a motion file keeps, for pictures that need more than its rows."""
+"""Robot and plan of a motion, which its file keeps or which go with it, for pictures that need more than its rows."""
 
+import dataclasses
 import json
 from pathlib import Path
 
-from cspr_jax.config.plan import PlanFile, kept_plan
-from cspr_jax.config.reading import checked
-from cspr_jax.config.robot import RobotFile
-from cspr_jax.errors import InputError
+import numpy as np
+
+from cspr_jax.config.equivalents import as_moved
+from cspr_jax.config.plan import PlanFile, kept_plan, read_plan
+from cspr_jax.config.reading import checked, read_text
+from cspr_jax.config.robot import RobotFile, resolve_robot
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.outputs.plots.moving import moving
+from cspr_jax.schema.families import FAMILIES
+from cspr_jax.schema.identity import canonical_json
 from cspr_jax.store.result import Result
+
+# Lengths of cables in a table and those of a robot in its poses are the same but for rounding, in parts of the longest.
+SAME_LENGTH = 1e-6
+
+
+def keeps_plan(result: Result) -> bool:
+    """Whether a motion has its robot and its plan.
+
+    Args:
+        result: the motion.
+
+    Returns:
+        not of tables read without their plan, and of files of earlier versions.
+    """
+    return bool(result.attributes.get("robot_settings") and result.attributes.get("plan"))
+
+
+def with_plan(result: Result, file: str, path: Path) -> Result:
+    """A motion without robot and plan, with those of a plan file.
+
+    Args:
+        result: the motion.
+        file: its name, for errors.
+        path: of the plan file.
+
+    Returns:
+        the motion, with the attributes that an HDF5 file keeps.
+
+    Raises:
+        ConfigError: a mistake in the plan, a motion that has a plan or is a map, or one of another robot.
+    """
+    if result.is_map or keeps_plan(result):
+        raise ConfigError("--plan", f"{path}: cannot be combined with {file}, which keeps what it was made of")
+    text = read_text(path)
+    keys = read_plan(text, path)
+    spec = as_moved(resolve_robot(keys.robot, path, path.parent), [FAMILIES[name].legs for name in keys.families])
+    _check_cables(result, file, spec, path)
+    attributes = {
+        "robot": spec.name,
+        "robot_settings": canonical_json(spec.settings),
+        "plan": text,
+        "family": keys.family,
+        "base_points": np.asarray(spec.base_points, float),
+        "mass": spec.mass,
+        "z_axis": spec.z_axis,
+        **({"z0": keys.z0} if isinstance(keys.z0, float) else {}),
+    }
+    return dataclasses.replace(result, attributes=result.attributes | attributes)
+
+
+def _check_cables(result: Result, file: str, spec: RobotFile, path: Path) -> None:
+    # Whether the lengths are those of this robot in these poses; of cables over pulleys only their number is known.
+    count = result.data["tension"].shape[1]
+    if len(spec.base_points) != count:
+        raise ConfigError(path, f"its robot {spec.name} has {len(spec.base_points)} cables: {file} has {count}")
+    if spec.is_platform is not ("quaternion" in result.data):
+        raise ConfigError(path, f"its robot {spec.name} and {file}: must both turn, or both be point masses")
+    if spec.pulley_radius is None and "length" in result.data:
+        robot, length = moving(result.data, spec, np.arange(len(result.axes["t"]))), result.data["length"]
+        gap = np.abs(np.linalg.norm(robot.attached - robot.base, axis=2) - length)
+        row, cable = np.unravel_index(gap.argmax(), gap.shape)
+        if gap[row, cable] > SAME_LENGTH * length.max():
+            fault = f"cable {cable + 1} is {length[row, cable]:.6g} m long at t = {result.axes['t'][row]:.6g} s"
+            raise ConfigError(path, f"its robot {spec.name} is not that of {file}, where {fault}")
 
 
 def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]:
@@ -25,10 +96,11 @@ def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]
         InputError: the file keeps none, as those of earlier versions.
         ConfigError: a mistake in the plan.
     """
-    settings, text = (result.attributes.get(name) for name in ("robot_settings", "plan"))
-    if not settings or not text:
+    if not keeps_plan(result):
         fault = f'"{quantity}" of a motion that keeps no robot and no plan'
-        raise InputError("--quantity", quantity, "must be of one that `cspr plan -o` writes now", fault=fault)
+        allowed = "must have its plan beside it, --plan FILE.toml, or be an HDF5 file of `cspr plan -o`"
+        raise InputError("--quantity", quantity, allowed, fault=fault)
+    settings, text = (result.attributes.get(name) for name in ("robot_settings", "plan"))
     # The settings were checked when the file was read.
     spec = checked(RobotFile, json.loads(settings), file)
     return spec.equivalent() if spec.translation_only else spec, kept_plan(text, Path(file))

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.outputs.plots.kept import kept
+from cspr_jax.outputs.plots.kept import keeps_plan, kept
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.moving import limits_of
 from cspr_jax.schema.motion_quantities import PARTS
@@ -65,7 +65,7 @@ def motion_figure(result: Result) -> Figure:
     if result.attributes.get("z_axis", "down") == "down":
         drawn["xz"].invert_yaxis()
     _tensions(drawn["tension"], time, tension, cable_names(result.data), result.attributes.get("mass"))
-    if "tension_residual" in result.data:
+    if "tension_residual" in result.data and keeps_plan(result):
         _limits(drawn["tension"], tension, *kept(result, "plan", "tension"))
     if "couple" in drawn:
         _lines(drawn["couple"], time, result.data["tension_couple"], [f"couple {name}" for name in PARTS["couple"]])
@@ -110,6 +110,8 @@ def doubt(result: Result) -> str:
     if result.attributes.get("feasible", 1):
         return ""
     none = result.data.get("segment_arcs", np.empty(0)) == 0
+    if not len(none):
+        return "\nNOT PROVED FEASIBLE"
     wrong = np.flatnonzero(none & (result.data.get("segment_verdict", none) != 0)) + 1
     which = ", ".join(str(number) for number in wrong[:6]) + (", ..." if len(wrong) > 6 else "")
     return f"\nNOT PROVED FEASIBLE: segment{'s' if len(wrong) > 1 else ''} {which}"

@@ -31,6 +31,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis: nearest point; t of a motion"
     )
+    add_motion_plan(parser)
     parser.set_defaults(device=None)
     add_look(parser)
 
@@ -48,6 +49,17 @@ def add_best(parser: argparse.ArgumentParser) -> None:
         metavar="AXIS",
         help="of a map, such as z0: each cell at the best point of this axis, that with the fewest arcs if any is "
         "feasible; --quantity best_AXIS: which one",
+    )
+
+
+def add_motion_plan(parser: argparse.ArgumentParser) -> None:
+    """The argument of commands that read motions in CSV.
+
+    Args:
+        parser: of the command.
+    """
+    parser.add_argument(
+        "--plan", type=Path, metavar="FILE", help="plan file of a motion in CSV, which keeps neither robot nor limits"
     )
 
 

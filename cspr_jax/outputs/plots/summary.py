@@ -39,12 +39,13 @@ def summary_figure(result: Result, spec: RobotFile, keys: PlanFile) -> Figure:
     draw_tensions(over_time, result, limits_of(spec, keys))
     over_time.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     _rates(figure.add_subplot(parts[2], sharex=over_time), result)
-    table = figure.add_subplot(parts[3])
-    table.axis("off")
-    drawn = table.table(cells, colLabels=HEADS, loc="center", cellLoc="center", edges="horizontal")
-    drawn.auto_set_column_width(list(range(len(HEADS))))
-    drawn.auto_set_font_size(False)
-    drawn.scale(1.0, 1.15)
+    if cells:
+        table = figure.add_subplot(parts[3])
+        table.axis("off")
+        drawn = table.table(cells, colLabels=HEADS, loc="center", cellLoc="center", edges="horizontal")
+        drawn.auto_set_column_width(list(range(len(HEADS))))
+        drawn.auto_set_font_size(False)
+        drawn.scale(1.0, 1.15)
     figure.suptitle(f"{robot_name(result)}: {result.axes['t'][-1]:.4g} s\n{extremes(result)}{doubt(result)}")
     return figure
 

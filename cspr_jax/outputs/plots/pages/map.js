@@ -97,6 +97,32 @@ function motionMarks() {
   return { x: places.map((own) => axes.at(-1).values[own[1]]), y: places.map((own) => axes.at(-2).values[own[0]]) };
 }
 
+// Edges of cells between what is inside of a workspace and what is not.
+function outline(reason) {
+  const [rows, columns] = content.map.shape.slice(-2), [y, x] = content.map.axes.slice(-2);
+  const inside = (i, j) => content.map.reasons.entries[reason[i]?.[j] ?? -1]?.word === "feasible";
+  const edges = (values) => {
+    const mean = values.slice(1).map((value, k) => (value + values[k]) / 2), last = values.length - 1;
+    if (!last) return [values[0] - 0.5, values[0] + 0.5];
+    return [2 * values[0] - mean[0], ...mean, 2 * values[last] - mean[last - 1]];
+  };
+  const [across, upward] = [edges(x.values), edges(y.values)], line = { x: [], y: [] };
+  const add = (x0, y0, x1, y1) => { line.x.push(x0, x1, null); line.y.push(y0, y1, null); };
+  for (let i = 0; i <= rows; i++) {
+    for (let j = 0; j <= columns; j++) {
+      if (inside(i, j) !== inside(i, j - 1)) add(across[j], upward[i], across[j], upward[i + 1]);
+      if (inside(i, j) !== inside(i - 1, j)) add(across[j], upward[i], across[j + 1], upward[i]);
+    }
+  }
+  return line;
+}
+
+// Verdicts of the cells that are shown, in rows.
+function reasonsHere() {
+  const [rows, columns] = content.map.shape.slice(-2), start = sliceStart();
+  return Array.from({ length: rows }, (_, i) => Array.from(map.reasons.slice(start + i * columns, start + (i + 1) * columns)));
+}
+
 function drawMap() {
   const { axes, quantities, reasons, isDown, isEqual } = content.map;
   const quantity = quantities[map.quantity], scale = quantity.scale, own = planes();
@@ -110,6 +136,14 @@ function drawMap() {
     const count = reasons.entries.length, shades = reasons.entries.map((entry) => entry.colour);
     traces.push({ ...common, z: own.reason, zmin: -0.5, zmax: count - 0.5, showscale: false, opacity: 0.55,
       colorscale: stepped({ stepped: true, shades }), hoverongaps: false });
+  }
+  if (content.map.spools) {
+    const [up, over] = [content.map.spools.up, content.map.spools.across];
+    traces.push({ type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false, ...outline(reasonsHere()),
+      line: { color: theme.ink, width: 2 } });
+    traces.push({ type: "scatter", mode: "markers+text", hoverinfo: "skip", showlegend: false, x: over, y: up,
+      text: over.map((_, k) => `${k + 1}`), textposition: "top center", cliponaxis: false,
+      marker: { symbol: "square", size: 8, color: theme.ink } });
   }
   traces.push({ type: "scatter", mode: "markers", hoverinfo: "skip", showlegend: false, ...motionMarks(),
     marker: { symbol: "circle", size: 7, color: "white", line: { color: "black", width: 1.2 } } });
@@ -136,13 +170,16 @@ function drawLegend(reason) {
     one.style.setProperty("--own", colour);
     node.append(one);
   }
+  if (!content.map.spools) return;
+  node.append(made("span", "outline of the workspace", { className: "line" }));
+  node.append(made("span", "spools, by number", { className: "square" }));
 }
 
 function tellCell() {
   const flat = flatCell(), reason = reasonOf(flat);
   const rows = coordinates(...map.cell).map((own) => own.slice(0, 2)).concat(facts(flat));
   for (const sentence of reason ? reason.sentences : []) rows.push(["", sentence]);
-  rows.push(["motion", content.cells[flat] === undefined ? "not computed for this cell" : "Enter or click shows it"]);
+  if (content.motions.length) rows.push(["motion", content.cells[flat] === undefined ? "not computed for this cell" : "Enter or click shows it"]);
   rowsInto(element("cell"), rows);
 }
 
@@ -225,6 +262,7 @@ async function startMap() {
   quantities.forEach((own, k) => element("quantity").append(made("option", own.label, { value: k })));
   element("quantity").addEventListener("change", (event) => { map.quantity = Number(event.target.value); drawMap(); });
   addSliders();
+  element("slice-keys").hidden = !shape.slice(0, -2).some((count) => count > 1);
   drawMap();
   element("map").on("plotly_click", ({ points }) => {
     const [row, column] = placeOf(points[0]);

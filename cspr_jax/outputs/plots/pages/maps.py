@@ -12,6 +12,7 @@ from cspr_jax.outputs.plots.labels import WORDS, as_drawn, axis_label, label, un
 from cspr_jax.outputs.plots.notes import notes
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.planes import in_order
+from cspr_jax.outputs.plots.posed import asked, robot_of
 from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
 from cspr_jax.outputs.plots.worded import word_scale, worded
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
@@ -22,6 +23,7 @@ from cspr_jax.store.result import Result
 FIRST = ("verdict", "duration", "margin")
 LARGEST = 14_000_000
 SHADES = 32
+SPACE, WORKSPACE = ("x", "y", "z"), "workspace"
 
 
 def order_of(result: Result) -> tuple[list[str], list[np.ndarray]]:
@@ -60,7 +62,9 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
     known = [name for name in dict.fromkeys((*kind.pictured, *FIRST, *result.data)) if name in result.data]
     if quantity is not None and quantity not in known:
         raise InputError("--quantity", quantity, "one of " + ", ".join(sorted(result.data)))
+    known = [name for name in known if name == quantity or _is_asked(result, name)] or known[:1]
     first = quantity or shown_first(result)
+    first = first if first in known else known[0]
     names, points = order_of(result)
     places = [list(result.axes).index(name) for name in names]
     shape = [len(chosen) for chosen in points]
@@ -85,9 +89,31 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
         else None,
         "notes": said(result)
         + notes(result, "", [], [name for name, count in zip(names, shape, strict=True) if count > 1]),
+        "spools": _spools(result, names[-2:]),
         "isDown": names[-2:-1] == ["z"] and result.attributes.get("z_axis", "down") == "down",
         "isEqual": len(names) > 1 and all(result.units[name] == "m" for name in names[-2:]),
     }, left
+
+
+def _is_asked(result: Result, name: str) -> bool:
+    # What a map was not asked for has no value anywhere; of workspaces some of it follows from the verdict alone.
+    data = result.data[name]
+    if data.dtype.kind == "f" and np.isnan(data).all():
+        return False
+    if result.attributes["map"] != WORKSPACE:
+        return True
+    if name == "orientation_fraction":
+        return asked(result).orientations is not None
+    return name != "cell_side" or bool(data.any())
+
+
+def _spools(result: Result, plane: list[str]) -> dict[str, list[float]] | None:
+    # Of the robot of a workspace, seen along the axis out of the plane.
+    if result.attributes["map"] != WORKSPACE or "verdict" not in result.data or not set(plane) <= set(SPACE):
+        return None
+    base = np.asarray(robot_of(result).base_points, float)
+    up, across = (base[:, SPACE.index(name)].tolist() for name in plane)
+    return {"up": up, "across": across}
 
 
 def _axis(result: Result, name: str, points: np.ndarray) -> dict[str, Any]:

@@ -5,9 +5,14 @@ const DASHES = ["solid", "dash", "dashdot", "dot"];
 const TENSION = [[0, "#7e03a8"], [0.35, "#b73779"], [0.7, "#e8622c"], [1, "#f9a63a"]];
 const known = new Map();
 
+// The charts over time: their places, quantities and units; that of the position has no cables.
+const OVER_TIME = [["tensions", "tension", "tension", "N"], ["speeds", "rate", "cable speed", "m/s"],
+  ["lengths", "length", "cable length", "m"], ["position", "path", "position", "m"]];
+
 async function loaded(number) {
   if (!known.has(number)) {
-    const given = content.motions[number], names = ["t", "path", "attached", "corners", "tension"];
+    const given = content.motions[number];
+    const names = ["t", "path", "attached", "corners", "tension", "rate", "length"].filter((name) => given[name]);
     const arrays = await Promise.all(names.map((name) => unpacked(given[name])));
     known.set(number, { ...given, ...Object.fromEntries(names.map((name, k) => [name, arrays[k]])) });
   }
@@ -35,7 +40,8 @@ function shade(value, [low, high]) {
 
 // Coordinates of the traces that move, at one row: cables, edges of the platform, the effector.
 function moving(row) {
-  const { own, range } = motion, { cables, edges } = own;
+  // The robot of a table may not be known: then it has no spools.
+  const { own, range } = motion, { edges } = own, cables = own.base.length;
   const at = (values, width, k) => [0, 1, 2].map((axis) => values[row * width + 3 * k + axis]);
   const lines = Array.from({ length: cables }, (_, k) => [own.base[k], at(own.attached, 3 * cables, k)]);
   const shape = Array.from({ length: edges }, (_, k) => [at(own.corners, 6 * edges, 2 * k),
@@ -53,22 +59,28 @@ function robotTraces() {
   const { own, range } = motion, theme = colours(), now = moving(motion.row);
   const line = (k, extra) => ({ type: "scatter3d", x: now.x[k], y: now.y[k], z: now.z[k], showlegend: false,
     mode: "lines", hoverinfo: "skip", ...extra });
-  const traces = now.tension.map((value, k) => line(k, { name: `cable ${k + 1}`, hoverinfo: "name",
-    line: { width: 5, color: now.shades[k] } }));
-  traces.push(line(own.cables, { line: { width: 7, color: theme.ink } }));
-  traces.push(line(own.cables + 1, { mode: "markers",
+  const count = own.base.length, traces = now.tension.map((value, k) => line(k, { name: own.cables[k],
+    hoverinfo: "name", line: { width: 5, color: now.shades[k] } }));
+  traces.push(line(count, { line: { width: 7, color: theme.ink } }));
+  traces.push(line(count + 1, { mode: "markers",
     marker: { size: own.edges ? 0 : 5, color: theme.ink } }));
   const points = (values, extra) => ({ type: "scatter3d", x: values[0], y: values[1], z: values[2], showlegend: false,
     hoverinfo: "skip", ...extra });
   const path = [0, 1, 2].map((k) => columnOf(own.path, 3, k));
-  traces.push(points(path, { mode: "lines", line: { width: 2, color: theme.soft } }));
+  traces.push(points(path, { mode: "lines", name: "path", showlegend: true, line: { width: 2, color: theme.soft } }));
   const base = [0, 1, 2].map((k) => own.base.map((point) => point[k]));
-  traces.push(points(base, { mode: "markers", name: "spools", marker: { size: 4, symbol: "square", color: theme.soft,
-    colorscale: TENSION, cmin: range[0], cmax: range[1], showscale: false } }));
+  traces.push(points(base, { mode: "markers+text", name: "spools", text: own.base.map((_, k) => `${k + 1}`),
+    textposition: "top center", textfont: { color: theme.ink }, showlegend: count > 0,
+    marker: { size: 4, symbol: "square", color: theme.soft } }));
+  for (const [name, row, symbol] of [["start", 0, "circle-open"], ["end", own.count - 1, "diamond-open"]]) {
+    traces.push(points([0, 1, 2].map((k) => [own.path[3 * row + k]]), { mode: "markers", name, showlegend: true,
+      marker: { size: 6, symbol, color: theme.ink } }));
+  }
   if (own.flight) {
     const flight = [0, 1, 2].map((k) => own.flight.map((point) => point[k]));
-    traces.push(points(flight, { mode: "lines", line: { width: 3, dash: "dash", color: theme.mark } }));
+    traces.push(points(flight, { mode: "lines", name: "flight", showlegend: true, line: { width: 3, dash: "dash", color: theme.mark } }));
   }
+  if (!count) return traces;
   // A trace without points holds the bar of the colours.
   traces.push(points([[null], [null], [null]], { mode: "markers", marker: { size: 0.1, color: [range[0]],
     colorscale: TENSION, cmin: range[0], cmax: range[1], showscale: true,
@@ -78,7 +90,7 @@ function robotTraces() {
 
 function box() {
   const { own } = motion, every = [0, 1, 2].map((k) => [...own.base.map((point) => point[k]),
-    ...columnOf(own.attached, 3, k), ...(own.flight ?? []).map((point) => point[k])]);
+    ...columnOf(own.attached, 3, k), ...columnOf(own.path, 3, k), ...(own.flight ?? []).map((point) => point[k])]);
   const ranges = every.map(extremes), margin = 0.04 * Math.max(...ranges.map(([low, high]) => high - low));
   return ranges.map(([low, high]) => [low - margin, high + margin]);
 }
@@ -92,6 +104,7 @@ function drawRobot() {
     const sizes = ranges.map(([low, high]) => high - low), [x, y, z] = sizes.map((own) => 1.9 * own / Math.hypot(...sizes));
     const aspectratio = { x, y, z };
     return { margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "robot",
+      legend: { orientation: "h", x: 0.5, xanchor: "center", y: 0, yanchor: "bottom" },
       scene: { xaxis: own[0], yaxis: own[1], zaxis: own[2], aspectmode: "manual", aspectratio,
         camera: { eye: { x: 1.0, y: -1.4, z: 0.55 }, projection: { type: "orthographic" } } } };
   }), CHARTS);
@@ -100,31 +113,42 @@ function drawRobot() {
 const cursor = (theme) => ({ type: "line", yref: "paper", y0: 0, y1: 1, x0: motion.own.t[motion.row],
   x1: motion.own.t[motion.row], line: { color: theme.mark, width: 2 } });
 
-function drawTensions() {
-  const { own } = motion, t = Array.from(own.t);
-  const traces = Array.from({ length: own.cables }, (_, k) => ({ type: "scatter", mode: "lines",
-    name: `cable ${k + 1}`, x: t, y: columnOf(own.tension, own.cables, k), hovertemplate: "%{y:.4g} N",
-    line: { width: 1.8, color: PALETTE[k % PALETTE.length], dash: DASHES[Math.floor(k / PALETTE.length) % 4] } }));
-  const [, high] = motion.range, near = own.limits.filter((limit) => limit.value < 3 * high);
-  Plotly.react("tensions", traces, layoutOf((axis, theme) => ({
-    hovermode: "x unified", legend: { orientation: "h", y: 1.16 }, margin: { l: 60, r: 15, t: 30, b: 45 },
-    xaxis: { ...axis, title: { text: "time (s)" }, hoverformat: ".4g" },
-    yaxis: { ...axis, title: { text: "tension (N)" }, rangemode: "tozero" },
+function drawOverTime([place, name, words, unit]) {
+  const { own } = motion, t = Array.from(own.t), names = name === "path" ? ["x", "y", "z"] : own.cables;
+  const look = (k) => ({ width: 1.8, color: PALETTE[k % PALETTE.length],
+    dash: DASHES[(k + Math.floor(k / PALETTE.length)) % DASHES.length] });
+  const traces = names.map((label, k) => ({ type: "scatter", mode: "lines", name: label, x: t, line: look(k),
+    y: columnOf(own[name], names.length, k), hovertemplate: `%{y:.4g} ${unit}` }));
+  const [low, high] = extremes(own[name]), limits = (own.limits[name] ?? [])
+    .flatMap((limit) => (name === "rate" ? [limit, { ...limit, value: -limit.value }] : [limit]));
+  const near = limits.filter((limit) => Math.abs(limit.value) < 3 * Math.max(-low, high));
+  const beyond = limits.filter((limit) => limit.value >= 3 * Math.max(-low, high)).map((limit) => limit.value);
+  const above = beyond.length ? `; largest allowed ${shown(Math.min(...beyond), 4)} ${unit}, above the chart` : "";
+  const level = (limit) => ({ xref: "paper", x: 0.01, xanchor: "left", y: limit.value,
+    yanchor: limit.words[0] === "s" || limit.value < 0 ? "bottom" : "top", showarrow: false,
+    text: `${limit.words} ${shown(Math.abs(limit.value), 4)} ${unit}` });
+  Plotly.react(place, traces, layoutOf((axis, theme) => ({
+    hovermode: "x unified", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 11 } },
+    showlegend: true, margin: { l: 60, r: 30, t: 30, b: 45 },
+    modebar: { orientation: "v" },
+    xaxis: { ...axis, title: { text: `time (s)${above}` }, hoverformat: ".4g" },
+    yaxis: { ...axis, title: { text: `${words} (${unit})` }, rangemode: name === "tension" ? "tozero" : "normal" },
     shapes: [cursor(theme),
       ...own.segments.slice(0, -1).map((part) => ({ type: "line", yref: "paper", y0: 0, y1: 1, x0: part.end,
         x1: part.end, line: { color: theme.soft, width: 1, dash: "dot" } })),
       ...near.map((limit) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: limit.value, y1: limit.value,
-        line: { color: theme.ink, width: 1, dash: "dash" } }))],
-    annotations: near.map((limit) => ({ xref: "paper", x: 0.01, xanchor: "left", y: limit.value, yanchor: "bottom",
-      showarrow: false, text: `${limit.words} ${shown(limit.value, 4)} N` })),
+        line: { color: theme.mark, width: 1.5, dash: "dash" } }))],
+    annotations: near.map(level),
   })), CHARTS);
 }
+
+const charts = () => OVER_TIME.filter(([, name]) => motion.own[name]);
 
 function tellSegments() {
   const { own } = motion, time = own.t[motion.row];
   const rows = own.segments.map((part, k) => [k + 1, `${shown(part.start, 4)} – ${shown(part.end, 4)} s`,
     part.arcs || "–", part.margin === null ? "–" : shown(part.margin, 4), part.isFeasible ? "feasible" : part.verdict]);
-  rowsInto(element("segments"), rows, ["segment", "time", "arcs", "margin", "verdict"]);
+  if (rows.length) rowsInto(element("segments"), rows, ["segment", "time", "arcs", "margin", "verdict"]);
   const now = own.segments.findIndex((part) => time <= part.end);
   if (own.segments.length > 1 && now >= 0) element("segments").rows[now + 1].className = "now";
 }
@@ -135,7 +159,8 @@ function setRow(row) {
   const now = moving(motion.row), which = now.x.map((_, k) => k), theme = colours();
   const shades = [...now.shades, theme.ink, theme.ink];
   Plotly.restyle("robot", { x: now.x, y: now.y, z: now.z, "line.color": shades }, which);
-  Plotly.relayout("tensions", { "shapes[0].x0": own.t[motion.row], "shapes[0].x1": own.t[motion.row] });
+  const time = { "shapes[0].x0": own.t[motion.row], "shapes[0].x1": own.t[motion.row] };
+  charts().forEach(([place]) => Plotly.relayout(place, time));
   element("time").value = motion.row;
   element("clock").textContent = `${own.t[motion.row].toFixed(2)} of ${own.t[own.count - 1].toFixed(2)} s`;
   tellSegments();
@@ -174,6 +199,8 @@ async function showMotion(number) {
 
 function drawMotion() {
   drawRobot();
-  drawTensions();
+  OVER_TIME.forEach(([place, name]) => { element(place).hidden = !motion.own[name]; });
+  charts().forEach(drawOverTime);
+  rowsInto(element("facts"), motion.own.facts);
   setRow(motion.row);
 }

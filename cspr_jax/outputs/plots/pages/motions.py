@@ -7,22 +7,28 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.fitting import shortened
+from cspr_jax.outputs.plots.labels import WRITTEN, cable_names
 from cspr_jax.outputs.plots.moving import limits_of, moving
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
 from cspr_jax.plans.causes import cause_text
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 
 # Rows of a motion in a page, at most.
 MOST_ROWS = 1200
+# Columns of cables, each with the quantity of its limits; units of all quantities that limits bound.
+OF_CABLES = {"tension": "tension", "rate": "speed", "length": "length"}
+UNITS = {row.quantity: WRITTEN.get(row.unit, row.unit).replace("^2", "²") for row in LIMITS}
 
 
 def motion_content(
     title: str,
     columns: Mapping[str, np.ndarray],
     segments: Mapping[str, np.ndarray],
-    spec: RobotFile,
-    keys: PlanFile,
+    spec: RobotFile | None,
+    keys: PlanFile | None,
 ) -> dict[str, Any]:
     """What a page shows of a motion.
 
@@ -30,30 +36,65 @@ def motion_content(
         title: of the motion.
         columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, and the flight if there is one.
         segments: by the names of `schema.motion_quantities.SEGMENTS`.
-        spec: the robot whose cables have these tensions.
-        keys: the plan, for the limits.
+        spec: the robot whose cables have these tensions; None: the file does not keep it.
+        keys: the plan, for the limits; None: the file does not keep it.
 
     Returns:
         plain values, for JSON.
     """
     rows = _chosen(np.asarray(columns["t"]))
-    robot, tension = moving(columns, spec, rows), np.asarray(columns["tension"])[rows]
+    robot = moving(columns, spec, rows)
     return {
         "title": title,
-        "isDown": spec.z_axis == "down",
+        "facts": _facts(np.asarray(columns["t"]), segments, spec, keys),
+        "isDown": spec is None or spec.z_axis == "down",
         "count": len(rows),
-        "cables": len(robot.base),
+        "cables": cable_names(columns),
         "base": np.round(robot.base, 9).tolist(),
         "t": packed(np.asarray(columns["t"])[rows]),
         "path": packed(robot.position),
         "attached": packed(robot.attached),
         "corners": packed(robot.corners),
         "edges": robot.corners.shape[1] // 2,
-        "tension": packed(tension),
+        **{name: packed(np.asarray(columns[name])[rows]) for name in OF_CABLES if name in columns},
         "flight": np.asarray(columns["flight_position"]).tolist() if "flight_position" in columns else None,
-        "limits": [{"words": words, "value": value} for words, value in limits_of(spec, keys)],
+        "limits": {name: _limits(spec, keys, quantity) for name, quantity in OF_CABLES.items()},
         "segments": _segments(segments),
     }
+
+
+def _limits(spec: RobotFile | None, keys: PlanFile | None, quantity: str) -> list[dict[str, Any]]:
+    if spec is None or keys is None:
+        return []
+    return [{"words": words, "value": value} for words, value in limits_of(spec, keys, quantity)]
+
+
+def _facts(
+    time: np.ndarray, segments: Mapping[str, np.ndarray], spec: RobotFile | None, keys: PlanFile | None
+) -> list[tuple[str, str]]:
+    # Robot, limits and duration, in words.
+    count = len(segments.get("segment_end", ()))
+    of_segments = f" in {count} segment{'s' if count > 1 else ''}" if count else ""
+    facts = [("duration", f"{time[-1] - time[0]:.4g} s{of_segments}")]
+    if spec is None or keys is None:
+        return [("robot", "the file keeps neither robot nor limits; --plan gives them"), *facts]
+    body = "platform" if spec.is_platform else "point mass"
+    robot = f"{shortened(spec.name)}, {body} of {spec.mass:.4g} kg on {len(spec.base_points)} cables, z {spec.z_axis}"
+    limits = ", ".join(filter(None, (_bound(row, limits_of(spec, keys, row)) for row in UNITS)))
+    return [("robot", robot), ("limits", limits or "none, but that all cables are taut"), *facts]
+
+
+def _bound(quantity: str, limits: list[tuple[str, float]]) -> str:
+    if quantity == "depth":
+        return f"floor at z = {limits[0][1]:.4g} m" if limits else ""
+    parts = []
+    for words, phrase in (("smallest allowed", "at least"), ("largest allowed", "at most")):
+        values = [value for own, value in limits if own == words]
+        if values:
+            each = f" to {values[-1]:.4g}, by cable" if len(values) > 1 else ""
+            parts.append(f"{phrase} {values[0]:.4g}{each}")
+    name = quantity if quantity == "tension" else f"cable {quantity}"
+    return f"{name} {' and '.join(parts)} {UNITS[quantity]}" if parts else ""
 
 
 def _chosen(time: np.ndarray) -> np.ndarray:

@@ -23,6 +23,7 @@ async function start() {
   // What is alone takes the whole width.
   document.querySelector("main").classList.toggle("alone", !content.map);
   document.querySelector("main").classList.toggle("still", !content.motions.length);
+  element("motion-keys").hidden = !content.motions.length;
   element("motion-side").hidden = !content.motions.length;
   if (content.map) await startMap();
   if (content.motions.length) await showMotion(content.shown ?? 0);

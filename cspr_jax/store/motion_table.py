@@ -1,0 +1,87 @@
+"""Motions as tables: the CSV of `cspr plan -o FILE.csv`, read back.
+
+Its columns are those of a motion file over time. It keeps neither the robot nor the plan nor the segments.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.config.limits import MOST_CABLES
+from cspr_jax.errors import one_line, shown
+from cspr_jax.schema.motion_quantities import ACROSS, PARTS, TRAJECTORY
+from cspr_jax.store.netcdf import file_size
+from cspr_jax.store.seal import DamagedError, unreadable
+
+# Of text; numbers take a third of it in memory. The header has some hundred names.
+LARGEST_TABLE, LARGEST_HEADER = 2 << 30, 1 << 16
+FEASIBLE = "feasible"
+
+
+def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Columns of a table of a motion.
+
+    Args:
+        path: the file.
+
+    Returns:
+        attributes, and arrays by the names of `schema.motion_quantities.TRAJECTORY`: (n,), or (n, k) of vectors.
+
+    Raises:
+        DamagedError: it is not what `cspr plan` writes.
+        StoreError: it cannot be read at the moment.
+    """
+    if not 0 <= file_size(path) <= LARGEST_TABLE:
+        raise DamagedError(f"it is not a file, or has more than {LARGEST_TABLE} bytes")
+    try:
+        with path.open(encoding="utf-8-sig", newline=None) as file:
+            heads = file.readline(LARGEST_HEADER).rstrip("\n").split(",")
+            places = _places(heads)
+            table = np.loadtxt(_whole(file), delimiter=",", comments=None, ndmin=2)
+    except OSError as error:
+        raise unreadable(path, error) from error
+    except ValueError as error:  # of a number, a row or a letter that is none
+        raise DamagedError(f"its rows cannot be read: {str(error).splitlines()[0]}") from error
+    if table.shape[1] != len(heads):
+        raise DamagedError(f"its rows have {table.shape[1]} numbers, its header has {len(heads)} names")
+    attributes: dict[str, Any] = {"robot": one_line(path.stem)[:200] or "motion"}
+    if heads[-1] == FEASIBLE:
+        flags = table[:, -1]
+        if not np.isin(flags, (0.0, 1.0)).all():
+            raise DamagedError(f"{FEASIBLE} holds another number than 0 and 1")
+        attributes[FEASIBLE] = int(flags.all())
+    arrays = {name: np.ascontiguousarray(table[:, place]) for name, place in places.items()}
+    return attributes, arrays
+
+
+def _whole(file):
+    # The lines of the table; each ends in a line break, the last one too.
+    line = None
+    for line in file:
+        if not line.endswith("\n"):
+            raise DamagedError("its last line is cut off")
+        yield line
+    if line is None:
+        raise DamagedError("it has no rows")
+
+
+def _places(heads: list[str]) -> dict[str, Any]:
+    # Column, or columns, of each quantity; they stand in the order in which `cspr plan` writes them.
+    names = heads[:-1] if heads[-1] == FEASIBLE else heads
+    places: dict[str, Any] = {}
+    start = 0
+    for name in TRAJECTORY:
+        parts = PARTS.get(ACROSS[name], tuple(str(k + 1) for k in range(MOST_CABLES))) if name in ACROSS else ()
+        wanted = [f"{name}_{part}" for part in parts] or [name]
+        count = next((k for k, head in enumerate(names[start:]) if k == len(wanted) or head != wanted[k]), None)
+        count = len(names) - start if count is None else count
+        if not count:
+            continue
+        if ACROSS.get(name) != "cable" and count != len(wanted):
+            raise DamagedError(f"it has no column {wanted[count]} behind {wanted[count - 1]}")
+        places[name] = slice(start, start + count) if parts else start
+        start += count
+    if start < len(names):
+        raise DamagedError(f"column {shown(names[start])}: must be one that `cspr plan` writes, in its order")
+    return places
