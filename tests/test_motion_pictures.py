@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
+from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from support.commands import plan
 from test_outputs import panels
@@ -11,9 +12,10 @@ from test_transition_plans import text as transition_text
 
 import cspr_jax
 from cspr_jax.cli import main
+from cspr_jax.outputs.plots.fitting import share_of_panels, with_minus
 from cspr_jax.outputs.plots.labels import cable_names
 from cspr_jax.outputs.plots.motion_pictures import MOTION_PICTURES
-from cspr_jax.outputs.plots.scene import colours_of_tension
+from cspr_jax.outputs.plots.scene import FILLS, box_in_space, colours_of_tension, words_in_space
 
 LIMITED = f"{SHORT}\n[limits]\ntension_min = 0.02\ntension_max = 1.5\n"
 
@@ -52,7 +54,14 @@ def test_the_trajectory_in_space(motions, figures, capsys):
     # z points down in the file and upward it is drawn: nothing is mirrored if two axes are turned.
     turned = [getattr(space, f"get_{axis}lim")()[0] > getattr(space, f"get_{axis}lim")()[1] for axis in "xyz"]
     assert turned == [False, True, True]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["path", "start", "end", "spools"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "path",
+        "start",
+        "end",
+        "cables",
+        "spools, by cable",
+    ]
+    assert [text.get_text().strip() for text in space.texts] == ["1", "2", "3"]
 
 
 def test_tensions_with_their_limits(motions, figures, capsys):
@@ -65,7 +74,10 @@ def test_tensions_with_their_limits(motions, figures, capsys):
         line.get_ydata()[0] for line in panel.lines if len(line.get_xdata()) == 2 and line.get_linestyle() == "--"
     ]
     assert levels == [0.02, 1.5]
-    assert [text.get_text() for text in panel.texts] == ["smallest allowed 0.02 N", "largest allowed 1.5 N"]
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["range", *(f"cable {k}" for k in (1, 2, 3)), "smallest", "at least 0.02 N", "at most 1.5 N"]
+    looks = {(line.get_color(), line.get_linestyle()) for line in panel.lines[:3]}
+    assert len(looks) == 3
     title = figure.get_suptitle()
     assert f"smallest {tension.min():.4g} N" in title and f"largest {tension.max():.4g} N" in title
     _, cable = np.unravel_index(tension.argmin(), tension.shape)
@@ -75,7 +87,7 @@ def test_tensions_with_their_limits(motions, figures, capsys):
 def test_a_limit_far_away_is_written(motions, tmp_path, figures, capsys):
     assert plan(tmp_path, LIMITED.replace("= 1.5", "= 50.0"), "-o", str(tmp_path / "far.h5"))[0] == 0
     panel = panels(drawn(figures, str(tmp_path / "far.h5"), "--quantity", "tensions"))[0]
-    assert panel.texts[-1].get_text() == "largest allowed 50 N, above the picture" and panel.get_ylim()[1] < 5.0
+    assert "at most 50 N (above)" in panel.get_legend_handles_labels()[1] and panel.get_ylim()[1] < 5.0
 
 
 def test_a_plan_on_a_page(motions, figures, capsys):
@@ -150,3 +162,52 @@ def test_several_motions_of_a_planar_robot_have_no_view_from_above(tmp_path, fig
     figure = drawn(figures, file, file)
     assert figure.axes[0].get_ylabel() == "z (m)" and len(figure.axes) == 3
     assert len(figure.legends[0].get_texts()) == 2
+
+
+@pytest.mark.parametrize("size", [[], ["--column"], ["--page", "--no-title"]])
+@pytest.mark.parametrize("quantity", ["trajectory", "summary"])
+def test_a_robot_in_space_fills_its_place(motions, figures, capsys, size, quantity):
+    """All of it and of its letters is in the picture, one scale holds for all axes, and no two words meet."""
+    figure = drawn(figures, str(motions / "first.h5"), "--quantity", quantity, *size)
+    figure.draw_without_rendering()
+    space = next(panel for panel in figure.axes if panel.name == "3d")
+    place = space.get_gid()
+    assert place == FILLS
+    boxes = [*words_in_space(space), box_in_space(space)]
+    union = Bbox.union(boxes)
+    assert figure.bbox.padded(1.0).count_contains([union.min, union.max]) == 2
+    sizes = [abs(np.subtract(*getattr(space, f"get_{axis}lim")())) for axis in "xyz"]
+    np.testing.assert_allclose(space._box_aspect / sizes, (space._box_aspect / sizes)[0])
+    words = words_in_space(space)
+    assert not any(one.overlaps(other) for k, one in enumerate(words) for other in words[:k])
+
+
+def test_presets_and_titles(motions, figures, capsys):
+    """A title of a narrow picture has one line; none is drawn if none is wanted, but what is not proved is said."""
+    for words, width in ((["--column"], 8.5), (["--page"], 17.5)):
+        for quantity in ("tensions", "summary", "trajectory"):
+            figure = drawn(figures, str(motions / "first.h5"), "--quantity", quantity, *words)
+            assert figure.get_figwidth() * 2.54 == pytest.approx(width)
+            title = figure.suptitle(figure.get_suptitle())
+            assert width > 12.0 or "\n" not in title.get_text()
+            assert title.get_window_extent().width <= figure.bbox.width
+            figure.draw_without_rendering()
+            assert share_of_panels(figure) >= 0.5
+    assert drawn(figures, str(motions / "first.h5"), "--no-title").get_suptitle() == ""
+    for words in (["--no-title"], ["--column"]):
+        figure = drawn(figures, str(motions / "second.h5"), *words)
+        assert "NOT PROVED FEASIBLE" in figure.get_suptitle()
+    assert main(["plot", str(motions / "first.h5"), "--column", "--size", "10x10"]) == 2
+    assert "cannot be combined with --column" in capsys.readouterr().err
+
+
+def test_speeds_have_their_limits(motions, tmp_path, figures, capsys):
+    text = LIMITED.replace("tension_max", "cable_speed_max = 9.0\ntension_max")
+    assert plan(tmp_path, text, "-o", str(tmp_path / "fast.h5"))[0] == 0
+    figure = drawn(figures, str(tmp_path / "fast.h5"), "--quantity", "summary")
+    rates = next(panel for panel in figure.axes if panel.get_ylabel() == "cable speed (m/s)")
+    assert rates.get_legend().get_texts()[0].get_text().startswith("at most 9 m/s")
+
+
+def test_negative_numbers_have_a_minus_sign():
+    assert with_minus("from -3.5 to -.5 m, e-3, rig-2, 1e-05") == "from \u22123.5 to \u2212.5 m, e-3, rig-2, 1e-05"

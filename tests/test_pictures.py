@@ -377,6 +377,16 @@ def test_titles_stand_clear_of_panels(capsys, tmp_path, figures):
 
 def test_long_titles_are_broken(capsys, tmp_path, figures):
     path = made(tmp_path / "map.h5", GRID | {"z": [1.5]})
-    cspr(capsys, "plot", path, "--size", "8x12")
+    cspr(capsys, "plot", path, "--size", "12x12", "--font-size", "16")
     title = figures[0].suptitle(figures[0].get_suptitle())
     assert title.get_text().count("\n") > 1 and title.get_window_extent().width <= figures[0].bbox.width
+
+
+def test_a_narrow_title_has_one_line(capsys, tmp_path, figures):
+    path = made(tmp_path / "map.h5", GRID | {"z": [1.5]}, robot="a robot with a name of many letters")
+    for words in (["--size", "8x12"], ["--column"]):
+        cspr(capsys, "plot", path, *words)
+        title = figures[-1].suptitle(figures[-1].get_suptitle())
+        assert "\n" not in title.get_text() and title.get_window_extent().width <= figures[-1].bbox.width
+    cspr(capsys, "plot", path, "--page", "--no-title")
+    assert figures[-1].get_suptitle() == "" and figures[-1].get_figwidth() * 2.54 == pytest.approx(17.5)

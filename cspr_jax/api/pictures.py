@@ -30,6 +30,8 @@ def plot(  # noqa: PLR0913
     size: str | tuple[float, float] | None = None,
     dpi: float | None = None,
     font_size: float | None = None,
+    preset: str | None = None,
+    title: bool = True,
     plan: str | Path | None = None,
     output: str | Path | None = None,
 ) -> Figure:
@@ -50,6 +52,8 @@ def plot(  # noqa: PLR0913
         size: width and height, cm, as (16, 10) or "16x10"; None: what suits the picture.
         dpi: pixels an inch of a file; None: 160.
         font_size: points; None: 10.
+        preset: "column", 8.5 cm wide, or "page", 17.5 cm, of a paper; the height follows. None: neither.
+        title: whether titles are drawn; what is not proved is said in any case.
         plan: plan file of motions in CSV, which keep neither robot nor limits; None: none.
         output: picture to write; its ending is the format. None: nothing is written.
 
@@ -63,7 +67,7 @@ def plot(  # noqa: PLR0913
     given = [results] if isinstance(results, str | Path | Result) else list(results)
     if not given:
         raise ConfigError("results", "[]: must be one result, or more")
-    style = style_of(size, dpi, font_size)
+    style = style_of(size, dpi, font_size, preset, title=title)
     stage("reading")
     files = [one if isinstance(one, Result) else result_at(Path(one)) for one in given]
     loaded = [one if isinstance(one, Result) else open_result(one) for one in files]

@@ -29,6 +29,8 @@ class Replay(replays.Replay):
         size: str | tuple[float, float] | None = None,
         dpi: float | None = None,
         font_size: float | None = None,
+        preset: str | None = None,
+        title: bool = True,
         output: str | Path | None = None,
     ) -> Figure:
         """Draw planned and played path, and the deviations of path and tensions over time.
@@ -37,6 +39,8 @@ class Replay(replays.Replay):
             size: width and height, cm, as (16, 10) or "16x10"; None: what suits the picture.
             dpi: pixels an inch of a file; None: 160.
             font_size: points; None: 10.
+            preset: "column" or "page" of a paper; None: neither.
+            title: whether the title is drawn.
             output: picture to write; its ending is the format. None: nothing is written.
 
         Returns:
@@ -46,7 +50,9 @@ class Replay(replays.Replay):
             ConfigError: a size out of bounds, or an unknown picture format.
             StoreError: the picture cannot be written.
         """
-        return finished(lambda: replay_figure(self), self.robot, style_of(size, dpi, font_size), output)
+        return finished(
+            lambda: replay_figure(self), self.robot, style_of(size, dpi, font_size, preset, title=title), output
+        )
 
 
 @checked

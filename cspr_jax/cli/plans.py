@@ -134,7 +134,8 @@ def _replay(options: argparse.Namespace) -> int:
     from cspr_jax.outputs.plots.style import style_of
     from cspr_jax.outputs.replay import need_mujoco
 
-    style_of(options.size, options.dpi, options.font_size)  # before what takes long
+    look = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
+    style_of(**look)  # before what takes long
     need_mujoco()
     plan = _planned(options)
     if not (plan.feasible or options.anyway):
@@ -145,7 +146,7 @@ def _replay(options: argparse.Namespace) -> int:
 
         found = replay(plan, anyway=True, **({} if options.step is None else {"step": options.step}))
         if options.output is not None:
-            found.plot(output=options.output, size=options.size, dpi=options.dpi, font_size=options.font_size)
+            found.plot(output=options.output, **look)
     if options.json:
         print_json(found.to_dict())
     else:

@@ -18,9 +18,12 @@ from matplotlib.figure import Figure
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.fitting import fit, legend_above
 from cspr_jax.outputs.plots.labels import cable_names, line_look
+from cspr_jax.outputs.plots.motion import draw_limits
 from cspr_jax.outputs.plots.moving import Moving, limits_of, moving
-from cspr_jax.outputs.plots.scene import colours_of_tension, set_space
+from cspr_jax.outputs.plots.scene import colours_of_tension, fill_places, set_space
+from cspr_jax.outputs.plots.trajectory import name_spools
 from cspr_jax.runtime.stages import stage
 
 ENDINGS = (".gif", ".mp4", ".html")
@@ -32,7 +35,6 @@ SIZE, DPI = (10.0, 5.6), 90
 # Pages of more than so many MB are none that one opens.
 LARGEST = 100.0
 MARK = "#D55E00"
-FAR = 3.0
 
 
 def film(
@@ -141,16 +143,20 @@ class _Picture:
         self.figure.suptitle(title)
         # Once: places of axes do not change. A figure with any layout is drawn twice for each picture.
         self.show(0)
-        self.figure.canvas.draw()
-        self.figure.set_layout_engine(None)
+        fit(self.figure)
+        fill_places(self.figure)
 
     def _draw_space(self, *, is_down: bool) -> None:
         space, robot = self._space, self.robot
         flight = np.concatenate([robot.base, robot.attached.reshape(-1, 3), self._path])
         set_space(space, flight, is_down=is_down)
         space.plot(*self._path.T, color="0.7", linewidth=0.8)
+        name_spools(space, robot.base)
+        for place, marker, name in zip(self._path[[0, -1]], ("o", "D"), ("start", "end"), strict=True):
+            space.plot(*place[:, None], linestyle="", marker=marker, color="black", markerfacecolor="white", label=name)
+        self.figure.legend(loc="outside lower left", ncols=3)
         self._behind = space.plot([], [], [], color="black", linewidth=1.1)[0]
-        space.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35")
+        space.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35", label="spools, by cable")
         self.cables = [space.plot([], [], [], linewidth=2.0)[0] for _ in robot.base]
         self._edges = [space.plot([], [], [], color="black", linewidth=2.0)[0] for _ in range(self._edge_count)]
         self._mass = space.plot([], [], [], linestyle="", marker="o", markersize=6, color="black")[0]
@@ -165,16 +171,12 @@ class _Picture:
     def _draw_tensions(self, panel: Any, limits: list[tuple[str, float]]) -> None:
         for k, values in enumerate(self.tension.T):
             panel.plot(self._time, values, linewidth=1.2, label=self._names[k], **line_look(k))
-        for words, value in limits:
-            if value < FAR * self._largest:
-                panel.axhline(value, color="black", linewidth=0.8, linestyle="--")
-                panel.annotate(f"{words} {value:.4g} N", (0.01, value), xycoords=("axes fraction", "data"), va="bottom")
+        draw_limits(panel, limits, self.tension, "N")
         self._mark = panel.axvline(self._time[0], color=MARK, linewidth=1.8)
         panel.set(xlabel="time (s)", ylabel="tension (N)")
         panel.margins(x=0.01)
         panel.set_ylim(bottom=min(0.0, float(np.nanmin(self.tension))))
-        columns = min(4, self.tension.shape[1])
-        panel.legend(ncols=columns, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+        legend_above(panel, min(4, self.tension.shape[1]))
         self._clock = panel.annotate("", (0.99, 0.98), xycoords="axes fraction", ha="right", va="top")
 
     def show(self, number: int) -> None:

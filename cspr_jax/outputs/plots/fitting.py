@@ -1,15 +1,27 @@
 """Text that fits into a picture: long names cut, long lines broken."""
 
+import re
+from collections.abc import Callable
 from typing import Literal
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
+from matplotlib.ticker import FixedFormatter, FuncFormatter
 
 from cspr_jax.errors import one_line
 
 LONGEST_NAME = 40
+# Letters that a title of one line has at least.
+SHORTEST = 8
+# A hyphen before a number, and not within a word.
+HYPHEN = re.compile(r"(?<![\w.\-])-(?=\.?\d)")
+# The line of a title that says what is not proved begins so.
+DOUBT = "NOT PROVED FEASIBLE"
+# Of a panel's place, what its tick labels leave.
+BETWEEN_LABELS = 0.82
+ABOVE = "legend above its panel"
 
 
 def shortened(text: str, most: int = LONGEST_NAME) -> str:
@@ -29,24 +41,136 @@ def shortened(text: str, most: int = LONGEST_NAME) -> str:
     return f"{text[: most - 3 - tail]}...{text[len(text) - tail :]}"
 
 
-def fit(figure: Figure) -> None:
+def fit(figure: Figure, *, has_title: bool = True, lines: int | None = None) -> None:
     """Break titles and labels that are longer than their place, at commas or else at spaces; legends likewise.
+
+    Numbers get a real minus sign.
 
     Args:
         figure: with its final size.
+        has_title: whether the title stays; what it says of a doubt stays in any case.
+        lines: of the title, at most: 1, or None for as many as it needs.
     """
     width, height = figure.bbox.width, figure.bbox.height
-    if figure.get_suptitle():
-        _break(figure.suptitle(figure.get_suptitle()), 0.97 * width)
+    _fit_title(figure, 0.97 * width, has_title=has_title, lines=lines)
+    for text in figure.findobj(Text):
+        text.set_text(with_minus(text.get_text()))
     for legend in list(figure.legends):
         _fit_legend(figure, legend, 0.98 * width)
     for panel in figure.axes:
         if not panel.get_visible() or panel.name == "3d":
             continue
         columns, rows = _shares(panel)
+        _fit_above(panel, BETWEEN_LABELS * width * columns)
+        _fit_ticks(panel)
         _break(panel.title, 0.85 * width * columns)
         _break(panel.xaxis.label, 0.85 * width * columns)
         _break(panel.yaxis.label, 0.85 * height * rows, upright=True)
+
+
+def with_minus(text: str) -> str:
+    """A text whose negative numbers have a minus sign, not a hyphen.
+
+    Args:
+        text: any.
+
+    Returns:
+        the text.
+    """
+    return HYPHEN.sub("\u2212", text)
+
+
+def share_of_panels(figure: Figure) -> float:
+    """The part of a picture's height that its panels take.
+
+    Args:
+        figure: the picture, drawn.
+
+    Returns:
+        the part that some panel covers, at most 1; colour bars are none.
+    """
+    spans = sorted(
+        (panel.get_position(original=panel.name == "3d").intervaly for panel in figure.axes if _is_panel(panel)),
+        key=lambda span: float(span[0]),
+    )
+    total, end = 0.0, 0.0
+    for low, high in spans:
+        total += max(0.0, float(high) - max(float(low), end))
+        end = max(end, float(high))
+    return min(total, 1.0)
+
+
+def _is_panel(panel: Axes) -> bool:
+    return panel.get_visible() and panel.get_label() != "<colorbar>"
+
+
+def _fit_title(figure: Figure, room: float, *, has_title: bool, lines: int | None) -> None:
+    title = figure.get_suptitle()
+    doubts = [line for line in title.split("\n") if line.startswith(DOUBT)]
+    if not title:
+        return
+    text = figure.suptitle(title)
+    if not has_title:
+        text.set_text("\n".join(doubts))
+        text.set_in_layout(bool(doubts))
+        title = text.get_text()
+    if lines is None:
+        _break(text, room)
+        return
+    first = title.split("\n")[0]
+    line = f"{first.split(':')[0]}: {doubts[0]}" if doubts and has_title else first
+    for most in range(len(line), SHORTEST, -1):
+        text.set_text(shortened(line, most))
+        if text.get_window_extent().width <= room:
+            return
+
+
+def _fit_above(panel: Axes, room: float) -> None:
+    # A legend above its panel: as many entries side by side as fit.
+    legend = panel.get_legend()
+    if legend is None or legend.get_gid() != ABOVE:
+        return
+    handles = [handle for handle in legend.legend_handles if handle is not None]
+    words = [text.get_text() for text in legend.get_texts()]
+    for columns in range(len(words) - 1, 0, -1):
+        if legend.get_window_extent().width <= room:
+            return
+        legend = legend_above(panel, columns, handles, words)
+
+
+def legend_above(panel: Axes, columns: int, handles: list | None = None, words: list[str] | None = None) -> Legend:
+    """A legend above a panel, at its right; `fit` breaks it into lines.
+
+    Args:
+        panel: whose.
+        columns: entries side by side.
+        handles: of the entries; None: those of the panel.
+        words: of the entries.
+
+    Returns:
+        the legend.
+    """
+    entries = panel.get_legend_handles_labels() if handles is None or words is None else (handles, words)
+    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+    legend = panel.legend(*entries, ncols=columns, frameon=False, columnspacing=1.2, handlelength=1.8, **place)
+    legend.set_gid(ABOVE)
+    return legend
+
+
+def _fit_ticks(panel: Axes) -> None:
+    for axis in (panel.xaxis, panel.yaxis):
+        formatter = axis.get_major_formatter()
+        if isinstance(formatter, FuncFormatter):
+            axis.set_major_formatter(FuncFormatter(_minus_of(formatter.func)))
+        elif isinstance(formatter, FixedFormatter):
+            formatter.seq = [with_minus(word) for word in formatter.seq]
+
+
+def _minus_of(words: Callable[..., str]) -> Callable[..., str]:
+    def written(tick: float, place: int | None = None) -> str:
+        return with_minus(words(tick, place))
+
+    return written
 
 
 def _fit_legend(figure: Figure, legend: Legend, room: float) -> None:

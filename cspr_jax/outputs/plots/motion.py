@@ -1,13 +1,13 @@
 """A motion over time: its path and the tensions of the cables."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cspr_jax.config.plan import PlanFile
-from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.kept import keeps_plan, kept
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.moving import limits_of
@@ -18,9 +18,9 @@ from cspr_jax.store.result import Result
 BOUNDARIES = 200
 # Share of the distance between spools that typed digits may leave between points of one plane.
 ONE_PLANE = 1e-9
-# Limits of tensions beyond this many times the largest are written and not drawn.
+# Limits beyond this many times the largest value are written and not drawn.
 FAR = 3.0
-BESIDE = ("axes fraction", "data")
+LIMIT: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--"}
 
 
 def motion_figure(result: Result) -> Figure:
@@ -65,8 +65,8 @@ def motion_figure(result: Result) -> Figure:
     if result.attributes.get("z_axis", "down") == "down":
         drawn["xz"].invert_yaxis()
     _tensions(drawn["tension"], time, tension, cable_names(result.data), result.attributes.get("mass"))
-    if "tension_residual" in result.data and keeps_plan(result):
-        _limits(drawn["tension"], tension, *kept(result, "plan", "tension"))
+    if keeps_plan(result):
+        _draw_all_limits(drawn, result)
     if "couple" in drawn:
         _lines(drawn["couple"], time, result.data["tension_couple"], [f"couple {name}" for name in PARTS["couple"]])
         drawn["couple"].set_ylabel("tension couple (N)")
@@ -85,6 +85,47 @@ def motion_figure(result: Result) -> Figure:
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
     figure.suptitle(f"{robot_name(result)}: {place}z axis {result.attributes.get('z_axis', 'down')}{doubt(result)}")
     return figure
+
+
+SHORT = {"smallest allowed": "at least", "largest allowed": "at most"}
+
+
+def draw_limits(
+    panel: Axes, limits: list[tuple[str, float]], values: np.ndarray, unit: str, *, signed: bool = False
+) -> None:
+    """Limits over time as lines, named in the legend; one far above all values is only named.
+
+    Args:
+        panel: over time.
+        limits: words and values.
+        values: that the panel shows.
+        unit: of both.
+        signed: whether a limit bounds both signs.
+    """
+    largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    beyond = []
+    for words, value in limits:
+        if value > FAR * largest:
+            beyond.append(f"{value:.4g}")
+            continue
+        panel.axhline(value, label=f"{SHORT[words]} {value:.4g} {unit}", **LIMIT)
+        if signed:
+            panel.axhline(-value, **LIMIT)
+    if beyond:
+        each = f"{beyond[0]}{' .. ' + beyond[-1] if len(beyond) > 1 else ''}"
+        panel.plot([], [], label=f"at most {each} {unit} (above)", **LIMIT)
+
+
+def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
+    tension = result.data["tension"]
+    spec, keys = kept(result, "plan", "tension")
+    draw_limits(drawn["tension"], limits_of(spec, keys), tension, "N")
+    legend_above(drawn["tension"], len(tension.T) + 2)
+    if "tension_residual" in result.data:
+        # The rule by which redundant cables share the load.
+        drawn["tension"].set_ylabel(f"tension (N)\n{keys.tension_rule}")
+    for _, level in limits_of(spec, keys, "depth"):
+        drawn["xz"].axhline(level, **LIMIT)
 
 
 def boundaries(panel: Axes, result: Result) -> None:
@@ -111,10 +152,10 @@ def doubt(result: Result) -> str:
         return ""
     none = result.data.get("segment_arcs", np.empty(0)) == 0
     if not len(none):
-        return "\nNOT PROVED FEASIBLE"
+        return f"\n{DOUBT}"
     wrong = np.flatnonzero(none & (result.data.get("segment_verdict", none) != 0)) + 1
     which = ", ".join(str(number) for number in wrong[:6]) + (", ..." if len(wrong) > 6 else "")
-    return f"\nNOT PROVED FEASIBLE: segment{'s' if len(wrong) > 1 else ''} {which}"
+    return f"\n{DOUBT}: segment{'s' if len(wrong) > 1 else ''} {which}"
 
 
 def _path(panel: Axes, position: np.ndarray, j: int) -> None:
@@ -131,7 +172,7 @@ def _flight(panel: Axes, position: np.ndarray, j: int) -> None:
     for row, marker, name in ((0, "o", "release"), (-1, "x", "landing")):
         place = position[row, 0], position[row, j]
         panel.plot(*place, linestyle="", marker=marker, markersize=6, color=COLOURS[1], label=name)
-    panel.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_above(panel, 3)
 
 
 def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:
@@ -139,28 +180,13 @@ def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:
     panel.set_ylabel("quaternion")
 
 
-def _limits(panel: Axes, tension: np.ndarray, spec: RobotFile, keys: PlanFile) -> None:
-    # The rule by which redundant cables share the load, and the limits that it heeds.
-    panel.set_ylabel(f"tension (N)\n{keys.tension_rule}")
-    beyond = []
-    for words, value in limits_of(spec, keys):
-        if value > FAR * np.nanmax(tension, initial=0.0):
-            beyond.append(f"{value:.4g}")
-            continue
-        panel.axhline(value, color="black", linewidth=0.8, linestyle="--")
-        panel.annotate(f"{words} {value:.4g} N", (0.01, value), xycoords=BESIDE, va="bottom", fontsize="small")
-    if beyond:
-        text = f"largest allowed {beyond[0]}{' .. ' + beyond[-1] if len(beyond) > 1 else ''} N, above the picture"
-        panel.annotate(text, (0.01, 0.97), xycoords="axes fraction", va="top", fontsize="small")
-
-
 def _lines(panel: Axes, time: np.ndarray, values: np.ndarray, names: list[str], *, axis: bool = True) -> None:
     for k, name in enumerate(names):
-        panel.plot(time, values[:, k], linewidth=1.0, label=name, **line_look(k))
+        panel.plot(time, values[:, k], linewidth=1.2, label=name, **line_look(k))
     if axis:
         panel.axhline(0.0, color="black", linewidth=0.8)
     panel.set_xlabel("time (s)")
-    panel.legend(ncols=len(names), loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_above(panel, len(names))
     panel.margins(x=0.01)
 
 
@@ -174,7 +200,7 @@ def _bounds(panel: Axes, time: np.ndarray, values: np.ndarray) -> None:
     panel.set_ylim(-1.8 * largest, 1.8 * largest)
     panel.set_xlabel("time (s)")
     panel.set_ylabel("acceleration\nalong the line (m/s²)")
-    panel.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_above(panel, 2)
     panel.margins(x=0.01)
 
 

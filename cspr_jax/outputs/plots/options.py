@@ -70,5 +70,11 @@ def add_look(parser: argparse.ArgumentParser) -> None:
         parser: of a command that draws.
     """
     parser.add_argument("--size", metavar="WIDTHxHEIGHT", help="of the picture, cm, such as 16x10")
+    presets = parser.add_mutually_exclusive_group()
+    for name, words in (("column", "8.5 cm wide"), ("page", "17.5 cm wide")):
+        presets.add_argument(
+            f"--{name}", dest="preset", action="store_const", const=name, help=f"for a {name} of a paper, {words}"
+        )
+    parser.add_argument("--no-title", dest="title", action="store_false", help="leave out the title")
     parser.add_argument("--dpi", type=float, metavar="N", help="pixels an inch (default 160)")
-    parser.add_argument("--font-size", type=float, metavar="PT", help="points (default 10)")
+    parser.add_argument("--font-size", type=float, metavar="PT", help="points (default 10; --column 8, --page 9)")

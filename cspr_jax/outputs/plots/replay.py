@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from cspr_jax.outputs.plots.fitting import legend_above
 from cspr_jax.outputs.plots.labels import COLOURS, line_look
 from cspr_jax.outputs.replay import Replay
 from cspr_jax.outputs.table_layout import two_digits
@@ -14,6 +15,7 @@ from cspr_jax.outputs.table_layout import two_digits
 # Share of the length of the path that typed digits may leave across a plane.
 ONE_PLANE = 1e-9
 BOUNDARIES = 200  # of longer plans the lines would hide the rest
+RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
 WINDOWS = 250  # of time, each with its largest deviation
 
 
@@ -60,7 +62,7 @@ def _paths(panel: Axes, replay: Replay, j: int) -> None:
     panel.set_ylabel(f"{'xyz'[j]} (m)")
     panel.set_aspect("equal", adjustable="datalim")
     panel.grid(alpha=0.3)
-    panel.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_above(panel, 2)
 
 
 def _deviations(panel: Axes, replay: Replay, values: dict[str, np.ndarray]) -> None:
@@ -69,16 +71,27 @@ def _deviations(panel: Axes, replay: Replay, values: dict[str, np.ndarray]) -> N
     time = replay.time[starts]
     for k, (name, some) in enumerate(values.items()):
         panel.plot(time, _largest(some, starts), linewidth=1.0, label=name, **line_look(k))
-    panel.set_yscale("log")
-    panel.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: f"{tick:.0e}"))
-    panel.yaxis.set_minor_formatter(NullFormatter())
+    _whole_decades(panel, np.concatenate(list(values.values())))
     panel.set_xlabel("time (s)")
     panel.margins(x=0.01)
     panel.grid(alpha=0.3)
-    panel.legend(ncols=len(values), loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    legend_above(panel, len(values))
     ends = np.flatnonzero(np.diff(replay.segment))
     for end in replay.time[ends][:BOUNDARIES]:
         panel.axvline(end, color="black", linewidth=0.8, alpha=0.35)
+
+
+def _whole_decades(panel: Axes, values: np.ndarray) -> None:
+    # From one power of ten to another, so that at least two ticks have their numbers.
+    positive = values[np.isfinite(values) & (values > 0.0)]
+    if not len(positive):
+        return
+    low, high = int(np.floor(np.log10(positive.min()))), int(np.ceil(np.log10(positive.max())))
+    panel.set_yscale("log")
+    panel.set_ylim(10.0**low, 10.0 ** max(high, low + 1))
+    panel.yaxis.set_major_locator(LogLocator(numticks=6))
+    panel.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: "10" + str(round(np.log10(tick))).translate(RAISED)))
+    panel.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _largest(values: np.ndarray, starts: np.ndarray) -> np.ndarray:

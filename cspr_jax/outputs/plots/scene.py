@@ -1,17 +1,23 @@
 """Axes in space for a robot on its way, and the colours of its cables by tension."""
 
+import itertools
 from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.colors import ListedColormap
-from matplotlib.ticker import FixedLocator, Locator, MaxNLocator
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, MaxNLocator
+from matplotlib.transforms import Bbox, TransformedBbox
+from mpl_toolkits.mplot3d import proj3d
 
 ELEVATION, AZIMUTH = 18.0, -62.0  # degrees, of the eye
 # Around what is drawn, of its size.
 ROOM = 0.04
-# Sides below this part of the longest one have room for few ticks.
-SHORT = 0.45
+# Ticks of an axis at most, and steps that make a picture fit.
+MOST_TICKS, STEPS = 5, 4
+FILLS = "fills its place"
 
 
 def colours_of_tension() -> ListedColormap:
@@ -23,14 +29,13 @@ def colours_of_tension() -> ListedColormap:
     return ListedColormap(matplotlib.colormaps["plasma"](np.linspace(0.0, 0.88, 256)))
 
 
-def set_space(panel: Any, points: np.ndarray, *, is_down: bool, zoom: float = 0.9) -> None:
-    """Axes of true proportions, seen from the side with z upward in the picture.
+def set_space(panel: Any, points: np.ndarray, *, is_down: bool) -> None:
+    """Axes of true proportions, seen from the side with z upward in the picture; `fill_places` makes them large.
 
     Args:
         panel: axes in three dimensions.
         points: (n, 3) what is drawn, m.
         is_down: whether z points down; then y is turned too, so that nothing is mirrored.
-        zoom: of the box; 1 fills the panel if it is a cube.
     """
     low, high = points.min(0), points.max(0)
     size = np.maximum(high - low, 0.1 * (high - low).max())
@@ -39,15 +44,124 @@ def set_space(panel: Any, points: np.ndarray, *, is_down: bool, zoom: float = 0.
     for k, name in enumerate("xyz"):
         half = (0.5 + ROOM) * signs[k] * size[k]
         panel.set(**{f"{name}lim": (middle[k] - half, middle[k] + half), f"{name}label": f"{name} (m)"})
-        getattr(panel, f"{name}axis").set_major_locator(_ticks(middle[k], size[k], size.max()))
-    panel.set_box_aspect(tuple(size), zoom=zoom)
+        axis = getattr(panel, f"{name}axis")
+        # Turned by itself, a label may stand on its head.
+        axis.set_rotate_label(False)
+        axis.label.set_rotation(90.0 if name == "z" else 0.0)
+        axis.labelpad = rcParams["font.size"] * (0.2 if name == "z" else 1.1)
+        axis.set_in_layout(False)
+    panel.set_box_aspect(tuple(size))
+    panel.set_proj_type("ortho")
     panel.view_init(elev=ELEVATION, azim=AZIMUTH)
+    # Its square is larger than its place, and lies over what is beside it.
+    panel.patch.set_visible(False)
+    panel.set_gid(FILLS)
 
 
-def _ticks(middle: float, size: float, largest: float) -> Locator:
-    # Those near the ends of a short side would meet those of its neighbour.
-    if size >= SHORT * largest:
-        return MaxNLocator(4)
-    every = np.asarray(MaxNLocator(3).tick_values(middle - 0.5 * size, middle + 0.5 * size))
-    away = np.abs(every - middle)
-    return FixedLocator(every[away <= max(0.35 * size, away.min())])
+def shape_of(points: np.ndarray) -> float:
+    """Height of the picture of a box over its width.
+
+    Args:
+        points: (n, 3) what is drawn, m.
+
+    Returns:
+        the part.
+    """
+    sizes = np.ptp(points, axis=0)
+    right, back, up = np.maximum(sizes, 0.1 * sizes.max())
+    elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
+    across = abs(right * np.sin(azimuth)) + abs(back * np.cos(azimuth))
+    level = abs(right * np.cos(azimuth)) + abs(back * np.sin(azimuth))
+    return float((up * np.cos(elevation) + level * np.sin(elevation)) / across)
+
+
+def fill_places(figure: Figure) -> None:
+    """Make each robot in space as large as its place allows, with as many ticks as do not meet.
+
+    Args:
+        figure: the picture, with its final size; its layout is final afterwards.
+    """
+    spaces: list[Any] = [panel for panel in figure.axes if panel.get_gid() == FILLS]
+    if not spaces:
+        return
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for panel in spaces:
+        place = panel.get_position(original=True)
+        for count in range(MOST_TICKS, 1, -1):
+            for axis in _axes(panel):
+                axis.set_major_locator(MaxNLocator(count, prune="both"))
+            _fill(figure, panel, place)
+            if not _meet(panel):
+                break
+        _leave_out(panel)
+
+
+def _fill(figure: Figure, panel: Any, place: Bbox) -> None:
+    # Letters keep their size when the box grows: a few steps.
+    width, height = figure.get_size_inches()
+    side = max(place.width * width, place.height * height)
+    room = TransformedBbox(place, figure.transSubfigure)
+    middle, zoom = np.array([0.5 * (place.x0 + place.x1), 0.5 * (place.y0 + place.y1)]), 1.0
+    sizes = tuple(abs(high - low) for low, high in (panel.get_xlim(), panel.get_ylim(), panel.get_zlim()))
+    half = 0.5 * side / np.array([width, height])
+    for _ in range(STEPS):
+        panel.set_position(Bbox([middle - half, middle + half]))
+        panel.set_box_aspect(sizes, zoom=zoom)
+        figure.draw_without_rendering()
+        drawn = Bbox.union([*words_in_space(panel), box_in_space(panel)])
+        zoom *= float(min(room.width / drawn.width, room.height / drawn.height))
+        shift = np.array([room.x0 + room.x1 - drawn.x0 - drawn.x1, room.y0 + room.y1 - drawn.y0 - drawn.y1])
+        middle = middle + 0.5 * shift / np.array([figure.bbox.width, figure.bbox.height])
+
+
+def _axes(panel: Any) -> tuple[Any, ...]:
+    return panel.xaxis, panel.yaxis, panel.zaxis
+
+
+def box_in_space(panel: Any) -> Bbox:
+    """Where the corners of a box in space are drawn.
+
+    Args:
+        panel: axes in three dimensions.
+
+    Returns:
+        the rectangle around them, pixels.
+    """
+    low, high = np.array([panel.get_xlim(), panel.get_ylim(), panel.get_zlim()]).T
+    corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
+    x, y, _ = proj3d.proj_transform(*corners.T, panel.get_proj())
+    seen = panel.transData.transform(np.column_stack([x, y]))
+    return Bbox([seen.min(0), seen.max(0)])
+
+
+def words_in_space(panel: Any) -> list[Bbox]:
+    """Where ticks and labels of axes in space are written.
+
+    Args:
+        panel: axes in three dimensions.
+
+    Returns:
+        a rectangle each, pixels.
+    """
+    texts = [tick.label1 for axis in _axes(panel) for tick in axis.get_major_ticks() if tick.label1.get_text()]
+    texts += [axis.label for axis in _axes(panel)]
+    return [text.get_window_extent() for text in texts if text.get_visible() and text.get_text()]
+
+
+def _leave_out(panel: Any) -> None:
+    # Of few ticks those whose numbers would still meet others; an axis may be seen nearly from its end.
+    taken = [axis.label.get_window_extent() for axis in _axes(panel)]
+    for axis in _axes(panel):
+        places = []
+        for tick in axis.get_major_ticks():
+            box = tick.label1.get_window_extent()
+            if tick.label1.get_text() and not any(box.padded(1.0).overlaps(other) for other in taken):
+                places.append(tick.get_loc())
+                taken.append(box)
+        axis.set_major_locator(FixedLocator(places))
+
+
+def _meet(panel: Any) -> bool:
+    boxes = [box.padded(1.0) for box in words_in_space(panel)]
+    return any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))

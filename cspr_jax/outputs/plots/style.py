@@ -10,16 +10,18 @@ from typing import NamedTuple
 
 import matplotlib.style
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.outputs.plots.fitting import fit
+from cspr_jax.outputs.plots.fitting import fit, share_of_panels
+from cspr_jax.outputs.plots.scene import fill_places
 
 # Over matplotlib's own defaults, so that a user's matplotlibrc changes nothing. Letters stay letters: TrueType in PDF,
 # text in SVG, and a dollar sign in a name is no mathematics. Sizes of letters are relative to font.size.
 LOOK = {
     "text.parse_math": False,
     "axes.formatter.useoffset": False,
-    "axes.unicode_minus": False,
+    "axes.unicode_minus": True,
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
     "svg.fonttype": "none",
@@ -38,6 +40,14 @@ LOOK = {
 METADATA: dict[str, dict] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 INCH = 2.54  # cm
 SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
+# Width and letters of pictures for papers, cm and points; their heights follow from what they show.
+PRESETS = {"column": (8.5, 8.0), "page": (17.5, 9.0)}
+# Of the height, what panels take at least; where they have less the picture gets higher, at most so often.
+LEAST_SHARE, HIGHER, TRIES = 0.5, 1.2, 6
+# Letters that nobody chose get smaller instead where the size is given, down to so many points.
+SMALLER, LEAST_LETTERS = 0.92, 5.0
+# Below this width, cm, a title has one line.
+NARROW = 12.0
 # A picture is held in memory as a whole, several bytes a pixel.
 LARGEST_PIXELS = 1e8
 
@@ -49,20 +59,35 @@ class Style(NamedTuple):
         size: width and height, cm; None: what suits the picture.
         dpi: pixels an inch, of PNG and of the coloured cells in PDF and SVG.
         font_size: points.
+        width: of a picture whose height follows, cm; None: what suits the picture.
+        has_title: whether titles are drawn; what is not proved is said in any case.
+        is_free: whether letters may get smaller than `font_size`.
     """
 
     size: tuple[float, float] | None = None
     dpi: float = 160.0
     font_size: float = 10.0
+    width: float | None = None
+    has_title: bool = True
+    is_free: bool = True
 
 
-def style_of(size: str | tuple[float, float] | None, dpi: float | None, font_size: float | None) -> Style:
+def style_of(
+    size: str | tuple[float, float] | None,
+    dpi: float | None,
+    font_size: float | None,
+    preset: str | None = None,
+    *,
+    title: bool = True,
+) -> Style:
     """The style that is asked for.
 
     Args:
         size: such as "16x10" or (16, 10), cm; None: what suits the picture.
         dpi: pixels an inch; None: the default.
         font_size: points; None: the default.
+        preset: "column" or "page" of a paper; None: neither.
+        title: whether titles are drawn.
 
     Returns:
         the style.
@@ -70,11 +95,19 @@ def style_of(size: str | tuple[float, float] | None, dpi: float | None, font_siz
     Raises:
         ConfigError: a wrong text, or a number out of bounds.
     """
-    default = Style()
+    if preset is not None and preset not in PRESETS:
+        raise ConfigError("preset", f"{shown(preset)}: must be one of {', '.join(PRESETS)}, or absent")
+    if preset is not None and size is not None:
+        raise ConfigError("--size", f"{size}: cannot be combined with --{preset}")
+    width, letters = PRESETS[preset] if preset else (None, Style().font_size)
+    default = Style(font_size=letters)
     return Style(
         None if size is None else _sides(size if isinstance(size, str) else "x".join(f"{side:g}" for side in size)),
         default.dpi if dpi is None else _bounded("--dpi", dpi, DPIS),
         default.font_size if font_size is None else _bounded("--font-size", font_size, FONT_SIZES),
+        width,
+        title,
+        font_size is None,
     )
 
 
@@ -119,14 +152,51 @@ def laid_out(figure: Figure, style: Style) -> None:
     Raises:
         InputError: too many pixels.
     """
+    width, height = (float(side) for side in figure.get_size_inches())
     if style.size is not None:
-        figure.set_size_inches(style.size[0] / INCH, style.size[1] / INCH)
-    width, height = figure.get_size_inches()
+        width, height = style.size[0] / INCH, style.size[1] / INCH
+    elif style.width is not None:
+        # Panels get narrower, letters do not get much smaller: heights are in the middle of the two.
+        part = style.width / INCH / width
+        is_rigid = any(panel.get_aspect() != "auto" and panel.get_adjustable() == "box" for panel in figure.axes)
+        is_rigid &= all(panel.name != "3d" for panel in figure.axes) or figure.get_layout_engine() is None
+        letters = part if is_rigid else style.font_size / Style().font_size
+        width, height = style.width / INCH, height * min(1.0, math.sqrt(part * letters))
+    figure.set_size_inches(width, height)
     most = math.floor(math.sqrt(LARGEST_PIXELS / (width * height)))
     if style.dpi > most:
         raise InputError("--dpi", style.dpi, f"at most {most} for {width * INCH:.3g}x{height * INCH:.3g} cm")
     with _no_missing_letters():
-        fit(figure)
+        fit(figure, has_title=style.has_title, lines=1 if width * INCH < NARROW else None)
+        _give_room(figure, style)
+        fill_places(figure)
+
+
+def _give_room(figure: Figure, style: Style) -> None:
+    # Panels take their part of the height of a narrow picture, or one whose height nobody chose.
+    if figure.get_layout_engine() is None or (style.width is None and figure.get_figwidth() * INCH >= NARROW):
+        return
+    letters, before = style.font_size, -1.0
+    for _ in range(TRIES):
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "constrained_layout not applied")
+            figure.draw_without_rendering()
+        share = share_of_panels(figure)
+        if share >= LEAST_SHARE:
+            return
+        if style.size is None and share <= before:  # panels of a shape of their own
+            figure.set_figheight(figure.get_figheight() / HIGHER)
+            return
+        before = share
+        if style.size is None:
+            figure.set_figheight(HIGHER * figure.get_figheight())
+        elif style.is_free and letters * SMALLER >= LEAST_LETTERS:
+            letters *= SMALLER
+            for text in figure.findobj(Text):
+                text.set_fontsize(SMALLER * text.get_fontsize())
+            for axis in (axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)):
+                axis.set_tick_params(labelsize=SMALLER * axis.get_ticklabels()[0].get_fontsize())
+    # What has no room for its panels is refused where it is written.
 
 
 def rendered(figure: Figure, ending: str, style: Style) -> bytes:

@@ -1,21 +1,25 @@
 """One page about a plan for a paper: the motion in space, tensions, rates of the cables, and a table of segments."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.fitting import legend_above
 from cspr_jax.outputs.plots.labels import cable_names, line_look, robot_name
-from cspr_jax.outputs.plots.motion import boundaries, doubt
+from cspr_jax.outputs.plots.motion import boundaries, doubt, draw_limits
 from cspr_jax.outputs.plots.moving import limits_of
 from cspr_jax.outputs.plots.reasons import reasons
 from cspr_jax.outputs.plots.tensions import draw_tensions, extremes
-from cspr_jax.outputs.plots.trajectory import draw_trajectory
+from cspr_jax.outputs.plots.trajectory import draw_trajectory, legend_of
 from cspr_jax.store.result import Result
 
 # Lines of the table; of a longer plan the first ones.
 SEGMENTS = 8
+WIDTHS = (0.15, 0.12, 0.22, 0.18, 0.33)
 HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
 
 
@@ -35,29 +39,33 @@ def summary_figure(result: Result, spec: RobotFile, keys: PlanFile) -> Figure:
     parts = figure.add_gridspec(4, 1, height_ratios=[4.4, 2.0, 1.6, 0.3 + 0.22 * len(cells)])
     space = figure.add_subplot(parts[0], projection="3d", computed_zorder=False)
     draw_trajectory(figure, space, result, spec)
+    figure.legend(*legend_of(result), loc="outside lower center", ncols=6)
     over_time = figure.add_subplot(parts[1])
     draw_tensions(over_time, result, limits_of(spec, keys))
-    over_time.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
-    _rates(figure.add_subplot(parts[2], sharex=over_time), result)
+    legend_above(over_time, len(spec.base_points) + 4)
+    _rates(figure.add_subplot(parts[2], sharex=over_time), result, limits_of(spec, keys, "speed"))
     if cells:
         table = figure.add_subplot(parts[3])
         table.axis("off")
-        drawn = table.table(cells, colLabels=HEADS, loc="center", cellLoc="center", edges="horizontal")
-        drawn.auto_set_column_width(list(range(len(HEADS))))
-        drawn.auto_set_font_size(False)
-        drawn.scale(1.0, 1.15)
+        place: Any = {"bbox": (0.0, 0.0, 1.0, 1.0), "colWidths": WIDTHS}
+        # Its letters get smaller where the picture is narrow.
+        table.table(cells, colLabels=HEADS, cellLoc="center", edges="horizontal", **place)
     figure.suptitle(f"{robot_name(result)}: {result.axes['t'][-1]:.4g} s\n{extremes(result)}{doubt(result)}")
     return figure
 
 
-def _rates(panel: Axes, result: Result) -> None:
+def _rates(panel: Axes, result: Result, limits: list[tuple[str, float]]) -> None:
     names = cable_names(result.data)
     for k, values in enumerate(result.data["rate"].T):
         panel.plot(result.axes["t"], values, linewidth=1.0, label=names[k], **line_look(k))
+    draw_limits(panel, limits, result.data["rate"], "m/s", signed=True)
     panel.axhline(0.0, color="black", linewidth=0.8)
     boundaries(panel, result)
     panel.set(xlabel="time (s)", ylabel="cable speed (m/s)")
-    panel.legend(ncols=min(4, len(names)), loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    # The names of the cables stand above the tensions.
+    handles, words = panel.get_legend_handles_labels()
+    if len(words) > len(names):
+        legend_above(panel, 2, handles[len(names) :], words[len(names) :])
 
 
 def _cells(result: Result) -> list[list[str]]:

@@ -6,14 +6,10 @@ from matplotlib.figure import Figure
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.outputs.plots.labels import COLOURS, cable_names, robot_name
-from cspr_jax.outputs.plots.motion import boundaries, doubt
+from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
+from cspr_jax.outputs.plots.motion import FAR, boundaries, doubt, draw_limits
 from cspr_jax.outputs.plots.moving import limits_of
 from cspr_jax.store.result import Result
-
-# Limits beyond this many times the largest tension are written and not drawn.
-FAR = 1.6
-LIMIT = COLOURS[1]
 
 
 def tensions_figure(result: Result, spec: RobotFile, keys: PlanFile) -> Figure:
@@ -64,25 +60,15 @@ def draw_tensions(panel: Axes, result: Result, limits: list[tuple[str, float]]) 
     """
     time, tension = result.axes["t"], result.data["tension"]
     low, high = np.min(tension, axis=1), np.max(tension, axis=1)
-    panel.fill_between(time, low, high, color=COLOURS[5], alpha=0.35, linewidth=0.0, label="all cables")
+    panel.fill_between(time, low, high, color=COLOURS[5], alpha=0.35, linewidth=0.0, label="range")
     for k, values in enumerate(tension.T):
-        panel.plot(time, values, color="black", linewidth=0.5, alpha=0.45, label="" if k else "each cable")
-    panel.plot(time, low, color=COLOURS[0], linewidth=1.3, label="smallest of them")
+        panel.plot(time, values, linewidth=1.0, label=cable_names(result.data)[k], **line_look(k))
+    panel.plot(time, low, color="black", linewidth=1.4, label="smallest")
+    draw_limits(panel, limits, tension, "N")
     finite = tension[np.isfinite(tension)]
-    top = 1.08 * float(finite.max(initial=0.0)) or 1.0
-    beyond = [value for _, value in limits if value > FAR * top]
-    top = max([top, *(1.08 * value for _, value in limits if value not in beyond)])
+    drawn = [value for _, value in limits if value <= FAR * float(np.abs(finite).max(initial=0.0))]
+    top = 1.08 * max([float(finite.max(initial=0.0)), *drawn]) or 1.0
     bottom = min(0.0, 1.05 * float(finite.min(initial=0.0)))
-    for words, value in limits:
-        if value not in beyond:
-            panel.axhline(value, color=LIMIT, linewidth=1.2, linestyle="--")
-            side = "top" if value > 0.9 * top else "bottom"
-            panel.annotate(
-                f"{words} {value:.4g} N", (0.99, value), xycoords=("axes fraction", "data"), ha="right", va=side
-            )
-    if beyond:
-        text = f"largest allowed {min(beyond):.4g} N, above the picture"
-        panel.annotate(text, (0.99, 0.98), xycoords="axes fraction", ha="right", va="top")
     # No cable pulls there.
     panel.axhline(0.0, color="black", linewidth=0.8)
     boundaries(panel, result)

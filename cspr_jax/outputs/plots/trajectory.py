@@ -13,13 +13,15 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.motion import doubt
 from cspr_jax.outputs.plots.moving import moving
-from cspr_jax.outputs.plots.scene import colours_of_tension, set_space
+from cspr_jax.outputs.plots.scene import colours_of_tension, set_space, shape_of
 from cspr_jax.store.result import Result
 
 # The robot is drawn where segments begin and end, at most so often.
 SHOWN = 6
-# Heights of the picture of a flat robot and of a tall one, inches.
-LOW, HIGH = 4.4, 6.8
+# Inches: width of the robot, height of what stands above and below it, and heights of the picture.
+ACROSS, BESIDE, LOW, HIGH = 5.2, 1.2, 3.6, 7.2
+# Spools nearer to each other than this part of the largest distance have one label.
+TOGETHER = 0.08
 
 
 def trajectory_figure(result: Result, spec: RobotFile) -> Figure:
@@ -33,18 +35,16 @@ def trajectory_figure(result: Result, spec: RobotFile) -> Figure:
         the figure.
     """
     points = np.concatenate([result.data["position"], np.asarray(spec.base_points, float)])
-    sizes = np.ptp(points, axis=0)
-    tall = min(1.0, sizes[2] / max(sizes[0], sizes[1]))
-    height = LOW + (HIGH - LOW) * tall
+    height = float(np.clip(ACROSS * shape_of(points) + BESIDE, LOW, HIGH))
     figure = Figure(figsize=(7.2, height), layout="constrained")
     panel = figure.add_subplot(projection="3d", computed_zorder=False)
-    draw_trajectory(figure, panel, result, spec, zoom=1.25 - 0.35 * tall)
-    figure.legend(*_legend(result), loc="outside lower center", ncols=5)
+    draw_trajectory(figure, panel, result, spec)
+    figure.legend(*legend_of(result), loc="outside lower center", ncols=6)
     figure.suptitle(f"{robot_name(result)}: trajectory, {result.axes['t'][-1]:.4g} s{doubt(result)}")
     return figure
 
 
-def draw_trajectory(figure: Figure, panel: Any, result: Result, spec: RobotFile, *, zoom: float = 0.9) -> None:
+def draw_trajectory(figure: Figure, panel: Any, result: Result, spec: RobotFile) -> None:
     """Path, spools, flight of a released object, and the robot where segments begin and end.
 
     Args:
@@ -52,7 +52,6 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, spec: RobotFile,
         panel: axes in three dimensions, without computed z order.
         result: the motion.
         spec: the robot whose cables have these tensions.
-        zoom: of the box; 1 fills the panel if it is a cube.
     """
     rows = _instants(result)
     robot, path = moving(result.data, spec, rows), result.data["position"]
@@ -61,7 +60,6 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, spec: RobotFile,
         panel,
         np.concatenate([robot.base, robot.attached.reshape(-1, 3), path, flight]),
         is_down=result.attributes.get("z_axis", "down") == "down",
-        zoom=zoom,
     )
     tension = result.data["tension"]
     norm = Normalize(0.0, float(tension[np.isfinite(tension)].max(initial=0.0)) or 1.0)
@@ -72,6 +70,7 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, spec: RobotFile,
     spools = panel.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35", zorder=2.0)[0]
     # A flat box is larger than its panel, which is a square.
     spools.set(clip_on=False, in_layout=False)
+    name_spools(panel, robot.base)
     for row, attached, corners in zip(rows, robot.attached, robot.corners, strict=True):
         lines = np.stack([robot.base, attached], axis=1)
         cables = Line3DCollection(lines, colors=colours(norm(tension[row])), linewidths=1.6, zorder=2.5)
@@ -88,6 +87,22 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, spec: RobotFile,
     figure.colorbar(ScalarMappable(norm, colours), ax=panel, label="tension (N)", shrink=0.6, location="left", pad=0.04)
 
 
+def name_spools(panel: Any, base: np.ndarray) -> None:
+    """Numbers of cables beside their spools; those of spools that stand together are one label.
+
+    Args:
+        panel: axes in three dimensions.
+        base: (n_cables, 3) of the spools, m.
+    """
+    near = TOGETHER * np.ptp(base, axis=0).max()
+    left = list(range(len(base)))
+    while left:
+        group = [k for k in left if np.linalg.norm(base[k] - base[left[0]]) <= near]
+        left = [k for k in left if k not in group]
+        words = ", ".join(str(k + 1) for k in group) + "\n"
+        panel.text(*base[group].mean(0), words, ha="center", va="center", fontsize="small", zorder=6.0)
+
+
 def _instants(result: Result) -> np.ndarray:
     # Rows at the ends of segments, evenly chosen if there are many.
     time = result.axes["t"]
@@ -96,13 +111,22 @@ def _instants(result: Result) -> np.ndarray:
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(SHOWN, len(rows))).round().astype(int))]
 
 
-def _legend(result: Result) -> tuple[list[Line2D], list[str]]:
+def legend_of(result: Result) -> tuple[list[Line2D], list[str]]:
+    """Entries of the legend of a motion in space.
+
+    Args:
+        result: the motion.
+
+    Returns:
+        lines and words.
+    """
     hollow: dict[str, Any] = {"linestyle": "", "color": "black", "markerfacecolor": "white"}
     every = {
         "path": Line2D([], [], color="black", linewidth=1.2),
         "start": Line2D([], [], marker="o", **hollow),
         "end": Line2D([], [], marker="D", **hollow),
-        "spools": Line2D([], [], linestyle="", marker="s", color="0.35"),
+        "cables": Line2D([], [], color=colours_of_tension()(0.6), linewidth=1.6),
+        "spools, by cable": Line2D([], [], linestyle="", marker="s", color="0.35"),
     }
     if "flight_position" in result.data:
         every["flight"] = Line2D([], [], color=COLOURS[2], linewidth=1.4, linestyle="--")
