@@ -181,7 +181,7 @@ def test_angles_are_degrees_and_axes_have_words(capsys, tmp_path, figures):
     shown = {
         round(tick): text.get_text() for tick, text in zip(around.get_ticklocs(), around.get_ticklabels(), strict=True)
     }
-    assert shown[180] == "180" and shown[270] == "-90"
+    assert shown[180] == "180" and shown[270] == "\u221290"
 
 
 def test_an_orientation_plane_has_no_label_on_its_head(capsys, tmp_path, figures):
@@ -199,7 +199,7 @@ def test_an_orientation_plane_has_no_label_on_its_head(capsys, tmp_path, figures
     cspr(capsys, "plot", path)
     (panel,) = panels(figures[0])
     figures[0].draw_without_rendering()
-    assert [text.get_text() for text in panel.get_xticklabels()][-3:] == ["-135°", "-90°", "-45°"]
+    assert [text.get_text() for text in panel.get_xticklabels()][-3:] == ["\u2212135°", "\u221290°", "\u221245°"]
     outward = [text.get_text() for text in panel.texts]
     assert outward == ["30°", "60°"] and panel.get_ylim()[1] == pytest.approx(np.degrees(1.35))
     assert "outward: tilt (°)" in figures[0].get_suptitle() and "from rest" in figures[0].get_suptitle()
@@ -386,7 +386,7 @@ def test_a_narrow_title_has_one_line(capsys, tmp_path, figures):
     path = made(tmp_path / "map.h5", GRID | {"z": [1.5]}, robot="a robot with a name of many letters")
     for words in (["--size", "8x12"], ["--column"]):
         cspr(capsys, "plot", path, *words)
-        title = figures[-1].suptitle(figures[-1].get_suptitle())
+        title = figures[-1]._suptitle
         assert "\n" not in title.get_text() and title.get_window_extent().width <= figures[-1].bbox.width
     cspr(capsys, "plot", path, "--page", "--no-title")
     assert figures[-1].get_suptitle() == "" and figures[-1].get_figwidth() * 2.54 == pytest.approx(17.5)

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -150,8 +150,8 @@ def legend_above(panel: Axes, columns: int, handles: list | None = None, words: 
     Returns:
         the legend.
     """
-    entries = panel.get_legend_handles_labels() if handles is None or words is None else (handles, words)
-    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+    entries: Any = panel.get_legend_handles_labels() if handles is None or words is None else (handles, words)
+    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
     legend = panel.legend(*entries, ncols=columns, frameon=False, columnspacing=1.2, handlelength=1.8, **place)
     legend.set_gid(ABOVE)
     return legend

@@ -100,7 +100,7 @@ def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]
         fault = f'"{quantity}" of a motion that keeps no robot and no plan'
         allowed = "must have its plan beside it, --plan FILE.toml, or be an HDF5 file of `cspr plan -o`"
         raise InputError("--quantity", quantity, allowed, fault=fault)
-    settings, text = (result.attributes.get(name) for name in ("robot_settings", "plan"))
+    settings, text = (str(result.attributes[name]) for name in ("robot_settings", "plan"))
     # The settings were checked when the file was read.
     spec = checked(RobotFile, json.loads(settings), file)
     return spec.equivalent() if spec.translation_only else spec, kept_plan(text, Path(file))

@@ -193,9 +193,10 @@ def _give_room(figure: Figure, style: Style) -> None:
         elif style.is_free and letters * SMALLER >= LEAST_LETTERS:
             letters *= SMALLER
             for text in figure.findobj(Text):
-                text.set_fontsize(SMALLER * text.get_fontsize())
+                text.set_fontsize(SMALLER * float(text.get_fontsize()))
             for axis in (axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)):
-                axis.set_tick_params(labelsize=SMALLER * axis.get_ticklabels()[0].get_fontsize())
+                for words in axis.get_ticklabels()[:1]:
+                    axis.set_tick_params(labelsize=SMALLER * float(words.get_fontsize()))
     # What has no room for its panels is refused where it is written.
 
 
