@@ -166,7 +166,7 @@ def test_angles_are_degrees_and_axes_have_words(capsys, tmp_path, figures):
     path = made(tmp_path / "map.h5", GRID | {"z": [1.5]} | turns, kind="poses")
     cspr(capsys, "plot", path, "--at", "torsion=0")
     assert [panel.get_title() for panel in panels(figures[0])] == [
-        f"azimuth of the tilt = {angle}°" for angle in (0, 90, 180, -90)
+        f"azimuth of the tilt = {angle}°" for angle in ("0", "90", "180", "\u221290")
     ]
     assert "from rest, torsion = 0°, z = 1.5 m" in figures[0].get_suptitle()
     assert "tilt = 45.84°" in figures[0].get_suptitle() and "rad" not in figures[0].get_suptitle()
