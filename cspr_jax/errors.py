@@ -54,7 +54,7 @@ class InputError(CsprError, ValueError):
     def __init__(self, key: str, value: object, allowed: str, *, fault: str = "") -> None:
         """Keep the parts, so that a reader of files can add its name."""
         line = f"{key}: {fault}: {allowed}" if fault else f"{key} = {shown(value)}: {demand(allowed)}"
-        super().__init__(one_line(line))
+        super().__init__(printable(line))
         self.key, self.value, self.allowed, self.fault = key, value, allowed, fault
 
 
@@ -150,10 +150,6 @@ def printable(text: object) -> str:
         one line.
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in str(text))
-
-
-# The name by which older modules know it.
-one_line = printable
 
 
 def shown(value: object) -> str:

@@ -3,7 +3,7 @@
 import difflib
 from pathlib import Path
 
-from cspr_jax.errors import ConfigError, RefusedError, StoreError, one_line, shown
+from cspr_jax.errors import ConfigError, RefusedError, StoreError, printable, shown
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import make_folders
 
@@ -65,12 +65,12 @@ def copy(names: list[str], place: Path) -> list[Path]:
     copies = {name: place / f"{name}.toml" for name in names}
     for path in copies.values():
         if path.exists():
-            raise RefusedError(one_line(f"{path}: is there already: remove it, or choose another folder with -o"))
+            raise RefusedError(printable(f"{path}: is there already: remove it, or choose another folder with -o"))
     make_folders(Disk(), place)
     for name, path in copies.items():
         try:
             with path.open("xb") as file:
                 file.write((source / f"{name}.toml").read_bytes())
         except FileExistsError as error:
-            raise RefusedError(one_line(f"{path}: is there already: choose another folder with -o")) from error
+            raise RefusedError(printable(f"{path}: is there already: choose another folder with -o")) from error
     return list(copies.values())

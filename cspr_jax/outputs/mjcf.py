@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cspr_jax import __version__
-from cspr_jax.errors import one_line
+from cspr_jax.errors import printable
 from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended
 from cspr_jax.plans.planning import Plan
 from cspr_jax.store.disk import Disk
@@ -39,7 +39,7 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
     Returns:
         the text of an MJCF file.
     """
-    root = ElementTree.Element("mujoco", model=one_line(body.name))
+    root = ElementTree.Element("mujoco", model=printable(body.name))
     turned = "" if body.z_axis == "up" else ", turned by half a turn about x: (x, -y, -z) of the robot file"
     words = f"World axes are those of the robot file{turned}; z is up. A control is the tension of a cable, N."
     root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words}{note} "))

@@ -16,7 +16,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import CATALOGUE, RobotFile, catalogue_names
 from cspr_jax.config.sweep import SweepFile
-from cspr_jax.errors import InputError, RefusedError, StoreError, one_line
+from cspr_jax.errors import InputError, RefusedError, StoreError, printable
 from cspr_jax.outputs.example_files import folder
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.map_kinds import MAP_KINDS
@@ -128,9 +128,9 @@ def write_new(path: Path, text: str) -> Path:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise RefusedError(one_line(f"{path}: is there already: remove it, or choose another name")) from error
+        raise RefusedError(printable(f"{path}: is there already: remove it, or choose another name")) from error
     except OSError as error:
-        raise StoreError(one_line(f"{path}: {error.strerror}")) from error
+        raise StoreError(printable(f"{path}: {error.strerror}")) from error
     return path
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from pydantic.functional_validators import PlainValidator
 
-from cspr_jax.errors import one_line
+from cspr_jax.errors import printable
 from cspr_jax.schema.identity import FORMAT_VERSION, digest
 from cspr_jax.schema.tiles import LARGEST_TILE, Tiling
 from cspr_jax.store.guard import LARGEST_CHUNKS, LARGEST_RANK
@@ -200,7 +200,7 @@ def plain_json(text: str | bytes) -> Any:
     except RecursionError as error:
         raise DamagedError("it is nested too deeply") from error
     except ValueError as error:
-        raise DamagedError(one_line(f"it is not JSON: {error}")) from error
+        raise DamagedError(printable(f"it is not JSON: {error}")) from error
     level: list[Any] = [value]
     for _ in range(DEEPEST):
         nested = [one for one in level if isinstance(one, dict | list)]
@@ -229,7 +229,7 @@ def document(kind: type[Known], value: Any, what: str) -> Known:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False, include_context=False)[0]
         place = ".".join(map(str, first["loc"]))
-        raise DamagedError(one_line(f"{what} is not of cspr: {place or 'it'}: {first['msg']}"[:300])) from error
+        raise DamagedError(printable(f"{what} is not of cspr: {place or 'it'}: {first['msg']}"[:300])) from error
 
 
 def _not_finite(word: str) -> float:

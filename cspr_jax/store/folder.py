@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.errors import RefusedError, StoreError, one_line
+from cspr_jax.errors import RefusedError, StoreError, printable
 from cspr_jax.store.disk import Disk, check_plain, open_plain
 from cspr_jax.store.publishing import PART, make_folders, refusal
 
@@ -99,9 +99,9 @@ class RunFolder:
             except BlockingIOError as error:
                 holder = os.pread(file, 200, 0).decode("utf-8", "replace").strip() or "another process"
                 line = f"{self.path}: is being written by {holder}; wait for it or stop it"
-                raise RefusedError(one_line(line)) from error
+                raise RefusedError(printable(line)) from error
             except OSError as error:
-                raise StoreError(one_line(f"{path}: cannot be locked: {error.strerror}: {_NO_LOCKS}")) from error
+                raise StoreError(printable(f"{path}: cannot be locked: {error.strerror}: {_NO_LOCKS}")) from error
             if not _HOLDER.fullmatch(os.pread(file, 400, 0)):
                 raise RefusedError(f"{path}: is somebody's file, not a lock of cspr: choose another -o")
             with contextlib.suppress(OSError):  # it only serves the message of others
@@ -123,7 +123,7 @@ class RunFolder:
         """
         for folder in (self.shards, self.quarantine):
             if folder.is_symlink():
-                raise RefusedError(one_line(f"{folder}: is a link: must be a folder of the run: choose another -o"))
+                raise RefusedError(printable(f"{folder}: is a link: must be a folder of the run: choose another -o"))
         try:
             there = os.lstat(self.lock)
         except FileNotFoundError:
@@ -134,7 +134,7 @@ class RunFolder:
             raise refusal(self.lock, error) from error
         if there is None or self._held is None or not os.path.samestat(there, self._held):
             raise RefusedError(
-                one_line(f"{self.lock}: was removed or replaced, so that another process may write here: run it again")
+                printable(f"{self.lock}: was removed or replaced, so that another process may write here: run it again")
             )
 
     def leftovers(self) -> list[Path]:

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 
-from cspr_jax.errors import StoreError, one_line
+from cspr_jax.errors import StoreError, printable
 from cspr_jax.schema.quantities import from_outside
 from cspr_jax.store.consolidation import Content
 from cspr_jax.store.documents import Header
@@ -234,20 +234,20 @@ class Reader:
             except OSError as error:
                 here.close()
                 line = f"{path}: no process could be started to read it: {error.strerror}"
-                raise StoreError(one_line(line)) from error
+                raise StoreError(printable(line)) from error
         self._channel, self._pipe = here, here.makefile("rb", buffering=0)
         try:
             self._header(self._pipe, patience=None)
         except EOFError as error:
             line = f"{path}: the process that reads it did not start: exit code {self._child.wait()}"
-            raise StoreError(one_line(line)) from error
+            raise StoreError(printable(line)) from error
 
     def _ended(self, path: Path) -> StoreError | DamagedError:
         code = cast(subprocess.Popen[bytes], self._child).wait()
         if -code in _ENDS:
             return DamagedError(_ENDS[signal.Signals(-code)])
         end = f"was killed: signal {-code}" if code < 0 else f"ended with exit code {code}"
-        return StoreError(one_line(f"{path}: the process that read it {end}; run it again"))
+        return StoreError(printable(f"{path}: the process that read it {end}; run it again"))
 
     def _end(self) -> None:
         for end in (self._pipe, self._channel):
@@ -268,7 +268,7 @@ class Reader:
         header = json.loads(data)
         self._idle = "refused" in header or "failed" in header
         if "failed" in header:
-            raise StoreError(one_line(header["failed"]))
+            raise StoreError(printable(header["failed"]))
         if "refused" in header:
             raise DamagedError(header["refused"])
         return header

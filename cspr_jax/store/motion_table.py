@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.config.limits import MOST_CABLES
-from cspr_jax.errors import one_line, shown
+from cspr_jax.errors import printable, shown
 from cspr_jax.schema.motion_quantities import ACROSS, PARTS, TRAJECTORY
 from cspr_jax.store.netcdf import file_size
 from cspr_jax.store.seal import DamagedError, unreadable
@@ -45,7 +45,7 @@ def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         raise DamagedError(f"its rows cannot be read: {str(error).splitlines()[0]}") from error
     if table.shape[1] != len(heads):
         raise DamagedError(f"its rows have {table.shape[1]} numbers, its header has {len(heads)} names")
-    attributes: dict[str, Any] = {"robot": one_line(path.stem)[:200] or "motion"}
+    attributes: dict[str, Any] = {"robot": printable(path.stem)[:200] or "motion"}
     if heads[-1] == FEASIBLE:
         flags = table[:, -1]
         if not np.isin(flags, (0.0, 1.0)).all():

@@ -10,7 +10,7 @@ import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
-from cspr_jax.errors import StoreError, one_line
+from cspr_jax.errors import StoreError, printable
 from cspr_jax.store.disk import USUAL, Disk, write_all
 
 # Ending of what is not whole: of this version, and of earlier ones, which named their process.
@@ -104,7 +104,7 @@ def make_folders(disk: Disk, path: Path) -> None:
         if not path.is_dir():
             raise NotADirectoryError(20, "Not a directory")
     except OSError as error:
-        raise StoreError(one_line(f"{path}: cannot be made: {error.strerror or error}")) from error
+        raise StoreError(printable(f"{path}: cannot be made: {error.strerror or error}")) from error
 
 
 def refusal(path: Path, error: OSError) -> StoreError:
@@ -117,4 +117,6 @@ def refusal(path: Path, error: OSError) -> StoreError:
     Returns:
         the error to raise.
     """
-    return StoreError(one_line(f"{path}: cannot be written: {error.strerror or error}; make room or choose another -o"))
+    return StoreError(
+        printable(f"{path}: cannot be written: {error.strerror or error}; make room or choose another -o")
+    )

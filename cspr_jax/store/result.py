@@ -10,7 +10,7 @@ from cspr_jax.config.limits import LARGEST_LENGTH, MOST_CABLES
 from cspr_jax.config.reading import checked
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
-from cspr_jax.errors import ConfigError, InputError, StoreError, one_line, shown
+from cspr_jax.errors import ConfigError, InputError, StoreError, printable, shown
 from cspr_jax.schema import labelled
 from cspr_jax.schema.best import best_of, check_axis
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
@@ -167,7 +167,7 @@ def open_result(path: Path) -> Result:
         else:
             axes, data = _motion(attributes, arrays, keeps_robot=not is_table)
     except DamagedError as error:
-        raise StoreError(one_line(f"{path}: cannot be read as a result: {error}")) from error
+        raise StoreError(printable(f"{path}: cannot be read as a result: {error}")) from error
     except ConfigError as error:
         raise StoreError(str(error)) from error
     names = [*axes, *data]
@@ -223,7 +223,7 @@ def _check_robot(attributes: dict[str, Any], path: Path) -> None:
         raise DamagedError(f"robot = {shown(name)}: must be a name of at most 200 characters")
     if z_axis not in ("down", "up"):
         raise DamagedError(f'z_axis = {shown(z_axis)}: must be "down" or "up"')
-    attributes["robot"] = one_line(name)
+    attributes["robot"] = printable(name)
     if points is not None:
         attributes["base_points"] = np.asarray(points, float)
         _check_numbers("base_points", attributes["base_points"], LARGEST_LENGTH)

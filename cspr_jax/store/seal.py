@@ -10,7 +10,7 @@ import os
 import stat
 from pathlib import Path
 
-from cspr_jax.errors import StoreError, one_line
+from cspr_jax.errors import StoreError, printable
 from cspr_jax.store.disk import Disk, write_all
 
 _MARK = b"\ncspr_jax, sha256 of all before this line: "
@@ -41,7 +41,7 @@ def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
     reason = error.strerror or str(error)
     if error.errno in _NO_FILE:
         return DamagedError(f"it cannot be read: {reason}")
-    return StoreError(one_line(f"{path}: cannot be read: {reason}; mend that, or remove the file, and run again"))
+    return StoreError(printable(f"{path}: cannot be read: {reason}; mend that, or remove the file, and run again"))
 
 
 def sealed(data: bytes) -> bytes:

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 
-from cspr_jax.errors import one_line
+from cspr_jax.errors import printable
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantity import EARLIER
 from cspr_jax.store import guard
@@ -146,7 +146,7 @@ def decode(
             values = {name: one.values() for name, one in datasets.items()}
             written = file.attrs["content_sha256"]
     except UNREADABLE as error:
-        raise DamagedError(one_line(f"HDF5 cannot read it: {reason(error)}")) from error
+        raise DamagedError(printable(f"HDF5 cannot read it: {reason(error)}")) from error
     # Of the types in which it was written.
     if not isinstance(written, str) or digest_of(values) != written:
         raise DamagedError("its content has changed")

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.errors import RefusedError, one_line
+from cspr_jax.errors import RefusedError, printable
 from cspr_jax.schema.identity import differences, digest
 from cspr_jax.store.consolidation import Content
 from cspr_jax.store.documents import Record
@@ -38,7 +38,7 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder, reader: Reader) -> None:
         if isinstance(content, Content) and content.identity != sweep.identity:
             raise RefusedError(*differing(sweep, folder, content.settings))
     if {identity for identity, _ in _owners(folder, reader)} - {sweep.identity}:
-        raise RefusedError(one_line(f"{folder.path}: holds shards of another sweep: choose another -o"))
+        raise RefusedError(printable(f"{folder.path}: holds shards of another sweep: choose another -o"))
 
 
 def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
@@ -57,7 +57,7 @@ def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
         return
     inside = sorted(folder.shards.iterdir()) if folder.shards.is_dir() else [folder.shards]
     if strangers := [path for path in (folder.record, *inside) if os.path.lexists(path)]:
-        raise RefusedError(one_line(f"{strangers[0]}: is somebody's file, not of a run of cspr: choose another -o"))
+        raise RefusedError(printable(f"{strangers[0]}: is somebody's file, not of a run of cspr: choose another -o"))
 
 
 def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> list[str]:
@@ -72,7 +72,7 @@ def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> list
         a line for each key.
     """
     lines = differences(sweep.settings, settings) or ["the format of the run differs"]
-    return [one_line(f"{folder.path}: {line}: must be equal, or another -o") for line in lines]
+    return [printable(f"{folder.path}: {line}: must be equal, or another -o") for line in lines]
 
 
 def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], accept: bool, reader: Reader) -> None:
@@ -93,10 +93,10 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
     advice = "--accept-environment-change mixes them, another -o starts anew"
     if record is None:
         if {theirs for _, theirs in _owners(folder, reader)} - {digest(environment)}:
-            raise RefusedError(one_line(f"{folder.path}: its shards were computed in another environment: {advice}"))
+            raise RefusedError(printable(f"{folder.path}: its shards were computed in another environment: {advice}"))
         return
     lines = differences(environment, record.environment)
-    raise RefusedError(*(one_line(f"{folder.path}: {line}: {advice}") for line in lines))
+    raise RefusedError(*(printable(f"{folder.path}: {line}: {advice}") for line in lines))
 
 
 def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
@@ -113,7 +113,7 @@ def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
         return
     advice = "--accept-environment-change takes it"
     lines = differences(actual, expected)
-    raise RefusedError(*(one_line(f"a worker differs from the run: {line}: {advice}") for line in lines))
+    raise RefusedError(*(printable(f"a worker differs from the run: {line}: {advice}") for line in lines))
 
 
 def damage(path: Path) -> str | None:

@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
-from cspr_jax.errors import ExitCode, RefusedError, StoppedError, StoreError, one_line
+from cspr_jax.errors import ExitCode, RefusedError, StoppedError, StoreError, printable
 from cspr_jax.schema.identity import canonical_json, digest
 from cspr_jax.store.consolidation import Content, consolidate
 from cspr_jax.store.disk import Disk
@@ -114,7 +114,7 @@ class Run:
             content = claims.content_at(self._folder.result, self._reader)
         if not isinstance(content, Content):
             if not (self._folder.record.exists() or self._folder.shards.is_dir()):
-                raise RefusedError(one_line(f"{self._folder.result}: is there, and {content}: choose another -o"))
+                raise RefusedError(printable(f"{self._folder.result}: is there, and {content}: choose another -o"))
             return None
         if content.identity != self._sweep.identity:
             raise RefusedError(*claims.differing(self._sweep, self._folder, content.settings))
@@ -173,7 +173,7 @@ class Run:
     def _quarantine(self, path: Path, reason: str) -> None:
         target = self._folder.set_aside(path)
         self._folder.note("quarantined", file=path.name, reason=reason)
-        self._hooks.warn(one_line(f"{path}: {reason}: moved to {target} and made again"))
+        self._hooks.warn(printable(f"{path}: {reason}: moved to {target} and made again"))
 
     def _read(self, index: int) -> Shard:
         return self._reader.shard(self._folder.shard(index), self._sweep.layout, index, self._tiling.extent(index))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.errors import StoreError, one_line
+from cspr_jax.errors import StoreError, printable
 from cspr_jax.schema.tiles import Tiling
 from cspr_jax.store.consolidation import Content
 from cspr_jax.store.disk import Disk
@@ -105,10 +105,10 @@ def _is_read(report: dict[str, Any], path: Path, read: Callable[[], object]) -> 
     try:
         read()
     except DamagedError as error:
-        report["faults"].append(one_line(f"{path}: {error}"))
+        report["faults"].append(printable(f"{path}: {error}"))
         return False
     except StoreError as error:
-        report["unreadable"].append(one_line(str(error)))
+        report["unreadable"].append(printable(str(error)))
         return False
     return True
 
@@ -127,7 +127,7 @@ def result_in(directory: Path) -> Path:
     """
     path = _folder(directory, _record(directory)).result
     if file_size(path) < 0:
-        raise StoreError(one_line(f"{directory}: holds no finished result: run the sweep to its end"))
+        raise StoreError(printable(f"{directory}: holds no finished result: run the sweep to its end"))
     return path
 
 
@@ -138,7 +138,7 @@ def _verify_file(path: Path, report: dict[str, Any]) -> dict[str, Any]:
             with Reader() as reader:
                 inside = reader.content(path, follow=True)
     except DamagedError as error:
-        return report | {"result": str(path), "faults": [one_line(f"{path}: {error}")]}
+        return report | {"result": str(path), "faults": [printable(f"{path}: {error}")]}
     if inside is not None:
         return report | {"result": str(path)} | _counts(inside)
     try:

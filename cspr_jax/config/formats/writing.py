@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cspr_jax.errors import one_line
+from cspr_jax.errors import printable
 
 
 def robot_text(keys: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
@@ -20,7 +20,7 @@ def robot_text(keys: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
     """
     lines = []
     if any(cable_names):
-        lines.append("# cables: " + ", ".join(one_line(name) for name in cable_names))
+        lines.append("# cables: " + ", ".join(printable(name) for name in cable_names))
     return "\n".join([*lines, *(f"{key} = {value_text(value)}" for key, value in keys.items())]) + "\n"
 
 

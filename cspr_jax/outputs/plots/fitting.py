@@ -10,7 +10,7 @@ from matplotlib.legend import Legend
 from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FuncFormatter
 
-from cspr_jax.errors import one_line
+from cspr_jax.errors import printable
 
 LONGEST_NAME = 40
 # Letters that a title of one line has at least.
@@ -34,7 +34,7 @@ def shortened(text: str, most: int = LONGEST_NAME) -> str:
     Returns:
         the text, or its beginning and its end.
     """
-    text = one_line(text)
+    text = printable(text)
     if len(text) <= most:
         return text
     tail = (most - 3) // 3
