@@ -120,6 +120,7 @@ def test_every_command_has_its_function():
         own |= {"names": "names"} if name == "robots" else {}
         own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}
         own |= {"result": "given", "cell": "cells"} if name == "report" else {}
+        own |= {"plan": "plan"} if name in ("plot", "report") else {}
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
         options = {action.dest for action in parser._actions} - PRINTING
         assert {own.get(option, option) for option in options} <= known, name

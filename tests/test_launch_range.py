@@ -216,7 +216,7 @@ def test_its_picture(tmp_path, figures):
     mapped(tmp_path / "one", x=[0.0, 0.3], y=[0.0, 0.5])
     path = tmp_path / "one" / "run" / "s.h5"
     assert cspr("plot", path, "-o", tmp_path / "s.png")[0] == 0
-    assert figures[0].get_suptitle().startswith("launch-robot: least speed at the release\nfrom (0, 0, -0.6) m")
+    assert figures[0].get_suptitle().startswith("launch-robot: least speed at the release\nfrom (0, 0, −0.6) m")
     assert figures[0].axes[-1].get_ylabel() == "least speed at the release (m/s)"
 
 

@@ -351,7 +351,7 @@ def test_hints_about_units(keys, wanted):
 
 def test_the_catalogue_gives_no_hint_but_two():
     """Of all robots two have their mass centre outside the hull of their points, as their sources give them."""
-    from cspr_jax.config.robot import CATALOGUE, catalogue_names
+    from cspr_jax.config.catalogue import CATALOGUE, catalogue_names
 
     lines = {name: hints.robot_hints(read_robot(CATALOGUE / f"{name}.toml")) for name in catalogue_names()}
     outside = {"greenline": "0.005 m outside the hull", "ipanema-1-iros": "0.25 m outside the hull"}

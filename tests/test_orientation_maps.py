@@ -265,7 +265,9 @@ def test_a_map_of_every_orientation_has_its_own_grid(tmp_path):
 def test_reasons_are_told_apart():
     """One colour and word a cell, what lies deeper first."""
     flags = [0, Verdict.NO_ARCS | Verdict.SLACK_CABLE, Verdict.SLACK_CABLE | Verdict.SINGULAR, Verdict.NOT_ACCESSIBLE]
-    found, words, colours = reasons(np.array([int(flag) for flag in [*flags, Verdict.FEWER_ARCS_UNDECIDED]]), "verdict")
+    found, words, colours = reasons(
+        np.array([int(flag) for flag in [*flags, Verdict.FEWER_ARCS_UNDECIDED]]), "feasible"
+    )
     assert [words[i] for i in found] == ["feasible", "slack cable", "singular", "not accessible", "feasible"]
     assert len(set(colours)) == len(colours) == 4
 

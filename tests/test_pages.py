@@ -116,7 +116,7 @@ def test_motions_of_cells_are_theirs(result, page):
         np.testing.assert_allclose(path[0], [0.0, 0.0, place["z0"]], atol=1e-6)
         attached = unpacked(motion["attached"]).reshape(-1, 3, 3)
         np.testing.assert_allclose(attached, np.repeat(path[:, None], 3, axis=1))
-        assert motion["limits"] == [{"words": "largest allowed", "value": 4.0}]
+        assert motion["limits"] == {"tension": [{"words": "largest allowed", "value": 4.0}], "rate": [], "length": []}
         # Taut, and between them the forces carry weight and inertia at rest.
         tension = unpacked(motion["tension"]).reshape(-1, 3)
         units = np.array(motion["base"]) - path[0]

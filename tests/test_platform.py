@@ -25,7 +25,8 @@ from support.platforms import (
 )
 
 from cspr_jax.arithmetic import rotations
-from cspr_jax.config.robot import CATALOGUE, read_robot
+from cspr_jax.config.catalogue import CATALOGUE
+from cspr_jax.config.robot import read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.feasibility.platform.end_acceleration import endpoint

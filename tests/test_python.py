@@ -10,7 +10,8 @@ from conftest import equilateral
 
 import cspr_jax
 from cspr_jax import cli
-from cspr_jax.config.robot import CATALOGUE, catalogue_names, read_robot
+from cspr_jax.config.catalogue import CATALOGUE, catalogue_names
+from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plan_report import plan_object
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from support.commands import cspr
 
-from cspr_jax.config import robot as catalogue
+from cspr_jax.config import catalogue
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, register, registered
 from cspr_jax.schema.quantities import AXES, QUANTITIES

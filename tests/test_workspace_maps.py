@@ -61,7 +61,7 @@ def test_interference_and_the_floor_of_a_map(tmp_path):
     text = SWEEP.format(robot="caspr-seven", conditions='["interference-free"]', more="[limits]\nfloor = 0.0\n")
     (tmp_path / "w.toml").write_text(text)
     code, out, error = cspr("run", tmp_path / "w.toml", "-o", tmp_path / "run")
-    assert (code, error) == (0, "")
+    assert code == 0 and "does the robot lack cable_diameter?" in error and len(error.splitlines()) == 1
     with h5py.File(out.strip()) as file:
         clearance, verdict, z = file["clearance"][...], file["verdict"][...], file["z"][...]
     assert (((verdict & Verdict.CABLE_CABLE) != 0) == (clearance <= 0.0)).all()

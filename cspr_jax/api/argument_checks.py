@@ -59,8 +59,8 @@ def _rule(function: str, key: str) -> Rule:
     return special or ARGUMENTS[key]
 
 
-_NUMBER = real("a number", (), infinite=True)
-_NUMBER_OR_NONE = real("a number, or None", (), none=True, infinite=True)
+_NUMBER = real("a number", (), infinite=True, nan=True)
+_NUMBER_OR_NONE = real("a number, or None", (), none=True, infinite=True, nan=True)
 _TEXT = kind_of("a string", str)
 _TEXT_OR_NONE = kind_of("a string, or None", str, none=True)
 _FLAG = kind_of("True or False", bool, np.bool_)
@@ -231,6 +231,7 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "straight_line.start": _POINT,
     "table.amplitude": _TEXT_OR_NONE,
     "table.definition": _TEXT_OR_NONE,
+    "table.name": _TEXT_OR_NONE,
     "table.max_arcs": integer(1, LARGEST_MAX_ARCS, none=True),
     "transition.z0": _ONE_DEPTH,
 }

@@ -81,7 +81,7 @@ def warn_of_rest(robot: Any, key: str, place: Any, z0: Any, cure: str) -> None:
     if np.shape(place) == (3,) and np.shape(z0) == ():
         line = almost_at_rest(key, np.asarray(place, float).tolist(), float(z0), robot, cure)
         if line:
-            warnings.warn(line, stacklevel=4)
+            warnings.warn(line, stacklevel=5)  # above the check of arguments
 
 
 def kernel_problem(

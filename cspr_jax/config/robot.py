@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
-from cspr_jax.config.catalogue import CATALOGUE as CATALOGUE
+from cspr_jax.config import catalogue
 from cspr_jax.config.catalogue import catalogue_names as catalogue_names
 from cspr_jax.config.formats.table import ENDINGS, Imported, format_of, parted, read
 from cspr_jax.config.kinds import refuse_other_kinds
@@ -290,7 +290,7 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
             raise _missing(reference, file, path)
         return read_robot(path)
     if reference in catalogue_names():
-        return read_robot(CATALOGUE / f"{reference}.toml")
+        return read_robot(catalogue.CATALOGUE / f"{reference}.toml")
     hint = did_you_mean(reference, catalogue_names())
     names = ", ".join(catalogue_names())
     raise ConfigError(

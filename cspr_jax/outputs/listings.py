@@ -5,7 +5,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.config.catalogue import CATALOGUE, FAULTS, catalogue_keys, catalogue_names
+from cspr_jax.config import catalogue
+from cspr_jax.config.catalogue import FAULTS, catalogue_keys, catalogue_names
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.limits import LIMITS
@@ -32,7 +33,7 @@ def robots(names: Iterable[str | Path] = ()) -> list[dict[str, Any]]:
     listed = []
     for name in list(names) or catalogue_names():
         spec = resolve_robot(str(name), "robots", Path())
-        is_known = spec.file is not None and spec.file.parent == CATALOGUE
+        is_known = spec.file is not None and spec.file.parent == catalogue.CATALOGUE
         if is_known:
             fault = FAULTS.get(spec.name)
         else:

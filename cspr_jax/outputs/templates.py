@@ -11,10 +11,11 @@ from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
 
+from cspr_jax.config import catalogue
 from cspr_jax.config.formats.writing import value_text
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import Table
-from cspr_jax.config.robot import CATALOGUE, RobotFile, catalogue_names
+from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import InputError, RefusedError, StoreError, printable
 from cspr_jax.outputs.example_files import folder
@@ -45,9 +46,9 @@ def robot_template(like: str) -> str:
     Raises:
         InputError: no such robot.
     """
-    if like not in catalogue_names():
-        raise InputError("--like", like, "one of " + ", ".join(catalogue_names()))
-    values = tomllib.loads((CATALOGUE / f"{like}.toml").read_text("utf-8"))
+    if like not in catalogue.catalogue_names():
+        raise InputError("--like", like, "one of " + ", ".join(catalogue.catalogue_names()))
+    values = tomllib.loads((catalogue.CATALOGUE / f"{like}.toml").read_text("utf-8"))
     values |= {"name": "my robot", "source": ""}
     head = "A robot; change what stands here, and take off the # of what you need."
     return f"# {head}\n" + _section("", RobotFile, values, frozenset())

@@ -6,7 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.config.robot import CATALOGUE, read_robot
+from cspr_jax.config.catalogue import CATALOGUE
+from cspr_jax.config.robot import read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.feasibility.transition.oscillations import (

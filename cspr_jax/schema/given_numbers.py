@@ -80,6 +80,7 @@ class Numbers:
         largest: largest number; inf: none, and infinite ones are taken only with `infinite`.
         above: whether the smallest one itself is refused.
         infinite: whether inf is taken.
+        nan: whether NaN is taken, since the function itself says what it allows instead.
     """
 
     allowed: str
@@ -88,6 +89,7 @@ class Numbers:
     largest: float = math.inf
     above: bool = False
     infinite: bool = False
+    nan: bool = False
 
     def array(self, key: str, given: Any) -> np.ndarray:
         """The numbers.
@@ -109,6 +111,7 @@ class Numbers:
             raise InputError(key, None, f"must be {self.allowed}", fault=f"an array of shape {values.shape}")
         inside = (values > self.least if self.above else values >= self.least) & (values <= self.largest)
         inside &= ~np.isnan(values) if self.infinite else np.isfinite(values)
+        inside |= np.isnan(values) & self.nan
         if not inside.all():
             # One row of points, or one number, is enough to show.
             at = tuple(np.argwhere(~inside)[0][: 1 if values.ndim == 2 else values.ndim])

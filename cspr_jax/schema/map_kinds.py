@@ -88,7 +88,14 @@ class MapKind:
         return (*self.needs, *self.takes, *self.one_of)
 
     def keys_of(self, quantity: str) -> tuple[str, ...]:
-        """Keys without which a quantity is no number, of which one must be given; empty where none is needed."""
+        """Keys without which a quantity is no number.
+
+        Args:
+            quantity: its name.
+
+        Returns:
+            the keys, of which one must be given; empty where none is needed.
+        """
         return next((keys for names, keys in self.only_with if quantity in names), ())
 
     def load(self) -> Any:

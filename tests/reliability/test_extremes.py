@@ -9,9 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
-from cspr_jax.config.robot import CATALOGUE, resolve_robot
+from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError, CsprError, InputError
 from cspr_jax.plans.choices import chosen_depth
 from cspr_jax.plans.sequence import Sequence

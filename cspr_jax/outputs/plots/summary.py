@@ -73,7 +73,7 @@ def _cells(result: Result) -> list[list[str]]:
     count = len(data.get("segment_end", ()))
     cells = []
     for k in range(min(count, SEGMENTS)):
-        numbers, words, _ = reasons(data["segment_verdict"][k : k + 1], "verdict")
+        numbers, words, _ = reasons(data["segment_verdict"][k : k + 1], "feasible")
         arcs, duration = int(data["segment_arcs"][k]), data["segment_end"][k] - data["segment_start"][k]
         margin = f"{data['segment_margin'][k]:.4g}" if np.isfinite(data["segment_margin"][k]) else "none"
         number = f"{k + 1}" if count <= SEGMENTS else f"{k + 1} of {count}"
