@@ -128,7 +128,7 @@ def test_a_spatial_robot_in_three_sections(capsys, tmp_path, figures):
     np.testing.assert_allclose(corners_of(level), np.unique(np.round(met, 9), axis=0), atol=1e-8)
     assert sorted(text.get_text() for text in level.texts) == ["1", "2", "3", "4"]
     assert f"margin {wanted:.3g} m/s²" in figures[0].get_suptitle() and level.get_title().endswith("−0.7 m/s²")
-    assert f"azimuth {np.degrees(np.arctan2(-1.0, 0.5)):.3g}°" in along.get_xlabel()
+    assert f"azimuth −{np.degrees(np.arctan2(1.0, 0.5)):.3g}°" in along.get_xlabel()
     assert np.linalg.norm(np.diff(margin_of(across), axis=0)) == pytest.approx(wanted, rel=1e-9)
     for panel in (level, along, across):
         point = next(x for x in panel.lines if x.get_zorder() == 4.0).get_xydata()[0]

@@ -116,7 +116,9 @@ def test_dictionaries_that_hold_themselves(function):
 
 
 @pytest.mark.parametrize(
-    "value", [10**400, LOOP, 1.0 + 2.0j, np.array([1j]), "1.7\n", float("nan"), object(), {1, 2}], ids=repr
+    "value",
+    [10**400, LOOP, 1.0 + 2.0j, np.array([1j]), "1.7\n", float("nan"), object(), {1, 2}],
+    ids=["very large", "in itself", "complex", "complex array", "text", "nan", "no number", "set"],
 )
 def test_values_of_files_from_python(value):
     """The schema of the file refuses them, in one line."""

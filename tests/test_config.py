@@ -131,7 +131,7 @@ SWEEPS = {
         "start = 1.0, stop = 2.0",
         "start = -2.0, stop = 0.0",
         "axes",
-        "above the spool plane",
+        "in the spool plane or above it",
         "z points down",
     ),
     "starts above": ("rest = true", "position = [0, 0, -1]", "trajectory.from", "above the spool plane"),

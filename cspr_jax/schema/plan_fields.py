@@ -34,8 +34,8 @@ SEGMENT = {
     "cause": (
         "",
         "What stands between the segment and feasible, worst first: `criterion` (name of a flag), `cable` (from 0 on; "
-        "null: none), `t` (s from the start of the segment), `needed` and `allowed` (of `unit`), and `cables` where two "
-        "touch; null where the segment is feasible.",
+        "null: none), `t` (s from the start of the segment), `needed` and `allowed` (of `unit`), and `cables` where "
+        "two touch; null where the segment is feasible.",
     ),
     "fewer_arcs_undecided": ("", "Whether a smaller number of arcs could not be refuted."),
     "feasible_at_infinity": ("1", "Point masses: left-hand side of thesis (2.55)."),
