@@ -134,7 +134,7 @@ def test_a_spatial_robot_in_three_sections(capsys, tmp_path, figures):
         point = next(x for x in panel.lines if x.get_zorder() == 4.0).get_xydata()[0]
         assert panel.patches[0].get_path().contains_point(point) and panel.get_aspect() == 1.0
     cspr(capsys, "plot", path, "--quantity", "acceleration")
-    assert "t = 1 s" in figures[1].get_suptitle() and "margin -" in figures[1].get_suptitle()
+    assert "t = 1 s" in figures[1].get_suptitle() and "margin −" in figures[1].get_suptitle()
     # At rest there is no direction to follow: one vertical section shows all.
     rest = level_motion(tmp_path / "b.h5", RECTANGLE, place, [[0.0, 0.0, 0.0]])
     cspr(capsys, "plot", rest, "--quantity", "acceleration")

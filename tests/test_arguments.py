@@ -51,14 +51,34 @@ BAD = {
     "None": None,
     "a set": {0.5},
 }
-TEXTS = {"amplitude", "cable_set", "condition", "definition", "family", "law", "like", "lines", "map", "name", "names"}
+TEXTS = {
+    "best",
+    "preset",
+    "amplitude",
+    "cable_set",
+    "condition",
+    "definition",
+    "family",
+    "law",
+    "like",
+    "lines",
+    "map",
+    "name",
+    "names",
+}
 TEXTS |= {"pattern", "precision", "quantity", "rule", "scheduler", "size", "what", "z_axis"}
-PATHS = {"directory", "folder", "given", "kernels", "output", "path", "reference", "result", "results"}
+PATHS = {"plan", "directory", "folder", "given", "kernels", "output", "path", "reference", "result", "results"}
 # Whole numbers, which are bounded: what would take all memory.
 WHOLE = {"divisions", "max_arcs", "population", "samples", "trajectories", "workers"}
 
 # Where None has a meaning without being the default.
-NONE = (("hypocycloid", "start"), ("platform_motion", "start"), ("run", "workers"), ("table", "workers"))
+NONE = (
+    ("hypocycloid", "start"),
+    ("platform_motion", "start"),
+    ("run", "workers"),
+    ("table", "workers"),
+    ("table", "name"),
+)
 
 
 def is_good(function: str, key: str, kind: str) -> bool:

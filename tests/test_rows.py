@@ -17,6 +17,7 @@ import pytest
 from support.commands import cspr
 
 from cspr_jax.config import catalogue
+from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, register, registered
 from cspr_jax.schema.quantities import AXES, QUANTITIES
@@ -62,7 +63,7 @@ def test_a_kind_of_map_from_file_to_picture(sweep, tmp_path, workers):
         assert (data.attrs["units"], data.attrs["long_name"]) == (b"m", b"distance from the nearest spool")
         assert data.shape == (6, 3, 1) and np.prod(data.chunks) <= 8 and file["nearest_spool"].dtype == np.int16
         found = data[...]
-    spools = np.array(catalogue.resolve_robot("prototype", "", tmp_path).base_points)
+    spools = np.array(resolve_robot("prototype", "", tmp_path).base_points)
     targets = np.stack(np.meshgrid(np.linspace(-0.5, 0.5, 6), [-0.3, 0.0, 0.4], [1.1], indexing="ij"), axis=-1)
     wanted = np.linalg.norm(targets[..., None, :] - spools, axis=-1).min(-1)
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
