@@ -52,18 +52,18 @@ def check_tables(monkeypatch):
 @pytest.mark.thorough
 def test_the_smallest_proportion_is_that_of_all(monkeypatch):
     """Though not all values of beta-hat are tried at every place."""
-    monkeypatch.setattr(chapter_3, "MAX_ARCS", 8)
+    choice = chapter_3.Choice(max_arcs=8)
     checker, asked = chapter_3.checker_of("effective-c3"), []
     for radius, azimuth, tilt in ((1.5, 0.2, 0.6), (2.5, 0.0, 1.0), (2.5, 0.5, 1.0), (3.0, 0.1, 0.7), (1.5, 0.1, 0.0)):
         place = np.array([radius * np.cos(azimuth), radius * np.sin(azimuth), 1.7]) * [0.86, 0.86, 1.0]
         angles = np.random.default_rng(1).uniform([-np.pi, 0.0, -1.0], [np.pi, 1.0, 1.0], (60, 3)) * [1.0, tilt, tilt]
         asked.append((place, angles))
-    every = [good.mean() for good in chapter_3.attained(checker, asked)]
+    every = [good.mean() for good in chapter_3.attained(checker, asked, choice=choice)]
     tried = []
 
     def attained(sets, values):
         tried.append(sets)
-        return chapter_3.attained(checker, sets, tried=values)
+        return chapter_3.attained(checker, sets, choice=choice, tried=values)
 
     assert smallest_proportions(attained, [asked]) == [min(every)]
     assert min(every) < max(every) == 1.0
@@ -74,7 +74,7 @@ def test_the_smallest_proportion_is_that_of_all(monkeypatch):
     assert smallest_proportions(attained, [asked[-1:]]) == [1.0]
     # Few places at a time, as of many orientations.
     monkeypatch.setattr(chapter_3, "TOGETHER", 100)
-    some = chapter_3.attained_there("effective-c3", np.array([0]), asked)
+    some = chapter_3.attained_there("effective-c3", choice, np.array([0]), asked)
     assert [good.mean() for good in some] == preferred
 
 

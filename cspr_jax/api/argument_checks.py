@@ -215,6 +215,7 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "hypocycloid.z0": _ONE_DEPTH,
     "keep_compiled_code.folder": _PATH_OR_NONE,
     "launch_range.start": _STARTS,
+    "list_robots.names": many(kind_of("a string, or a path", str, os.PathLike), "names and paths of robots"),
     "least_time.start": _STARTS,
     "minimum_arcs.amplitude": choice(_AMPLITUDE, None),
     "minimum_arcs.start": _STARTS_OR_NONE,

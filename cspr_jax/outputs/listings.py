@@ -61,7 +61,7 @@ def catalogue_table():
         )
         for keys in catalogue_keys()
     ]
-    table = _table(("name", "cables", "moves", "mass (kg)", "z axis", "remarks"), rows, wraps=False)
+    table = _table(("name", "cables", "moves", "kg", "z", "remarks"), rows, wraps=False)
     table.caption, table.caption_justify = "cspr robots NAME shows all about one", "left"
     return table
 
@@ -73,7 +73,7 @@ def _pattern(keys: dict[str, Any]) -> str:
 
 def _remarks(keys: dict[str, Any]) -> list[str]:
     remarks = [PLACEHOLDER] if keys.get("source", "").startswith(PLACEHOLDER) else []
-    remarks += ["only translates"] if keys.get("translation_only") else []
+    remarks += ["translates"] if keys.get("translation_only") else []
     return remarks + (["cannot hang taut"] if keys["name"] in FAULTS else [])
 
 

@@ -100,7 +100,7 @@ function motionMarks() {
 // Edges of cells between what is inside of a workspace and what is not.
 function outline(reason) {
   const [rows, columns] = content.map.shape.slice(-2), [y, x] = content.map.axes.slice(-2);
-  const inside = (i, j) => content.map.reasons.entries[reason[i]?.[j] ?? -1]?.word === "feasible";
+  const inside = (i, j) => Boolean(content.map.reasons.entries[reason[i]?.[j] ?? -1]?.isInside);
   const edges = (values) => {
     const mean = values.slice(1).map((value, k) => (value + values[k]) / 2), last = values.length - 1;
     if (!last) return [values[0] - 0.5, values[0] + 0.5];
