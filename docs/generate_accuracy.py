@@ -2,7 +2,7 @@
 
 python docs/generate_accuracy.py            all of them, about 20 minutes
 python docs/generate_accuracy.py 2.1 4.1    these; the others stay as they are
-python docs/generate_accuracy.py choices    how proportions of Tables 3.3 and 3.4 depend on what was tried, some hours
+python docs/generate_accuracy.py choices-3.3 choices-3.4    how proportions depend on what was tried, over an hour
 """
 
 import itertools
@@ -53,12 +53,12 @@ REASONS = {
 }
 CHOICES_WORDS = (
     "The text does not say up to which number of arcs p, and with how many values of beta-hat, orientations were "
-    "tried. These are the nine proportions, in percent, for both amplitude functions with short ends. Elsewhere on "
-    "this page p goes to 20, with 20 values."
+    "tried. These are the proportions, in percent, for both amplitude functions with short ends. Elsewhere on this "
+    "page p goes to 20, with 20 values."
 )
 # Blocks with more cells are summed up.
 MANY = 100
-CHOICES = "choices"
+CHOICES = {"choices-3.3": "3.3", "choices-3.4": "3.4"}
 # What the text does not say was tried in Tables 3.3 and 3.4.
 LARGEST_ARCS, NUMBERS_OF_VALUES, AMPLITUDES = (10, 14, 20), (6, 12, 20), ("effective", "effective-c3")
 
@@ -118,22 +118,18 @@ def decimals(cell: Cell) -> int:
     return len(cell.printed.partition(".")[2])
 
 
-def choices() -> str:
-    """How the nine proportions of Tables 3.3 and 3.4 depend on the arcs and the values of beta-hat that are tried."""
-    names = [f"3.3: {row}" for row in chapter_3.PLACES] + [f"3.4: z = {row}" for row in table_3_4.PRINTED]
-    printed = [cells[2] for cells in chapter_3.PRINTED.values()] + list(table_3_4.PRINTED.values())
-    parts = ["## Tables 3.3 and 3.4: what was tried\n\n" + textwrap.fill(CHOICES_WORDS, 118) + "\n"]
+def choices(name: str) -> str:
+    """How the proportions of Table 3.3 or 3.4 depend on the arcs and the values of beta-hat that are tried."""
+    source = {"3.3": chapter_3.PRINTED, "3.4": table_3_4.PRINTED}[name]
+    printed = [cells[2] if name == "3.3" else cells for cells in source.values()]
+    parts = [f"## Table {name}: what was tried\n\n" + textwrap.fill(CHOICES_WORDS, 118) + "\n"]
     for amplitude in AMPLITUDES:
-        lines = ["| p up to | values | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
+        lines = ["| p up to | values | " + " | ".join(source) + " |", "|---" * (len(source) + 2) + "|"]
         lines.append("| printed | | " + " | ".join(printed) + " |")
         for most, values in itertools.product(LARGEST_ARCS, NUMBERS_OF_VALUES):
-            cells = [
-                cell
-                for name in ("3.3", "3.4")
-                for cell in cspr_jax.table(name, amplitude=amplitude, max_arcs=most, values=values, workers=None)
-                if cell.column == "proportion"
-            ]
-            lines.append(f"| {most} | {values} | " + " | ".join(f"{cell.computed:.1f}" for cell in cells) + " |")
+            cells = cspr_jax.table(name, amplitude=amplitude, max_arcs=most, values=values, workers=None)
+            shares = [f"{cell.computed:.1f}" for cell in cells if cell.column == "proportion"]
+            lines.append(f"| {most} | {values} | " + " | ".join(shares) + " |")
             sys.stderr.write(f"{amplitude} {lines[-1]}\n")
         parts.append(f"*amplitude = {amplitude} 0.1; definition = scan*\n\n" + "\n".join(lines) + "\n")
     return "\n".join(parts)
@@ -148,15 +144,15 @@ def text(cell: Cell, cells: list[Cell]) -> str:
 def main(names: list[str]) -> None:
     """Compute tables, and replace their sections."""
     known = re.split(r"^(?=## )", PAGE.read_text("utf-8"), flags=re.MULTILINE)[1:] if PAGE.exists() else []
-    titles = [re.match(r"## (Tables|Table \S+)", own)[1] for own in known]
-    sections = {
-        CHOICES if title == "Tables" else title.removeprefix("Table "): own
-        for title, own in zip(titles, known, strict=True)
-    }
+    sections = {}
+    for own in known:
+        name, tried = re.match(r"## Table ([^\s:]+)(: what was tried)?", own).groups()
+        sections[f"choices-{name}" if tried else name] = own
     for name in names or REASONS:
-        sections[name] = choices() if name == CHOICES else section(name, cspr_jax.table(name))
+        sections[name] = choices(CHOICES[name]) if name in CHOICES else section(name, cspr_jax.table(name))
     PAGE.write_text(
-        "\n".join([HEAD, *(sections[name].strip() + "\n" for name in (*REASONS, CHOICES) if name in sections)]), "utf-8"
+        "\n".join([HEAD, *(sections[name].strip() + "\n" for name in (*REASONS, *CHOICES) if name in sections)]),
+        "utf-8",
     )
 
 
