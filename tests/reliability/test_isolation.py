@@ -89,7 +89,10 @@ def test_a_reader_that_somebody_ends_is_no_damage(finished, tmp_path, monkeypatc
     sweep, source, reference = finished
     shutil.copytree(source, tmp_path / "run")
     (tmp_path / "run" / "small.h5").unlink()
-    code = f"import cspr_jax.store.reader as r, os\nr.answer = lambda *a: os.kill(os.getpid(), {int(number)})\nserve()"
+    code = f"import cspr_jax.store.reader as r, os, signal\nr.answer = lambda *a: os.kill(os.getpid(), {int(number)})\n"
+    if number != signal.SIGKILL:  # a shell's background job inherits some of them ignored
+        code += f"signal.signal({int(number)}, signal.SIG_DFL)\n"
+    code += "serve()"
     with monkeypatch.context() as patch:
         patch.setattr(isolated, "_CODE", isolated._CODE.replace("serve()", code))
         with pytest.raises(StoreError, match=r"00000\.h5: the process that read it .*; run it again"):
