@@ -1,5 +1,6 @@
 """How pictures look: words, degrees, ticks, marks, colours, and the bytes of their files."""
 
+import itertools
 import json
 import re
 from pathlib import Path
@@ -262,6 +263,9 @@ def test_a_few_large_cells_do_not_use_up_the_colours():
     assert (scale.norm.vmin, scale.norm.vmax, scale.extend, scale.missing) == (0.1, 1.0, "max", True)
     scale = scale_of(np.append(usual / 10.0, -50.0))
     assert (scale.norm.vmin, scale.norm.vmax, scale.extend, scale.beyond) == (0.1, 1.0, "min", "down to -50")
+    scale = scale_of(np.append(usual / 10.0, [-np.inf, np.inf]))
+    assert (scale.extend, scale.beyond) == ("both", "")
+    assert scale_of(np.append(usual / 10.0, [-50.0, -np.inf])).beyond == "down to -50"
     for even in (usual, np.arange(1, 40), usual / 10.0, np.array([1, 2, 40])):
         assert scale_of(even).extend == "neither" and scale_of(even).norm.vmax >= even.max()
 
@@ -390,3 +394,17 @@ def test_a_narrow_title_has_one_line(capsys, tmp_path, figures):
         assert "\n" not in title.get_text() and title.get_window_extent().width <= figures[-1].bbox.width
     cspr(capsys, "plot", path, "--page", "--no-title")
     assert figures[-1].get_suptitle() == "" and figures[-1].get_figwidth() * 2.54 == pytest.approx(17.5)
+
+
+def test_panels_side_by_side_follow_from_the_width(capsys, tmp_path, figures):
+    path = made(tmp_path / "map.h5", GRID | {"z": [1.0, 1.2, 1.4, 1.6, 1.8, 2.0]})
+    for words, side_by_side in (([], 3), (["--page"], 3), (["--column"], 2), (["--size", "6x30"], 1)):
+        cspr(capsys, "plot", path, *words)
+        figures[-1].draw_without_rendering()
+        every = panels(figures[-1])
+        assert len({round(panel.get_position().x0, 3) for panel in every}) == side_by_side
+        for panel in every:
+            low, high = panel.get_window_extent().x0, panel.get_window_extent().x1
+            boxes = [text.get_window_extent() for text in panel.get_xticklabels() if text.get_text()]
+            boxes = [box for box in boxes if low <= (box.x0 + box.x1) / 2 <= high]
+            assert all(a.x1 < b.x0 for a, b in itertools.pairwise(boxes))

@@ -207,3 +207,19 @@ def test_settings_of_a_notebook_and_no_home(monkeypatch):
     surroundings.settle()
     assert os.environ["MPLBACKEND"] == "Agg" and os.environ["HOME"] == os.devnull
     assert xla._folder(None, lambda line: None) is None
+
+
+@pytest.mark.parametrize("place", ["folder", "variable"])
+def test_settings_of_matplotlib_that_cannot_be_read(tmp_path, place):
+    """One of the variable is not used; one in the working folder, where matplotlib looks first, is named."""
+    settings = tmp_path / ("matplotlibrc" if place == "folder" else "theirs")
+    settings.write_bytes("font.family: Größe\n".encode("latin-1"))
+    environment = os.environ | ({"MATPLOTLIBRC": str(settings)} if place == "variable" else {})
+    code = "import sys; from cspr_jax.cli import main; sys.argv = ['cspr', 'plot', 'no.h5']; sys.exit(main())"
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60)
+    assert len(done.stderr.splitlines()) == 1
+    if place == "folder":
+        assert done.returncode == 2 and done.stderr.startswith("cspr: matplotlibrc: must be UTF-8 text")
+    else:
+        assert done.returncode == 4 and done.stderr.startswith("cspr: no.h5: ")

@@ -57,6 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = _parser().parse_args(arguments)
         surroundings.check_threads()
+        surroundings.check_matplotlibrc()
     except SystemExit as end:
         raise SystemExit(_flushed(int(end.code or 0))) from end
     except BrokenPipeError:

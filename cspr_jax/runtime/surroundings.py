@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 
 from cspr_jax.arithmetic.cores import cores
-from cspr_jax.errors import ResourceError
+from cspr_jax.errors import ConfigError, ResourceError
 
 # Threads that a command needs whatever it does: for signals, and those of NumPy's library, one a core. Then for jax: of
 # XLA's own pools some have one a core.
@@ -27,6 +27,7 @@ def settle() -> None:
     The command line opens no window, and its pictures do not depend on matplotlib's settings.
     """
     os.environ["MPLBACKEND"] = "Agg"
+    os.environ["MATPLOTLIBRC"] = os.devnull  # an empty file: theirs may be one that ends the import of matplotlib
     logging.getLogger("matplotlib").setLevel(logging.CRITICAL)
     try:
         Path.home()
@@ -34,6 +35,24 @@ def settle() -> None:
         # A user without a name, as in a container. Where folders of the home folder are made, this fails in the usual
         # way, and everybody does without them.
         os.environ["HOME"] = os.devnull
+
+
+def check_matplotlibrc() -> None:
+    """Refuse a matplotlibrc of the working folder that ends the import of matplotlib, which looks there first.
+
+    Raises:
+        ConfigError: it cannot be read.
+    """
+    path = Path("matplotlibrc")
+    must = "must be UTF-8 text that can be read, since matplotlib reads it in the working folder"
+    if not path.exists() or path.is_dir():
+        return
+    if not path.is_file():
+        raise ConfigError(str(path), must)
+    try:
+        path.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(str(path), f"{must}: {getattr(error, 'strerror', None) or error}") from error
 
 
 def check_threads(count: int = 0) -> None:

@@ -71,8 +71,10 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
     if most <= least:
         most = least + (abs(least) or 1.0)
     extend = {(False, False): "neither", (True, False): "max", (False, True): "min"}.get((above, below), "both")
-    words = [f"up to {float(data[data > most].max()):.3g}"] if above else []
-    words += [f"down to {float(data[data < least].min()):.3g}"] if below else []
+    # Of what has no limit there is no number to tell.
+    ends = data[np.isfinite(data)]
+    words = [f"up to {float(ends.max()):.3g}"] if (ends > most).any() else []
+    words += [f"down to {float(ends.min()):.3g}"] if (ends < least).any() else []
     whole = bool((inside == np.round(inside)).all())
     return Scale(
         colours,

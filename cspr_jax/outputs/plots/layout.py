@@ -2,6 +2,7 @@
 
 import math
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -12,18 +13,21 @@ from cspr_jax.outputs.plots.labels import turned
 
 # Steps between ticks of angles, degrees.
 DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
+# Width, inches, that a panel takes at least of the picture, its part of labels and colour bar included.
+LEAST_WIDTH = 1.6
 
 
 def columns_of(count: int) -> int:
-    """Number of panels side by side.
+    """Number of panels side by side in a picture of the width that `in_style` has set.
 
     Args:
         count: of all panels.
 
     Returns:
-        at most three, in a full rectangle where that is possible.
+        at most three and what the width has room for, in a full rectangle where that is possible.
     """
-    return 2 if count == 4 else min(3, count)
+    room = max(1, int(matplotlib.rcParams["figure.figsize"][0] / LEAST_WIDTH))
+    return min(room, 2 if count == 4 else min(3, count))
 
 
 def panels(

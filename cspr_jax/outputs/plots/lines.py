@@ -19,7 +19,7 @@ from cspr_jax.outputs.plots.labels import (
     robot_name,
     values,
 )
-from cspr_jax.outputs.plots.layout import in_degrees, in_whole_numbers, panels
+from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbers, panels
 from cspr_jax.outputs.plots.notes import table
 from cspr_jax.outputs.plots.worded import worded
 from cspr_jax.store.result import Result
@@ -59,7 +59,8 @@ def line_figure(
         the figure.
     """
     count = len(groups)
-    figure = Figure(figsize=(6.8, 4.4) if count == 1 else (3.4 * min(3, count) + 1.0, 3.4 * -(-count // 3) + 0.9))
+    columns = columns_of(count)
+    figure = Figure(figsize=(6.8, 4.4) if count == 1 else (3.4 * columns + 1.0, 3.4 * -(-count // columns) + 0.9))
     figure.set_layout_engine("constrained")
     every, bottom, left = panels(figure, count)
     drawn = [[_as_drawn(result, name, across, line) for line in lines] for lines in groups.values()]

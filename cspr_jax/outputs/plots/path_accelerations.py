@@ -13,7 +13,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.labels import COLOURS, PANELS, chosen, robot_name
-from cspr_jax.outputs.plots.layout import panels
+from cspr_jax.outputs.plots.layout import columns_of, panels
 from cspr_jax.outputs.plots.motion import doubt
 from cspr_jax.store.result import Result
 
@@ -56,7 +56,8 @@ def path_figure(result: Result, file: str) -> Figure:
     spec, keys = kept(result, file, "path_acceleration")
     ways = _ways(result, spec, keys)
     shown = [ways[k] for k in chosen(len(ways), PANELS)]
-    columns, rows = min(3, len(shown)), -(-len(shown) // 3)
+    columns = columns_of(len(shown))
+    rows = -(-len(shown) // columns)
     size = (6.8, 4.8) if len(shown) == 1 else (3.8 * columns + 0.6, 3.3 * rows + 1.2)
     figure = Figure(figsize=size, layout="constrained")
     every, bottom, left = panels(figure, len(shown), same=False)

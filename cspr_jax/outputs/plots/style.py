@@ -138,7 +138,11 @@ def in_style(style: Style) -> Iterator[None]:
     Yields:
         nothing; figures are to be made and saved inside.
     """
-    with matplotlib.style.context(["default", LOOK | {"font.size": style.font_size}]):
+    look = LOOK | {"font.size": style.font_size}
+    width = style.size[0] if style.size is not None else style.width
+    if width is not None:
+        look["figure.figsize"] = (width / INCH, width / INCH)
+    with matplotlib.style.context(["default", look]):
         yield
 
 
