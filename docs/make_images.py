@@ -142,6 +142,7 @@ IMAGES = {
     "workspace": Image(
         "Wrench-feasible workspace of CoGiRo at four heights: distance of the tensions from their limits, N.",
         20,
+        "--quantity wrench_margin",
     ),
     "workspace_solid": Image(
         "The wrench-feasible workspace of CoGiRo, and the robot at its centroid; lines at the heights of the ticks.",
