@@ -223,3 +223,11 @@ def test_settings_of_matplotlib_that_cannot_be_read(tmp_path, place):
         assert done.returncode == 2 and done.stderr.startswith("cspr: matplotlibrc: must be UTF-8 text")
     else:
         assert done.returncode == 4 and done.stderr.startswith("cspr: no.h5: ")
+
+
+def test_a_wrong_sweep_is_refused_before_dask_is_imported(tmp_path):
+    (tmp_path / "wrong.toml").write_text("schema = 1\nmap = 3\n")
+    code = "import sys; from cspr_jax.cli import main; print(main(sys.argv[1:]), 'distributed' in sys.modules)"
+    words = ["run", str(tmp_path / "wrong.toml"), "--scheduler", "tcp://127.0.0.1:1"]
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60)
+    assert done.stdout == "2 False\n" and len(done.stderr.splitlines()) == 1

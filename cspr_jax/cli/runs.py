@@ -50,9 +50,9 @@ def _run(options: argparse.Namespace) -> int:
 
     if options.scheduler is not None and options.device is not None:
         raise ConfigError("--device", f"{options.device}: cannot be combined with --scheduler, whose workers choose")
+    sweep = sweeps.sweep_given(options.sweep)
     if options.scheduler is not None:
         surroundings.quiet_scheduler()
-    sweep = sweeps.sweep_given(options.sweep)
     directory = options.output or sweeps.run_directory(sweep)
     choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
     with stop_signals(warn) as stop, progress() as on_tile:
