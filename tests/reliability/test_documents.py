@@ -9,6 +9,7 @@ import pytest
 from support.commands import cspr
 
 from cspr_jax.schema.identity import FORMAT_VERSION, digest, identity
+from cspr_jax.store import documents
 from cspr_jax.store.documents import DEEPEST, plain_json
 from cspr_jax.store.seal import DamagedError
 from cspr_jax.sweep.inspection import status
@@ -171,3 +172,14 @@ def test_status_of_a_map_over_all_orientations(tmp_path):
     sweep = read_sweep(path)
     assert Settings.model_validate(sweep.settings).tiling == sweep.grid.tiling
     assert len(sweep.grid.tiling) > 1
+
+
+HEADER = {"identity": "a" * 64, "tile": 3, "environment": "0" * 64, "near_zero": 2}
+
+
+@pytest.mark.parametrize("key", HEADER)
+def test_headers_hold_hashes_and_counts(key):
+    assert documents.document(documents.Header, HEADER, "its header").undecided is None
+    for value in (None, "x", "A" * 64, "a" * 63, "a" * 64 + "\n", -1, 10**30, True, 0.5, [3]):
+        with pytest.raises(DamagedError):
+            documents.document(documents.Header, HEADER | {key: value}, "its header")
