@@ -206,6 +206,7 @@ def test_a_transition_that_one_limit_refuses(limits, flag):
     assert cause.needed == pytest.approx(free[next(iter(limits))])
 
 
+@pytest.mark.thorough
 def test_a_bezier_segment_of_the_least_duration_is_taut_if_some_duration_is():
     """One that broke the limit by less, with slack cables, was shown."""
     poses = [{"position": place} for place in ([0, 0, -0.5], [-0.05, -0.05, -0.7], [0.1, 0.15, -0.8])]
@@ -224,6 +225,7 @@ LINE |= {
 }
 
 
+@pytest.mark.thorough
 def test_a_line_that_no_slow_motion_follows_is_not_called_too_fast():
     """At its ends each spool carries most of the weight, halfway two of them pull against each other."""
     bound = cspr_jax.plan(LINE | {"tension_max": 130.0, "cable_speed_max": 0.5})

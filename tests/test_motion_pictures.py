@@ -164,8 +164,22 @@ def test_several_motions_of_a_planar_robot_have_no_view_from_above(tmp_path, fig
     assert len(figure.legends[0].get_texts()) == 2
 
 
-@pytest.mark.parametrize("size", [[], ["--column"], ["--page", "--no-title"]])
-@pytest.mark.parametrize("quantity", ["trajectory", "summary"])
+@pytest.mark.parametrize(
+    ("quantity", "size"),
+    [
+        ("trajectory", []),
+        ("summary", ["--column"]),
+        *(
+            pytest.param(*case, marks=pytest.mark.thorough)
+            for case in (
+                ("trajectory", ["--column"]),
+                ("trajectory", ["--page", "--no-title"]),
+                ("summary", []),
+                ("summary", ["--page", "--no-title"]),
+            )
+        ),
+    ],
+)
 def test_a_robot_in_space_fills_its_place(motions, figures, capsys, size, quantity):
     """All of it and of its letters is in the picture, one scale holds for all axes, and no two words meet."""
     figure = drawn(figures, str(motions / "first.h5"), "--quantity", quantity, *size)
@@ -182,6 +196,7 @@ def test_a_robot_in_space_fills_its_place(motions, figures, capsys, size, quanti
     assert not any(one.overlaps(other) for k, one in enumerate(words) for other in words[:k])
 
 
+@pytest.mark.thorough
 def test_presets_and_titles(motions, figures, capsys):
     """A title of a narrow picture has one line; none is drawn if none is wanted, but what is not proved is said."""
     for words, width in ((["--column"], 8.5), (["--page"], 17.5)):

@@ -156,6 +156,7 @@ def test_a_plan_goes_with_tables_alone(folder, capsys):
     assert "--plan" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_the_platform_stands_where_its_cables_end(tmp_path):
     """Also where the mass centre, whose position a motion holds, is not the origin of the platform's points."""
     assert plan(tmp_path, PLATFORM, "-o", str(tmp_path / "motion.h5"))[0] == 0

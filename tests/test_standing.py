@@ -11,7 +11,8 @@ from cspr_jax.feasibility.workspace.standing import DEPTHS, slack_at_rest
 from cspr_jax.problem import centred
 from cspr_jax.robots.limits import Limits
 
-SIZES = [("1T", 3), ("2T", 4), ("3T", 5), ("1R2T", 4), ("2R3T", 7), ("3R3T", 8)]
+SIZES = [("2T", 4), ("1R2T", 4), *(pytest.param(*size, marks=pytest.mark.thorough) for size in (("1T", 3), ("3T", 5)))]
+SIZES += [pytest.param(*size, marks=pytest.mark.thorough) for size in (("2R3T", 7), ("3R3T", 8))]
 
 
 def hangs(drawn, low, high):

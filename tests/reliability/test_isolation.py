@@ -83,7 +83,10 @@ serve()"""
     check_same(tmp_path / "run", reference)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGTERM, *(pytest.param(one, marks=pytest.mark.thorough) for one in (signal.SIGKILL, signal.SIGINT))],
+)
 def test_a_reader_that_somebody_ends_is_no_damage(finished, tmp_path, monkeypatch, number):
     """Batch systems end all processes of a job, and the system one that takes too much memory."""
     sweep, source, reference = finished
