@@ -439,6 +439,22 @@ def test_batches_are_larger_on_a_gpu(monkeypatch, backend, length):
     assert set(shapes) == {length} and len(shapes) == -(-700 // length)
 
 
+@pytest.mark.parametrize("count", [1, 2, 7, 128])
+def test_rows_on_a_gpu_give_what_they_give_on_a_cpu(monkeypatch, count):
+    """Even and odd numbers of rows, and one."""
+    lanes = np.linspace(0.1, 2.0, 50)
+
+    def one(row):
+        return {"sine": jax.numpy.sin(row[0] * lanes) + row[1]}
+
+    rows = np.linspace(0.0, 3.0, count), np.arange(float(count))
+    expected = np.sin(rows[0][:, None] * lanes) + rows[1][:, None]
+    for backend in ("cpu", "gpu"):
+        monkeypatch.setattr(jax, "default_backend", lambda backend=backend: backend)
+        found = jax.jit(lambda some: batches.row_by_row(one, some))(rows)
+        np.testing.assert_allclose(found["sine"], expected, rtol=1e-14)
+
+
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="arenas are glibc's")
 def test_few_arenas_of_memory(tmp_path):
     """For this process (glibc tells by its statistics) and for those started from it; a user's setting stays."""

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 import jax
 import numpy as np
+from jax import lax
 
 from cspr_jax.arithmetic.cores import cores
 from cspr_jax.arithmetic.elementary import double_precision
@@ -79,6 +80,26 @@ def room(size: int) -> int:
         the length.
     """
     return min(size * LARGER.get(jax.default_backend(), 1), LARGEST)
+
+
+def row_by_row(function: Callable, rows):
+    """Apply a function of many lanes to each row of a table, inside of a compiled function.
+
+    On a CPU one row after the other, so that the lanes stay in its caches. Elsewhere in two halves: a GPU waits for the
+    start of every kernel, and XLA stores what a loop gives, while it would compute a formula outside of loops again for
+    each of its consumers.
+
+    Args:
+        function: takes one row, a pytree without the leading dimension.
+        rows: pytree of arrays (m, ...).
+
+    Returns:
+        pytree of the results, leaves (m, ...).
+    """
+    if jax.default_backend() == "cpu":
+        return lax.map(function, rows)
+    count = len(jax.tree.leaves(rows)[0])
+    return lax.map(function, rows, batch_size=max(count // 2, 1))
 
 
 def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):

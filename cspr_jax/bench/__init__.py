@@ -7,6 +7,7 @@ from typing import Any
 
 import jax
 
+from cspr_jax.arithmetic.batches import room
 from cspr_jax.bench import hand_written, six_cables, three_cables, timing, workspaces
 
 SCHEMA = 1
@@ -25,7 +26,7 @@ def bench(kernels: Path | None = None) -> dict[str, Any]:
         ConfigError: there is no compiler, or it refuses a kernel, or that computes something else.
     """
     by_hand = None if kernels is None else hand_written.compiled(kernels)
-    six, three = six_cables.work(six_cables.TRAJECTORIES), three_cables.work()
+    six, three = six_cables.work(room(six_cables.TRAJECTORIES)), three_cables.work()
     batches = six_cables.batches(six)
     rough, exact = (six_cables.rate(six.robot, batches, rough=is_rough) for is_rough in (True, False))
     rates = {

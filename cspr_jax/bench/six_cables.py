@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.batches import in_batches, in_threads, padded
+from cspr_jax.arithmetic.batches import in_batches, in_threads, padded, room
 from cspr_jax.bench.timing import best, operations
 from cspr_jax.feasibility.platform.prefilter import smallest_tensions
 from cspr_jax.problem import load_robot
@@ -71,7 +71,7 @@ class Batch(NamedTuple):
     Fields:
         arcs: how many.
         real: how many segments are not padding.
-        segments: leaves (LANES, ...), on the device.
+        segments: leaves (lanes, ...), on the device.
     """
 
     arcs: int
@@ -90,14 +90,14 @@ def batches(given: Work) -> list[Batch]:
     """
     half = given.angle[:, None] / 2.0
     quaternions = np.concatenate([np.cos(half), np.sin(half) * given.axis], axis=1)
-    portions = []
+    portions, lanes = [], room(LANES)
     for arcs in np.unique(given.arcs):
         which = np.flatnonzero(given.arcs == arcs)
         kernel = partial(_segments, given.robot, np.asarray(arcs % 2 == 1))
         every = in_batches(kernel, (quaternions[which], given.beta_hat[which]), size=LANES)
-        for start in range(0, len(which), LANES):
-            some = jax.tree.map(lambda x, s=start: x[s : s + LANES], every)
-            portions.append(Batch(int(arcs), len(some.rate), jax.device_put(padded(some, LANES))))
+        for start in range(0, len(which), lanes):
+            some = jax.tree.map(lambda x, s=start: x[s : s + lanes], every)
+            portions.append(Batch(int(arcs), len(some.rate), jax.device_put(padded(some, lanes))))
     return portions
 
 
@@ -142,7 +142,7 @@ def tensions(robot: PlatformRobot, batch: Batch, *, rough: bool) -> Array:
         rough: whether in float32.
 
     Returns:
-        (LANES,) of `prefilter.smallest_tensions`.
+        (lanes,) of `prefilter.smallest_tensions`.
     """
     tau, arcs = np.linspace(0.0, 1.0, SAMPLES), float(batch.arcs)
     return smallest_tensions(robot, QUINTIC, arcs, tau, batch.segments, kind=FROM_REST, rough=rough)[0]
@@ -161,7 +161,7 @@ def operations_a_check(robot: PlatformRobot, batch: Batch) -> float | None:
     lowered = smallest_tensions.lower(
         robot, QUINTIC, float(batch.arcs), np.zeros(1), batch.segments, kind=FROM_REST, rough=True
     )
-    return operations(lowered, LANES)
+    return operations(lowered, len(batch.segments.rate))
 
 
 def numpy_rate(given: Work) -> float:

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
+from cspr_jax.arithmetic.batches import row_by_row
 from cspr_jax.arithmetic.elementary import lesser, sincospi
 from cspr_jax.feasibility.point_mass.slacks import largest_term
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
@@ -98,7 +99,7 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
             return smallest
 
         # Not carried from one to the next: what a loop stacks XLA leaves on one core, as its caller's threads want it.
-        smallest = lax.map(several, jnp.arange(len(tau) // UNROLL)).min(0)
+        smallest = row_by_row(several, jnp.arange(len(tau) // UNROLL)).min(0)
         return jnp.where(exists, smallest, -jnp.inf)
 
     return lax.map(one, (jnp.asarray(arcs, dtype), sample_table(amplitude, arcs, tau, dtype)))

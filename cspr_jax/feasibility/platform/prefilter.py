@@ -12,9 +12,9 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
+from jax import Array
 
-from cspr_jax.arithmetic.batches import in_batches, room
+from cspr_jax.arithmetic.batches import in_batches, room, row_by_row
 from cspr_jax.arithmetic.lanes import cross, dot
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.feasibility.platform.slack_lanes import certain_tension, lowest_tension
@@ -67,7 +67,7 @@ def smallest_tensions(
             return lowest_tension(robot, segments, number, now, kind)
 
     # One number a loop: XLA would compute the tension once for each of several.
-    values = lax.map(at, table)
+    values = row_by_row(at, table)
     lowest = values.min(0)
     return lowest, jnp.where(values == lowest[None], jnp.arange(len(tau))[:, None], len(tau)).min(0)
 
