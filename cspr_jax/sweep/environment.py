@@ -9,6 +9,8 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+from cspr_jax import __version__
+
 PACKAGE = Path(__file__).resolve().parents[1]
 LIBRARIES = ("jax", "jaxlib", "numpy", "h5py")
 
@@ -27,7 +29,7 @@ def environment() -> dict[str, Any]:
     model, flags = _processor()
     return {
         "package": package_hash(),
-        "version": importlib.metadata.version("cspr_jax"),
+        "version": __version__,
         **_git(),
         "python": platform.python_version(),
         **{name: importlib.metadata.version(name) for name in LIBRARIES},

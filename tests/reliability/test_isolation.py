@@ -37,9 +37,13 @@ def spoiled_runs(folder, tiles):
     go(sweep, directory)
     reference = content(directory)
     (directory / "small.h5").unlink()
+    computed_by = digest(ENVIRONMENT).encode()
     for index in range(tiles):
         path = directory / "shards" / f"{index:05d}.h5"
-        path.write_bytes(sealed(mutated(np.random.default_rng([23, index]), path.read_bytes()[:-LENGTH])))
+        spoiled = mutated(np.random.default_rng([23, index]), path.read_bytes()[:-LENGTH])
+        # One letter of the environment's hash makes a whole shard of another environment, which a run refuses to mix in.
+        if computed_by in spoiled:
+            path.write_bytes(sealed(spoiled))
     found = verify(directory)
     assert found["shards"] + len(found["faults"]) == tiles and not found["unreadable"]
     paper = Paper(sweep)
