@@ -109,8 +109,8 @@ def test_damage_is_one_line(folder, capsys, change, said):
         cspr_jax.open_result(path)
     for command in (["verify", str(path)], ["plot", str(path)], ["report", str(path)]):
         assert main(command) == 4
-        error = capsys.readouterr().err
-        assert said in error and str(path) in error and error.count("\n") == 1
+        out, error = capsys.readouterr()
+        assert out == "" and said in error and str(path) in error and error.count("\n") == 1
     assert not path.with_suffix(".png").exists() and not path.with_suffix(".html").exists()
 
 

@@ -125,6 +125,35 @@ def test_obstacles_are_drawn():
     assert "obstacles" in [text.get_text() for text in solid.legends[0].get_texts()]
 
 
+def test_obstacles_are_on_pages():
+    """What each height cuts of them, across and upward, and the outlines of all."""
+    numbers = {"verdict": np.zeros(24, np.uint32), "clearance": np.ones(24)}
+    content = map_content(result(AXES | {"z": [1.0, 2.2]}, numbers, AMONG))[0]
+    own, names = content["obstacles"], [axis["name"] for axis in content["axes"]]
+    assert names == ["z", "y", "x"] and own["axis"] == 0
+    sphere, box, cylinder = own["bodies"]
+    assert sphere["cuts"][1]["up"] == [] and not box["cuts"][0]["up"] and cylinder["cuts"][0]["up"]
+    assert np.ptp(sphere["cuts"][0]["across"]) == pytest.approx(0.3, rel=0.01)
+    assert (min(box["cuts"][1]["across"]), max(box["cuts"][1]["across"])) == (-0.5, 0.0)
+    assert np.ptp(sphere["shadow"]["up"]) == pytest.approx(0.5, rel=0.01)
+    assert cylinder["shadow"]["up"][0] == cylinder["shadow"]["up"][-1]
+    assert map_content(result(AXES, {"verdict": np.zeros(12, np.uint32)}, CLOSED))[0]["obstacles"] is None
+
+
+@pytest.mark.parametrize("by", [None, "y"])
+def test_lines_mark_what_other_conditions_exclude(by):
+    """With a cross each, and one legend; a map of one condition has none."""
+    verdict = np.where(np.arange(12) % 4 == 1, OUT, 0)
+    data = {"verdict": verdict.astype(np.uint32), "wrench_margin": np.ones(12), "closure_margin": -np.ones(12)}
+    how = {"at": {"x": 0.0}} if by is None else {"lines": by}
+    figure = cspr_jax.plot(result(AXES, data, BOTH), quantity="wrench_margin", **how)
+    crosses = [line for line in figure.axes[0].lines if line.get_marker() == "x"]
+    assert [line.get_xdata().tolist() for line in crosses] == [[AXES["y"][1]]] if by is None else [[-1.0, 0.0, 1.0]]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["excluded by other conditions"]
+    plain = cspr_jax.plot(result(AXES, data, BOTH), quantity="closure_margin", **how)
+    assert not plain.legends and "x" not in [line.get_marker() for line in plain.axes[0].lines]
+
+
 def test_outlines_are_those_of_the_volumes():
     """A margin of another scale moves no outline: half-way between points, in a band of all that may be inside."""
     points = {"x": np.linspace(0.0, 3.0, 4), "y": np.linspace(0.0, 3.0, 4), "z": [1.0]}

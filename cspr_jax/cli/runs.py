@@ -118,7 +118,8 @@ def _verify(options: argparse.Namespace) -> int:
         print_json(report)
     else:
         counts = ", ".join(f"{key} {report[key]}" for key in VERIFIED if key in report)
-        print_line(f"{report['path']}: {counts}")
+        if counts:  # a file that cannot be read has none
+            print_line(f"{report['path']}: {counts}")
     again = "run the sweep" if "shards" in report else "run or plan it"
     for fault in report["faults"]:
         warn(f"{fault}: {again} again to make it anew")

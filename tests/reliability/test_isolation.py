@@ -41,7 +41,7 @@ def spoiled_runs(folder, tiles):
     for index in range(tiles):
         path = directory / "shards" / f"{index:05d}.h5"
         spoiled = mutated(np.random.default_rng([23, index]), path.read_bytes()[:-LENGTH])
-        # One letter of the environment's hash makes a whole shard of another environment, which a run refuses to mix in.
+        # One letter of the environment's hash makes it a good shard of another environment, which a run refuses.
         if computed_by in spoiled:
             path.write_bytes(sealed(spoiled))
     found = verify(directory)

@@ -145,6 +145,37 @@ def test_a_dask_scheduler(toys, tmp_path):
     check_same(tmp_path / "run", reference)
 
 
+# A scheduler and its worker in one process: nobody ends them in good order.
+CLUSTER = """from distributed import LocalCluster
+cluster = LocalCluster(1, processes=False, threads_per_worker=1, dashboard_address=None, protocol="tcp")
+print(cluster.scheduler_address, flush=True)
+input()"""
+
+
+def test_a_scheduler_dies(toys, tmp_path):
+    """One line on standard error, without dask's own, exit 4; the finished tiles stay, and another run goes on."""
+    path, reference = toys
+    directory, pipes = tmp_path / "run", {"stdout": subprocess.PIPE, "text": True}
+    (path.parent / "pause").write_text("0.3")
+    settings = {"cwd": ROOT / "tests", "env": os.environ | {"CSPR_CACHE_DIR": ""}}
+    with subprocess.Popen([sys.executable, "-c", CLUSTER], stdin=subprocess.PIPE, **pipes, **settings) as cluster:
+        words = ["run", str(path), "-o", str(directory), "--scheduler", cluster.stdout.readline().strip()]
+        process = subprocess.Popen(
+            [sys.executable, "-m", "support.toy", *words], stderr=subprocess.PIPE, **pipes, **settings
+        )
+        end = time.monotonic() + 60
+        while not (directory / "shards" / "00001.h5").exists():
+            assert time.monotonic() < end and process.poll() is None, process.stderr.read()
+            time.sleep(0.005)
+        cluster.kill()
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err.count("\n")) == (4, "", 1) and "the scheduler is gone" in err
+    check_prefix(directory, reference)
+    (path.parent / "pause").unlink()
+    assert cspr("run", path, "-o", directory)[::2] == (0, "")
+    check_same(directory, reference)
+
+
 @pytest.mark.soak
 def test_a_dask_scheduler_all(job, tmp_path):
     path, reference = job

@@ -16,6 +16,8 @@ MARGINS = {
     "wrench-closure": "closure_margin",
     "interference-free": "clearance",
 }
+# What a picture says of cells that a margin counts as inside, but that are not in the workspace.
+EXCLUDED = "excluded by other conditions"
 SETS = {"maximum": "some", "inclusion": "some", "dextrous": "every", "total": "every"}
 
 
@@ -74,21 +76,20 @@ def is_margin(result: Result, name: str) -> bool:
     return is_workspace(result) and name.endswith(("_margin", "clearance"))
 
 
-def excluded(result: Result, name: str, data: np.ndarray, verdict: np.ndarray) -> np.ndarray:
+def excluded(result: Result, name: str) -> np.ndarray:
     """Cells that a margin of a workspace counts as inside, but other conditions exclude.
 
     Args:
         result: the map.
         name: of the quantity.
-        data: (...) the quantity.
-        verdict: (...) the verdicts of the same cells.
 
     Returns:
-        (...) whether a cell is such a one; nowhere if the quantity is no margin of a workspace.
+        whether a cell is such a one, as the quantity; nowhere if it is no margin of a workspace.
     """
+    data = result.data[name]
     if not is_margin(result, name):
         return np.zeros(data.shape, bool)
-    return (data > 0.0) & (verdict != 0)
+    return (data > 0.0) & (result.data["verdict"] != 0)
 
 
 def conditions(result: Result) -> str:

@@ -30,6 +30,7 @@ class View(NamedTuple):
     Fields:
         name: of the quantity.
         data: it, one dimension for each of `across`.
+        excluded: of data's shape, the cells that other conditions exclude than the quantity tells.
         across: axes that vary.
         fixed: what was fixed, in words.
         place: the axes that were fixed, and where.
@@ -37,6 +38,7 @@ class View(NamedTuple):
 
     name: str
     data: np.ndarray
+    excluded: np.ndarray
     across: list[str]
     fixed: list[str]
     place: dict[str, float]
@@ -147,7 +149,7 @@ def _fixed(result: Result, at: dict[str, float], across: list[str]) -> tuple[dic
 def _overlay(
     paths: list[Path], results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None
 ) -> Figure:
-    columns: list[tuple[Result, np.ndarray, str]] = []
+    columns: list[tuple[Result, str, Line]] = []
     constant: list[list[str]] = []
     if lines is not None:
         raise InputError("--lines", lines, "absent where several results are drawn")
@@ -162,7 +164,7 @@ def _overlay(
         view = _view(result, quantity, at)
         if len(view.across) != 1:
             raise InputError("results", f"{path} over {view.across}", "maps over one axis; --at fixes the others")
-        columns.append((result, view.data, view.across[0]))
+        columns.append((result, view.across[0], Line(result.axes[view.across[0]], view.data, excluded=view.excluded)))
         constant.append(_constant(result, view))
     stems = [path.stem for path in paths]
     names = names_of(results, stems if len(set(stems)) == len(stems) else [str(path) for path in paths])
@@ -181,18 +183,14 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
         return _lines_figure(result, view, lines)
     if len(view.across) == 1:
         axis = view.across[0]
-        only = {"": [Line(result.axes[axis], view.data)]}
+        only = {"": [Line(result.axes[axis], view.data, excluded=view.excluded)]}
         return line_figure(result, view.name, only, axis, heading(result, view.name), _constant(result, view))
     order = in_order(result, view.across)
     view = _panelled(result, view, order)
-    data, panels = view.data, view.across[2] if len(view.across) > 2 else None
+    data, hatched, panels = view.data, view.excluded, view.across[2] if len(view.across) > 2 else None
     told = _told(result, at, order) if tuple(view.across[:2]) == POLAR else None
     if not panels:
-        data, told = data[..., None], None if told is None else told[..., None]
-    hatched = np.zeros(data.shape, bool)
-    if is_workspace(result):
-        verdict = _panelled(result, _view(result, "verdict", at), order).data.reshape(data.shape)
-        hatched = excluded(result, view.name, data, verdict)
+        data, hatched, told = data[..., None], hatched[..., None], None if told is None else told[..., None]
     section = Section(view.name, view.across[:2], panels, view.place, _constant(result, view), hatched)
     return section_figure(result, section, data, told)
 
@@ -216,31 +214,32 @@ def _lines_figure(result: Result, view: View, by: str) -> Figure:
     order = [along, by, *(axis for axis in view.across if axis not in (along, by))]
     view = _panelled(result, view, order)
     if len(view.across) == 2:
-        groups = {"": lines_of(result, view.data, along, by)}
+        groups = {"": lines_of(result, view.data, view.excluded, along, by)}
     else:
         points = result.axes[view.across[2]]
         shown = chosen(len(points), PANELS)
         titles = values(result, view.across[2], points[shown])
-        groups = {t: lines_of(result, view.data[:, :, i], along, by) for t, i in zip(titles, shown, strict=True)}
+        parts = [(view.data[:, :, i], view.excluded[:, :, i]) for i in shown]
+        groups = {t: lines_of(result, *part, along, by) for t, part in zip(titles, parts, strict=True)}
     return line_figure(result, view.name, groups, along, heading(result, view.name), _constant(result, view))
 
 
 def _panelled(result: Result, view: View, order: list[str]) -> View:
     # At most three axes, in this order; the others at their first point.
-    data, fixed = view.data.transpose([view.across.index(axis) for axis in order]), list(view.fixed)
-    place = dict(view.place)
+    data, hatched = (x.transpose([view.across.index(axis) for axis in order]) for x in (view.data, view.excluded))
+    fixed, place = list(view.fixed), dict(view.place)
     for extra in order[3:]:
-        data = data[:, :, :, 0]
+        data, hatched = data[:, :, :, 0], hatched[:, :, :, 0]
         place[extra] = float(result.axes[extra][0])
         fixed.append(first_of(result, extra))
-    return View(view.name, data, order[:3], fixed, place)
+    return View(view.name, data, hatched, order[:3], fixed, place)
 
 
 def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
     name = quantity or shown_first(result)
     if name not in result.data:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
-    data, fixed, place = result.data[name], [], {}
+    fixed, place = [], {}
     for axis, wanted in at.items():
         place[axis], words = nearest(result, axis, wanted)
         fixed.append(words)
@@ -248,5 +247,6 @@ def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
     if not across:
         counts = {axis: 1 if axis in place else len(points) for axis, points in result.axes.items()}
         raise InputError("axes", counts, "one with more than one point")
-    data = data[tuple(slice(None) if axis in across else place.get(axis, 0) for axis in result.axes)]
-    return View(name, data, across, fixed, {axis: float(result.axes[axis][i]) for axis, i in place.items()})
+    part = tuple(slice(None) if axis in across else place.get(axis, 0) for axis in result.axes)
+    places = {axis: float(result.axes[axis][i]) for axis, i in place.items()}
+    return View(name, result.data[name][part], excluded(result, name)[part], across, fixed, places)

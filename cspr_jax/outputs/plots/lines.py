@@ -1,12 +1,15 @@
 """Quantities of maps as lines over one axis: of several points of another axis, or of several results."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.conditions import EXCLUDED
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import (
     COLOURS,
@@ -25,6 +28,8 @@ from cspr_jax.outputs.plots.worded import worded
 from cspr_jax.store.result import Result
 
 LINES = len(COLOURS)
+# A point of a margin that other conditions exclude.
+CROSSES: dict[str, Any] = {"marker": "x", "linestyle": "", "color": "black", "markersize": 5}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,11 +40,13 @@ class Line:
         points: (n,) along the axis.
         values: (n,).
         name: for the legend; empty for none.
+        excluded: (n,) points that other conditions exclude than the values tell; None: no point.
     """
 
     points: np.ndarray
     values: np.ndarray
     name: str = ""
+    excluded: np.ndarray | None = None
 
 
 def line_figure(
@@ -74,10 +81,13 @@ def line_figure(
         panel.set_ylabel(label(result, name))
     _ticks(every[0], result, across, drawn, words)
     if any(line.name for line in drawn[0]):
-        legend = every[0].legend(every[0].lines, [""] * len(drawn[0]), frameon=True, framealpha=0.9, fontsize="small")
+        own = every[0].lines[: len(drawn[0])]
+        legend = every[0].legend(own, [""] * len(own), frameon=True, framealpha=0.9, fontsize="small")
         # Set afterwards: a name that begins with an underscore would be left out.
         for text, line in zip(legend.get_texts(), drawn[0], strict=True):
             text.set_text(line.name)
+    if any(line.excluded is not None and line.excluded.any() for lines in drawn for line in lines):
+        figure.legend([Line2D([], [], **CROSSES)], [EXCLUDED], loc="outside lower center")
     figure.suptitle("\n".join([title, ", ".join(fixed)]).strip())
     return figure
 
@@ -86,7 +96,7 @@ def _as_drawn(result: Result, name: str, across: str, line: Line) -> Line:
     # The points of an axis may come in any order.
     order = np.argsort(line.points, kind="stable")
     points, data = as_drawn(result, across, line.points[order]), as_drawn(result, name, line.values[order])
-    return Line(points, data, line.name)
+    return Line(points, data, line.name, None if line.excluded is None else line.excluded[order])
 
 
 def _draw(panel: Axes, lines: list[Line]) -> None:
@@ -102,6 +112,9 @@ def _draw(panel: Axes, lines: list[Line]) -> None:
             drawstyle="steps-mid" if whole else "default",
             label=line.name or None,
         )
+    for line in lines:
+        if line.excluded is not None and line.excluded.any():
+            panel.plot(line.points[line.excluded], line.values[line.excluded], **CROSSES)
     panel.grid(alpha=0.3)
 
 
@@ -128,12 +141,13 @@ def _ticks(panel: Axes, result: Result, across: str, groups: list[list[Line]], w
         in_whole_numbers(panel.xaxis)
 
 
-def lines_of(result: Result, data: np.ndarray, across: str, by: str) -> list[Line]:
+def lines_of(result: Result, data: np.ndarray, excluded: np.ndarray, across: str, by: str) -> list[Line]:
     """The lines of one panel, one for each point of an axis, at most six.
 
     Args:
         result: gives axes and units.
         data: (n_across, n_by).
+        excluded: of data's shape, points that other conditions exclude.
         across: the axis along the lines.
         by: the axis that tells them apart.
 
@@ -143,7 +157,7 @@ def lines_of(result: Result, data: np.ndarray, across: str, by: str) -> list[Lin
     points = result.axes[by]
     shown = chosen(len(points), LINES)
     names = values(result, by, points[shown])
-    return [Line(result.axes[across], data[:, i], name) for i, name in zip(shown, names, strict=True)]
+    return [Line(result.axes[across], data[:, i], name, excluded[:, i]) for i, name in zip(shown, names, strict=True)]
 
 
 def names_of(results: list[Result], stems: list[str]) -> list[str]:
@@ -174,12 +188,12 @@ def _amplitude(result: Result) -> str:
     return shortened(given) if isinstance(given, str) else ""
 
 
-def overlaid(names: list[str], results: list[tuple[Result, np.ndarray, str]]) -> tuple[str, list[Line]]:
+def overlaid(names: list[str], results: list[tuple[Result, str, Line]]) -> tuple[str, list[Line]]:
     """One line a result, over the same axis.
 
     Args:
         names: of the results.
-        results: of each itself, its values (n,), its axis.
+        results: of each itself, its axis, its line.
 
     Returns:
         the axis and the lines.
@@ -189,8 +203,7 @@ def overlaid(names: list[str], results: list[tuple[Result, np.ndarray, str]]) ->
     """
     if len(results) > LINES:
         raise InputError("results", len(results), f"at most {LINES} in one picture")
-    axes = sorted({axis for _, _, axis in results})
+    axes = sorted({axis for _, axis, _ in results})
     if len(axes) > 1:
         raise InputError("results", axes, "results that vary along the same axis")
-    lines = zip(names, results, strict=True)
-    return axes[0], [Line(result.axes[axis], data, name) for name, (result, data, axis) in lines]
+    return axes[0], [dataclasses.replace(line, name=name) for name, (*_, line) in zip(names, results, strict=True)]

@@ -11,6 +11,7 @@ from matplotlib.path import Path
 from matplotlib.projections.polar import PolarAxes
 
 from cspr_jax.outputs.plots.colours import LARGEST, NONE_COLOUR, Scale, add_bar
+from cspr_jax.outputs.plots.conditions import EXCLUDED
 from cspr_jax.outputs.plots.labels import PANELS, as_drawn, axis_label, chosen, heading, is_angle, label, unit, values
 from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbers, panels, reach_polar
 from cspr_jax.outputs.plots.marks import mark, marked
@@ -89,7 +90,7 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
             "−∞" if name != "wrench_margin" else "−∞: the cables do not span the wrench": Patch(color=NONE_COLOUR)
         }
     if excluded.any():
-        legend["excluded by other conditions"] = Patch(facecolor="white", hatch=HATCH, edgecolor="black")
+        legend[EXCLUDED] = Patch(facecolor="white", hatch=HATCH, edgecolor="black")
     for k, panel in enumerate(every):
         image = _section(panel, result, cells[:, :, k], across, points, scale)
         _hatch(panel, excluded[:, :, k], points)

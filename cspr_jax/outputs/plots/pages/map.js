@@ -117,6 +117,22 @@ function outline(reason) {
   return line;
 }
 
+// Obstacles of this plane: what it cuts of them filled, the outline of those beside it dashed.
+function obstaclesHere() {
+  const own = content.map.obstacles;
+  return (own ? own.bodies : []).map((body) => {
+    const place = own.axis === null ? 0 : [...map.index, ...map.cell][own.axis], cut = body.cuts[place];
+    return cut?.up.length ? { isCut: true, ...cut } : { isCut: false, ...body.shadow };
+  });
+}
+
+function obstacleTraces() {
+  const color = content.map.obstacles?.colour;
+  return obstaclesHere().map(({ isCut, up, across }) => ({ type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false,
+    x: across, y: up, fill: isCut ? "toself" : "none", fillcolor: color,
+    line: { color: isCut ? "white" : color, width: 1.2, dash: isCut ? "solid" : "dash" } }));
+}
+
 // Verdicts of the cells that are shown, in rows.
 function reasonsHere() {
   const [rows, columns] = content.map.shape.slice(-2), start = sliceStart();
@@ -137,6 +153,7 @@ function drawMap() {
     traces.push({ ...common, z: own.reason, zmin: -0.5, zmax: count - 0.5, showscale: false, opacity: 0.55,
       colorscale: stepped({ stepped: true, shades }), hoverongaps: false });
   }
+  traces.push(...obstacleTraces());
   if (content.map.spools) {
     const [up, over] = [content.map.spools.up, content.map.spools.across];
     traces.push({ type: "scatter", mode: "lines", hoverinfo: "skip", showlegend: false, ...outline(reasonsHere()),
@@ -167,6 +184,13 @@ function drawLegend(reason) {
   const words = new Map(used.map((entry) => [entry.word, entry.colour]));
   for (const [word, colour] of words) {
     const one = made("span", word);
+    one.style.setProperty("--own", colour);
+    node.append(one);
+  }
+  const obstacles = obstaclesHere(), colour = content.map.obstacles?.colour;
+  for (const [isCut, word] of [[true, "obstacle"], [false, "obstacle beside this section"]]) {
+    if (!obstacles.some((own) => own.isCut === isCut)) continue;
+    const one = made("span", word, { className: isCut ? "" : "dashed" });
     one.style.setProperty("--own", colour);
     node.append(one);
   }

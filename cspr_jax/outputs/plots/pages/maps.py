@@ -10,6 +10,7 @@ from cspr_jax.outputs.plots.colours import Scale, scale_of
 from cspr_jax.outputs.plots.conditions import is_margin, said, shown_first
 from cspr_jax.outputs.plots.labels import WORDS, as_drawn, axis_label, label, unit, value
 from cspr_jax.outputs.plots.notes import notes
+from cspr_jax.outputs.plots.obstacles import COLOUR, obstacles, outline, section_of
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.posed import asked, robot_of
@@ -90,6 +91,7 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
         "notes": said(result)
         + notes(result, "", [], [name for name, count in zip(names, shape, strict=True) if count > 1]),
         "spools": _spools(result, names[-2:]),
+        "obstacles": _obstacles(result, names, points),
         "isDown": names[-2:-1] == ["z"] and result.attributes.get("z_axis", "down") == "down",
         "isEqual": len(names) > 1 and all(result.units[name] == "m" for name in names[-2:]),
     }, left
@@ -114,6 +116,38 @@ def _spools(result: Result, plane: list[str]) -> dict[str, list[float]] | None:
     base = np.asarray(robot_of(result).base_points, float)
     up, across = (base[:, SPACE.index(name)].tolist() for name in plane)
     return {"up": up, "across": across}
+
+
+def _obstacles(result: Result, names: list[str], points: list[np.ndarray]) -> dict[str, Any] | None:
+    # Their outlines as they are seen along the axis out of the plane, and what each point of that axis cuts of them.
+    plane = names[-2:]
+    bodies = obstacles(result) if set(plane) <= set(SPACE) else []
+    if not bodies:
+        return None
+    third = next(axis for axis in SPACE if axis not in plane)
+    places = result.axes[third][points[names.index(third)]] if third in names else []
+    return {
+        "axis": names.index(third) if third in names else None,
+        "colour": COLOUR,
+        "bodies": [
+            {
+                "shadow": _closed(outline(body[:, [SPACE.index(axis) for axis in plane]])),
+                "cuts": [_closed(_cut(body, plane, third, place)) for place in places],
+            }
+            for body in bodies
+        ],
+    }
+
+
+def _cut(body: np.ndarray, plane: list[str], third: str, place: float) -> np.ndarray:
+    corners = section_of(body, SPACE.index(third), place)
+    return corners if plane == sorted(plane) else corners[:, ::-1]
+
+
+def _closed(corners: np.ndarray) -> dict[str, list[float]]:
+    # In metres to a tenth of a millimetre, upward and across.
+    rounded = np.round(np.concatenate([corners, corners[:1]]), 4)
+    return {"up": rounded[:, 0].tolist(), "across": rounded[:, 1].tolist()}
 
 
 def _axis(result: Result, name: str, points: np.ndarray) -> dict[str, Any]:
