@@ -225,6 +225,18 @@ def test_settings_of_matplotlib_that_cannot_be_read(tmp_path, place):
         assert done.returncode == 4 and done.stderr.startswith("cspr: no.h5: ")
 
 
+def test_matplotlib_may_be_asked_for_a_locale_that_is_not_there(tmp_path):
+    """The locale of programs is C then, as everywhere else."""
+    (tmp_path / "matplotlibrc").write_text("axes.formatter.use_locale: True\n")
+    code = "import sys; from cspr_jax.cli import main; sys.exit(main(sys.argv[1:]))"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "plot", "no.h5"],
+        **{"cwd": tmp_path, "env": os.environ | {"LC_ALL": "xx_XX.UTF-8"}},
+        **{"capture_output": True, "text": True, "timeout": 60},
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (4, 1) and done.stderr.startswith("cspr: no.h5: ")
+
+
 def test_a_wrong_sweep_is_refused_before_dask_is_imported(tmp_path):
     (tmp_path / "wrong.toml").write_text("schema = 1\nmap = 3\n")
     code = "import sys; from cspr_jax.cli import main; print(main(sys.argv[1:]), 'distributed' in sys.modules)"

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import locale
 import logging
 import os
 import sys
@@ -40,6 +41,9 @@ def settle() -> None:
 def check_matplotlibrc() -> None:
     """Refuse a matplotlibrc of the working folder that ends the import of matplotlib, which looks there first.
 
+    Such a file can also ask for the user's locale. Where the system does not have that one, programs use C instead,
+    and matplotlib is told so.
+
     Raises:
         ConfigError: it cannot be read.
     """
@@ -53,6 +57,12 @@ def check_matplotlibrc() -> None:
         path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(str(path), f"{must}: {getattr(error, 'strerror', None) or error}") from error
+    before = locale.setlocale(locale.LC_ALL)
+    try:
+        locale.setlocale(locale.LC_ALL, "")
+    except locale.Error:
+        os.environ["LC_ALL"] = "C"
+    locale.setlocale(locale.LC_ALL, before)
 
 
 def check_threads(count: int = 0) -> None:
