@@ -76,7 +76,11 @@ def test_settings_of_the_user_win(tmp_path):
 def test_plans_compile_in_less_time_and_flags_of_the_user_are_not_set_twice(tmp_path):
     """A flag that the user names is left to them, whatever its value."""
     code = SEEN.format(device="quick=True")
-    ours = json.loads(told(with_known_flags(tmp_path), code))["XLA_FLAGS"].split()
+    plain = json.loads(told(with_known_flags(tmp_path), code))
+    ours, device = plain["XLA_FLAGS"].split(), plain["JAX_PLATFORMS"]
+    assert device == "cpu"  # a GPU would take longer, and may be asked for
+    assert json.loads(told(tmp_path, code, JAX_PLATFORMS="cuda,cpu"))["JAX_PLATFORMS"] == "cuda,cpu"
+    assert json.loads(told(tmp_path, SEEN.format(device='"gpu", quick=True')))["JAX_PLATFORMS"] is None
     assert [flag for flag in ours if flag != xla.WIDE] == list(xla.QUICK)
     theirs = "--xla_backend_optimization_level=3"
     given = json.loads(told(tmp_path, code, XLA_FLAGS=theirs))["XLA_FLAGS"].split()

@@ -38,13 +38,15 @@ def add_json(parser: argparse.ArgumentParser, what: str = "object") -> None:
     parser.add_argument("--json", action="store_true", help=f"print one JSON {what} and nothing else")
 
 
-def add_device(parser: argparse.ArgumentParser) -> None:
+def add_device(parser: argparse.ArgumentParser, *, quick: bool = False) -> None:
     """Option of where to compute.
 
     Args:
         parser: of a command.
+        quick: whether it computes little; see `xla.prepare`.
     """
-    parser.add_argument("--device", choices=("cpu", "gpu"), help="where to compute (default: a GPU if jax finds one)")
+    usual = "cpu" if quick else "a GPU if jax finds one"
+    parser.add_argument("--device", choices=("cpu", "gpu"), help=f"where to compute (default: {usual})")
 
 
 def add_all_errors(parser: argparse.ArgumentParser) -> None:

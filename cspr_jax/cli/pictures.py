@@ -44,7 +44,7 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
     )
     add_motion_plan(parser)
     add_all_errors(parser)
-    add_device(parser)
+    add_device(parser, quick=True)
 
 
 def _report(options: argparse.Namespace) -> int:

@@ -43,7 +43,7 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
         "--speed", type=float, metavar="X", help="--animate: playback speed relative to real time (default 1)"
     )
     add_all_errors(parser)
-    add_device(parser)
+    add_device(parser, quick=True)
 
 
 def _check_plan(options: argparse.Namespace) -> None:
@@ -124,7 +124,7 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--step", type=float, metavar="S", help=_STEP)
     add_look(parser)
     add_all_errors(parser)
-    add_device(parser)
+    add_device(parser, quick=True)
 
 
 def _replay(options: argparse.Namespace) -> int:

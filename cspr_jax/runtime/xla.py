@@ -62,7 +62,8 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
     """Set what jax reads when it is imported; nothing if it has been.
 
     Args:
-        device: "cpu"; "gpu" and None leave the choice to jax.
+        device: "cpu"; "gpu" and None leave the choice to jax, but where little is computed None is the CPU, since a GPU
+            has to be started and its code takes longer to compile.
         warn: called with a line for people where compiled code cannot be kept.
         quick: whether little is computed, so that compiling in less time is worth more than faster code.
 
@@ -75,6 +76,8 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
         os.environ.setdefault(*_ONLY_FATAL)
     if device == "cpu":
         os.environ["JAX_PLATFORMS"] = "cpu"
+    elif device is None and quick:
+        os.environ.setdefault("JAX_PLATFORMS", "cpu")
     _few_arenas()
     if math.isfinite(quota()):
         os.environ.setdefault(SHARE, str(cores()))  # XLA would start a thread for each core of the machine

@@ -15,7 +15,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array, lax
+from jax import Array
 
 from cspr_jax.arithmetic.batches import row_by_row
 from cspr_jax.arithmetic.elementary import lesser, sincospi
@@ -102,7 +102,7 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
         smallest = row_by_row(several, jnp.arange(len(tau) // UNROLL)).min(0)
         return jnp.where(exists, smallest, -jnp.inf)
 
-    return lax.map(one, (jnp.asarray(arcs, dtype), sample_table(amplitude, arcs, tau, dtype)))
+    return row_by_row(one, (jnp.asarray(arcs, dtype), sample_table(amplitude, arcs, tau, dtype)))
 
 
 @partial(jax.jit, static_argnames="max_arcs")
