@@ -69,9 +69,10 @@ def _deviations(panel: Axes, replay: Replay, values: dict[str, np.ndarray]) -> N
     # The largest of each window: rounding is noise, which would fill the panel.
     starts = np.unique(np.linspace(0.0, len(replay.time), WINDOWS, endpoint=False).astype(int))
     time = replay.time[starts]
-    for k, (name, some) in enumerate(values.items()):
-        panel.plot(time, _largest(some, starts), linewidth=1.0, label=name, **line_look(k))
-    _whole_decades(panel, np.concatenate(list(values.values())))
+    drawn = {name: _largest(some, starts) for name, some in values.items()}
+    for k, (name, some) in enumerate(drawn.items()):
+        panel.plot(time, some, linewidth=1.0, label=name, **line_look(k))
+    _whole_decades(panel, np.concatenate(list(drawn.values())))
     panel.set_xlabel("time (s)")
     panel.margins(x=0.01)
     panel.grid(alpha=0.3)
