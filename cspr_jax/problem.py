@@ -15,7 +15,6 @@ from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, Traj
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.feasibility.given_limits import check_bounded, check_certain, limits_of
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.feasibility.workspace.standing import slack_at_rest
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
@@ -25,11 +24,12 @@ from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
 from cspr_jax.robots.pulleys import Pulleys
 from cspr_jax.robots.reference_pose import aligned, reference_pose
 from cspr_jax.robots.robot import MOVED, check_moved
+from cspr_jax.robots.static_equilibrium import slack_at_rest
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.trajectories import amplitudes
 from cspr_jax.trajectories.amplitudes import Amplitude, boundary_errors
-from cspr_jax.trajectories.platform_segment import Kind
+from cspr_jax.trajectories.platform_kind import Kind
 
 MAKERS = {"1T": point_mass.guided_robot, "2T": point_mass.planar_robot, "3T": point_mass.point_mass_robot}
 
@@ -171,7 +171,7 @@ def fault_at_rest(spec: RobotFile) -> str | None:
 
     Args:
         spec: the robot; a platform is tried as deep below the centroid of its spools as these are away from it, one
-            on more cables at many depths, `feasibility.workspace.standing`.
+            on more cables at many depths, `robots.static_equilibrium`.
 
     Returns:
         the reason; None if it hangs with every cable taut.

@@ -33,7 +33,8 @@ from cspr_jax.trajectories import hypocycloid, oscillating_slerp, platform_segme
 from cspr_jax.trajectories.amplitudes import Amplitude, named
 from cspr_jax.trajectories.hypocycloid import Segment
 from cspr_jax.trajectories.oscillating_slerp import Turn
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 ROOMS = ("robots", "trajectories", "feasibility")
 # Of "..." in arguments, and of letters. What else is named has the size that it is met with first.

@@ -14,7 +14,7 @@ from cspr_jax.feasibility.platform.slack_lanes import certain_tension
 from cspr_jax.robots.wrench_lanes import Cables, balance
 from cspr_jax.search.platform_arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_segment import USUAL
+from cspr_jax.trajectories.platform_kind import USUAL
 
 BENDS, ARCS = 5, 8
 

@@ -37,7 +37,7 @@ from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.state import State
 from cspr_jax.trajectories import platform_segment as segments
 from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_segment import USUAL, Kind
+from cspr_jax.trajectories.platform_kind import USUAL, Kind
 
 PLATFORMS = ("laval-mssm", "nist-robocrane", "fast", "greenline")
 AMPLITUDES = {

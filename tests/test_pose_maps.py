@@ -40,8 +40,9 @@ from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import open_result
+from cspr_jax.trajectories.platform_kind import USUAL, Kind
 from cspr_jax.trajectories.platform_lanes import instant, state
-from cspr_jax.trajectories.platform_segment import USUAL, Kind, motion
+from cspr_jax.trajectories.platform_segment import motion
 
 REST = "{ rest = true }"
 POSE = "{ position = [0.6, -0.4, 1.5], tilt_torsion = [0.3, 0.4, -0.2], beta_hat = -2.0 }"

@@ -31,7 +31,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.platform_arcs import Candidates, segments_with
 from cspr_jax.search.pose_ends import end_options
 from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_segment import USUAL
+from cspr_jax.trajectories.platform_kind import USUAL
 
 ROBOTS = ("fast", "greenline", "laval-mssm", "nist-robocrane", "without symmetry")
 INSTANTS, BATCH = 20_001, 2048

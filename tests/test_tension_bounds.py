@@ -19,7 +19,7 @@ from cspr_jax.feasibility.platform import certificate, tension_blocks
 from cspr_jax.feasibility.platform.certificate import Certifier, determinant_at_rest
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.trajectories import platform_lanes, platform_reach
-from cspr_jax.trajectories.platform_segment import USUAL, Kind
+from cspr_jax.trajectories.platform_kind import USUAL, Kind
 
 STANDARD = Kind(variable=False, plain=True)
 G = 9.81

@@ -17,7 +17,7 @@ from cspr_jax.feasibility.platform.motions import rows as some_of
 from cspr_jax.feasibility.uncertainty import closer_changes, deviations, requirements_of, worst
 from cspr_jax.feasibility.uncertainty import tensions as tensions_of
 from cspr_jax.robots.limits import Limits, Uncertainty
-from cspr_jax.trajectories.platform_segment import Kind
+from cspr_jax.trajectories.platform_kind import Kind
 
 BETWEEN = Kind()
 SPOOLS, CENTRE = 0.004, 0.006

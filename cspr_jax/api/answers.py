@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.demands import SAMPLES
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.plans.leg import each
-from cspr_jax.search.answers import Answers
 from cspr_jax.search.oscillations import OscillationAnswers
 from cspr_jax.search.platform_answers import PoseAnswers
 from cspr_jax.trajectories.motion import Placed
@@ -48,7 +48,7 @@ class _WithMotions:
 
 @dataclasses.dataclass(frozen=True)
 class ArcsAnswers(Answers, _WithMotions):
-    """Answers of `minimum_arcs`; see `search.answers.Answers`."""
+    """Answers of `minimum_arcs`; see `feasibility.answers.Answers`."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,13 +10,13 @@ from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
 from cspr_jax.config.hints import almost_at_rest
 from cspr_jax.errors import InputError
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.problem import limits_over, prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.schema.given_numbers import ANY, Numbers
-from cspr_jax.search.answers import Answers
 from cspr_jax.search.pose_targets import REFERENCE
 from cspr_jax.trajectories.amplitudes import NAMES, Amplitude, boundary_errors, named
 from cspr_jax.trajectories.motion import Placed

@@ -32,7 +32,8 @@ from cspr_jax.trajectories import transition as transitions
 from cspr_jax.trajectories.amplitudes import Amplitude, named
 from cspr_jax.trajectories.hypocycloid import Hypocycloid, segment
 from cspr_jax.trajectories.motion import Motion, Placed, inward
-from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, pose_segment
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PlatformMotion, pose_segment
 
 amplitude = checked(named, "amplitude", __name__)
 # Compiled whole: XLA would compile each of their operations by itself.

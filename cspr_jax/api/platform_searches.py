@@ -26,7 +26,8 @@ from cspr_jax.search.platform_arcs import Candidates, segments_with
 from cspr_jax.search.pose_targets import pose_arcs, rest_poses, start_beta_hat
 from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.motion import Placed
-from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PlatformMotion
 
 
 @checked

@@ -13,10 +13,10 @@ from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
-from cspr_jax.search.answers import Answers
 from cspr_jax.search.oscillations import minimum_oscillations as search_oscillations
 from cspr_jax.search.oscillations import transitions_to
 from cspr_jax.search.parities import pick

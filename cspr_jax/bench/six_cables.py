@@ -21,7 +21,8 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.trajectories import amplitudes
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment, pose_segment
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PoseSegment, pose_segment
 
 TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
 NUMPY_TRAJECTORIES = 128

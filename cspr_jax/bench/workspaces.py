@@ -11,7 +11,6 @@ from cspr_jax.arithmetic.batches import in_threads, room
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.bench.timing import best
 from cspr_jax.feasibility.workspace import geometry
-from cspr_jax.feasibility.workspace.programs import by_program, by_squares
 from cspr_jax.problem import centred, load_robot
 from cspr_jax.robots import clearance_kernels
 from cspr_jax.robots.clearance import scene
@@ -19,6 +18,7 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import PointMassRobot, point_mass_robot
 from cspr_jax.robots.tension_lanes import least_norms
+from cspr_jax.robots.tension_programs import by_program, by_squares
 from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, question
 from cspr_jax.search.workspaces import WorkspaceSearch
 

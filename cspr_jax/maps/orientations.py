@@ -6,7 +6,7 @@ import numpy as np
 
 from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.maps.places import DIGITS, AttainabilityMap
-from cspr_jax.maps.poses import TILT_TORSION
+from cspr_jax.schema.axes import TILT_TORSION
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import FLAGS, Verdict

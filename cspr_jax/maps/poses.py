@@ -11,11 +11,10 @@ from cspr_jax.feasibility.platform.motion_checker import MANY
 from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.problem import given_quaternion, motion_kind, orientations
 from cspr_jax.robots.reference_pose import reference_pose
+from cspr_jax.schema.axes import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.platform_arcs import Candidates
 from cspr_jax.search.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
-
-TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 
 
 class PosesMap(PlatformMap):

@@ -12,10 +12,10 @@ from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
-from cspr_jax.maps.poses import TILT_TORSION
 from cspr_jax.problem import build_limits, build_robot, centred, given_quaternion
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.schema.axes import TILT_TORSION
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.search.orientation_grids import cone_grid, equal_volume_grid, turn_grid

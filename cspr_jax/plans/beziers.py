@@ -8,13 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.point_mass.bezier_margins import depths_of
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg, each
 from cspr_jax.plans.released import question_of
 from cspr_jax.plans.stops import Stops
 from cspr_jax.robots.point_mass import AT_P0, spool_radius
-from cspr_jax.search.answers import Answers
 from cspr_jax.search.bezier_sequences import Anchored, least_total, segments_of
 from cspr_jax.search.beziers import answers_of, joined_segments
 from cspr_jax.search.launches import launched

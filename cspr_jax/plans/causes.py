@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.needs import Need, needs
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
-from cspr_jax.search.answers import Answers
 from cspr_jax.trajectories.motion import Motion
 
 # Digits that a number has at least, and at most where fewer do not tell it from another one.

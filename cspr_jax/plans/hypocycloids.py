@@ -4,10 +4,10 @@ import numpy as np
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg, each
 from cspr_jax.plans.stops import Stops
-from cspr_jax.search.answers import Answers
 from cspr_jax.search.point_mass_arcs import arcs_and_segments
 from cspr_jax.trajectories.hypocycloid import Hypocycloid, Segment
 from cspr_jax.trajectories.motion import Motion

@@ -5,9 +5,9 @@ import abc
 import jax
 import numpy as np
 
+from cspr_jax.feasibility.answers import Answers, joined
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.stops import Stops
-from cspr_jax.search.answers import Answers, joined
 from cspr_jax.trajectories.motion import Motion
 
 

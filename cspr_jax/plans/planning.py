@@ -17,6 +17,7 @@ from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.answers import Answers, joined
 from cspr_jax.feasibility.demands import SAMPLES, Demands, demands
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.causes import Cause, causes
@@ -28,7 +29,6 @@ from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.search.answers import Answers, joined
 from cspr_jax.trajectories.motion import Motion, Placed
 
 # Where a search for z0 takes "best" epsilon to be, until it is chosen.

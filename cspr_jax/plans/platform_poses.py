@@ -14,6 +14,7 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import Pose
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.feasibility.fewest_limits import Refused
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.feasibility.platform.motion_checker import FEW, MANY, TOUCH, MotionChecker
 from cspr_jax.feasibility.problem import Problem
@@ -27,13 +28,13 @@ from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.search.beta_hat import BEYOND, cheapest_path, options
-from cspr_jax.search.fewest_limits import Refused
 from cspr_jax.search.platform_answers import PoseAnswers, settled
 from cspr_jax.search.platform_arcs import Candidates, Found, refused_by_limits, smallest_arcs
 from cspr_jax.search.pose_checkers import pose_checker
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.motion import Motion
-from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, PoseSegment
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PlatformMotion, PoseSegment
 
 # A third derivative that changes more than this, relative to its largest value, just beside a knot makes tensions jump.
 JUMP, NEAR_KNOT = 1e-6, 1e-12

@@ -3,13 +3,13 @@
 import numpy as np
 
 from cspr_jax.errors import ConfigError
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.point_mass.line_faces import in_one_plane
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg
 from cspr_jax.plans.stops import Stops
 from cspr_jax.robots.point_mass import AT_P0, spool_radius
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.answers import Answers
 from cspr_jax.search.timed_lines import LineAnswers, motions_of, timed_lines
 from cspr_jax.trajectories.motion import Motion
 

@@ -6,10 +6,10 @@ import numpy as np
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.config.plan import Pose
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.plans.leg import Leg, each
 from cspr_jax.plans.stops import Stops
-from cspr_jax.search.answers import Answers
 from cspr_jax.search.oscillations import minimum_oscillations, transitions_to
 from cspr_jax.trajectories.hypocycloid import Hypocycloid, Segment
 from cspr_jax.trajectories.motion import Backwards, Motion

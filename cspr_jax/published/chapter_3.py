@@ -27,7 +27,7 @@ from cspr_jax.runtime.stages import within
 from cspr_jax.search import attainable
 from cspr_jax.search.accessible import DEFINITIONS, Accessible, accessible_sets
 from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_segment import Kind
+from cspr_jax.trajectories.platform_kind import Kind
 
 RADIUS = 0.86  # b of (3.95), m
 MAX_ARCS = 20

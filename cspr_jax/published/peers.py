@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from cspr_jax.feasibility.workspace import geometry
 from cspr_jax.feasibility.workspace.geometry import mass_centres
-from cspr_jax.feasibility.workspace.programs import CLOSE, by_program, by_squares
 from cspr_jax.problem import centred, load_robot
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.tension_programs import CLOSE, by_program, by_squares
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, STATIC, Question, question
 from cspr_jax.search.workspaces import WorkspaceSearch

@@ -32,6 +32,8 @@ AXES = {
         Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
     )
 }
+# Axes that say an orientation together.
+TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 # No choices: a motion passes all of its instants, and a robot has all of its cables.
 _NO_CHOICES = ("tau", "cable")
 

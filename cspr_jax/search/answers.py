@@ -6,15 +6,15 @@ limits refuse those whose cables stay taut, and one of these is reported; where 
 largest margin is. Answers of platforms are those of `search.platform_answers`.
 """
 
-import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass import criteria
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, prove
@@ -22,7 +22,6 @@ from cspr_jax.feasibility.point_mass.enclosures import tolerated_by_point_masses
 from cspr_jax.feasibility.point_mass.margins import margins
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.tolerances import Tolerated
-from cspr_jax.schema.labelled import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.search.parities import pick, rows_of
 from cspr_jax.search.refusals import BASIC, refusals, unavoidable
@@ -33,65 +32,6 @@ from cspr_jax.trajectories.hypocycloid import Segment
 BATCH = 4096
 # Candidates whose margins differ by less are equally good; the first of them is reported.
 TIE = 1e-9
-Said = TypeVar("Said", bound="Answers")
-
-
-@dataclasses.dataclass(frozen=True)
-class Answers(Columns):
-    """One answer a segment.
-
-    Fields:
-        arcs: (n,) smallest number of arcs proved feasible, on more than six cables found so at samples; 0: none.
-        tried_arcs: (n,) the number of arcs that duration and margins belong to: `arcs`, else that of the candidate that
-            a limit alone refuses, if there is one, else of that with the largest margin.
-        verdict: (n,) `Verdict` flags; 0 is feasible.
-        duration: (n,) s.
-        margin: (n,) smallest normalised pseudotension, or depth below the spools over z0.
-        margin_bound: (n,) proved lower bound of the same; NaN where nothing is proved, as on more than six cables.
-        limit_margin: (n,) smallest slack of the limits; inf where none is given.
-        feasible_at_infinity: (n,) left-hand side of (2.55).
-        tolerated: (n,) largest multiple of the uncertainty that the motion is proved to stand; NaN where none is given.
-        not_tolerated: (n,) smallest one found that it does not.
-    """
-
-    arcs: np.ndarray
-    tried_arcs: np.ndarray
-    verdict: np.ndarray
-    duration: np.ndarray
-    margin: np.ndarray
-    margin_bound: np.ndarray
-    limit_margin: np.ndarray
-    feasible_at_infinity: np.ndarray
-    tolerated: np.ndarray
-    not_tolerated: np.ndarray
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """Whether each segment is feasible, (n,): proved, on more than six cables found at samples."""
-        return self.arcs > 0
-
-    def details(self, i: int) -> dict[str, Any]:
-        """Details of a segment that only this kind of answers has, by their names in a plan's JSON.
-
-        Args:
-            i: number of the segment.
-
-        Returns:
-            plain values.
-        """
-        return {}
-
-
-def joined(parts: list[Said]) -> Said:
-    """Answers side by side.
-
-    Args:
-        parts: at least one.
-
-    Returns:
-        one for all.
-    """
-    return type(parts[0])(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 
 @jax.jit

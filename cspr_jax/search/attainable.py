@@ -4,11 +4,11 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_parts
 from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
+from cspr_jax.feasibility.answers import joined
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.symmetries import NONE, Symmetries, alike
-from cspr_jax.search.answers import joined
 from cspr_jax.search.platform_answers import PoseAnswers, reached, trials
 from cspr_jax.search.platform_arcs import CANDIDATES, Candidates, smallest_arcs
 from cspr_jax.search.pose_ends import end_options

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.point_mass.bezier_durations import Ends
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.search.answers import Answers
 from cspr_jax.search.bezier_durations import feasible_durations, least_duration
 from cspr_jax.search.bezier_verdicts import verdicts
 from cspr_jax.trajectories.bezier import Bezier, end_acceleration

@@ -14,6 +14,7 @@ import numpy as np
 from jax import lax
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.certificate import tolerance
 from cspr_jax.feasibility.point_mass.transition_margins import transition_margins
@@ -22,7 +23,7 @@ from cspr_jax.feasibility.transition import oscillations as counts
 from cspr_jax.feasibility.transition import zero_tension
 from cspr_jax.feasibility.transition.envelopes import proved_envelope
 from cspr_jax.runtime.stages import stage
-from cspr_jax.search.answers import BATCH, Answers, Known, decided, end_slacks
+from cspr_jax.search.answers import BATCH, Known, decided, end_slacks
 from cspr_jax.search.point_mass_arcs import check_numbers
 from cspr_jax.trajectories import transition
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.feasibility.answers import Answers
+from cspr_jax.feasibility.fewest_limits import Refused, rank
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.feasibility.platform.motion_checker import MotionChecker, PoseChecks
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.search.answers import Answers
-from cspr_jax.search.fewest_limits import Refused, rank
 from cspr_jax.search.platform_arcs import (
     Candidates,
     Found,

@@ -9,12 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.feasibility.fewest_limits import FewestLimits, Refused
 from cspr_jax.feasibility.platform.motion_checker import MotionChecker, PoseChecks
 from cspr_jax.feasibility.platform.motions import rows
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.fewest_limits import FewestLimits, Refused
 from cspr_jax.trajectories.platform_segment import PoseSegment, pose_segment
 
 BATCH = 2048

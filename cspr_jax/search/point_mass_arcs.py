@@ -11,11 +11,12 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts, room
 from cspr_jax.errors import InputError
+from cspr_jax.feasibility.answers import Answers, joined
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.runtime.stages import stage
 from cspr_jax.search import arc_sieve
-from cspr_jax.search.answers import Answers, decided, end_slacks, joined
+from cspr_jax.search.answers import decided, end_slacks
 from cspr_jax.trajectories import hypocycloid
 from cspr_jax.trajectories.amplitudes import boundary_errors
 from cspr_jax.trajectories.hypocycloid import Segment

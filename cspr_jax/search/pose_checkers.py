@@ -4,7 +4,7 @@ from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.motion_checker import FEW, MotionChecker
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.search.redundant_checker import RedundantChecker
-from cspr_jax.trajectories.platform_segment import USUAL, Kind
+from cspr_jax.trajectories.platform_kind import USUAL, Kind
 
 
 def pose_checker(problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> MotionChecker:

@@ -5,11 +5,11 @@ from typing import Literal
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_parts
+from cspr_jax.feasibility.answers import joined
 from cspr_jax.feasibility.platform.checker import PoseChecker
 from cspr_jax.feasibility.platform.end_acceleration import AT_REST
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
-from cspr_jax.search.answers import joined
 from cspr_jax.search.beta_hat import OPTIONS
 from cspr_jax.search.platform_answers import PoseAnswers, reached
 from cspr_jax.search.platform_arcs import CANDIDATES, Candidates

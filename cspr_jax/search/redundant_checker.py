@@ -33,7 +33,8 @@ from cspr_jax.schema.verdicts import Verdict, conjunction
 from cspr_jax.search.beta_hat import LARGEST
 from cspr_jax.search.workspace_questions import FEASIBLE, question
 from cspr_jax.search.workspaces import WorkspaceSearch
-from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
+from cspr_jax.trajectories.platform_kind import USUAL, Kind
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # So many samples are held at a time, instants of the first look computed at a time.
 ROOM, CHUNK = 200_000, 8

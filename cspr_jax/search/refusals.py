@@ -1,13 +1,13 @@
-"""Limits that refuse every number of arcs of a point mass; see `search.fewest_limits`."""
+"""Limits that refuse every number of arcs of a point mass; see `feasibility.fewest_limits`."""
 
 import jax
 import numpy as np
 
+from cspr_jax.feasibility.fewest_limits import FewestLimits, Refused
 from cspr_jax.feasibility.limits import given
 from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, is_met_at_samples, prove
 from cspr_jax.feasibility.point_mass.criteria import flags
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.search.fewest_limits import FewestLimits, Refused
 from cspr_jax.search.parities import pick
 from cspr_jax.trajectories.hypocycloid import Segment
 

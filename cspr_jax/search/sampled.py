@@ -7,10 +7,10 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.slacks import flags, slacks
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.search.answers import Answers
 from cspr_jax.trajectories.motion import Motion
 
 BATCH = 512

@@ -7,8 +7,8 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.feasibility.answers import Answers
 from cspr_jax.feasibility.problem import Problem
-from cspr_jax.search.answers import Answers
 from cspr_jax.search.fastest_lines import fastest
 from cspr_jax.search.line_durations import Rule, names_of
 from cspr_jax.search.line_verdicts import laws_of

@@ -14,7 +14,8 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 
 class Swings(NamedTuple):

@@ -16,7 +16,8 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import polynomial, sincospi
 from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation, stored
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Degree of Chebyshev fits on s in [0, 1] of W = arccos(s) / sqrt(1 - s^2) and of its derivatives, one each: accurate to
 # 2e-15. A derivative of the fit of W would be wrong by 3e-10.

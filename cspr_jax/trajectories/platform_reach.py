@@ -19,8 +19,9 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import polynomial, sincospi
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
+from cspr_jax.trajectories.platform_kind import Kind
 from cspr_jax.trajectories.platform_lanes import Instant
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # 1 - s up to which arccos(s) / sqrt(1 - s^2) is bounded: it is singular at 2. Less than the least counts as that.
 FARTHEST, NEAREST = 1.9, 0.1

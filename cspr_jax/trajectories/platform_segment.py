@@ -13,7 +13,6 @@ so that the platform stands still at every cusp, not only at the ends as with th
 import dataclasses
 import math
 from functools import partial
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -27,24 +26,8 @@ from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_balance import normalised_determinant
 from cspr_jax.trajectories.amplitudes import Amplitude, derivatives
 from cspr_jax.trajectories.oscillating_slerp import Turn, beat, orientation, rates, turn
+from cspr_jax.trajectories.platform_kind import USUAL, Kind
 from cspr_jax.trajectories.swing_plane import swing_plane
-
-
-class Kind(NamedTuple):
-    """Kind of motions; known when a function is compiled.
-
-    Fields:
-        variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
-        plain: whether orientations beat with beta_1 of (3.66), whatever beta-hat is, or with beta_ff of (3.93).
-        from_rest: whether all segments start at rest in P0.
-    """
-
-    variable: bool = True
-    plain: bool = False
-    from_rest: bool = False
-
-
-USUAL = Kind()
 
 
 @jax.tree_util.register_dataclass

@@ -22,7 +22,7 @@ from cspr_jax.robots.state import State
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.trajectories import platform_segment as segments
 from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_segment import USUAL, Kind
+from cspr_jax.trajectories.platform_kind import USUAL, Kind
 
 MSSM = oracle.mssm()
 Z0 = 1.4

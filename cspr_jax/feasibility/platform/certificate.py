@@ -34,7 +34,8 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.wrench_lanes import CABLES
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Parts of an arc that are looked at first, from rest and between poses, where orientations turn faster. Where verdicts
 # alone are wanted, and no instants to narrow margins down from, they go from the first to the second number with the

@@ -31,7 +31,8 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.tolerances import Tolerated
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.trajectories.platform_segment import USUAL, Kind, PoseSegment
+from cspr_jax.trajectories.platform_kind import USUAL, Kind
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Blocks of a call at most; so many arcs are held at a time.
 BLOCKS, ARCS = 1024, 32 * MANY

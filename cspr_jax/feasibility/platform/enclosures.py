@@ -25,9 +25,10 @@ from cspr_jax.robots.interference import between, contacts, nearest
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES
+from cspr_jax.trajectories.platform_kind import Kind
 from cspr_jax.trajectories.platform_lanes import State, squared_duration, state
 from cspr_jax.trajectories.platform_reach import Reach, instant_beside, middle_of, reach
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Cables are nearest between their ends, and are not parallel, by so much.
 INSIDE, PARALLEL = 1e-6, 1e-6

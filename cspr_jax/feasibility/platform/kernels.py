@@ -11,8 +11,8 @@ from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, stil
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import contact_lanes
 from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.trajectories.platform_kind import Kind
 from cspr_jax.trajectories.platform_lanes import instant, state
-from cspr_jax.trajectories.platform_segment import Kind
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))

@@ -11,7 +11,8 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.feasibility.problem import Problem
 from cspr_jax.feasibility.tolerances import Tolerated
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment, duration
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PoseSegment, duration
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
 FEW, MANY = 256, 2048

@@ -25,9 +25,10 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import CABLES, Cables, cables
 from cspr_jax.schema.limits import Limit
+from cspr_jax.trajectories.platform_kind import Kind
 from cspr_jax.trajectories.platform_lanes import State, state
 from cspr_jax.trajectories.platform_reach import instant_beside, middle_of, reach
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Steps of a block, and the instants between them.
 STEPS = 4

@@ -22,9 +22,10 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots import contact_lanes
 from cspr_jax.robots.interference import contacts
 from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.trajectories.platform_kind import Kind
 from cspr_jax.trajectories.platform_lanes import state
 from cspr_jax.trajectories.platform_reach import instant_beside, middle_of
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Parts of an arc that are looked at first: where margins are wanted; else, as in `certificate`, at cusps and halfway
 # between two, where a platform moves fastest.

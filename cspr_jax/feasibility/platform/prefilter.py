@@ -22,8 +22,9 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import balance, cables
 from cspr_jax.trajectories.amplitudes import Amplitude
 from cspr_jax.trajectories.from_rest_lanes import rest_table, swing, swings
+from cspr_jax.trajectories.platform_kind import Kind
 from cspr_jax.trajectories.platform_lanes import instant
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Instants of one call; how many more motions are looked at than checked at a time, and what part of them is few.
 CHUNK, FIRST, FEWER = 8, 2, 8

@@ -15,7 +15,8 @@ from cspr_jax.robots.interference import cable_directions, gaps
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.schema.limits import Limit
-from cspr_jax.trajectories.platform_segment import Kind, PlatformMotion, PoseSegment
+from cspr_jax.trajectories.platform_kind import Kind
+from cspr_jax.trajectories.platform_segment import PlatformMotion, PoseSegment
 
 
 class Instants(NamedTuple):

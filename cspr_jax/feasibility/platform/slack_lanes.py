@@ -20,8 +20,9 @@ from cspr_jax.robots.wrench_lanes import (
     normalised_determinant,
 )
 from cspr_jax.schema.limits import Limit
+from cspr_jax.trajectories.platform_kind import Kind
 from cspr_jax.trajectories.platform_lanes import Instant, State, squared_duration, state
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # The volume of three of the cables over the product of their lengths below which no tension is told: they are nearly in
 # one plane, and the rounding of the fast balance grows with the third power of the inverse. It must refute nothing.

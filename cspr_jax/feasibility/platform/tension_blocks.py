@@ -38,9 +38,10 @@ from cspr_jax.feasibility.problem import Problem
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES, balance, cables, inertial_wrench
 from cspr_jax.schema.limits import Limit
+from cspr_jax.trajectories.platform_kind import Kind
 from cspr_jax.trajectories.platform_lanes import State, squared_duration, state
 from cspr_jax.trajectories.platform_reach import Reach, instant_beside, middle_of, reach
-from cspr_jax.trajectories.platform_segment import Kind, PoseSegment
+from cspr_jax.trajectories.platform_segment import PoseSegment
 
 # Part of a bound on real time by which a value at a node may be wrong (tests: by a tenth of that), and by which the
 # polynomial through such values may be. What computing its Bernstein coefficients adds is a part of the values.

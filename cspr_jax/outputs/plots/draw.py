@@ -19,9 +19,8 @@ from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.sections import POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.outputs.plots.solid import SPACE, solid_figure
+from cspr_jax.schema.axes import TILT_TORSION
 from cspr_jax.store.result import Result
-
-TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
 
 
 class View(NamedTuple):

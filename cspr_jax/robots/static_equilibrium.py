@@ -4,9 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.feasibility.workspace.programs import by_program
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.tension_programs import by_program
 from cspr_jax.robots.wrench_balance import at_rest
 
 # Depths that are tried, over the mean distance of the spools from their centroid.

@@ -1,0 +1,20 @@
+"""Kinds of motions of platforms, known when a function is compiled."""
+
+from typing import NamedTuple
+
+
+class Kind(NamedTuple):
+    """Kind of motions; known when a function is compiled.
+
+    Fields:
+        variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
+        plain: whether orientations beat with beta_1 of (3.66), whatever beta-hat is, or with beta_ff of (3.93).
+        from_rest: whether all segments start at rest in P0.
+    """
+
+    variable: bool = True
+    plain: bool = False
+    from_rest: bool = False
+
+
+USUAL = Kind()
