@@ -16,12 +16,12 @@ def main() -> None:
 
     jax.config.update("jax_enable_x64", True)
     from cspr_jax.arithmetic.chebyshev import DEGREE
-    from cspr_jax.feasibility.platform.certificate import WITH_MARGINS
-    from cspr_jax.feasibility.platform.place_blocks import STEPS
-    from cspr_jax.feasibility.platform.place_certificate import PARTS
+    from cspr_jax.platforms.accessible import accessible
+    from cspr_jax.platforms.attainable import VALUES
+    from cspr_jax.platforms.place_blocks import STEPS
+    from cspr_jax.platforms.place_proof import PARTS
+    from cspr_jax.platforms.proof import WITH_MARGINS
     from cspr_jax.published import chapter_3 as tables
-    from cspr_jax.search.accessible import accessible
-    from cspr_jax.search.attainable import VALUES
 
     checker = tables.checker_of(options.amplitude)
     places = [np.array([x * tables.RADIUS, y * tables.RADIUS, tables.DEPTH]) for x, y in tables.PLACES.values()]

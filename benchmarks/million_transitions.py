@@ -18,11 +18,11 @@ def main() -> None:
     import numpy as np
 
     jax.config.update("jax_enable_x64", True)
-    from cspr_jax.feasibility.problem import Problem
-    from cspr_jax.problem import load_robot
+    from cspr_jax.build import load_robot
+    from cspr_jax.motions.amplitudes import named
+    from cspr_jax.motions.problem import Problem
     from cspr_jax.robots.limits import Limits
-    from cspr_jax.search.oscillations import minimum_oscillations, transitions_to
-    from cspr_jax.trajectories.amplitudes import named
+    from cspr_jax.swings.oscillations import minimum_oscillations, transitions_to
 
     rng, z0 = np.random.default_rng(0), np.full(options.count, 2.0)
     targets = rng.uniform(-3.5, 3.5, (options.count, 3))

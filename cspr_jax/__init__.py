@@ -60,16 +60,16 @@ if TYPE_CHECKING:
     from cspr_jax.api.volumes import WorkspaceVolume as WorkspaceVolume
     from cspr_jax.api.volumes import workspace_volume as workspace_volume
     from cspr_jax.api.workspaces import workspace as workspace
+    from cspr_jax.beziers.landings import LaunchErrors
     from cspr_jax.robots.limits import Limits as Limits
     from cspr_jax.robots.limits import Uncertainty as Uncertainty
     from cspr_jax.schema.verdicts import Verdict as Verdict
-    from cspr_jax.search.landings import LaunchErrors as LaunchErrors
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
     "ImportedRobot": ("cspr_jax.api.imports", "ImportedRobot"),
-    "LaunchErrors": ("cspr_jax.search.landings", "LaunchErrors"),
+    "LaunchErrors": ("cspr_jax.beziers.landings", "LaunchErrors"),
     "Limits": ("cspr_jax.robots.limits", "Limits"),
     "Replay": ("cspr_jax.api.replays", "Replay"),
     "Uncertainty": ("cspr_jax.robots.limits", "Uncertainty"),

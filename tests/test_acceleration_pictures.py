@@ -13,16 +13,16 @@ from test_outputs import cspr, panels
 from test_pictures import GRID, bar, made, ticks
 
 import cspr_jax
-from cspr_jax.maps.least_time import LeastTimeMap
+from cspr_jax.build import limits_over
+from cspr_jax.lines.durations import names_of
+from cspr_jax.lines.map import LeastTimeMap
 from cspr_jax.outputs.plots.colours import NONE_COLOUR
 from cspr_jax.outputs.plots.half_planes import WINDOW, Plane, Window, section
-from cspr_jax.problem import limits_over
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.meanings import line_bounds, value_attributes
 from cspr_jax.schema.motion_quantities import SEGMENTS, TRAJECTORY
 from cspr_jax.schema.quantities import QUANTITIES
-from cspr_jax.search.line_durations import names_of
 from cspr_jax.store.netcdf import describe, dtype_of, new_hdf5
 
 GRAVITY = 9.81

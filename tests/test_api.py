@@ -21,9 +21,9 @@ from cspr_jax import cli
 from cspr_jax.api import plans
 from cspr_jax.config.catalogue import catalogue_names
 from cspr_jax.errors import ConfigError, CsprError, InputError, RefusedError, StoreError
+from cspr_jax.platforms.answers import PoseAnswers
 from cspr_jax.published.tables import table_object
 from cspr_jax.schema.quantities import AXES, QUANTITIES
-from cspr_jax.search.platform_answers import PoseAnswers
 
 PLAN = """schema = 1
 robot = "mine.toml"

@@ -12,7 +12,7 @@ from test_outputs import cspr, strict_json
 from cspr_jax import load_robot
 from cspr_jax.bench import six_cables, three_cables, timing, workspaces
 from cspr_jax.cli import main
-from cspr_jax.search import arc_sieve
+from cspr_jax.swings import sieve
 
 ROOT = Path(__file__).parent.parent
 with_compiler = pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler")
@@ -105,7 +105,7 @@ def test_the_numpy_version_of_the_six_cable_check(small_bench):
 
 def test_the_numpy_version_of_the_three_cable_check():
     base, ends = np.asarray(load_robot("prototype").base_points), np.array([[-1.1, 0.2, 1.2]])
-    found, tau = three_cables._numpy_checks(base, ends), (np.arange(arc_sieve.SAMPLES) + 0.5) / arc_sieve.SAMPLES
+    found, tau = three_cables._numpy_checks(base, ends), (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
     for arcs in range(1, 31):
         _, place, _, acceleration = point_mass.motion([0.7, 0.7, 3.0], ends[0], [0, 0, 1.7], 9.81, arcs, tau)
         wanted = point_mass.pseudotensions(base, place, acceleration, 9.81).min()

@@ -4,9 +4,9 @@ import jax
 import numpy as np
 import pytest
 
-from cspr_jax.feasibility.blocks import INSTANTS, Parts, growing, parts_of_arcs
-from cspr_jax.feasibility.platform.least_nodes import least_nodes
-from cspr_jax.trajectories.amplitudes import from_polynomial, named
+from cspr_jax.motions.amplitudes import from_polynomial, named
+from cspr_jax.motions.blocks import INSTANTS, Parts, growing, parts_of_arcs
+from cspr_jax.platforms.least_nodes import least_nodes
 
 AMPLITUDES = {
     "quintic": named("quintic"),

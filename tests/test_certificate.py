@@ -12,14 +12,13 @@ from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 from support.amplitudes import of_one_shape
 
-from cspr_jax.feasibility.point_mass import criteria
-from cspr_jax.feasibility.point_mass.certificate import SMALLEST_MARGIN, prove, tolerance
-from cspr_jax.feasibility.point_mass.slacks import instant, row_bounds, stretch, taut_bounds
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.limits import Limits
-from cspr_jax.trajectories import hypocycloid
-from cspr_jax.trajectories.amplitudes import named
+from cspr_jax.swings import criteria, hypocycloid
+from cspr_jax.swings.proof import SMALLEST_MARGIN, prove, tolerance
+from cspr_jax.swings.slacks import instant, row_bounds, stretch, taut_bounds
 
 COUNT, SOAK_COUNT = 200, 20_000
 SAMPLES = 20_001

@@ -20,8 +20,12 @@ import pytest
 
 import cspr_jax
 from cspr_jax.arithmetic.bounds import Bounds
-from cspr_jax.feasibility.point_mass import slacks
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.amplitudes import Amplitude, named
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms import oscillating_slerp, platform_segment
+from cspr_jax.platforms.oscillating_slerp import Turn
+from cspr_jax.platforms.platform_segment import PoseSegment
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot, pairs_apart
@@ -29,14 +33,10 @@ from cspr_jax.robots.point_mass import PointMassRobot, planar_robot
 from cspr_jax.robots.robot import Robot
 from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_sets import Faces, acceleration_faces
-from cspr_jax.trajectories import hypocycloid, oscillating_slerp, platform_segment
-from cspr_jax.trajectories.amplitudes import Amplitude, named
-from cspr_jax.trajectories.hypocycloid import Segment
-from cspr_jax.trajectories.oscillating_slerp import Turn
-from cspr_jax.trajectories.platform_kind import Kind
-from cspr_jax.trajectories.platform_segment import PoseSegment
+from cspr_jax.swings import hypocycloid, slacks
+from cspr_jax.swings.hypocycloid import Segment
 
-ROOMS = ("robots", "trajectories", "feasibility")
+ROOMS = ("robots", "motions", "swings", "lines", "beziers", "platforms", "workspaces")
 # Of "..." in arguments, and of letters. What else is named has the size that it is met with first.
 ANY, LETTERS = (2, 4), {"n": 7, "m": 5}
 DIM = r"(?:\.\.\.|[a-z]\w*(?: [+-] 1)?|[1-9]\d*)"

@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 from support.amplitudes import of_one_shape
 from support.commands import cspr
 
-from cspr_jax.feasibility.point_mass.margins import margins
-from cspr_jax.feasibility.point_mass.transition_margins import transition_margins
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.feasibility.transition import oscillations as counts
-from cspr_jax.feasibility.transition import zero_tension
-from cspr_jax.feasibility.transition.envelopes import lower_envelope, proved_envelope
+from cspr_jax.motions.amplitudes import derivatives, named
+from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.limits import Limits
-from cspr_jax.search.oscillations import transitions_to
 from cspr_jax.store.result import open_result
-from cspr_jax.trajectories.amplitudes import derivatives, named
+from cspr_jax.swings import envelope_oscillations as counts
+from cspr_jax.swings import zero_tension
+from cspr_jax.swings.envelopes import lower_envelope, proved_envelope
+from cspr_jax.swings.margins import margins
+from cspr_jax.swings.oscillations import transitions_to
+from cspr_jax.swings.transition_margins import transition_margins
 
 CURVES = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}
 SWEEP = """schema = 1

@@ -9,12 +9,12 @@ import pytest
 from oracles import platform as oracle
 from support.platforms import EFFECTIVE, FROM_REST, MSSM, Z0, checker_of, made, ours
 
-from cspr_jax.feasibility.platform import prefilter
-from cspr_jax.feasibility.platform.slack_lanes import certain_tension
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.platform_kind import USUAL
+from cspr_jax.platforms import sieve
+from cspr_jax.platforms.arcs import Candidates, _Segments, smallest_arcs
+from cspr_jax.platforms.slack_lanes import certain_tension
 from cspr_jax.robots.wrench_lanes import Cables, balance
-from cspr_jax.search.platform_arcs import Candidates, _Segments, smallest_arcs
-from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_kind import USUAL
 
 BENDS, ARCS = 5, 8
 
@@ -77,14 +77,14 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     np.testing.assert_array_equal(checker.prefilter.refuted(segments, 6, tau), wanted)
     few = jax.tree.map(lambda x: x[:16], segments)
     np.testing.assert_array_equal(checker.prefilter.refuted(few, 6, tau), wanted[:16])
-    whole = prefilter._rough_and_certain
+    whole = sieve._rough_and_certain
     for wrong in (lambda x: x - 0.3, lambda x: np.inf * x, lambda x: np.nan * x):
 
         def spoiled(*given, wrong=wrong, **options):
             rough, certain = whole(*given, **options)
             return wrong(rough), certain
 
-        monkeypatch.setattr(prefilter, "_rough_and_certain", spoiled)
+        monkeypatch.setattr(sieve, "_rough_and_certain", spoiled)
         refuted = checker.prefilter.refuted(segments, 6, tau)
         assert not (refuted & ~wanted).any()
 
@@ -121,7 +121,7 @@ def test_the_size_of_the_robot_changes_nothing(scale):
         given = given._replace(start=start, end=end, z0=given.z0 * unit)
         segments = _Segments(checker.problem.robot, given)(5, np.arange(300))
         sizes.append(checker.prefilter.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
-        rough, _ = prefilter.smallest_tensions(
+        rough, _ = sieve.smallest_tensions(
             checker.problem.robot,
             EFFECTIVE,
             5.0,

@@ -9,17 +9,17 @@ import pytest
 from oracles import lines as oracle
 
 import cspr_jax
-from cspr_jax.feasibility.point_mass.least_time import least_of_law, least_s_curve, least_time, thesis_s_curve
-from cspr_jax.feasibility.point_mass.line_faces import Sides, in_one_plane, line_faces, sides
-from cspr_jax.feasibility.point_mass.line_proof import smallest_slacks
-from cspr_jax.feasibility.point_mass.line_slacks import line_slacks
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.problem import prepared
+from cspr_jax.build import prepared
+from cspr_jax.lines.faces import Sides, in_one_plane, line_faces, sides
+from cspr_jax.lines.motion import fixed_law, s_curve
+from cspr_jax.lines.proof import smallest_slacks
+from cspr_jax.lines.s_model import least_of_law, least_s_curve, least_time, thesis_s_curve
+from cspr_jax.lines.slacks import line_slacks
+from cspr_jax.lines.timed_lines import motions_of, timed_lines
+from cspr_jax.motions.amplitudes import derivatives, named
+from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.timed_lines import motions_of, timed_lines
-from cspr_jax.trajectories.amplitudes import derivatives, named
-from cspr_jax.trajectories.timed_lines import fixed_law, s_curve
 
 GRAVITY = 9.81
 T, P = 4.37688606, 2.23955703  # by brute force, of section 4

@@ -11,14 +11,13 @@ from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax.arithmetic.elementary import vertex
-from cspr_jax.feasibility.point_mass import criteria
-from cspr_jax.feasibility.point_mass.certificate import prove
-from cspr_jax.feasibility.point_mass.margins import margins
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.amplitudes import from_pieces, named
+from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.limits import Limits
-from cspr_jax.trajectories import hypocycloid
-from cspr_jax.trajectories.amplitudes import from_pieces, named
+from cspr_jax.swings import criteria, hypocycloid
+from cspr_jax.swings.margins import margins
+from cspr_jax.swings.proof import prove
 
 N, Z0 = 40, 1.7
 BASES = {"prototype": equilateral(0.26), "tilted": TILTED}

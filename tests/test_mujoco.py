@@ -12,7 +12,7 @@ import cspr_jax
 from cspr_jax.outputs.mjcf import model_xml
 from cspr_jax.outputs.mujoco_motion import Played, Suspended, in_world, played, suspended, upward
 from cspr_jax.outputs.replay import ends_of_steps, tension_deviation, way_of
-from cspr_jax.trajectories.platform_segment import duration
+from cspr_jax.platforms.platform_segment import duration
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -9,11 +9,11 @@ from support.commands import cspr
 from support.platforms import FROM_REST, LOOSE, MSSM, checker_of, ours, place
 
 from cspr_jax.outputs.plots.reasons import reasons
+from cspr_jax.platforms.accessible import accessible
+from cspr_jax.platforms.attainable import attainable
 from cspr_jax.published import chapter_3
 from cspr_jax.published.table_3_4 import smallest_proportions
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.accessible import accessible
-from cspr_jax.search.attainable import attainable
 from cspr_jax.store.result import open_result
 
 NEAR = ("x = 1.5b", "y = 1.5b")

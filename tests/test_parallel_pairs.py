@@ -14,12 +14,12 @@ from support.commands import cspr, plan, planned
 from support.pairs import LAUNCH_BASE, LAUNCH_PLATFORM, made, random_pairs
 
 import cspr_jax
+from cspr_jax.build import build_limits
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.equivalents import as_moved, no_equivalent
 from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.robot import RobotFile, read_robot
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.problem import build_limits
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.parallel_pairs import parallel_pairs
 from cspr_jax.robots.state import State

@@ -13,10 +13,10 @@ from scipy.optimize import brentq
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.build import centred, fault_at_rest, limits_over
 from cspr_jax.cli import main
 from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import InputError
-from cspr_jax.problem import centred, fault_at_rest, limits_over
 from cspr_jax.robots import pulleys
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS

@@ -12,10 +12,10 @@ from support.platforms import FROM_REST, MSSM, USUAL, Z0, general, limits_of, st
 from support.random_motions import BATCH, ROBOTS, drawn, motions_of, problem_of, turned
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.feasibility.platform import meetings
-from cspr_jax.feasibility.platform.meetings import Cables
-from cspr_jax.feasibility.platform.place_blocks import STEPS, place_blocks
-from cspr_jax.feasibility.platform.place_certificate import PARTS, PlaceCertifier
+from cspr_jax.platforms import meetings
+from cspr_jax.platforms.meetings import Cables
+from cspr_jax.platforms.place_blocks import STEPS, place_blocks
+from cspr_jax.platforms.place_proof import PARTS, PlaceCertifier
 from cspr_jax.robots.contact_lanes import residual
 from cspr_jax.robots.interference import contacts, platform_hit
 

@@ -25,19 +25,19 @@ from support.platforms import (
 )
 
 from cspr_jax.arithmetic import rotations
+from cspr_jax.build import kernel_robot
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.robot import read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.platform.end_acceleration import endpoint
-from cspr_jax.feasibility.platform.prefilter import CHUNK, smallest_tensions
-from cspr_jax.problem import kernel_robot
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.platforms import platform_segment as segments
+from cspr_jax.platforms.end_acceleration import endpoint
+from cspr_jax.platforms.sieve import CHUNK, smallest_tensions
 from cspr_jax.robots.platform import pairs_apart, platform_robot
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.state import State
-from cspr_jax.trajectories import platform_segment as segments
-from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_kind import USUAL, Kind
 
 PLATFORMS = ("laval-mssm", "nist-robocrane", "fast", "greenline")
 AMPLITUDES = {

@@ -27,12 +27,15 @@ from support.platforms import (
     states,
 )
 
-from cspr_jax.feasibility.platform.kernels import slacks_at
-from cspr_jax.feasibility.platform.place_certificate import wires_beside
-from cspr_jax.feasibility.platform.slack_lanes import moving_slacks, order, still_slacks
-from cspr_jax.feasibility.platform.slacks import pose_slacks
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.problem import Problem
 from cspr_jax.plans import choices, planning
+from cspr_jax.platforms.kernels import slacks_at
+from cspr_jax.platforms.place_proof import wires_beside
+from cspr_jax.platforms.platform_lanes import instant, state
+from cspr_jax.platforms.platform_segment import motion
+from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
+from cspr_jax.platforms.slacks import pose_slacks
 from cspr_jax.robots import contact_lanes, interference
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.platform import rays as rays_of
@@ -40,9 +43,6 @@ from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import open_result
-from cspr_jax.trajectories.platform_kind import USUAL, Kind
-from cspr_jax.trajectories.platform_lanes import instant, state
-from cspr_jax.trajectories.platform_segment import motion
 
 REST = "{ rest = true }"
 POSE = "{ position = [0.6, -0.4, 1.5], tilt_torsion = [0.3, 0.4, -0.2], beta_hat = -2.0 }"

@@ -13,25 +13,25 @@ from oracles import platform as oracle
 from support.platforms import FROM_REST, general, ours
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.build import kernel_robot
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.feasibility.platform import certificate, redundant_kernels
-from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.platform.crossings import passed_over
-from cspr_jax.feasibility.platform.kernels import slacks_at
-from cspr_jax.feasibility.platform.motions import Motions
-from cspr_jax.feasibility.platform.place_blocks import STEPS
-from cspr_jax.feasibility.platform.place_certificate import PARTS
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.problem import kernel_robot
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.platform_kind import USUAL
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms import proof, redundant_kernels
+from cspr_jax.platforms.arcs import Candidates, segments_with
+from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.crossings import passed_over
+from cspr_jax.platforms.kernels import slacks_at
+from cspr_jax.platforms.motions import Motions
+from cspr_jax.platforms.place_blocks import STEPS
+from cspr_jax.platforms.place_proof import PARTS
+from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.interference import contacts
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.platform_arcs import Candidates, segments_with
-from cspr_jax.search.pose_ends import end_options
-from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_kind import USUAL
 
 ROBOTS = ("fast", "greenline", "laval-mssm", "nist-robocrane", "without symmetry")
 INSTANTS, BATCH = 20_001, 2048
@@ -89,7 +89,7 @@ class Samples:
 
     def tension(self, motions, row, tau):
         """Smallest slack of taut cables, (k,), in other orders of these, of which one has digits everywhere."""
-        orders = [order.problem for order in certificate._orders(self._problem)[1:3]]
+        orders = [order.problem for order in proof._orders(self._problem)[1:3]]
 
         def kernel(problem, items):
             return slacks_at(problem, items, pairs=(), kind=self._kind)[0]

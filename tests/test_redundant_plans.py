@@ -12,17 +12,17 @@ from support.commands import cspr, plan
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.build import limits_over, load_robot, prepared
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
 from cspr_jax.outputs import example_files, motion_files
-from cspr_jax.problem import limits_over, load_robot, prepared
+from cspr_jax.platforms.beta_hat import LARGEST
+from cspr_jax.platforms.redundant_checker import RedundantChecker
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.beta_hat import LARGEST
-from cspr_jax.search.redundant_checker import RedundantChecker
-from cspr_jax.trajectories.amplitudes import named
 
 EXAMPLE = example_files.folder() / "cogiro.toml"
 LOW, HIGH, GRAVITY = 100.0, 5000.0, 9.81

@@ -11,15 +11,14 @@ from oracles import platform as oracle
 
 import cspr_jax
 from cspr_jax.arithmetic import minima, rotations
+from cspr_jax.build import centred, fault_at_rest
 from cspr_jax.cli import main
 from cspr_jax.config.catalogue import CATALOGUE, FAULTS, catalogue_names
 from cspr_jax.config.limits import LimitKeys, LimitTable
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile, read_robot
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.limits import Values, scales, slack, values
-from cspr_jax.feasibility.point_mass import proof_slacks
-from cspr_jax.problem import centred, fault_at_rest
+from cspr_jax.motions.limits import Values, scales, slack, values
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.limits import Limits, Uncertainty
 from cspr_jax.robots.platform import platform_robot
@@ -27,6 +26,7 @@ from cspr_jax.robots.point_mass import planar_robot, plane_normal, point_mass_ro
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
+from cspr_jax.swings import limit_slacks
 
 RNG = np.random.default_rng(5)
 RING = np.array([[np.cos(a), np.sin(a), 0.1 * np.sin(3.0 * a)] for a in np.arange(8) * 0.7])
@@ -273,7 +273,7 @@ def test_an_inline_robot_of_more_cables_is_named_where_it_stands(tmp_path, capsy
 def test_a_limit_is_one_row():
     """Keys in files, fields of `Limits`, closed forms of point masses and values of a state: of each row one."""
     names, other = [row.name for row in LIMITS], {"uncertainty"}
-    assert {field.name for field in dataclasses.fields(Limits)} - other == set(names) == set(proof_slacks.CLOSED)
+    assert {field.name for field in dataclasses.fields(Limits)} - other == set(names) == set(limit_slacks.CLOSED)
     assert set(LimitTable.model_fields) - other == set(names) <= set(PlanFile.model_fields)
     assert {field.name for field in dataclasses.fields(Uncertainty)} == {row.name for row in UNCERTAINTIES}
     assert set(LimitKeys.model_fields) == {row.name for row in LIMITS if row.per_cable} <= set(RobotFile.model_fields)

@@ -15,8 +15,8 @@ from support.pairs import made, random_pairs
 import cspr_jax
 from cspr_jax.arithmetic.rotations import matrix
 from cspr_jax.errors import InputError
-from cspr_jax.maps.sensitivity import SensitivityMap
 from cspr_jax.sweep.definition import read_sweep
+from cspr_jax.workspaces.sensitivity_map import SensitivityMap
 
 N = 24
 SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))

@@ -14,12 +14,11 @@ from support.platforms import FROM_REST, Z0, limits_of, stacked
 from support.random_motions import BATCH, QUINTIC, ROBOTS, drawn, jets, motions_of, problem_of
 
 from cspr_jax.arithmetic import chebyshev, packed
-from cspr_jax.feasibility.blocks import Blocks
-from cspr_jax.feasibility.platform import certificate, tension_blocks
-from cspr_jax.feasibility.platform.certificate import Certifier, determinant_at_rest
+from cspr_jax.motions.blocks import Blocks
+from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.platforms import platform_lanes, platform_reach, proof, tension_blocks
+from cspr_jax.platforms.proof import Certifier, determinant_at_rest
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.trajectories import platform_lanes, platform_reach
-from cspr_jax.trajectories.platform_kind import USUAL, Kind
 
 STANDARD = Kind(variable=False, plain=True)
 G = 9.81
@@ -238,9 +237,7 @@ def test_every_order_of_the_cables_gives_the_same_bounds():
     problem = problem_of(robot, limits_of(**TIGHT))
     certifier, start = certifier_of(problem, USUAL), rng.uniform(0.0, 0.9, 16)
     blocks = Blocks(np.arange(16), start, start + 0.2 / arcs)
-    every = [
-        bounds_of(certifier, problem, segments, arcs, blocks, order=k, margins=True) for k in range(certificate.ORDERS)
-    ]
+    every = [bounds_of(certifier, problem, segments, arcs, blocks, order=k, margins=True) for k in range(proof.ORDERS)]
     good = every[0].rounding < 1e-8
     for other in every[1:]:
         both = good & (other.rounding < 1e-8)

@@ -10,10 +10,10 @@ from support.commands import cspr, plan, planned
 
 import cspr_jax
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.point_mass.least_time import LONGER
+from cspr_jax.lines.durations import names_of
+from cspr_jax.lines.s_model import LONGER
 from cspr_jax.published import boralugoda
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.line_durations import names_of
 
 T, P = 4.37688606, 2.23955703  # by brute force, of section 4
 

@@ -13,13 +13,12 @@ from hypothesis import strategies as st
 from support.amplitudes import of_one_shape
 
 from cspr_jax.cli import main
-from cspr_jax.feasibility.transition import oscillations as counts
-from cspr_jax.feasibility.transition import zero_tension
+from cspr_jax.motions.amplitudes import derivatives, from_polynomial, named
 from cspr_jax.robots import force_balance
 from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
-from cspr_jax.trajectories import hypocycloid
-from cspr_jax.trajectories import transition as transitions
-from cspr_jax.trajectories.amplitudes import derivatives, from_polynomial, named
+from cspr_jax.swings import envelope_oscillations as counts
+from cspr_jax.swings import hypocycloid, zero_tension
+from cspr_jax.swings import transition as transitions
 
 FUNCTIONS = {
     "A1": of_one_shape(named("A1")),

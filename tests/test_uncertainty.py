@@ -9,15 +9,15 @@ from support.other_robots import displaced, on_balls, ratios, uncertain, worst_r
 from support.platforms import FROM_REST, stacked
 from support.random_motions import ROBOTS, motions_of, problem_of, quintic
 
-from cspr_jax.feasibility.blocks import parts_of_arcs
-from cspr_jax.feasibility.enclosures import influence
-from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.platform.enclosures import Robustness
-from cspr_jax.feasibility.platform.motions import rows as some_of
-from cspr_jax.feasibility.uncertainty import closer_changes, deviations, requirements_of, worst
-from cspr_jax.feasibility.uncertainty import tensions as tensions_of
+from cspr_jax.motions.blocks import parts_of_arcs
+from cspr_jax.motions.enclosures import influence
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.uncertainty import closer_changes, deviations, requirements_of, worst
+from cspr_jax.motions.uncertainty import tensions as tensions_of
+from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.enclosures import Robustness
+from cspr_jax.platforms.motions import rows as some_of
 from cspr_jax.robots.limits import Limits, Uncertainty
-from cspr_jax.trajectories.platform_kind import Kind
 
 BETWEEN = Kind()
 SPOOLS, CENTRE = 0.004, 0.006

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from support.other_robots import on_balls, uncertain
 
-from cspr_jax.feasibility.platform.motions import rows as some_of
-from cspr_jax.feasibility.point_mass.enclosures import tolerated_by_point_masses
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.motions import rows as some_of
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
-from cspr_jax.search.oscillations import minimum_oscillations, transitions_to
-from cspr_jax.search.point_mass_arcs import arcs_and_segments
-from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.hypocycloid import motion as point_motion
-from cspr_jax.trajectories.transition import steady
+from cspr_jax.swings.arcs import arcs_and_segments
+from cspr_jax.swings.enclosures import tolerated_by_point_masses
+from cspr_jax.swings.hypocycloid import motion as point_motion
+from cspr_jax.swings.oscillations import minimum_oscillations, transitions_to
+from cspr_jax.swings.transition import steady
 
 TAUTEN = np.array([[0.5, 0.0, 0.0], [-0.3, 0.45, 0.0], [-0.2, -0.45, 0.0]])
 

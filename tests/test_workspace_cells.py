@@ -11,17 +11,17 @@ from support.workspaces import made
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.feasibility.workspace import geometry
-from cspr_jax.feasibility.workspace.geometry import mass_centres
-from cspr_jax.feasibility.workspace.required import RequiredWrenches
-from cspr_jax.problem import centred
+from cspr_jax.build import centred
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.cell_proofs import CellProofs
-from cspr_jax.search.workspace_cells import WorkspaceCells
-from cspr_jax.search.workspace_questions import CONDITIONS, question
-from cspr_jax.search.workspaces import WorkspaceSearch
+from cspr_jax.workspaces import geometry
+from cspr_jax.workspaces.cell_proofs import CellProofs
+from cspr_jax.workspaces.geometry import mass_centres
+from cspr_jax.workspaces.questions import CONDITIONS, question
+from cspr_jax.workspaces.required import RequiredWrenches
+from cspr_jax.workspaces.search import WorkspaceSearch
+from cspr_jax.workspaces.whole_cells import WorkspaceCells
 
 NONE = np.array([1.0, 0.0, 0.0, 0.0])
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])

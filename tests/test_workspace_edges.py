@@ -8,12 +8,12 @@ from support import cable_robots
 from support.workspaces import ROUND, made
 
 import cspr_jax
-from cspr_jax.problem import centred
+from cspr_jax.build import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.workspace_questions import question, required_wrenches
-from cspr_jax.search.workspaces import Poses, WorkspaceSearch
+from cspr_jax.workspaces.questions import question, required_wrenches
+from cspr_jax.workspaces.search import Poses, WorkspaceSearch
 
 G = cable_robots.GRAVITY
 CORNERS = np.array([[x, y, z] for x in (-2.0, 2.0) for y in (-1.5, 1.5) for z in (0.5, 3.0)])

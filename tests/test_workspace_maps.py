@@ -10,8 +10,8 @@ from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
+from cspr_jax.robots.orientation_grids import cone_grid, turn_grid
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.orientation_grids import cone_grid, turn_grid
 
 SWEEP = """
 schema = 1

@@ -10,8 +10,8 @@ from support import cable_robots
 from support.workspaces import made
 
 import cspr_jax
-from cspr_jax.feasibility.workspace.cocircuits import base_order, choices_of
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.workspaces.cocircuits import base_order, choices_of
 
 G = cable_robots.GRAVITY
 UP = np.array([0.0, 0.0, 1.0])

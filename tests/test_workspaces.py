@@ -11,17 +11,17 @@ from support.workspaces import ROUND, made
 
 import cspr_jax
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.build import centred
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.reasons import REASONS
-from cspr_jax.problem import centred
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.pulleys import exits
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
-from cspr_jax.search.workspace_clearances import at_rest, surroundings
-from cspr_jax.search.workspace_questions import question
-from cspr_jax.search.workspaces import Poses, WorkspaceSearch
+from cspr_jax.workspaces.clearances import at_rest, surroundings
+from cspr_jax.workspaces.questions import question
+from cspr_jax.workspaces.search import Poses, WorkspaceSearch
 
 G = cable_robots.GRAVITY
 

@@ -8,13 +8,13 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.build import limits_over, prepared
 from cspr_jax.errors import InputError
-from cspr_jax.problem import limits_over, prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.wrench_sets import Faces, spanning
 from cspr_jax.schema.verdicts import FLAGS
-from cspr_jax.search import accelerations as search
+from cspr_jax.workspaces import acceleration_search as search
 
 
 @dataclasses.dataclass(frozen=True)

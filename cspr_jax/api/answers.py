@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.feasibility.answers import Answers
-from cspr_jax.feasibility.demands import SAMPLES
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.demands import SAMPLES
+from cspr_jax.motions.leg import each
+from cspr_jax.motions.motion import Placed
+from cspr_jax.motions.problem import Problem
 from cspr_jax.plans.causes import Cause, causes
-from cspr_jax.plans.leg import each
-from cspr_jax.search.oscillations import OscillationAnswers
-from cspr_jax.search.platform_answers import PoseAnswers
-from cspr_jax.trajectories.motion import Placed
+from cspr_jax.platforms.answers import PoseAnswers
+from cspr_jax.swings.oscillations import OscillationAnswers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,14 +48,14 @@ class _WithMotions:
 
 @dataclasses.dataclass(frozen=True)
 class ArcsAnswers(Answers, _WithMotions):
-    """Answers of `minimum_arcs`; see `feasibility.answers.Answers`."""
+    """Answers of `minimum_arcs`; see `motions.answers.Answers`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class TransitionAnswers(OscillationAnswers, _WithMotions):
-    """Answers of `minimum_oscillations`; see `search.oscillations.OscillationAnswers`."""
+    """Answers of `minimum_oscillations`; see `swings.oscillations.OscillationAnswers`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class PlatformAnswers(PoseAnswers, _WithMotions):
-    """Answers of `minimum_pose_arcs`; see `search.platform_answers.PoseAnswers`."""
+    """Answers of `minimum_pose_arcs`; see `platforms.answers.PoseAnswers`."""

@@ -8,18 +8,18 @@ import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
+from cspr_jax.build import limits_over, prepared
 from cspr_jax.config.hints import almost_at_rest
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.answers import Answers
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.problem import limits_over, prepared
+from cspr_jax.motions.amplitudes import NAMES, Amplitude, boundary_errors, named
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.motion import Placed
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.pose_targets import REFERENCE
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.schema.given_numbers import ANY, Numbers
-from cspr_jax.search.pose_targets import REFERENCE
-from cspr_jax.trajectories.amplitudes import NAMES, Amplitude, boundary_errors, named
-from cspr_jax.trajectories.motion import Placed
 
 POINTS = Numbers(
     "finite numbers of shape (n, 3), n >= 1, at most 1e6 m", ((ANY, 3),), least=-LARGEST_LENGTH, largest=LARGEST_LENGTH

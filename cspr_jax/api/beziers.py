@@ -8,18 +8,18 @@ import numpy as np
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_point_mass, kernel_problem, points_of
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.beziers.duration_roots import Ends
+from cspr_jax.beziers.durations import feasible_durations
+from cspr_jax.beziers.margins import depths_of
+from cspr_jax.beziers.motion import Bezier
+from cspr_jax.beziers.verdicts import verdicts
+from cspr_jax.build import prepared
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.point_mass.bezier_durations import Ends
-from cspr_jax.feasibility.point_mass.bezier_margins import depths_of
-from cspr_jax.problem import prepared
+from cspr_jax.motions.motion import Placed
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.schema.labelled import Columns
-from cspr_jax.search.bezier_durations import feasible_durations
-from cspr_jax.search.bezier_verdicts import verdicts
-from cspr_jax.trajectories.bezier import Bezier
-from cspr_jax.trajectories.motion import Placed
 
 
 @dataclasses.dataclass(frozen=True)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.api.argument_checks import checked
+from cspr_jax.build import build_robot
 from cspr_jax.config.formats.table import ENDINGS, Imported, format_of
 from cspr_jax.config.formats.writing import robot_text
 from cspr_jax.config.hints import robot_hints
@@ -12,7 +13,6 @@ from cspr_jax.config.reading import other_case
 from cspr_jax.config.robot import RobotFile, read_foreign
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import ConfigError
-from cspr_jax.problem import build_robot
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.store.disk import Disk

@@ -7,12 +7,12 @@ import numpy as np
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_point_mass, kernel_problem, points_of
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.beziers.launch_range import POPULATION, LaunchRange
+from cspr_jax.beziers.launch_range import launch_range as searched
+from cspr_jax.beziers.release_bounds import bounds_of
 from cspr_jax.errors import InputError
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PLANAR, PointMassRobot
-from cspr_jax.search.launch_range import POPULATION, LaunchRange
-from cspr_jax.search.launch_range import launch_range as searched
-from cspr_jax.search.release_bounds import bounds_of
 
 
 @checked

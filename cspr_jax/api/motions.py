@@ -15,11 +15,16 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import amplitude_of, kernel_problem, warn_of_rest
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.build import prepared
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility import slacks as feasibility
-from cspr_jax.feasibility.platform.end_acceleration import AT_REST
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.problem import prepared
+from cspr_jax.motions import slacks as motion_slacks
+from cspr_jax.motions.amplitudes import Amplitude, named
+from cspr_jax.motions.motion import Motion, Placed, inward
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.platform_segment import PlatformMotion, pose_segment
+from cspr_jax.platforms.pose_targets import REFERENCE
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
@@ -27,18 +32,13 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
 from cspr_jax.robots.state import State
 from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
-from cspr_jax.search.pose_targets import REFERENCE
-from cspr_jax.trajectories import transition as transitions
-from cspr_jax.trajectories.amplitudes import Amplitude, named
-from cspr_jax.trajectories.hypocycloid import Hypocycloid, segment
-from cspr_jax.trajectories.motion import Motion, Placed, inward
-from cspr_jax.trajectories.platform_kind import Kind
-from cspr_jax.trajectories.platform_segment import PlatformMotion, pose_segment
+from cspr_jax.swings import transition as transitions
+from cspr_jax.swings.hypocycloid import Hypocycloid, segment
 
 amplitude = checked(named, "amplitude", __name__)
 # Compiled whole: XLA would compile each of their operations by itself.
-_SLACKS = jax.jit(feasibility.slacks)
-_MARGIN = jax.jit(feasibility.sampled_margin, static_argnames="samples")
+_SLACKS = jax.jit(motion_slacks.slacks)
+_MARGIN = jax.jit(motion_slacks.sampled_margin, static_argnames="samples")
 
 
 @checked
@@ -199,7 +199,7 @@ def slacks(problem: Problem, motion: Motion, tau) -> Array:
         tau: () normalised time in [0, 1].
 
     Returns:
-        (n_slacks,) without a unit, in the order of `feasibility.slacks`; all positive while the motion is feasible.
+        (n_slacks,) without a unit, in the order of `motions.slacks`; all positive while the motion is feasible.
     """
     return _SLACKS(problem, _inner(motion), jnp.asarray(tau, float))
 

@@ -10,15 +10,15 @@ import numpy as np
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.given import plain, text_of
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.beziers.landings import LaunchErrors, Scatter
+from cspr_jax.beziers.launch_outcome import scattered
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import motion_files, plan_report
 from cspr_jax.outputs.mjcf import write_mjcf
 from cspr_jax.outputs.mujoco_motion import STEP
 from cspr_jax.plans import planning
-from cspr_jax.plans.released import scattered
 from cspr_jax.schema import labelled
-from cspr_jax.search.landings import LaunchErrors, Scatter
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
 

@@ -11,23 +11,23 @@ from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, q
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.platform.end_acceleration import AT_REST
-from cspr_jax.feasibility.platform.motion_checker import MANY
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.amplitudes import Amplitude
+from cspr_jax.motions.motion import Placed
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.accessible import DEFINITIONS, Accessible
+from cspr_jax.platforms.accessible import accessible as search_accessible
+from cspr_jax.platforms.answers import PoseAnswers
+from cspr_jax.platforms.arcs import Candidates, segments_with
+from cspr_jax.platforms.attainable import attainable as search_attainable
+from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.motion_checker import MANY
+from cspr_jax.platforms.platform_segment import PlatformMotion
+from cspr_jax.platforms.pose_targets import pose_arcs, rest_poses, start_beta_hat
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.reference_pose import reference_pose
-from cspr_jax.search.accessible import DEFINITIONS, Accessible
-from cspr_jax.search.accessible import accessible as search_accessible
-from cspr_jax.search.attainable import attainable as search_attainable
-from cspr_jax.search.platform_answers import PoseAnswers
-from cspr_jax.search.platform_arcs import Candidates, segments_with
-from cspr_jax.search.pose_targets import pose_arcs, rest_poses, start_beta_hat
-from cspr_jax.trajectories.amplitudes import Amplitude
-from cspr_jax.trajectories.motion import Placed
-from cspr_jax.trajectories.platform_kind import Kind
-from cspr_jax.trajectories.platform_segment import PlatformMotion
 
 
 @checked

@@ -13,18 +13,18 @@ from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.answers import Answers
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.amplitudes import Amplitude
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.motion import Placed
+from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
-from cspr_jax.search.oscillations import minimum_oscillations as search_oscillations
-from cspr_jax.search.oscillations import transitions_to
-from cspr_jax.search.parities import pick
-from cspr_jax.search.point_mass_arcs import minimum_arcs as search_arcs
-from cspr_jax.search.point_mass_arcs import segments_between
-from cspr_jax.trajectories.amplitudes import Amplitude
-from cspr_jax.trajectories.hypocycloid import Hypocycloid, Segment
-from cspr_jax.trajectories.motion import Placed
+from cspr_jax.swings.arcs import minimum_arcs as search_arcs
+from cspr_jax.swings.arcs import segments_between
+from cspr_jax.swings.hypocycloid import Hypocycloid, Segment
+from cspr_jax.swings.oscillations import minimum_oscillations as search_oscillations
+from cspr_jax.swings.oscillations import transitions_to
+from cspr_jax.swings.parities import pick
 
 
 @checked

@@ -6,16 +6,16 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.build import centred, limits_over
 from cspr_jax.errors import InputError
-from cspr_jax.feasibility.workspace.geometry import mass_centres
-from cspr_jax.problem import centred, limits_over
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.given_numbers import numbers
-from cspr_jax.search.workspace_questions import CONDITIONS, FEASIBLE, check_cables, question, required_wrenches
-from cspr_jax.search.workspaces import WorkspaceAnswers, WorkspaceSearch
+from cspr_jax.workspaces.geometry import mass_centres
+from cspr_jax.workspaces.questions import CONDITIONS, FEASIBLE, check_cables, question, required_wrenches
+from cspr_jax.workspaces.search import WorkspaceAnswers, WorkspaceSearch
 
 __all__ = ["WorkspaceAnswers", "workspace"]
 

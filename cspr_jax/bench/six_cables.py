@@ -15,14 +15,14 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches, in_threads, padded, room
 from cspr_jax.bench.timing import best, operations
-from cspr_jax.feasibility.platform.prefilter import smallest_tensions
-from cspr_jax.problem import load_robot
+from cspr_jax.build import load_robot
+from cspr_jax.motions import amplitudes
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.platforms.platform_segment import PoseSegment, pose_segment
+from cspr_jax.platforms.sieve import smallest_tensions
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.trajectories import amplitudes
-from cspr_jax.trajectories.platform_kind import Kind
-from cspr_jax.trajectories.platform_segment import PoseSegment, pose_segment
 
 TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
 NUMPY_TRAJECTORIES = 128
@@ -143,7 +143,7 @@ def tensions(robot: PlatformRobot, batch: Batch, *, rough: bool) -> Array:
         rough: whether in float32.
 
     Returns:
-        (lanes,) of `prefilter.smallest_tensions`.
+        (lanes,) of `platforms.sieve.smallest_tensions`.
     """
     tau, arcs = np.linspace(0.0, 1.0, SAMPLES), float(batch.arcs)
     return smallest_tensions(robot, QUINTIC, arcs, tau, batch.segments, kind=FROM_REST, rough=rough)[0]

@@ -10,8 +10,7 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_threads, room
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.bench.timing import best
-from cspr_jax.feasibility.workspace import geometry
-from cspr_jax.problem import centred, load_robot
+from cspr_jax.build import centred, load_robot
 from cspr_jax.robots import clearance_kernels
 from cspr_jax.robots.clearance import scene
 from cspr_jax.robots.limits import Limits
@@ -19,8 +18,9 @@ from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import PointMassRobot, point_mass_robot
 from cspr_jax.robots.tension_lanes import least_norms
 from cspr_jax.robots.tension_programs import by_program, by_squares
-from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, question
-from cspr_jax.search.workspaces import WorkspaceSearch
+from cspr_jax.workspaces import geometry
+from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, question
+from cspr_jax.workspaces.search import WorkspaceSearch
 
 # Batches of poses; of twelve cables fewer.
 BATCHES, FEW_BATCHES = 16, 4
@@ -77,7 +77,7 @@ def margin_rate(
 
     Args:
         robot: the robot.
-        condition: of `search.workspace_questions.CONDITIONS`.
+        condition: of `workspaces.questions.CONDITIONS`.
         dtype: "float32" or "float64".
         by_null_space: which of the two ways.
         batches: of poses.

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
-# Why a robot of the catalogue cannot hang still with every cable taut, as `problem.fault_at_rest` finds it, which takes
+# Why a robot of the catalogue cannot hang still with every cable taut, as `build.fault_at_rest` finds it, which takes
 # seconds; a test compares them. Robots that are not here can.
 FAULTS: dict[str, str] = {}
 

@@ -37,7 +37,7 @@ def robots(names: Iterable[str | Path] = ()) -> list[dict[str, Any]]:
         if is_known:
             fault = FAULTS.get(spec.name)
         else:
-            from cspr_jax.problem import fault_at_rest  # imports jax
+            from cspr_jax.build import fault_at_rest  # imports jax
 
             fault = fault_at_rest(spec)
         listed.append(spec.model_dump(exclude_none=True) | {"fault": fault})

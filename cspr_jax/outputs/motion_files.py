@@ -13,11 +13,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import __version__
+from cspr_jax.beziers.launch_outcome import released
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.accelerations import along
+from cspr_jax.lines.motion import TimedLine
+from cspr_jax.motions.acceleration_sets import along
+from cspr_jax.motions.motion import Motion, outward
 from cspr_jax.plans.causes import cause_columns
 from cspr_jax.plans.planning import Plan
-from cspr_jax.plans.released import released
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
@@ -35,8 +37,6 @@ from cspr_jax.schema.quantities import flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
-from cspr_jax.trajectories.motion import Motion, outward
-from cspr_jax.trajectories.timed_lines import TimedLine
 
 SCHEMA = 2
 # Fields of a state by their names in files.

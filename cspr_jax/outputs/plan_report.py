@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from cspr_jax.beziers.launch_outcome import released
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import Plan
-from cspr_jax.plans.released import released
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.verdicts import Verdict
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.feasibility.answers import Answers
-from cspr_jax.feasibility.needs import Need, needs
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.needs import Need, needs
+from cspr_jax.motions.problem import Problem
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
-from cspr_jax.trajectories.motion import Motion
 
 # Digits that a number has at least, and at most where fewer do not tell it from another one.
 DIGITS, MOST_DIGITS = 3, 12

@@ -5,21 +5,21 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.build import build_amplitude
 from cspr_jax.config.hints import almost_at_rest, plan_hints
 from cspr_jax.config.plan import Choice
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.feasibility.transition.oscillations import best_inclination
+from cspr_jax.motions.amplitudes import Amplitude
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.waypoints import Stops
 from cspr_jax.plans.sequence import Sequence
-from cspr_jax.plans.stops import Stops
-from cspr_jax.problem import build_amplitude
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, rest_point, spool_radius
 from cspr_jax.robots.robot import Robot
 from cspr_jax.runtime.stages import within
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.trajectories import depths
-from cspr_jax.trajectories.amplitudes import Amplitude
-from cspr_jax.trajectories.transition import depth_for, transition, weights
+from cspr_jax.swings import depths
+from cspr_jax.swings.envelope_oscillations import best_inclination
+from cspr_jax.swings.transition import depth_for, transition, weights
 
 # A conservative z0 must lie above its bound: by this part of it.
 ABOVE_BOUND = 1e-6

@@ -11,25 +11,25 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.build import build_problem
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError
-from cspr_jax.feasibility.answers import Answers, joined
-from cspr_jax.feasibility.demands import SAMPLES, Demands, demands
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.answers import Answers, joined
+from cspr_jax.motions.demands import SAMPLES, Demands, demands
+from cspr_jax.motions.motion import Motion, Placed
+from cspr_jax.motions.problem import Problem
 from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
 from cspr_jax.plans.sequence import Sequence
-from cspr_jax.problem import build_problem
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.trajectories.motion import Motion, Placed
 
 # Where a search for z0 takes "best" epsilon to be, until it is chosen.
 FIRST_EPSILON = 0.2

@@ -10,9 +10,9 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.plans.leg import Leg
-from cspr_jax.plans.stops import Stops
+from cspr_jax.motions.leg import Leg
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.waypoints import Stops
 from cspr_jax.schema.families import FAMILIES, moving
 
 POINT_MASS = "3T"

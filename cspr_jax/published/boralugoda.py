@@ -9,16 +9,16 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.build import kernel_robot
 from cspr_jax.config.plan import read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import resolve_robot
-from cspr_jax.feasibility.point_mass.least_time import least_s_curve
-from cspr_jax.feasibility.point_mass.line_faces import Sides, line_faces, sides
+from cspr_jax.lines.faces import Sides, line_faces, sides
+from cspr_jax.lines.motion import s_curve
+from cspr_jax.lines.s_model import least_s_curve
 from cspr_jax.plans.sequence import Sequence
-from cspr_jax.problem import kernel_robot
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.trajectories.timed_lines import s_curve
 
 CASE, PRINTED = (Path(__file__).with_name(name) for name in ("table_4_1.toml", "table_4_3.csv"))
 TIMES = np.round(np.arange(2.9, 4.401, 0.05), 2)

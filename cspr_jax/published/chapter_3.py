@@ -12,22 +12,22 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.build import kernel_robot
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.platform.motion_checker import MANY
-from cspr_jax.feasibility.problem import Problem
-from cspr_jax.problem import kernel_robot
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms import attainable
+from cspr_jax.platforms.accessible import DEFINITIONS, Accessible, accessible_sets
+from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.robots.symmetries import symmetries
 from cspr_jax.runtime.processes import Spread
 from cspr_jax.runtime.stages import within
-from cspr_jax.search import attainable
-from cspr_jax.search.accessible import DEFINITIONS, Accessible, accessible_sets
-from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_kind import Kind
 
 RADIUS = 0.86  # b of (3.95), m
 MAX_ARCS = 20
@@ -47,7 +47,7 @@ class Choice:
     """Settings of a table of orientations.
 
     Fields:
-        definitions: of the accessible set, of `search.accessible.DEFINITIONS`.
+        definitions: of the accessible set, of `platforms.accessible.DEFINITIONS`.
         amplitudes: of `AMPLITUDES`.
         finer: how many times as fine the step is as pi / 32.
         max_arcs: largest number of arcs tried.
@@ -108,7 +108,7 @@ def attained(
         sets: of each set its place (3,), m, and its orientations (n, 3): tilt and torsion in the cylindrical frame,
             rad.
         choice: largest number of arcs, and number of values of beta-hat.
-        tried: which of these values, as for `search.attainable.attained`.
+        tried: which of these values, as for `platforms.attainable.attained`.
 
     Returns:
         (n,) of each.
@@ -128,7 +128,7 @@ def accessible_there(amplitude: str, definition: str, asked: list[tuple[np.ndarr
 
     Args:
         amplitude: key of `AMPLITUDES`.
-        definition: of `search.accessible.DEFINITIONS`.
+        definition: of `platforms.accessible.DEFINITIONS`.
         asked: of each its place (3,), m, and its divisions of pi.
 
     Returns:

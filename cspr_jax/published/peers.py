@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cspr_jax.feasibility.workspace import geometry
-from cspr_jax.feasibility.workspace.geometry import mass_centres
-from cspr_jax.problem import centred, load_robot
+from cspr_jax.build import centred, load_robot
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.tension_programs import CLOSE, by_program, by_squares
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.search.workspace_questions import CLOSURE, FEASIBLE, STATIC, Question, question
-from cspr_jax.search.workspaces import WorkspaceSearch
+from cspr_jax.workspaces import geometry
+from cspr_jax.workspaces.geometry import mass_centres
+from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, STATIC, Question, question
+from cspr_jax.workspaces.search import WorkspaceSearch
 
 # Poses of which linear programs and least squares are asked as well, evenly over the grid.
 SAMPLE = 60
@@ -31,7 +31,7 @@ class Grid(NamedTuple):
     Fields:
         name: of the row.
         robot: of the catalogue.
-        condition: of `search.workspace_questions.CONDITIONS`.
+        condition: of `workspaces.questions.CONDITIONS`.
         positions: (n, 3) of the platform frame's origin, axes of the file, m.
         quaternions: (n, 4) unit quaternions, scalar first.
     """

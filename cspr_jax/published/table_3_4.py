@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from cspr_jax.platforms import attainable
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.published.chapter_3 import (
     DIVISIONS,
@@ -22,7 +23,6 @@ from cspr_jax.published.chapter_3 import (
 from cspr_jax.robots.symmetries import folded, symmetries
 from cspr_jax.runtime.processes import Spread
 from cspr_jax.runtime.stages import within
-from cspr_jax.search import attainable
 
 _DEPTHS = (1.0, 1.4, 1.7, 2.0, 2.4)
 _RADII, _AZIMUTHS = (1.5, 2.0, 2.5, 3.0), np.radians(np.arange(0.0, 61.0, 10.0))

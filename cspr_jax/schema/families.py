@@ -1,6 +1,6 @@
 """Table of trajectory families: one row a family.
 
-A new family is a motion (`trajectories.motion.Motion`), a class that joins poses by it (`plans.leg.Leg`), and a row.
+A new family is a motion (`motions.motion.Motion`), a class that joins poses by it (`motions.leg.Leg`), and a row.
 """
 
 import contextlib
@@ -54,26 +54,25 @@ class Family:
 
 # Time functions of a platform's rotation that take no beta-hat.
 WITHOUT_BETA_HAT = ("beta_0", "beta_1")
-_LEGS = "cspr_jax.plans.{}"
 _ROWS = (
     Family(
         "hypocycloid-standard",
         "standard hypocycloids between any poses (thesis chapter 2)",
-        {"3T": _LEGS.format("hypocycloids:Hypocycloids"), "3R3T": _LEGS.format("platform_poses:StandardPoses")},
+        {"3T": "cspr_jax.swings.hypocycloid_leg:Hypocycloids", "3R3T": "cspr_jax.platforms.leg:StandardPoses"},
         any_cables=("3R3T",),
         knows_uncertainty=True,
     ),
     Family(
         "transition",
         "from rest to a target, swings at it, and back to rest (thesis chapter 1)",
-        {"2T": _LEGS.format("transitions:Transitions"), "3T": _LEGS.format("transitions:Transitions")},
+        dict.fromkeys(("2T", "3T"), "cspr_jax.swings.transition_leg:Transitions"),
         free_end=True,
         knows_uncertainty=True,
     ),
     Family(
         "hypocycloid",
         "hypocycloids of variable amplitude, for platforms (thesis chapter 3)",
-        {"3R3T": _LEGS.format("platform_poses:VariablePoses")},
+        {"3R3T": "cspr_jax.platforms.leg:VariablePoses"},
         any_cables=("3R3T",),
         knows_uncertainty=True,
     ),
@@ -81,7 +80,7 @@ _ROWS = (
         Family(
             name,
             f"straight lines from rest to rest {law}",
-            dict.fromkeys(("2T", "3T"), _LEGS.format("timed_lines:TimedLines")),
+            dict.fromkeys(("2T", "3T"), "cspr_jax.lines.leg:TimedLines"),
             rests_anywhere=True,
             any_cables=("2T", "3T"),
             is_line=True,
@@ -95,7 +94,7 @@ _ROWS = (
     Family(
         "bezier",
         "Bezier curves of the second order, at rest in every pose (launch paper)",
-        dict.fromkeys(("2T", "3T"), _LEGS.format("beziers:Beziers")),
+        dict.fromkeys(("2T", "3T"), "cspr_jax.beziers.leg:Beziers"),
         rests_anywhere=True,
     ),
 )

@@ -48,7 +48,7 @@ class Limit:
         name: key in files, and field of `robots.limits.Limits`.
         flag: the verdict where it is broken.
         sense: whether the quantity must be at least or at most so large.
-        quantity: of `feasibility.limits.Values`.
+        quantity: of `motions.limits.Values`.
         unit: of both.
         per_cable: whether each cable has a value of its own.
         of_motion: whether the quantity depends on how the effector moves, and not on where it is alone.

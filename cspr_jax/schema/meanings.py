@@ -11,7 +11,7 @@ from cspr_jax.schema.quantity import Quantity
 
 
 def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
-    """Bounds of the acceleration along a straight line, as `search.line_durations.names_of` names them from 1 on.
+    """Bounds of the acceleration along a straight line, as `lines.durations.names_of` names them from 1 on.
 
     Args:
         settings: of a sweep, with its point mass as "robot", or a platform that translates on three pairs of cables.

@@ -6,10 +6,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.plans.leg import Leg
+from cspr_jax.motions.leg import Leg
 from cspr_jax.robots.state import State
 from cspr_jax.schema.families import Family
-from cspr_jax.search.sampled import sampled_answers
+from cspr_jax.motions.sampled import sampled_answers
 
 SPEED = 0.05
 

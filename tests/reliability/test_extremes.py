@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from cspr_jax.build import build_problem
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
@@ -16,7 +17,6 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError, CsprError, InputError
 from cspr_jax.plans.choices import chosen_depth
 from cspr_jax.plans.sequence import Sequence
-from cspr_jax.problem import build_problem
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.tile import TileMap

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from support.commands import cspr
 from support.reading import read_here
 
+from cspr_jax.build import build_amplitude, build_limits, build_robot
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import CsprError
-from cspr_jax.problem import build_amplitude, build_limits, build_robot
 from cspr_jax.store.seal import sealed
 from cspr_jax.sweep.definition import read_sweep
 from reliability.support import SWEEP, content, go, sweep_of

@@ -13,16 +13,16 @@ import numpy as np
 from oracles import platform as oracle
 
 from cspr_jax.api.motions import sampled_margin
-from cspr_jax.feasibility.platform.checker import PoseChecker
-from cspr_jax.feasibility.problem import Problem
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms import platform_segment as segments
+from cspr_jax.platforms.checker import PoseChecker
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.state import State
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.trajectories import platform_segment as segments
-from cspr_jax.trajectories.amplitudes import named
-from cspr_jax.trajectories.platform_kind import USUAL, Kind
 
 MSSM = oracle.mssm()
 Z0 = 1.4

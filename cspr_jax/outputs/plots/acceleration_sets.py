@@ -6,16 +6,16 @@ import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision, leaf
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.build import build_limits, gravity_of, kernel_robot
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.labels import value
 from cspr_jax.outputs.plots.selection import nearest
-from cspr_jax.problem import build_limits, gravity_of, kernel_robot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.wrench_sets import spanning, tension_range
-from cspr_jax.search.accelerations import faces_of, judged
 from cspr_jax.store.result import Result
+from cspr_jax.workspaces.acceleration_search import faces_of, judged
 
 # Rows looked at together: of many cables the faces of all would not fit into memory.
 ROWS = 1 << 14

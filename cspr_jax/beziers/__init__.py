@@ -1,0 +1,28 @@
+"""Bezier curves of point masses from rest to rest, and objects that are launched from them.
+
+A Bezier curve of the second order, run through by half a cosine, is at rest at both ends wherever these are. The
+pseudotensions along it are polynomials of low degree in the cosine of the phase, whose coefficients depend on
+r = (T / pi)^2: their minima are exact, and the durations at which a verdict can change are roots of polynomials. A
+launch releases an object on the segment through the place and with the velocity that its flight to the target asks for.
+
+Source: the launch paper, section 3.1 (curve) and what follows it (release and free flight).
+
+Files, each importing only from those above it:
+
+    motion              positions over time, section 3.1
+    margins             smallest pseudotensions and depth, exact
+    limits              smallest slacks of limits, proved
+    duration_roots      durations at which a verdict can change
+    verdicts            verdicts of given durations
+    durations           intervals of durations that keep every cable taut; the least under limits
+    sequences           least sum of the durations of a sequence
+    segments            segments one after the other: answers
+    launch              free flight, and the segment through a release
+    launches            launches to a target: what is left to choose, and how it is chosen
+    release_bounds      bounds within which a release is looked for
+    launch_range        releases for many landing places
+    landings            scatter of landings
+    launch_outcome      what a plan asks of a launch, and what comes of it
+    leg                 Bezier segments in a plan
+    launch_range_map    maps of launches
+"""

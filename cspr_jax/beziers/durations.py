@@ -1,0 +1,175 @@
+"""Durations of Bezier segments that keep every cable taut, as intervals; and the least of them under limits."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.beziers.duration_roots import Ends, critical_durations
+from cspr_jax.beziers.margins import smallest_margins
+from cspr_jax.beziers.motion import Bezier
+from cspr_jax.beziers.verdicts import BATCH, verdicts
+from cspr_jax.motions.limits import given
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_verdicts import Verdicts
+from cspr_jax.robots.force_balance import adjugate
+from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, spool_radius
+from cspr_jax.schema.verdicts import Verdict
+
+# Halvings of the stretch between a duration that is feasible and one that is not: as many as float64 has digits.
+HALVINGS = 60
+# Durations tried in each interval of taut ones where limits count, in geometric progression up to so many times the
+# first.
+TRIED, WIDEST = 129, 100.0
+# Over the time that the largest speed or acceleration of the cables takes for the way.
+AMPLE = 20.0
+
+
+@jax.jit
+def _proved_margins(robot: PointMassRobot, motions: Bezier):
+    def one(motion):
+        margins = smallest_margins(robot, motion)
+        below = margins.below - margins.below_rounding
+        return jnp.minimum(jnp.min(margins.taut - margins.taut_rounding), below)
+
+    return jax.vmap(one)(motions)
+
+
+def proved_margins(robot: PointMassRobot, ends: Ends, durations: np.ndarray, z0: np.ndarray) -> np.ndarray:
+    """Smallest slacks less their rounding errors: feasible is proved where they are positive.
+
+    Args:
+        robot: a point mass on as many cables as it has degrees of freedom; centred.
+        ends: of n segments.
+        durations: (n,) s.
+        z0: (n,) m.
+
+    Returns:
+        (n,).
+    """
+    motions = Bezier(ends.start, ends.middles(durations), ends.end, durations, z0)
+    found = in_batches(partial(_proved_margins, robot), motions, size=BATCH)
+    return np.where(np.isfinite(found), found, -np.inf)
+
+
+def feasible_durations(robot: PointMassRobot, ends: Ends, z0: np.ndarray) -> list[np.ndarray]:
+    """Durations that keep every cable taut below the spools.
+
+    Args:
+        robot: a point mass on as many cables as it has degrees of freedom; centred.
+        ends: of n segments.
+        z0: (n,) m.
+
+    Returns:
+        of each segment (n_intervals, 2), both ends of each interval proved feasible, the last one inf where any longer
+        duration is; s.
+    """
+    rows, arms = (np.asarray(x) for x in jax.jit(adjugate)(robot))
+    roots = critical_durations(rows, arms, np.asarray(plane_normal(robot)), float(robot.gravity), ends)
+    segment, tests = _between(roots)
+    pick = Ends(*(x[segment] for x in ends))
+    is_good = proved_margins(robot, pick, tests, z0[segment]) > 0.0
+    changes = np.flatnonzero((segment[1:] == segment[:-1]) & (is_good[1:] != is_good[:-1]))
+    some = Ends(*(x[changes] for x in pick))
+    good, bad = np.where(is_good[changes], [tests[changes], tests[changes + 1]], [tests[changes + 1], tests[changes]])
+    for _ in range(HALVINGS):
+        middle = 0.5 * (good + bad)
+        if not len(changes) or ((middle == good) | (middle == bad)).all():
+            break
+        holds = proved_margins(robot, some, middle, z0[segment[changes]]) > 0.0
+        good, bad = np.where(holds, middle, good), np.where(holds, bad, middle)
+    return [_intervals(segment == i, is_good, changes, good) for i in range(len(roots))]
+
+
+def _between(roots: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    # One duration below all roots of a segment, one between any two, one above all; number of its segment for each.
+    tests = []
+    for own in roots:
+        known = own if len(own) else np.array([1.0])
+        tests.append(np.concatenate([[0.5 * known[0]], np.sqrt(known[1:] * known[:-1]), [2.0 * known[-1]]]))
+    return np.repeat(np.arange(len(roots)), [len(x) for x in tests]), np.concatenate(tests)
+
+
+def _intervals(own: np.ndarray, is_good: np.ndarray, changes: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    # Each change is one end of an interval; the last test of a segment says whether it is open.
+    places = np.flatnonzero(own)
+    inside = [float(edge) for change, edge in zip(changes, edges, strict=True) if own[change]]
+    starts = [0.0] if is_good[places[0]] else []
+    ends = [np.inf] if is_good[places[-1]] else []
+    return np.array([*starts, *inside, *ends]).reshape(-1, 2)
+
+
+def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: float) -> float:
+    """Least feasible duration of one segment.
+
+    Without limits it is the first one that keeps every cable taut. With limits, the first of many durations that meets
+    them is narrowed down; a shorter one between two that do not is not excluded.
+
+    Args:
+        problem: robot and limits.
+        ends: of the segment, leading dimension 1.
+        intervals: (n_intervals, 2) durations that keep every cable taut, s.
+        z0: m.
+
+    Returns:
+        s; if there is none, of those tried one that keeps every cable taut and breaks the fewest limits, if there is
+        one, else that with the largest margin.
+    """
+    if len(intervals) and not given(problem.limits):
+        return float(intervals[0, 0])
+
+    def judged(times: np.ndarray) -> Verdicts:
+        many = Ends(*(np.repeat(x, len(times), axis=0) for x in ends))
+        motions = Bezier(many.start, many.middles(times), many.end, times, np.full(len(times), z0))
+        return verdicts(problem, motions)
+
+    for first, last in intervals:
+        widest = max(WIDEST * first, slowest(problem, np.concatenate([ends.start, ends.end])))
+        times = np.geomspace(first, min(last, widest), TRIED)
+        good = np.flatnonzero(judged(times).verdict == 0)
+        if len(good):
+            return _narrowed(judged, times, int(good[0]))
+    # Nothing is feasible: what comes nearest.
+    size = np.abs(np.concatenate([ends.end - ends.start, ends.middle - ends.start])).sum()
+    unit = np.sqrt(max(size, np.abs(ends.start).sum() * 1e-3) / float(problem.robot.gravity))
+    times = np.concatenate([np.geomspace(0.1, 100.0, 4 * TRIED) * unit, intervals.ravel()])
+    times = times[np.isfinite(times)]
+    own = judged(times)
+    return float(times[_nearest(own) if given(problem.limits) else np.argmax(np.nan_to_num(own.margin, nan=-np.inf))])
+
+
+def _nearest(own: Verdicts) -> int:
+    # First those that keep cables taut below the spools, then those that break the fewest limits by the least.
+    margin = np.nan_to_num(np.minimum(own.margin, own.room), nan=-np.inf)
+    counts = np.sum([(own.verdict & flag.value) > 0 for flag in Verdict], axis=0)
+    return int(np.lexsort((-margin, counts, ~(own.margin > 0.0)))[0])
+
+
+def slowest(problem: Problem, points: np.ndarray) -> float:
+    """Duration that is long enough for what limits the speed of the cables.
+
+    Args:
+        problem: gives the limits.
+        points: (n + 1, 3) of the way, m; what is not known yet is NaN.
+
+    Returns:
+        s; 0 without such limits.
+    """
+    way = float(np.nansum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    way = way or float(spool_radius(problem.robot))
+    speed, acceleration = problem.limits.cable_speed_max, problem.limits.cable_acceleration_max
+    by_speed = 0.0 if speed is None else way / float(np.min(np.asarray(speed)))
+    by_acceleration = 0.0 if acceleration is None else np.sqrt(way / float(np.min(np.asarray(acceleration))))
+    return AMPLE * max(by_speed, by_acceleration)
+
+
+def _narrowed(judged, times: np.ndarray, first: int) -> float:
+    good, bad = times[first], times[max(first - 1, 0)]
+    for _ in range(HALVINGS):
+        middle = 0.5 * (good + bad)
+        if middle in (good, bad):
+            break
+        good, bad = (middle, bad) if judged(np.array([middle])).verdict[0] == 0 else (good, middle)
+    return float(good)

@@ -1,0 +1,184 @@
+"""Scatter of landings: errors of the winches and of the instant of release, thrown many times and to first order.
+
+At the release the cables have lengths and rates that miss the plan's; the effector is where the lengths are, and moves
+as the rates say. From there the object flies to the height of its target. A random sample of errors gives a sample of
+landings, and the derivatives of the landing with respect to all errors the covariance of small ones.
+"""
+
+import dataclasses
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import solved
+from cspr_jax.beziers.launch import flown
+from cspr_jax.beziers.motion import Bezier
+from cspr_jax.robots.force_balance import cable_motion
+from cspr_jax.robots.point_mass import PointMassRobot, is_planar
+from cspr_jax.schema.given_numbers import Numbers, whole
+
+BATCH, NEWTON = 1024, 12
+# As in the keys of a plan file.
+LARGEST_ERROR, MOST_THROWS, LARGEST_SEED = 1e3, 1_000_000, 2**63 - 1
+
+
+class Throw(NamedTuple):
+    """Planned release.
+
+    Fields:
+        motion: segment on which the object is released, z down.
+        release: () after its start, s.
+        target: (3,) m; landings are looked for at its height.
+    """
+
+    motion: Bezier
+    release: Any
+    target: Any
+
+
+@dataclasses.dataclass(frozen=True)
+class LaunchErrors:
+    """Independent errors of a launch.
+
+    Fields:
+        release: standard deviation of the instant of release, s.
+        cable_length: of the length of each cable at the release, m.
+        cable_speed: of the rate of each cable's length, m/s.
+        encoder: largest error of each length by the resolution of its encoder, m; uniform.
+        throws: size of the sample.
+        seed: of the sample.
+    """
+
+    release: float = 0.0
+    cable_length: float = 0.0
+    cable_speed: float = 0.0
+    encoder: float = 0.0
+    throws: int = 10_000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse sizes that are none."""
+        for name in ("release", "cable_length", "cable_speed", "encoder"):
+            Numbers("a number from 0 to 1000", least=0.0, largest=LARGEST_ERROR).array(name, getattr(self, name))
+        whole("throws", self.throws, 2, MOST_THROWS)
+        whole("seed", self.seed, 0, LARGEST_SEED)
+
+
+@dataclasses.dataclass(frozen=True)
+class Scatter:
+    """Landings of a sample of throws, and their covariance to first order.
+
+    Fields:
+        landings: (throws, 2) x and y over those of the target, m; NaN where the object never comes to its height.
+        covariance: (2, 2) of the sample, m^2.
+        first_order: (2, 2) of small errors, by derivatives, m^2.
+    """
+
+    landings: np.ndarray
+    covariance: np.ndarray
+    first_order: np.ndarray
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures of the scatter.
+
+        Returns:
+            plain values: "throws", "missed" (never at the height of the target), "mean", "covariance",
+            "covariance_first_order", and of the distances from the target "mean_error", "standard_deviation" and
+            "largest_error".
+        """
+        known = self.landings[np.isfinite(self.landings).all(1)]
+        sizes = np.linalg.norm(known, axis=1)
+        return {
+            "throws": len(self.landings),
+            "missed": len(self.landings) - len(known),
+            "mean": known.mean(0).tolist(),
+            "covariance": self.covariance.tolist(),
+            "covariance_first_order": self.first_order.tolist(),
+            "mean_error": float(sizes.mean()),
+            "standard_deviation": float(sizes.std()),
+            "largest_error": float(sizes.max()),
+        }
+
+
+def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
+    """Landing of one throw.
+
+    Args:
+        robot: a point mass on as many cables as it has degrees of freedom; centred.
+        throw: the planned release.
+        errors: (1 + 2 n_cables,) of the instant, s, of the lengths, m, and of their rates, m/s.
+
+    Returns:
+        (2,) x and y over those of the target, m; NaN where the object never comes to its height.
+    """
+    count = robot.n_cables
+    # Before the segment and behind it the effector is at rest there, for an instant.
+    share = jnp.clip((throw.release + errors[0]) / throw.motion.time, 0.0, 1.0)
+    state = throw.motion.state(share)
+    lengths, rates, _ = cable_motion(robot, *state[:3])
+    position = _placed(robot, state.position, lengths + errors[1 : count + 1])
+    velocity = _moving(robot, position, rates + errors[count + 1 :])
+    fall, gravity = throw.target[2] - position[2], robot.gravity
+    time = (jnp.sqrt(velocity[2] ** 2 + 2.0 * gravity * fall) - velocity[2]) / gravity
+    return flown(position, velocity, gravity, time)[0][:2] - throw.target[:2]
+
+
+def _placed(robot: PointMassRobot, start: Array, lengths: Array) -> Array:
+    # Where the cables have these lengths, by Newton's method; its last step carries the derivatives.
+    def step(place, _):
+        own = cable_motion(robot, place, place * 0.0, place * 0.0)[0]
+        return place + _moving(robot, place, lengths - own), None
+
+    return jax.lax.scan(step, start, None, length=NEWTON)[0]
+
+
+def _moving(robot: PointMassRobot, place: Array, rates: Array) -> Array:
+    # Velocity at which the lengths have these rates.
+    rays = place[None] - robot.base_points
+    units = rays / jnp.linalg.norm(rays, axis=1, keepdims=True)
+    if not is_planar(robot):
+        return solved(units, rates[:, None])[0][:, 0]
+    x, z = solved(units[:, np.array([0, 2])], rates[:, None])[0][:, 0]
+    return jnp.stack([x, jnp.zeros_like(x), z])
+
+
+@jax.jit
+def _landings(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
+    return jax.vmap(lambda own: landing(robot, throw, own))(errors)
+
+
+@jax.jit
+def _slopes(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
+    return jax.jacfwd(lambda own: landing(robot, throw, own))(errors)
+
+
+def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatter:
+    """Scatter of the landings of a launch.
+
+    Args:
+        robot: a point mass on as many cables as it has degrees of freedom; centred.
+        throw: the planned release.
+        errors: their sizes.
+
+    Returns:
+        the scatter, in the axes of the kernels.
+    """
+    count, random = robot.n_cables, np.random.default_rng(errors.seed)
+    # In this order, so that a sample of one kind of error is that of a larger one, scaled.
+    release = random.normal(size=(errors.throws, 1)) * errors.release
+    lengths = random.normal(size=(errors.throws, count)) * errors.cable_length
+    rates = random.normal(size=(errors.throws, count)) * errors.cable_speed
+    lengths = lengths + random.uniform(-1.0, 1.0, size=(errors.throws, count)) * errors.encoder
+    sample = np.concatenate([release, lengths, rates], axis=1)
+    found = in_batches(partial(_landings, robot, throw), sample, size=BATCH)
+    known = found[np.isfinite(found).all(1)]
+    sizes = [errors.release**2]
+    sizes += [errors.cable_length**2 + errors.encoder**2 / 3.0] * count + [errors.cable_speed**2] * count
+    slopes = np.asarray(_slopes(robot, throw, jnp.zeros(1 + 2 * count)))
+    own = np.cov(known.T) if len(known) > 1 else np.full((2, 2), np.nan)
+    return Scatter(found, own, (slopes * np.array(sizes)) @ slopes.T)

@@ -1,0 +1,194 @@
+"""Range of launches: to each landing place the release, and the one Bezier segment from rest, that reach it.
+
+Unknowns are the place of the release, the time of the flight, the duration of the segment, and when the object is
+released on it. All else follows: the velocity of the release (26), the control point and the end of the segment (29).
+"""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.differential_evolution import evolved
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.beziers.launch import aimed, through
+from cspr_jax.beziers.margins import depths_of
+from cspr_jax.beziers.motion import Bezier
+from cspr_jax.beziers.release_bounds import Bounds
+from cspr_jax.beziers.sequences import margins_of
+from cspr_jax.beziers.verdicts import BATCH, verdicts
+from cspr_jax.motions.limits import given
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.verdicts import FLAGS
+
+UNKNOWNS, POPULATION = 6, 64
+# Margins of the launch of least speed: exact ones of taut cables; limits are sampled, and only then proved.
+EXACT, SAMPLED, SAMPLES = (1e-6,), (1e-3, 1e-2), 33
+# Places at a time where the answers are made.
+TOGETHER = 512
+
+
+class Question(NamedTuple):
+    """Questions of n landing places, in the kernels' coordinates.
+
+    Fields:
+        start: (n, 3) where the segment starts at rest, m.
+        target: (n, 3) where the object is to land, m.
+        z0: (n,) depth at which slacks are normalised, m.
+    """
+
+    start: Any
+    target: Any
+    z0: Any
+
+
+class Shot(NamedTuple):
+    """A launch.
+
+    Fields:
+        position: (3,) of the release, m.
+        velocity: (3,) there, m/s.
+        flight_time: () s.
+        share: () of the duration of the segment, when the object is released.
+        motion: the segment.
+    """
+
+    position: Any
+    velocity: Any
+    flight_time: Any
+    share: Any
+    motion: Bezier
+
+
+@dataclasses.dataclass(frozen=True)
+class LaunchRange(Columns):
+    """Launches to n landing places, (n,) each; NaN where no launch is proved feasible, but for the first two.
+
+    Fields:
+        verdict: flags of `Verdict`: 0 if a launch was found whose segment is proved feasible, else those of the segment
+            with the largest margin found, which does not say that there is no other.
+        largest_margin: largest smallest slack, of taut cables, depth and limits, of the segments that were tried.
+        release_speed: least speed at the release of the launches found, m/s.
+        duration: of the segment of that launch, s.
+        release_time: of the release, after the start of the segment, s.
+        flight_time: s.
+        release_x: of the place of the release, m.
+        release_y: likewise.
+        release_z: likewise.
+    """
+
+    verdict: np.ndarray
+    largest_margin: np.ndarray
+    release_speed: np.ndarray
+    duration: np.ndarray
+    release_time: np.ndarray
+    flight_time: np.ndarray
+    release_x: np.ndarray
+    release_y: np.ndarray
+    release_z: np.ndarray
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Whether a launch to each place was found, its segment proved feasible, (n,)."""
+        return self.verdict == 0
+
+    @property
+    def releases(self) -> np.ndarray:
+        """Places of the releases, (n, 3) m."""
+        return np.stack([self.release_x, self.release_y, self.release_z], axis=1)
+
+    def placed(self, frame: Frame) -> "LaunchRange":
+        """The same, with the places of the releases in other axes.
+
+        Args:
+            frame: of the robot file.
+
+        Returns:
+            the launches.
+        """
+        x, y, z = frame.outward(self.releases).T
+        return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)
+
+
+def _shot(known: tuple[Problem, Bounds], question: Question, x: Array) -> Shot:
+    problem, bounds = known
+    own = bounds.low + (bounds.high - bounds.low) * x
+    position, (flight, duration), share = own[:3], jnp.exp(own[3:5]), own[5]
+    velocity = aimed(position, question.target, problem.robot.gravity, flight)
+    middle, end = through(question.start, position, velocity, share, duration)
+    return Shot(position, velocity, flight, share, Bezier(question.start, middle, end, duration, question.z0))
+
+
+def _energy(known: tuple[Problem, Bounds], question: Question, x: Array) -> tuple[Array, Array]:
+    # Kinetic energy at the release over weight and size of the robot, and the smallest margin.
+    robot, shot = known[0].robot, _shot(known, question, x)
+    margins = margins_of(known[0], jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], shot.motion), SAMPLES)
+    return 0.5 * jnp.sum(shot.velocity**2) / (robot.gravity * spool_radius(robot)), jnp.min(margins)
+
+
+@jax.jit
+def _shots(known: tuple[Problem, Bounds], cases: tuple[Question, Array]) -> Shot:
+    return jax.vmap(lambda question, x: _shot(known, question, x))(*cases)
+
+
+def launch_range(
+    problem: Problem, starts: np.ndarray, targets: np.ndarray, bounds: Bounds, population: int = POPULATION
+) -> LaunchRange:
+    """Launches of least speed, and the largest margins, to landing places.
+
+    Args:
+        problem: robot, a point mass on as many cables as it has degrees of freedom, centred, z down, and limits.
+        starts: (n, 3) where the segments start at rest, m.
+        targets: (n, 3) where the object is to land, m.
+        bounds: within which a release is looked for.
+        population: of the search; one twice as large takes four times as long.
+
+    Returns:
+        the launches, each the best of a search: those found are proved, that there is no other or no slower one is not.
+    """
+    question = Question(starts, targets, depths_of(problem.robot, starts))
+    asked = (np.inf, *(SAMPLED if given(problem.limits) else EXACT))
+    places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, asked=asked, population=population)
+    parts = [slice(i, i + TOGETHER) for i in range(0, len(starts), TOGETHER)]
+    own = [_answers((problem, bounds), jax.tree.map(lambda x, s=some: x[s], (question, places))) for some in parts]
+    return LaunchRange(**{name: np.concatenate([vars(part)[name] for part in own]) for name in vars(own[0])})
+
+
+def _answers(known: tuple[Problem, Bounds], cases: tuple[Question, np.ndarray]) -> LaunchRange:
+    # Of every place and margin asked for one candidate, in one row: the margins change fastest.
+    count, tracks, _ = cases[1].shape
+    question = jax.tree.map(lambda x: np.repeat(x, tracks, axis=0), cases[0])
+    shots = in_batches(lambda some: _shots(known, some), (question, cases[1].reshape(count * tracks, -1)), size=BATCH)
+    verdict, margin = _judged(known[0], shots.motion, (count, tracks))
+    speed = np.linalg.norm(shots.velocity, axis=1).reshape(count, tracks)
+    slowest = np.where(verdict == 0, speed, np.inf).argmin(1)
+    largest, each, is_found = margin.argmax(1), np.arange(count), (verdict == 0).any(1)
+
+    def shown(values: np.ndarray) -> np.ndarray:
+        return np.where(is_found, values.reshape(count, tracks)[each, slowest], np.nan)
+
+    return LaunchRange(
+        np.where(is_found, FLAGS(0), verdict[each, largest]),
+        margin[each, largest],
+        shown(speed),
+        shown(shots.motion.time),
+        shown(shots.share * shots.motion.time),
+        shown(shots.flight_time),
+        *(shown(x) for x in shots.position.T),
+    )
+
+
+def _judged(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    # So many together as give batches of one length, whatever is asked for.
+    parts = [slice(i, i + BATCH) for i in range(0, len(motions.time), BATCH)]
+    own = [verdicts(problem, jax.tree.map(lambda x, s=some: x[s], motions)) for some in parts]
+    verdict = np.concatenate([x.verdict for x in own])
+    # Above the spools the room under limits of tensions is not known, and the depth is what misses.
+    margin = np.concatenate([np.where(np.isneginf(x.room), x.margin, np.minimum(x.margin, x.room)) for x in own])
+    return verdict.reshape(shape), np.where(np.isnan(margin), -np.inf, margin).reshape(shape)

@@ -1,0 +1,148 @@
+"""Launches: the flight to a target, the segment on which an object is released, and what is left to choose of both.
+
+The control point and the end of that segment follow from the place and the velocity of release, (29), and the
+accelerations of the whole sequence from that control point.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.constrained_minima import least
+from cspr_jax.beziers.launch import aimed, flown, through
+from cspr_jax.beziers.sequences import Anchored, duration_bounds, judged, margins_of, segments_of
+from cspr_jax.motions.problem import Problem
+
+# Parts of the duration of its segment between which a release is looked for.
+EARLIEST, LATEST = 0.05, 0.95
+
+
+class Launch(NamedTuple):
+    """Question of a launch; numbers of NumPy or of jax, None of what is to be chosen.
+
+    Fields:
+        points: (n + 1, 3) of the sequence, z down, m; that of the end of the launching segment is of no account.
+        segment: () number of the launching segment.
+        target: (3,) m.
+        point: (3,) place of the release, m; None: on the parabola of `velocity`.
+        velocity: (3,) at the target, m/s; None: as `point` and the time of flight demand.
+        time: () of the flight, s; None: to be chosen.
+        release: () after the start of the segment, s; None: to be chosen.
+        z0: () depth at which slacks are normalised, m.
+    """
+
+    points: Any
+    segment: Any
+    target: Any
+    point: Any
+    velocity: Any
+    time: Any
+    release: Any
+    z0: Any
+
+
+class Found(NamedTuple):
+    """A launch and its sequence.
+
+    Fields:
+        sequence: with the end of the launching segment.
+        durations: (n,) s.
+        release: () after the start of the segment, s.
+        time: () of the flight, s.
+        position: (3,) at the release, m.
+        velocity: (3,) likewise, m/s.
+    """
+
+    sequence: Anchored
+    durations: Any
+    release: Any
+    time: Any
+    position: Any
+    velocity: Any
+
+
+@jax.jit
+def _found(arguments: Any, x: Array) -> Found:
+    # Unknowns: logarithms of the free durations, then the release, then the logarithm of the flight's time.
+    problem, launch, durations, free = arguments
+    times = durations.at[free].set(jnp.exp(x[: len(free)])) if len(free) else durations
+    rest, at = x[len(free) :], launch.segment
+    share = rest[0] if launch.release is None else launch.release / times[at]
+    time = jnp.exp(rest[-1]) if launch.time is None else launch.time
+    gravity = problem.robot.gravity
+    if launch.point is None:
+        position, velocity = flown(launch.target, launch.velocity, gravity, -time)
+    else:
+        position, velocity = launch.point, aimed(launch.point, launch.target, gravity, time)
+    middle, end = through(launch.points[at], position, velocity, share, times[at])
+    sequence = Anchored(launch.points.at[at + 1].set(end), at, middle, launch.z0)
+    return Found(sequence, times, share * times[at], time, position, velocity)
+
+
+def _margins(problem: Problem, found: Found) -> Array:
+    share = found.release / found.durations[found.sequence.segment]
+    own = margins_of(problem, segments_of(found.sequence, found.durations))
+    return jnp.append(own, jnp.minimum(share, 1.0 - share))
+
+
+def _total(arguments, x: Array) -> tuple[Array, Array]:
+    found = _found(arguments, x)
+    return jnp.sum(found.durations), _margins(arguments[0], found)
+
+
+def _speed(arguments, x: Array) -> tuple[Array, Array]:
+    # Square of the speed at the release, over gravity: kinetic energy over weight, m.
+    found = _found(arguments, x)
+    return 0.5 * jnp.sum(found.velocity**2) / arguments[0].robot.gravity, _margins(arguments[0], found)
+
+
+def _landing(arguments, x: Array) -> tuple[Array, Array]:
+    found, at = _found(arguments, x), arguments[1].segment
+    before = jnp.sum(jnp.where(jnp.arange(len(found.durations)) < at, found.durations, 0.0))
+    return before + found.release + found.time, _margins(arguments[0], found)
+
+
+def launched(problem: Problem, launch: Launch, durations: list[float | None], choose: str | None) -> Found:
+    """The launch, with everything that is left open chosen.
+
+    Args:
+        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
+        launch: the question.
+        durations: of the n segments, s; None: to be chosen, for the least total.
+        choose: the time of flight for the least kinetic energy at the release, "energy", or for the earliest landing,
+            "time"; None where it is given.
+
+    Returns:
+        the launch; where nothing feasible is found, the one with the largest margin found.
+    """
+    launch = Launch(*(value if value is None else jnp.asarray(value) for value in launch))
+    if choose == "energy":
+        launch = launch._replace(time=jnp.asarray(_searched(problem, launch, durations, _speed).time))
+    if choose == "time":
+        found, at = _searched(problem, launch, durations, _landing), int(launch.segment)
+        launch = launch._replace(time=jnp.asarray(found.time), release=jnp.asarray(found.release))
+        own = np.asarray(found.durations).tolist()
+        durations = [own[i] if i <= at else time for i, time in enumerate(durations)]
+    return _searched(problem, launch, durations, _total)
+
+
+def _searched(problem: Problem, launch: Launch, durations: list[float | None], parts) -> Found:
+    known = jnp.asarray([1.0 if time is None else time for time in durations])
+    free = np.array([i for i, time in enumerate(durations) if time is None], int)
+    arguments: Any = (problem, launch, known, free)
+    shortest, longest = duration_bounds(problem, np.asarray(launch.points))
+    bounds = [(shortest, longest)] * len(free)
+    bounds += [(EARLIEST, LATEST)] if launch.release is None else []
+    bounds += [(shortest, longest)] if launch.time is None else []
+    if not bounds:
+        return _found(arguments, jnp.zeros(0))
+
+    def own(x: np.ndarray):
+        found = _found(arguments, jnp.asarray(x))
+        return judged(problem, segments_of(found.sequence, found.durations))
+
+    low, high = (np.array(side) for side in zip(*bounds, strict=True))
+    return _found(arguments, jnp.asarray(least(parts, arguments, low, high, own)))

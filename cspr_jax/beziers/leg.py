@@ -1,0 +1,114 @@
+"""Leg of Bezier segments, at rest in every pose; an object may be released on one of them."""
+
+import dataclasses
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.beziers.launch_outcome import question_of
+from cspr_jax.beziers.launches import launched
+from cspr_jax.beziers.margins import depths_of
+from cspr_jax.beziers.motion import end_acceleration
+from cspr_jax.beziers.segments import answers_of, joined_segments
+from cspr_jax.beziers.sequences import Anchored, least_total, segments_of
+from cspr_jax.errors import ConfigError, shown
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.leg import Leg, each
+from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.waypoints import Stops
+from cspr_jax.robots.point_mass import AT_P0, spool_radius
+
+# Accelerations that count as none, over gravity.
+AT_REST = 1e-9
+
+
+class _Chosen(NamedTuple):
+    # Places, durations (None: the least, one after the other) and first control point; the release, if there is one.
+    points: np.ndarray
+    durations: list[float | None]
+    first: np.ndarray
+    release: float = np.nan
+    flight_time: float = np.nan
+
+
+class Beziers(Leg):
+    """Any places, joined by Bezier segments; see `Leg`."""
+
+    def __init__(self, stops: Stops) -> None:
+        """Refuse numbers of arcs, of which a segment has none."""
+        super().__init__(stops)
+        for i, pose in enumerate(stops.poses[1:], start=1):
+            if pose.arcs is not None:
+                raise ConfigError(stops.path, f'{stops.name(i)}.arcs: must be absent with family = "bezier"')
+        if stops.keys.least == "total" and None not in self._durations:
+            raise ConfigError(stops.path, 'least = "total": must be absent where every duration is given')
+        launch = stops.keys.launch
+        # Of the segment of the launch, if it is one of these.
+        self._at = None if launch is None or not 0 <= launch.segment - stops.first < len(self) else launch.segment
+
+    def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
+        """Join the places; see `Leg.join`."""
+        points, frame = self._points(problem, z0), self.stops.frame
+        # Of P0, else of the first pose.
+        depth = z0 if np.isfinite(z0) else float(depths_of(problem.robot, points[:1])[0])
+        chosen = self._chosen(problem, points, depth)
+        segments = joined_segments(problem, chosen.points, chosen.durations, chosen.first, depth)
+        answers, motions = answers_of(problem, segments), segments.motions
+        self._check_rests(problem, motions, chosen.first - points[0])
+        if self._at is not None:
+            answers.release[self._at - self.stops.first] = chosen.release
+            answers.flight_time[self._at - self.stops.first] = chosen.flight_time
+        shown_points = np.asarray(frame.outward(answers.control_points))
+        return dataclasses.replace(answers, control_points=shown_points), each(motions, len(self))
+
+    def _chosen(self, problem: Problem, points: np.ndarray, depth: float) -> _Chosen:
+        stops, durations, launch = self.stops, self._durations, self.stops.keys.launch
+        if launch is not None and self._at is not None:
+            question = question_of(stops, points, depth, float(problem.robot.gravity))
+            found = launched(problem, question, durations, launch.choose)
+            first = segments_of(found.sequence, jnp.asarray(found.durations)).middle[0]
+            places, times, first = jax.tree.map(np.asarray, (found.sequence.points, found.durations, first))
+            return _Chosen(places, times.tolist(), first, float(found.release), float(found.time))
+        given = stops.keys.first_control_point if stops.first == 0 else None
+        first = points[0] if given is None else np.asarray(stops.frame.inward(given))
+        if stops.keys.least == "total":
+            sequence = Anchored(points, np.asarray(0), first, np.asarray(depth))
+            durations = least_total(problem, sequence, durations).tolist()
+        return _Chosen(points, durations, first)
+
+    @property
+    def _durations(self) -> list[float | None]:
+        given = (pose.duration for pose in self.stops.poses[1:])
+        return [time if isinstance(time, float) else None for time in given]
+
+    def _points(self, problem: Problem, z0: float) -> np.ndarray:
+        points, stops = self.stops.points(z0), self.stops
+        if self._at is not None:  # where it follows from the launch
+            points[self._at - stops.first + 1] = np.nan
+        near = np.linalg.norm(np.diff(points, axis=0), axis=1) <= AT_P0 * float(spool_radius(problem.robot))
+        for i in (np.flatnonzero(near) + 1).tolist():
+            given = stops.keys.first_control_point if stops.first == 0 else None
+            if given is None or given == stops.poses[0].position:
+                raise ConfigError(
+                    stops.path,
+                    f"{stops.name(i)}.position: must be another than that of {stops.name(i - 1)}, for a segment that "
+                    "starts without acceleration",
+                )
+        return points
+
+    def _check_rests(self, problem: Problem, motions, first: np.ndarray) -> None:
+        # A pose at rest has no acceleration.
+        times = np.asarray(motions.time)[:, None]
+        ends = end_acceleration(motions.middle, motions.end, times)
+        starts = (np.pi / times[:1]) ** 2 * first[None]
+        sizes = np.linalg.norm(np.concatenate([starts, ends]), axis=1)
+        for i in np.flatnonzero(sizes > AT_REST * float(problem.robot.gravity)).tolist():
+            if self.stops.poses[i].rest:
+                raise ConfigError(
+                    self.stops.path,
+                    f"{self.stops.name(i)}.rest = {shown(True)}: must be absent where the acceleration is not zero: "
+                    f"it is {sizes[i]:.3g} m/s^2",
+                )

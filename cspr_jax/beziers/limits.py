@@ -1,0 +1,141 @@
+"""Smallest slacks of limits along Bezier segments, with a proof.
+
+In c = cos(pi tau) everything that a limit bounds is made of polynomials: squares of cable lengths, of their rates times
+the lengths, pseudotensions, the depth. Over a block of c each of them, and its derivatives, has bounds by its Bernstein
+coefficients; interval jets carry these to the slacks.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.block_minima import Blocks, Proved, smallest
+from cspr_jax.arithmetic.interval_jets import Jet, lowest
+from cspr_jax.arithmetic.polynomials import bounds, derivatives, over, product, total
+from cspr_jax.beziers.motion import Bezier, powers
+from cspr_jax.motions.limits import given
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.force_balance import adjugate
+
+Items = dict[str, Any]
+# Blocks that are looked at together.
+TOGETHER = 1 << 14
+
+
+def limit_slacks(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.ndarray) -> Proved:
+    """Smallest slacks of the limits that are given, in their order.
+
+    Args:
+        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
+        motions: NumPy leaves with a leading dimension n.
+        kappa: (n, n_cables, 4) pseudotensions by powers of c, m^3/s^2 (planar: m^2/s^2).
+        is_below: (n,) whether the segment is proved to stay below the spools: elsewhere slacks of tensions are -inf.
+
+    Returns:
+        slacks without a unit, (n, n_limits); of speeds 1 - (rate / limit)^2.
+    """
+    rows, tables = given(problem.limits), _tables(problem, motions, kappa, is_below)
+    slacks = [_SLACKS[row.name](problem, getattr(problem.limits, row.name)) for row in rows]
+    count = len(is_below)
+    whole = Blocks(np.arange(count), np.zeros(count, int), np.full(count, -1.0), np.full(count, 2.0))
+
+    def values(blocks: Blocks) -> tuple[np.ndarray, np.ndarray]:
+        own = {name: over(x[blocks.case], *_wide(blocks, x.ndim)) for name, x in tables.items()}
+        ends = [{name: x.sum(-1) if end else x[..., 0] for name, x in own.items()} for end in (0, 1)]
+        during = {name: Jet(*map(bounds, derivatives(x, 2))) for name, x in own.items()}
+        found = [_of_limit(slack, ends, during) for slack in slacks]
+        low, attained = (np.stack(x, axis=1) for x in zip(*found, strict=True))
+        return low, attained
+
+    proved = smallest(whole, count, values, np.ones(len(rows)), size=TOGETHER)
+    unknown = ~is_below[:, None] & np.array([row.quantity == "tension" for row in rows])[None]
+    return Proved(*(np.where(unknown, -np.inf, x) for x in proved))
+
+
+def _wide(blocks: Blocks, dimensions: int) -> tuple[np.ndarray, np.ndarray]:
+    shape = (-1, *[1] * (dimensions - 2))
+    return blocks.start.reshape(shape), blocks.width.reshape(shape)
+
+
+def _of_limit(slack: Callable[[Items], Any], ends: list[Items], during: Items) -> tuple[np.ndarray, np.ndarray]:
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        values = np.stack([slack(end) for end in ends])
+        return lowest(values, slack(during)).min(1), values.min((0, 2))
+
+
+def _tables(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.ndarray) -> dict[str, np.ndarray]:
+    # By powers of c: (n, n_cables, d) or (n, 1, d).
+    a = np.asarray(problem.robot.base_points)
+    square, slope, rest = powers(motions.start, motions.middle, motions.end)
+    u = ((np.pi / motions.time) ** 2)[:, None, None]
+    place = np.stack([rest, slope, square], axis=-1)
+    bend = u * np.stack([2.0 * square, -slope, -4.0 * square], axis=-1)
+    rays = np.repeat(-place[:, None], len(a), axis=1)
+    rays[..., 0] += a
+    growth = np.stack([slope, 2.0 * square], axis=-1)[:, None]
+    per_time = product(u, np.array([1.0, 0.0, -1.0]))
+    along = _dot(rays, growth)
+    rows, arms = (np.asarray(x)[0] for x in jax.jit(adjugate)(problem.robot))
+    level = np.einsum("i,nij->nj", np.cross(arms, a[0]) - rows, place)
+    level[:, 0] += rows @ a[0]
+    return {
+        "square": _dot(rays, rays),
+        "kappa": kappa,
+        "determinant": np.where(is_below[:, None], level, [1.0, 0.0, 0.0])[:, None],
+        "depth": place[:, 2:],
+        "rate": product(per_time, product(along, along)),
+        "bend": total(product(per_time, _dot(growth, growth)), -_dot(rays, bend[:, None])),
+        "z0": np.broadcast_to(motions.z0[:, None, None], (len(u), 1, 1)),
+    }
+
+
+def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    # Of vectors (..., 3, d).
+    return product(first, second).sum(-2)
+
+
+def _tension(problem: Problem, limit, sense: float) -> Callable[[Items], Any]:
+    robot = problem.robot
+    unit = sense * robot.n_cables / float(robot.mass * robot.gravity)
+    most = np.asarray(limit)
+
+    def slack(at: Items) -> Any:
+        return (at["kappa"] * at["square"] ** 0.5 * at["determinant"] ** -1.0 * float(robot.mass) - most) * unit
+
+    return slack
+
+
+def _floor(problem: Problem, limit) -> Callable[[Items], Any]:
+    return lambda at: (at["depth"] * -1.0 + float(limit)) * at["z0"] ** -1.0
+
+
+def _length(problem: Problem, limit) -> Callable[[Items], Any]:
+    return lambda at: at["square"] ** 0.5 * (-1.0 / np.asarray(limit)) + 1.0
+
+
+def _speed(problem: Problem, limit) -> Callable[[Items], Any]:
+    return lambda at: at["rate"] * at["square"] ** -1.0 * (-1.0 / np.asarray(limit) ** 2) + 1.0
+
+
+def _acceleration(problem: Problem, limit) -> Callable[[Items], Any]:
+    def slack(at: Items) -> Any:
+        share = (at["bend"] - at["rate"] * at["square"] ** -1.0) * at["square"] ** -0.5 * (1.0 / np.asarray(limit))
+        if isinstance(share, Jet):
+            return (share * -1.0 + 1.0).joined(share + 1.0)
+        return np.concatenate([1.0 - share, 1.0 + share], axis=-1)
+
+    return slack
+
+
+# By the names of the limits.
+_SLACKS: dict[str, Callable[[Problem, Any], Callable[[Items], Any]]] = {
+    "tension_min": partial(_tension, sense=1.0),
+    "tension_max": partial(_tension, sense=-1.0),
+    "floor": _floor,
+    "cable_length_max": _length,
+    "cable_speed_max": _speed,
+    "cable_acceleration_max": _acceleration,
+}

@@ -1,0 +1,65 @@
+"""Bounds within which a release is looked for, in the units of the unknowns."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.beziers.sequences import duration_bounds
+from cspr_jax.errors import InputError, shown
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.point_mass import PLANAR, spool_radius
+
+# Over the size of the robot: to each side of the central vertical, and down from the centroid of the spools.
+ASIDE, DEEP = 2.0, 4.0
+# Parts of the duration of the segment between which a release is looked for.
+EARLIEST, LATEST = 0.01, 0.99
+
+Range = Sequence[float] | None
+
+
+class Bounds(NamedTuple):
+    """Bounds of the unknowns: place of the release, m, logarithms of the flight's time and of the duration, s, share.
+
+    Fields:
+        low: (6,) smallest ones.
+        high: (6,) largest ones.
+    """
+
+    low: Any
+    high: Any
+
+
+def bounds_of(
+    problem: Problem, frame: Frame, releases: Sequence[Range] = (None, None, None), longest: float | None = None
+) -> Bounds:
+    """Bounds of the unknowns.
+
+    Args:
+        problem: gives the size of the robot.
+        frame: of the robot file.
+        releases: of x, y and z of the release in that file's axes the least and the largest, m; None: as far aside as
+            `ASIDE`, and as deep as `DEEP`, times the size of the robot.
+        longest: largest duration of the segment, s; None: that of all searches.
+
+    Returns:
+        the bounds.
+
+    Raises:
+        InputError: a planar robot whose y is not 0, or a largest duration below the smallest one.
+    """
+    size = float(spool_radius(problem.robot))
+    aside = 0.0 if problem.robot.dof == PLANAR else ASIDE * size
+    corners = frame.outward([[-ASIDE * size, -aside, 0.0], [ASIDE * size, aside, DEEP * size]])
+    for i, given in enumerate(releases):
+        if given is not None:
+            corners[:, i] = given
+    inner = np.sort(frame.inward(corners), axis=0)
+    if problem.robot.dof == PLANAR and inner[:, 1].any():
+        raise InputError("release_y", releases[1], "[0, 0], or absent: a planar robot")
+    short, long = duration_bounds(problem, np.zeros((2, 3)))
+    if longest is not None and not np.log(longest) > short:
+        raise InputError("max_duration", longest, f"above {shown(float(np.exp(short)))} s, for a robot of this size")
+    last = long if longest is None else min(np.log(longest), long)
+    return Bounds(np.array([*inner[0], short, short, EARLIEST]), np.array([*inner[1], long, last, LATEST]))

@@ -1,0 +1,124 @@
+"""Bezier segments, one after the other: durations that are given or the least, accelerations that go on, verdicts."""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.beziers.duration_roots import Ends
+from cspr_jax.beziers.durations import feasible_durations, least_duration
+from cspr_jax.beziers.motion import Bezier, end_acceleration
+from cspr_jax.beziers.verdicts import verdicts
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.problem import Problem
+
+
+@dataclasses.dataclass(frozen=True)
+class BezierAnswers(Answers):
+    """Answers of Bezier segments, one each.
+
+    Fields:
+        control_points: (n, 3, 3) start, middle and end; m.
+        taut_durations: (n,) of each segment, those that keep every cable taut, with the segments before it as they
+            are: [[least, largest], ...] in s, inf where any longer duration does.
+        release: (n,) when an object is released, after the start of the segment, s; NaN where none is.
+        flight_time: (n,) time of its flight, s; NaN likewise.
+    """
+
+    control_points: np.ndarray
+    taut_durations: np.ndarray
+    release: np.ndarray
+    flight_time: np.ndarray
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Whether each segment is proved feasible, (n,)."""
+        return self.verdict == 0
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Details of a segment; see `Answers.details`."""
+        durations = self.taut_durations[i].tolist()
+        return {
+            "control_points": self.control_points[i].tolist(),
+            "taut_durations": durations,
+            "least_duration": durations[0][0] if durations else None,
+            "arcs": None,
+            "tried_arcs": None,
+        }
+
+
+class Joined(NamedTuple):
+    """Segments, each with what its duration was chosen from.
+
+    Fields:
+        motions: NumPy leaves with a leading dimension n.
+        taut_durations: (n_intervals, 2) s of each; see `BezierAnswers`.
+    """
+
+    motions: Bezier
+    taut_durations: list[np.ndarray]
+
+
+def joined_segments(
+    problem: Problem,
+    points: np.ndarray,
+    durations: list[float | None],
+    first_control_point: np.ndarray,
+    z0: float,
+) -> Joined:
+    """Segments through points, at rest in each, with accelerations that go on from one to the next (15).
+
+    Args:
+        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
+        points: (n + 1, 3) from the centroid of the spools, z down, m.
+        durations: of the n segments, s; None: the least feasible one, with the segments before as they are.
+        first_control_point: (3,) second control point of the first segment, m.
+        z0: depth at which slacks are normalised, m.
+
+    Returns:
+        the segments; where no duration is feasible, "least" is the one with the largest margin of those tried.
+    """
+    found, intervals, depth = [], [], np.array([z0])
+    # Of the first segment the control point is given, of the next ones the acceleration at the start.
+    ends = Ends(points[:1], points[1:2], first_control_point[None], np.zeros((1, 3)))
+    for i, wanted in enumerate(durations):
+        own = feasible_durations(problem.robot, ends, depth)[0]
+        time = least_duration(problem, ends, own, z0) if wanted is None else wanted
+        middle = ends.middles(np.array([time]))
+        found.append(Bezier(ends.start, middle, ends.end, np.array([time]), depth))
+        intervals.append(own)
+        if i + 1 < len(durations):
+            turn = end_acceleration(middle, ends.end, time)
+            ends = Ends(ends.end, points[i + 2 : i + 3], ends.end, turn)
+    return Joined(jax.tree.map(lambda *rows: np.concatenate(rows), *found), intervals)
+
+
+def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
+    """Answers of segments.
+
+    Args:
+        problem: robot and limits.
+        segments: of `joined_segments`.
+
+    Returns:
+        the answers; control points from the centroid of the spools, z down.
+    """
+    motions = segments.motions
+    own, count = verdicts(problem, motions), len(motions.time)
+    none, nothing = np.zeros(count, int), np.full(count, np.nan)
+    intervals = np.empty(count, object)
+    intervals[:] = segments.taut_durations
+    return BezierAnswers(
+        none,
+        none,
+        own.verdict,
+        motions.time,
+        own.margin,
+        own.bound,
+        own.room,
+        *(nothing, nothing, nothing),
+        np.stack([motions.start, motions.middle, motions.end], axis=1),
+        intervals,
+        *(np.full(count, np.nan) for _ in range(2)),
+    )

@@ -1,0 +1,155 @@
+"""Durations of a sequence of Bezier segments whose sum is least; accelerations that go on couple them all.
+
+At the ends of segments the accelerations are affine in u = (pi / T)^2: each segment adds u (start - end) to the one
+before it, (15).
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.constrained_minima import Judged, least
+from cspr_jax.beziers.durations import slowest
+from cspr_jax.beziers.margins import smallest_margins
+from cspr_jax.beziers.motion import Bezier
+from cspr_jax.beziers.verdicts import verdicts
+from cspr_jax.motions.limits import given
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.slacks import slacks
+from cspr_jax.robots.point_mass import spool_radius
+
+# Durations looked at, over that of a fall by the robot's size.
+SHORTEST, LONGEST = 0.1, 40.0
+# Instants of a segment at which limits are asked for; they are proved afterwards.
+SAMPLES = 65
+
+
+class Anchored(NamedTuple):
+    """Sequence of segments, one of whose second control points is known; numbers of NumPy or of jax.
+
+    Fields:
+        points: (n + 1, 3) from the centroid of the spools, z down, m.
+        segment: () number of the segment whose control point is known.
+        control_point: (3,) m.
+        z0: () depth at which slacks are normalised, m.
+    """
+
+    points: Any
+    segment: Any
+    control_point: Any
+    z0: Any
+
+
+@jax.jit
+def segments_of(sequence: Anchored, durations: Array) -> Bezier:
+    """Segments of given durations.
+
+    Args:
+        sequence: the points.
+        durations: (n,) s.
+
+    Returns:
+        leaves with a leading dimension n.
+    """
+    starts, ends = sequence.points[:-1], sequence.points[1:]
+    r = (durations / np.pi) ** 2
+    added = (starts - ends) / r[:, None]
+    gained = jnp.cumsum(added, axis=0) - added
+    at = sequence.segment
+    known = (sequence.control_point - starts[at]) / r[at]
+    middles = starts + r[:, None] * (known[None] + gained - gained[at][None])
+    return Bezier(starts, middles, ends, durations, jnp.full_like(durations, sequence.z0))
+
+
+def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Array:
+    """Margins of segments for a search: exact ones of taut cables and of the depth, sampled ones of limits.
+
+    Args:
+        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
+        segments: leaves with a leading dimension n.
+        samples: instants of a segment at which limits are asked for.
+
+    Returns:
+        (n * n_slacks,) without a unit.
+    """
+
+    def one(motion):
+        own = smallest_margins(problem.robot, motion)
+        found = jnp.append(own.taut, own.below)
+        if not given(problem.limits):
+            return found
+        tau = jnp.linspace(0.0, 1.0, samples)
+        limits = jax.vmap(lambda t: slacks(problem, motion, t)[len(found) :])(tau)
+        return jnp.append(found, jnp.min(limits, axis=0))
+
+    return jax.vmap(one)(segments).ravel()
+
+
+def judged(problem: Problem, segments: Bezier) -> Judged:
+    """Judgement of a sequence, proved.
+
+    Args:
+        problem: robot and limits.
+        segments: leaves with a leading dimension n.
+
+    Returns:
+        whether all are feasible, and the smallest margin.
+    """
+    own = verdicts(problem, jax.tree.map(np.asarray, segments))
+    worst = np.nan_to_num(np.minimum(own.margin, own.room), nan=-np.inf).min()
+    return Judged(bool((own.verdict == 0).all()), float(worst))
+
+
+def duration_bounds(problem: Problem, points: np.ndarray) -> tuple[float, float]:
+    """Logarithms of the shortest and of the longest duration that searches look at.
+
+    Args:
+        problem: gives the size of the robot, and limits of its speed.
+        points: (n + 1, 3) of the sequence, m; what is not known yet is NaN.
+
+    Returns:
+        of s.
+    """
+    unit = np.sqrt(float(spool_radius(problem.robot)) / float(problem.robot.gravity))
+    longest = max(LONGEST * unit, slowest(problem, points))
+    return float(np.log(SHORTEST * unit)), float(np.log(longest))
+
+
+def _parts(arguments, x: Array) -> tuple[Array, Array]:
+    problem, sequence, durations, free = arguments
+    times = durations.at[free].set(jnp.exp(x))
+    return jnp.sum(times), margins_of(problem, segments_of(sequence, times))
+
+
+def least_total(problem: Problem, sequence: Anchored, durations: list[float | None]) -> np.ndarray:
+    """Durations whose sum is least.
+
+    Args:
+        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
+        sequence: the points.
+        durations: of the n segments, s; None: to be chosen.
+
+    Returns:
+        (n,) s; where nothing feasible is found, those with the largest margin found.
+    """
+    known = np.array([1.0 if time is None else time for time in durations])
+    free = np.array([i for i, time in enumerate(durations) if time is None])
+
+    def times(x: np.ndarray) -> np.ndarray:
+        own = known.copy()
+        own[free] = np.exp(x)
+        return own
+
+    bounds = duration_bounds(problem, np.asarray(sequence.points))
+    shortest, longest = (np.full(len(free), bound) for bound in bounds)
+    found = least(
+        _parts,
+        (problem, sequence, jnp.asarray(known), free),
+        shortest,
+        longest,
+        lambda x: judged(problem, segments_of(sequence, jnp.asarray(times(x)))),
+    )
+    return times(found)

@@ -1,1 +1,0 @@
-"""Verdict and margin of one trajectory."""

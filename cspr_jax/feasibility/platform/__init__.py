@@ -1,1 +1,0 @@
-"""Feasibility of motions of a platform: slacks, samples, checks, cables that cross."""

@@ -1,1 +1,0 @@
-"""Feasibility of motions of a point mass: slacks, bounds, certificate, margins."""

@@ -1,1 +1,0 @@
-"""Feasibility of transitions: oscillations, envelopes, margins."""

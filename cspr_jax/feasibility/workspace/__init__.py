@@ -1,1 +1,0 @@
-"""Workspaces: whether the cables of a robot can hold its effector at a pose, with a margin."""

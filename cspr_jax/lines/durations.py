@@ -1,0 +1,239 @@
+"""Durations of lines before their proof: by formulas where these hold, by search elsewhere."""
+
+import dataclasses
+from functools import partial
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.lines import s_model as fastest
+from cspr_jax.lines.any_limits import least_by_search
+from cspr_jax.lines.faces import in_one_plane, line_faces, sides
+from cspr_jax.lines.lower_bounds import least_durations
+from cspr_jax.lines.motion import fixed_law
+from cspr_jax.lines.slacks import LineSlacks, line_slacks
+from cspr_jax.motions.amplitudes import Amplitude
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
+from cspr_jax.robots.wrench_sets import spanning
+from cspr_jax.schema.limits import LIMITS
+
+BATCH, BATCH_OF_SEARCH = 4096, 16
+Rule = Literal["optimum", "thesis"]
+# Limits that depend on how the effector moves.
+MOVING = tuple(row.name for row in LIMITS if row.of_motion)
+
+
+@dataclasses.dataclass(frozen=True)
+class Durations:
+    """Durations of n lines, (n,) each.
+
+    Fields:
+        duration: T, s; not finite where there is none.
+        ratio: p / T.
+        least: no motion along the line is faster, s; 0 where nothing is known.
+        rest: smaller one of the margins of rest at both ends, m/s^2.
+        depth: smaller one of the depths of both ends below the spools' plane, m; inf if they have none.
+        is_bounded: whether anything bounds the acceleration.
+        up: number of the bound that holds back the acceleration, in the order of `names_of`.
+        down: likewise of the braking.
+    """
+
+    duration: np.ndarray
+    ratio: np.ndarray
+    least: np.ndarray
+    rest: np.ndarray
+    depth: np.ndarray
+    is_bounded: np.ndarray
+    up: np.ndarray
+    down: np.ndarray
+
+    def part(self, wanted: np.ndarray) -> "Durations":
+        """Durations of some of the lines.
+
+        Args:
+            wanted: (n,) whether, or numbers of lines.
+
+        Returns:
+            theirs.
+        """
+        return Durations(**{name: value[wanted] for name, value in vars(self).items()})
+
+    def replace(self, which: np.ndarray, part: "Durations") -> None:
+        """Put other durations in place of some.
+
+        Args:
+            which: numbers of the lines.
+            part: theirs.
+        """
+        for name, values in vars(part).items():
+            getattr(self, name)[which] = values
+
+
+def moving(limits: Limits) -> tuple[str, ...]:
+    """Limits that depend on how the effector moves.
+
+    Args:
+        limits: the limits, without tracers.
+
+    Returns:
+        names of those that are given; a smallest tension of zero is what taut cables ask for anyway.
+    """
+    known = [name for name in MOVING if getattr(limits, name) is not None]
+    return tuple(name for name in known if name != "tension_min" or np.asarray(limits.tension_min).any())
+
+
+def names_of(robot: PointMassRobot, limits: Limits) -> tuple[str, ...]:
+    """Names of the bounds along a line.
+
+    Args:
+        robot: the robot.
+        limits: its limits.
+
+    Returns:
+        such as "cables 3, 4", one for each choice of cables, "max_acceleration", and the limits that depend on how the
+        effector moves.
+    """
+    chosen = spanning(robot.n_cables, robot.dof) + 1
+    cables = ("cables " + ", ".join(map(str, row)) for row in chosen.tolist())
+    return (*cables, "max_acceleration", *moving(limits))
+
+
+def by_formula(
+    robot: PointMassRobot, starts: np.ndarray, ends: np.ndarray, *, law: str, rule: Rule, max_acceleration: float
+) -> Durations:
+    """Least durations along straight lines under taut cables and the largest acceleration alone.
+
+    Args:
+        robot: centred, z down.
+        starts: (n, 3) m; at rest.
+        ends: (n, 3) m; at rest.
+        law: one of `lines.motion.LAWS`.
+        rule: of the S-model.
+        max_acceleration: largest size of the acceleration, m/s^2.
+
+    Returns:
+        what formulas give; no durations of spools that are not in one plane.
+    """
+    in_plane, largest = in_one_plane(robot), np.full(len(starts), float(max_acceleration))
+    kernel = partial(_by_formula, robot, law=law, rule=rule, in_plane=in_plane)
+    least, bound, rest, depth, is_bounded = in_batches(kernel, (starts, ends, largest), size=BATCH)
+    duration = least.duration * (1.0 + fastest.LONGER) if in_plane else np.full(len(starts), np.nan)
+    fields = (duration, least.ratio, bound, rest, depth, is_bounded, least.up, least.down)
+    return Durations(*(np.array(x) for x in fields))
+
+
+@jax.jit
+def _lines(problem: Problem, arguments) -> LineSlacks:
+    return jax.vmap(partial(line_slacks, problem))(*arguments)
+
+
+def lines_of(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> LineSlacks:
+    """What slacks along lines depend on.
+
+    Args:
+        problem: robot and limits.
+        starts: (n, 3) m.
+        ends: (n, 3) m, elsewhere.
+
+    Returns:
+        NumPy leaves with a leading dimension n.
+    """
+    return in_batches(partial(_lines, problem), (starts, ends), size=BATCH)
+
+
+def by_cells(problem: Problem, starts: np.ndarray, ends: np.ndarray, max_acceleration: float) -> np.ndarray:
+    """Lower bounds of the duration of any motion along lines, under limits of tensions and cables too.
+
+    Args:
+        problem: robot and limits.
+        starts: (n, 3) m; at rest.
+        ends: (n, 3) m, elsewhere; at rest.
+        max_acceleration: largest size of the acceleration, m/s^2.
+
+    Returns:
+        (n,) s.
+    """
+    largest = max_acceleration / np.linalg.norm(ends - starts, axis=1)
+    return least_durations(lines_of(problem, starts, ends), largest)
+
+
+def by_search(
+    problem: Problem, starts: np.ndarray, ends: np.ndarray, found: Durations, *, law: str, max_acceleration: float
+) -> Durations:
+    """Least durations along straight lines under any limits, of spools in any layout.
+
+    Args:
+        problem: robot and limits.
+        starts: (n, 3) m; at rest.
+        ends: (n, 3) m, elsewhere; at rest.
+        found: of `by_formula`.
+        law: one of `lines.motion.LAWS`.
+        max_acceleration: largest size of the acceleration, m/s^2.
+
+    Returns:
+        what a search gives, the rest as it was.
+    """
+    own = problem._replace(limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)}))
+    largest = np.full(len(starts), float(max_acceleration))
+    least = in_batches(partial(_by_search, own, law=law), (starts, ends, largest), size=BATCH_OF_SEARCH)
+    rows = _bounds_of_rows(own)
+    return dataclasses.replace(
+        found, duration=least.duration, ratio=least.ratio, up=rows[least.up], down=rows[least.down]
+    )
+
+
+@partial(jax.jit, static_argnames=("rule", "law", "in_plane"))
+def _by_formula(robot: PointMassRobot, arguments, *, law: str, rule: str, in_plane: bool):
+    def one(start, end, largest):
+        faces = line_faces(robot, start, end, in_plane=in_plane)
+        bounds = sides(faces, largest / jnp.linalg.norm(end - start))
+        if law != "s-curve":
+            least = fastest.least_of_law(fixed_law(law), bounds)
+        elif rule == "optimum":
+            least = fastest.least_s_curve(bounds)
+        else:
+            least = fastest.thesis_s_curve(bounds)
+        sizes = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.turn, axis=1) for t in (0.0, 1.0)])
+        resting = -jnp.stack([faces.offset, faces.offset + faces.slope]) / jnp.where(sizes > 0.0, sizes, 1.0)
+        there = faces.bounds[None] & jnp.stack([faces.first <= 0.0, faces.last >= 1.0])
+        rest = jnp.min(jnp.where(there, resting, jnp.inf))
+        is_bounded = jnp.isfinite(bounds.up).any() & jnp.isfinite(bounds.down).any()
+        if not in_plane:
+            return least, fastest.least_time(bounds, everywhere=False), rest, jnp.asarray(jnp.inf), is_bounded
+        depth = jnp.minimum(plane_normal(robot) @ start, plane_normal(robot) @ end)
+        return least, fastest.least_time(bounds), rest, depth, is_bounded & faces.bounds.any()
+
+    return jax.vmap(one)(*arguments)
+
+
+def _fixed(law: str) -> Amplitude | None:
+    return None if law == "s-curve" else fixed_law(law)
+
+
+@partial(jax.jit, static_argnames=("law",))
+def _by_search(problem: Problem, arguments, *, law: str):
+    def one(start, end, largest):
+        line = line_slacks(problem, start, end)
+        return least_by_search(line, largest / jnp.linalg.norm(end - start), _fixed(law))
+
+    return jax.vmap(one)(*arguments)
+
+
+def _bounds_of_rows(problem: Problem) -> np.ndarray:
+    # Numbers in `names_of` of what bounds a search, see `any_limits.Gain`; faces are of both sides.
+    robot, names = problem.robot, names_of(problem.robot, problem.limits)
+    faces, given = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
+    counts = {"tension_min": faces, "tension_max": faces, "cable_speed_max": robot.n_cables}
+    counts["cable_acceleration_max"] = 2 * robot.n_cables
+    rows = [np.tile(np.arange(faces // 2), 2)]
+    for name, count in counts.items():
+        if name in given:
+            rows.append(np.full(count, names.index(name)))
+        elif name.startswith("tension"):
+            rows.append(np.full(count, -1))  # none is shifted so
+    return np.concatenate([*rows, [names.index("max_acceleration")]])

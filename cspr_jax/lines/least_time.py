@@ -1,0 +1,87 @@
+"""Least durations along straight lines from rest to rest: arrays of ends in, arrays out.
+
+Of spools in one plane and without limits, what the S-model's formulas give is feasible by proof: the bounds of every
+face are met all along (see `lines.s_model`), with a margin above rounding. Otherwise, and where p
+or T - p is so short that its digits are lost, every motion has a proof of its own.
+"""
+
+import dataclasses
+
+import numpy as np
+
+from cspr_jax.lines.durations import Rule, names_of
+from cspr_jax.lines.fastest import fastest
+from cspr_jax.motions.problem import Problem
+from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.verdicts import Verdict
+
+
+@dataclasses.dataclass(frozen=True)
+class LeastTimes(Columns):
+    """Least durations along n lines; NumPy arrays, (n,) each.
+
+    Fields:
+        verdict: flags of `Verdict`; 0 where there is a feasible motion.
+        duration: T, s; NaN where there is none, 0 where both ends are one place.
+        acceleration_time: p, s.
+        least_duration: no motion along the line is faster, s.
+        duration_ratio: of the two.
+        rest_margin: smaller one of the margins of rest at both ends, m/s^2; NaN where an end is not below the spools.
+        active_up: number of the bound that holds back the acceleration, from 1 on in the order of `names_of`; 0: none.
+        active_down: likewise of the braking.
+        names: of the bounds, the first one's first.
+    """
+
+    verdict: np.ndarray
+    duration: np.ndarray
+    acceleration_time: np.ndarray
+    least_duration: np.ndarray
+    duration_ratio: np.ndarray
+    rest_margin: np.ndarray
+    active_up: np.ndarray
+    active_down: np.ndarray
+    names: tuple[str, ...]
+
+
+def least_times(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    *,
+    law: str = "s-curve",
+    rule: Rule = "optimum",
+    max_acceleration: float = np.inf,
+) -> LeastTimes:
+    """Least durations along straight lines.
+
+    Args:
+        problem: robot, a point mass, centred, z down, and limits.
+        starts: (n, 3) m; at rest.
+        ends: (n, 3) m; at rest.
+        law: one of `lines.motion.LAWS`.
+        rule: of the S-model.
+        max_acceleration: largest size of the acceleration, m/s^2.
+
+    Returns:
+        the durations.
+    """
+    found, own, moves = fastest(
+        problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=False
+    )
+    # No motion that is refuted; 0 s where both ends are one place.
+    moves &= (own.verdict == 0) | (own.verdict == Verdict.UNDECIDED.value)
+    nothing = np.where((own.verdict == 0) & ~moves, 0.0, np.nan)
+    duration, least = (np.where(moves, x, nothing) for x in (found.duration, found.least))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        relative = np.where(least > 0.0, duration / least, np.nan)
+    return LeastTimes(
+        verdict=own.verdict,
+        duration=duration,
+        acceleration_time=np.where(moves, found.ratio, 0.5) * duration,
+        least_duration=least,
+        duration_ratio=relative,
+        rest_margin=np.where(found.depth > 0.0, found.rest, np.nan),
+        active_up=np.where(moves, found.up + 1, 0).astype(np.int16),
+        active_down=np.where(moves, found.down + 1, 0).astype(np.int16),
+        names=names_of(problem.robot, problem.limits),
+    )

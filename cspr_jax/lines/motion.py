@@ -1,0 +1,114 @@
+"""Straight lines from rest to rest, by a law of time: the S-model, the quintic and the cubic.
+
+The law s(tau) runs from 0 to 1 and is a piecewise polynomial, an `Amplitude` like those of chapter 2. Of the S-model
+(Boralugoda, Tables 3.1 and 3.2, their last range mended) the acceleration is a triangle up for the first part of the
+time, p / T, and one down for the rest. The quintic's acceleration is smooth, the cubic's jumps at both ends.
+"""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.motions import amplitudes
+from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.robots.state import State
+
+LAWS = ("s-curve", "quintic", "cubic")
+
+
+def s_curve(ratio: Array) -> Amplitude:
+    """Law of the S-model.
+
+    Args:
+        ratio: () p / T, in ]0, 1[.
+
+    Returns:
+        the law: knots at p / 2, p and (T + p) / 2 over T.
+    """
+    ratio = jnp.asarray(ratio, float)
+    rest, zero, one = 1.0 - ratio, jnp.zeros_like(ratio), jnp.ones_like(ratio)
+    up, down = 4.0 / (3.0 * ratio**2), 4.0 / (3.0 * rest**2)
+    # About the beginning, the fastest instant from either side, and the end.
+    pieces = [
+        [zero, zero, zero, up],
+        [ratio, 2.0 * one, zero, -up],
+        [ratio, 2.0 * one, zero, -down],
+        [one, zero, zero, down],
+    ]
+    steepest = jnp.maximum(1.0 / ratio, 1.0 / rest)
+    return Amplitude(
+        knots=jnp.stack([0.5 * ratio, ratio, 0.5 * (1.0 + ratio)]),
+        origins=jnp.stack([zero, ratio, ratio, one]),
+        coefficients=jnp.stack([jnp.stack(piece) for piece in pieces]),
+        largest=jnp.stack([one, 2.0 * one, 4.0 * steepest, 8.0 * steepest**2, zero, zero]),
+        lowest=zero,
+        highest=one,
+        name="s-curve",
+    )
+
+
+def fixed_law(name: str) -> Amplitude:
+    """Law that has no parameter.
+
+    Args:
+        name: "quintic" or "cubic".
+
+    Returns:
+        the law.
+    """
+    return amplitudes.named("quintic") if name == "quintic" else amplitudes.from_polynomial([0.0, 0.0, 3.0, -2.0])
+
+
+def largest_bend(law: str, ratio: np.ndarray) -> np.ndarray:
+    """Largest size of s'' over tau of a law.
+
+    Args:
+        law: one of `LAWS`.
+        ratio: (n,) p / T of the S-model.
+
+    Returns:
+        (n,) an upper bound, exact but for rounding.
+    """
+    if law == "s-curve":
+        return 4.0 / np.minimum(ratio, 1.0 - ratio)
+    return np.full(np.shape(ratio), np.asarray(fixed_law(law).largest)[2])
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class TimedLine:
+    """Motion along a straight line from rest to rest; see `Motion`.
+
+    Fields:
+        start: (3,) from the centroid of the spools, z down, m.
+        direction: (3,) from the start to the end, m.
+        law: s(tau).
+        time: () duration T, s.
+    """
+
+    start: Array
+    direction: Array
+    law: Amplitude
+    time: Array
+
+    @property
+    def z0(self) -> Array:
+        """Depth at which slacks are normalised: that of the start, () m."""
+        return self.start[..., 2]
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return self.time
+
+    def state(self, tau: Array) -> State:
+        """State, (7) to (9); see `Motion.state`."""
+        s, s1, s2 = derivatives(self.law, jnp.asarray(tau, float), order=2)
+        along = (self.start + s * self.direction, s1 / self.time * self.direction, s2 / self.time**2 * self.direction)
+        return State(*along)
+
+    def breaks(self) -> Array:
+        """Knots of the law; see `Motion.breaks`."""
+        return self.law.knots

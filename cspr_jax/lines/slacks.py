@@ -1,0 +1,236 @@
+"""Slacks of taut cables and of limits along a straight line, as functions of s, s'^2 and s''.
+
+On the line a cable has the length l = sqrt(|D|^2 (s - c)^2 + h^2), the rate |D|^2 (s - c) / l times s', and a second
+derivative with h^2 / l^3. Every slack here is affine in s'^2 and s'', so that for one law it is affine in 1 / T^2. The
+formulas are written once: arrays go in where a motion is searched, interval jets where it is proved.
+"""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.interval_jets import Jet
+from cspr_jax.lines.faces import line_faces
+from cspr_jax.motions.limits import given
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.schema.limits import LIMITS
+
+TAUT = "taut"
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class LineSlacks:
+    """What slacks along a line depend on.
+
+    Fields:
+        square: () |D|^2, m^2.
+        nearest: (n_cables,) s at which each cable is shortest, beyond the ends too.
+        apart: (n_cables,) square of its length there, m^2.
+        steepness: (n_faces,) n . D of the faces of both sides, over the size of n at its smallest on the line.
+        offset: (n_faces,) n . g at the start, likewise; -inf of what bounds nothing.
+        slope: (n_faces,) change of n . g, likewise.
+        along: (n_faces, n_cables) n . r of the rays at the start, likewise.
+        along_turn: (n_faces, n_cables) its change, likewise.
+        turning: (n_faces,) size of the change of n, likewise.
+        narrowest: (n_faces,) s at which n is smallest, beyond the ends too.
+        least_size: (n_faces,) square of the size of n there, likewise.
+        spans: (n_faces,) whether the cables of the face span it.
+        low: smallest tensions over the mass by group of faces, (n_cables,) m/s^2 each.
+        high: likewise the largest, inf for none.
+        largest: of the limits that depend on how the effector moves, by name; (n_cables,) each.
+    """
+
+    square: Array
+    nearest: Array
+    apart: Array
+    steepness: Array
+    offset: Array
+    slope: Array
+    along: Array
+    along_turn: Array
+    turning: Array
+    narrowest: Array
+    least_size: Array
+    spans: Array
+    low: dict[str, Array]
+    high: dict[str, Array]
+    largest: dict[str, Array]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Groups of slacks: taut cables, and the limits in their order."""
+        known = {*self.low, *self.largest}
+        return tuple(name for name in (TAUT, *(row.name for row in LIMITS)) if name in known)
+
+    @property
+    def tightest(self) -> str:
+        """Group of faces inside which all the others lie."""
+        return [name for name in self.names if name in self.low][-1]
+
+
+def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
+    """What slacks along a line depend on.
+
+    Args:
+        problem: robot and limits.
+        start: (3,) from the centroid of the spools, z down, m.
+        end: (3,) likewise, elsewhere.
+
+    Returns:
+        the coefficients.
+    """
+    robot, direction = problem.robot, end - start
+    faces = line_faces(robot, start, end, in_plane=False)
+    square = direction @ direction
+    rays = robot.base_points - start[None]
+    nearest = rays @ direction / square
+    apart = jnp.sum((rays - nearest[:, None] * direction[None]) ** 2, axis=1)
+    change = jnp.sum(faces.turn**2, axis=1)
+    narrowest = -jnp.sum(faces.normal * faces.turn, axis=1) / jnp.where(change > 0.0, change, 1.0)
+    least = jnp.sum((faces.normal + narrowest[:, None] * faces.turn) ** 2, axis=1)
+    at = jnp.clip(narrowest, 0.0, 1.0)
+    size = jnp.linalg.norm(faces.normal + at[:, None] * faces.turn, axis=1)
+    spans = (size > 0.0) & ((faces.along != 0.0) | (faces.along_turn != 0.0)).any(1)
+    over = jnp.where(spans, size, 1.0)
+    low, high = _tensions(problem)
+    return LineSlacks(
+        square=square,
+        nearest=nearest,
+        apart=apart,
+        steepness=faces.steepness / over,
+        offset=jnp.where(spans, faces.offset / over, -jnp.inf),
+        slope=faces.slope / over,
+        along=faces.along / over[:, None],
+        along_turn=faces.along_turn / over[:, None],
+        turning=change / over**2,
+        narrowest=narrowest,
+        least_size=least / over**2,
+        spans=spans,
+        low=low,
+        high=high,
+        largest={
+            row.name: jnp.broadcast_to(jnp.asarray(getattr(problem.limits, row.name)), (robot.n_cables,))
+            for row in given(problem.limits)
+            if row.quantity in ("speed", "acceleration")
+        },
+    )
+
+
+def _tensions(problem: Problem) -> tuple[dict[str, Array], dict[str, Array]]:
+    # The largest tension is asked for together with the smallest.
+    robot, none = problem.robot, jnp.zeros(problem.robot.n_cables)
+    least, most = tension_range(robot, problem.limits)
+    low, high = {TAUT: none}, {TAUT: none + jnp.inf}
+    if problem.limits.tension_min is not None:
+        low["tension_min"], high["tension_min"] = least / robot.mass, none + jnp.inf
+    if problem.limits.tension_max is not None:
+        low["tension_max"], high["tension_max"] = least / robot.mass, most / robot.mass
+    return low, high
+
+
+class Instants(NamedTuple):
+    """Where a motion along a line is: arrays, or jets over blocks; their last dimension has length 1.
+
+    Fields:
+        s: path coordinate.
+        speed: s'^2, 1/s^2.
+        bend: s'', 1/s^2.
+    """
+
+    s: Any
+    speed: Any
+    bend: Any
+
+
+def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> Any:
+    """Slacks of a group at instants, or a lower bound of them.
+
+    Args:
+        line: of the line, with leading dimensions of the instants or none.
+        name: of the group.
+        at: the instants, (..., 1).
+        tensions: of a group of faces, (..., n_faces, n_cables) over the mass: of `tensions_at`, or of `tensions_over`
+            for a lower bound.
+
+    Returns:
+        (..., n_rows): distances from the faces in m/s^2, positive inside, inf of a face that bounds nothing; of limits
+        of a motion without a unit, of speeds 1 - (rate / limit)^2.
+    """
+    away = at.s - line.nearest
+    square = line.square[..., None]
+    length2 = away**2 * square + line.apart
+    if name == "cable_speed_max":
+        return 1.0 - away**2 * length2**-1.0 * at.speed * (square / line.largest[name]) ** 2
+    if name == "cable_acceleration_max":
+        second = length2**-1.5 * at.speed * (square * line.apart) + away * length2**-0.5 * at.bend * square
+        return joined(1.0 - second / line.largest[name], 1.0 + second / line.largest[name])
+    slack = at.bend * line.steepness - at.s * line.slope - line.offset
+    if tensions is not None:
+        slack = slack - _pulled(line, at.s, length2**-0.5, tensions)
+    size2 = (at.s - line.narrowest) ** 2 * line.turning + line.least_size
+    return slack * size2**-0.5
+
+
+def _pulled(line: LineSlacks, s: Any, shortness: Any, tensions: Any) -> Any:
+    # What the cables pull towards the inside of each face, over the mass.
+    if isinstance(s, Jet):
+        return ((s.expanded(-1) * line.along_turn + line.along) * shortness.expanded(-2) * tensions).summed()
+    return ((line.along + line.along_turn * s[..., None]) * tensions * shortness[..., None, :]).sum(-1)
+
+
+def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
+    """Tensions within their limits that pull least towards the inside of each face.
+
+    Args:
+        line: of the line.
+        name: of a group of faces.
+        s: (..., 1) path coordinates.
+
+    Returns:
+        (..., n_faces, n_cables) over the mass, m/s^2; inf where nothing is the least.
+    """
+    xp = np if isinstance(s, np.ndarray) else jnp
+    low, high = line.low[name][..., None, :], line.high[name][..., None, :]
+    along = line.along + line.along_turn * s[..., None]
+    return xp.where(along > 0.0, low, xp.where(along < 0.0, high, 0.0))
+
+
+def tensions_over(line: LineSlacks, name: str, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """One choice of tensions for all of a stretch, with which slacks are bounded from below.
+
+    Args:
+        line: of the lines, with a leading dimension.
+        name: of a group of faces.
+        first: (n, 1) where the stretches begin.
+        last: (n, 1) where they end.
+
+    Returns:
+        the tensions, (n, n_faces, n_cables) over the mass; (n, n_faces) whether a face bounds nothing on the stretch.
+    """
+    low, high = line.low[name][:, None, :], line.high[name][:, None, :]
+    ends = [line.along + line.along_turn * s[..., None] for s in (first, last)]
+    endless = ~np.isfinite(high)
+    beyond = ((ends[0] < 0.0) & (ends[1] < 0.0) & endless).any(-1)
+    return np.where((ends[0] + ends[1] < 0.0) & ~endless, high, low), np.asarray(beyond | ~line.spans)
+
+
+def joined(first: Any, second: Any) -> Any:
+    """Rows of two groups in one.
+
+    Args:
+        first: (..., n) arrays or jets.
+        second: likewise.
+
+    Returns:
+        (..., 2 n).
+    """
+    if isinstance(first, Jet):
+        return first.joined(second)
+    xp = np if isinstance(first, np.ndarray) else jnp
+    return xp.concatenate([first, second], axis=-1)

@@ -1,0 +1,111 @@
+"""Straight lines from rest to rest in the least time: arrays of ends in, answers out."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.lines.durations import Rule, names_of
+from cspr_jax.lines.fastest import fastest
+from cspr_jax.lines.motion import TimedLine
+from cspr_jax.lines.verdicts import laws_of
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.problem import Problem
+
+
+@dataclasses.dataclass(frozen=True)
+class LineAnswers(Answers):
+    """Answers of straight lines, one each.
+
+    Fields:
+        acceleration_time: (n,) p, s.
+        least_duration: (n,) no motion along the line is faster, s.
+        active: (n, 2) number of the bound that holds back the acceleration, and of that which holds back the braking:
+            from 1 on; 0: none.
+        names: of these bounds, the first one's first.
+    """
+
+    acceleration_time: np.ndarray
+    least_duration: np.ndarray
+    active: np.ndarray
+    names: tuple[str, ...] = ()
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Whether each line is proved feasible, (n,)."""
+        return self.verdict == 0
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Details of a segment; see `Answers.details`."""
+        active = dict.fromkeys(self.names[k - 1] for k in self.active[i] if k > 0)
+        return {
+            "acceleration_time": float(self.acceleration_time[i]),
+            "active": list(active),
+            "least_duration": float(self.least_duration[i]),
+            "arcs": None,
+            "tried_arcs": None,
+        }
+
+
+def timed_lines(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    *,
+    law: str = "s-curve",
+    rule: Rule = "optimum",
+    max_acceleration: float = np.inf,
+) -> LineAnswers:
+    """The fastest motions along straight lines by a law of time, proved.
+
+    Args:
+        problem: robot and limits.
+        starts: (n, 3) from the centroid of the spools, z down, m; at rest.
+        ends: (n, 3) likewise, elsewhere.
+        law: one of `lines.motion.LAWS`.
+        rule: of the S-model.
+        max_acceleration: largest size of the acceleration, m/s^2.
+
+    Returns:
+        the answers, margins in m/s^2; durations are NaN where there is no motion.
+    """
+    found, own, moves = fastest(
+        problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=True
+    )
+    none, nothing = np.zeros(len(starts), int), np.full(len(starts), np.nan)
+    duration = np.where(moves, found.duration, np.nan)
+    return LineAnswers(
+        none,
+        none,
+        own.verdict,
+        duration,
+        own.margin,
+        own.bound,
+        own.room,
+        *(nothing, nothing, nothing),
+        np.where(moves, found.ratio, 0.5) * duration,
+        np.where(moves, found.least, np.nan),
+        np.stack([np.where(moves, x + 1, 0) for x in (found.up, found.down)], axis=1),
+        names_of(problem.robot, problem.limits),
+    )
+
+
+def motions_of(answers: LineAnswers, starts: np.ndarray, ends: np.ndarray, *, law: str) -> list[TimedLine]:
+    """Motions along straight lines.
+
+    Args:
+        answers: of the lines.
+        starts: (n, 3) from the centroid of the spools, z down, m.
+        ends: (n, 3) likewise.
+        law: one of `lines.motion.LAWS`.
+
+    Returns:
+        one each; not finite where there is none.
+    """
+    with np.errstate(invalid="ignore"):
+        ratios = answers.acceleration_time / answers.duration
+    laws = laws_of(law, np.where(np.isfinite(ratios), ratios, 0.5))
+    rows = (starts, ends - starts, laws, answers.duration)
+    return [TimedLine(*jax.tree.map(lambda x, i=i: leaf(x[i]), rows)) for i in range(len(starts))]

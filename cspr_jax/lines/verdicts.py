@@ -1,0 +1,158 @@
+"""Verdicts of motions along straight lines: proved where every slack has a bound above zero, refuted by one below."""
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.lines.durations import BATCH, Durations, lines_of
+from cspr_jax.lines.motion import fixed_law, largest_bend, s_curve
+from cspr_jax.lines.proof import smallest_slacks
+from cspr_jax.lines.slacks import TAUT
+from cspr_jax.motions.acceleration_sets import faces_at
+from cspr_jax.motions.amplitudes import Amplitude
+from cspr_jax.motions.limits import given, scales, slack
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_verdicts import Verdicts, plain_slack
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+# Over gravity, or the size of a limit: margins nearer to zero are undecided, and rest with a smaller margin is none.
+TOLERANCE = 1e-12
+
+
+@jax.jit
+def _s_curves(ratios) -> Amplitude:
+    return jax.vmap(s_curve)(ratios)
+
+
+def laws_of(law: str, ratios: np.ndarray) -> Amplitude:
+    """Laws of time.
+
+    Args:
+        law: one of `lines.motion.LAWS`.
+        ratios: (n,) p / T of the S-model.
+
+    Returns:
+        NumPy leaves with a leading dimension n.
+    """
+    if law == "s-curve":
+        return in_batches(_s_curves, ratios, size=BATCH)
+    one = jax.tree.map(np.asarray, fixed_law(law))
+    return jax.tree.map(lambda x: np.broadcast_to(x, (len(ratios), *x.shape)), one)
+
+
+def acceleration_slack(
+    starts: np.ndarray, ends: np.ndarray, found: Durations, *, law: str, max_acceleration: float
+) -> np.ndarray:
+    """Slack of the largest acceleration along lines: a closed form, since the peak of s'' of each law is known.
+
+    Args:
+        starts: (n, 3) m.
+        ends: (n, 3) m.
+        found: their durations.
+        law: of time.
+        max_acceleration: m/s^2.
+
+    Returns:
+        (n,) 1 - (largest acceleration) / max_acceleration; NaN without a duration.
+    """
+    largest = np.linalg.norm(ends - starts, axis=1) * largest_bend(law, found.ratio)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return 1.0 - largest / found.duration**2 / max_acceleration
+
+
+def verdicts(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    found: Durations,
+    *,
+    law: str,
+    max_acceleration: float,
+    sharp: bool,
+) -> Verdicts:
+    """Verdicts of motions whose durations are known.
+
+    Args:
+        problem: robot and limits.
+        starts: (n, 3) m.
+        ends: (n, 3) m, elsewhere.
+        found: finite durations.
+        law: of time.
+        max_acceleration: largest size of the acceleration, m/s^2; a motion beyond it is undecided.
+        sharp: whether margins are wanted, and not verdicts only.
+
+    Returns:
+        the verdicts.
+    """
+    gravity = float(np.asarray(problem.robot.gravity))
+    lines = lines_of(problem, starts, ends)
+    enough = np.inf if sharp else TOLERANCE
+    proved = smallest_slacks(lines, laws_of(law, found.ratio), found.duration, gravity, enough=enough)
+    doubt = TOLERANCE * np.array([gravity if name in lines.low else 1.0 for name in lines.names])
+    own_flags = {row.name: row.flag.value for row in LIMITS} | {TAUT: Verdict.SLACK_CABLE.value}
+    flags = np.where(proved.attained < -doubt, [own_flags[name] for name in lines.names], 0)
+    room, broken, doubtful = _at_ends(problem, starts, ends)
+    for name, values in zip(lines.names[1:], proved.attained.T[1:], strict=True):
+        room = np.minimum(room, plain_slack(name, values / gravity if name.startswith("tension") else values))
+    broken |= np.bitwise_or.reduce(flags, axis=1)
+    is_within = acceleration_slack(starts, ends, found, law=law, max_acceleration=max_acceleration) > TOLERANCE
+    is_open = ~(proved.bound > doubt).all(1) | doubtful | ~is_within
+    verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(FLAGS)
+    return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
+
+
+def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    # Smallest slack, flags and doubts, (n,) each, of limits on places: lengths are convex in s, depths linear.
+    robot, places = problem.robot, np.stack([starts, ends], axis=1)
+    lengths = np.linalg.norm(places[:, :, None] - np.asarray(robot.base_points), axis=3)
+    each: dict[str, Any] = {"depth": places[..., 2:], "length": lengths}
+    scale: Any = scales(robot.n_cables, robot.mass * robot.gravity, spool_radius(robot))
+    room, flags = np.full(len(starts), np.inf), np.zeros(len(starts), int)
+    for row in given(problem.limits):
+        if not row.of_motion:
+            limit: Any = np.asarray(getattr(problem.limits, row.name))
+            own = np.asarray(slack(row, limit, each[row.quantity], scale)).min((1, 2))
+            room, flags = np.minimum(room, own), flags | np.where(own < -TOLERANCE, row.flag.value, 0)
+    return room, flags, ~(room > TOLERANCE)
+
+
+def limits_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Limits that rest at either end breaks.
+
+    Args:
+        problem: robot and limits.
+        starts: (n, 3) m.
+        ends: (n, 3) m.
+
+    Returns:
+        (n,) flags of `Verdict`.
+    """
+    _, flags, _ = _at_ends(problem, starts, ends)
+    limits = {row.name: getattr(problem.limits, row.name) for row in given(problem.limits) if row.quantity == "tension"}
+    fails = partial(_fails_at_rest, problem, starts, ends)
+    alone = {name: fails({name: limit}) for name, limit in limits.items()}
+    for row in given(problem.limits):
+        flags |= np.where(alone.get(row.name, False), row.flag.value, 0)
+    if len(limits) > 1:  # of two that only fail together one may go
+        together = fails(limits) & ~np.any(list(alone.values()), axis=0)
+        flags |= np.where(together, Verdict.OVER_TENSION.value, 0)
+    return flags
+
+
+def _fails_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, limits: dict[str, Any]) -> np.ndarray:
+    # Whether rest at either end breaks limits of the tensions, or taut cables, (n,).
+    own = problem._replace(limits=Limits(**limits))
+    margins = [in_batches(partial(_at_rest, own), places, size=BATCH) for places in (starts, ends)]
+    return np.min(margins, axis=0) < -TOLERANCE * float(np.asarray(problem.robot.gravity))
+
+
+@jax.jit
+def _at_rest(problem: Problem, places):
+    return jax.vmap(lambda x: faces_at(problem.robot, problem.limits, x).margin(jnp.zeros_like(x)))(places)

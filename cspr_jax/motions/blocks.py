@@ -1,0 +1,134 @@
+"""Blocks of motions: parts of arcs, cut at the knots of the amplitude function, and halved where open."""
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.motions.amplitudes import Amplitude
+
+# Of a part more that a piece between knots gets as little as this is not worth a block.
+SLIVER = 0.3
+INSTANTS = 1025  # at which parts along a motion are told
+
+
+class Blocks(NamedTuple):
+    """Blocks of motions.
+
+    Fields:
+        row: (k,) whose block it is.
+        start: (k,) tau where it starts.
+        stop: (k,) tau where it stops; no knot inside.
+    """
+
+    row: np.ndarray
+    start: np.ndarray
+    stop: np.ndarray
+
+    def some(self, which: np.ndarray) -> "Blocks":
+        """Blocks chosen by indices, or by a mask (k,)."""
+        return Blocks(*(x[which] for x in self))
+
+    def instants(self, places: np.ndarray) -> np.ndarray:
+        """Instants at the same places of each block.
+
+        Args:
+            places: (m, 1), or (m, k) of each block's own, from -1 at its start to 1 at its stop.
+
+        Returns:
+            (m, k) tau.
+        """
+        return 0.5 * (self.start + self.stop) + places * (0.5 * (self.stop - self.start))
+
+    def halves(self) -> "Blocks":
+        """Both halves of each block, (2 k,)."""
+        middle = 0.5 * (self.start + self.stop)
+        return Blocks(
+            np.repeat(self.row, 2),
+            np.stack([self.start, middle], axis=1).ravel(),
+            np.stack([middle, self.stop], axis=1).ravel(),
+        )
+
+
+class Parts(NamedTuple):
+    """How many parts an arc has, at instants tau from 0 to 1, equally far apart.
+
+    Fields:
+        at_cusps: (m,) if there is a cusp at the instant.
+        at_middles: (m,) if it is halfway between two. Elsewhere it is between, as the squared sine of the phase.
+    """
+
+    at_cusps: np.ndarray
+    at_middles: np.ndarray
+
+    def of(self, arcs: int) -> np.ndarray:
+        """Parts of arcs along a motion.
+
+        Args:
+            arcs: how many it has.
+
+        Returns:
+            (m,).
+        """
+        share = np.sin(math.pi * arcs * np.linspace(0.0, 1.0, len(self.at_cusps))) ** 2
+        return self.at_cusps + (self.at_middles - self.at_cusps) * share
+
+
+def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tuple[float, float]) -> Parts:
+    """Parts of an arc along a motion from rest, more of them where it swings farther.
+
+    Args:
+        amplitude: A.
+        at_cusps: how many where A is 0, and where it is 1; in between linear, beyond as at the nearer one.
+        at_middles: likewise halfway between two cusps.
+
+    Returns:
+        the parts.
+    """
+    tau = np.linspace(0.0, 1.0, INSTANTS)
+    piece = np.searchsorted(np.asarray(amplitude.knots), tau)
+    coefficients, origins = np.asarray(amplitude.coefficients)[piece], np.asarray(amplitude.origins)[piece]
+    values = np.polynomial.polynomial.polyval(tau - origins, coefficients.T, tensor=False)
+    return Parts(*(np.interp(values, (0.0, 1.0), ramp) for ramp in (at_cusps, at_middles)))
+
+
+def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: float | Parts) -> Blocks:
+    """Parts of all arcs of motions.
+
+    Args:
+        arcs: (n,) number of arcs of each motion, 1 or more.
+        knots: of the amplitude function, inside ]0, 1[.
+        parts: how many an arc, or nearly.
+
+    Returns:
+        the blocks, those of a motion side by side, in time.
+    """
+    numbers, own = np.unique(arcs, return_inverse=True)
+    edges = [_edges(int(p), [0.0, *knots.tolist(), 1.0], parts) for p in numbers]
+    lengths = np.array([len(x) for x in edges], int)
+    # All edges in one row: where those of each motion begin, and which of them each block begins with.
+    begins, counts = (np.cumsum(lengths) - lengths)[own], (lengths - 1)[own]
+    row = np.repeat(np.arange(len(arcs)), counts)
+    first = np.arange(len(row)) + np.repeat(begins - (np.cumsum(counts) - counts), counts)
+    every = np.concatenate([np.zeros(0), *edges])
+    return Blocks(row, every[first], every[first + 1])
+
+
+def _edges(arcs: int, knots: list[float], parts: float | Parts) -> np.ndarray:
+    # Of the blocks of a motion, both ends among the knots.
+    each = parts.of(arcs) if isinstance(parts, Parts) else np.full(2, float(parts))
+    tau = np.linspace(0.0, 1.0, len(each))
+    # How many parts lie before an instant.
+    before = arcs * np.append(0.0, np.cumsum(0.5 * (each[1:] + each[:-1]) * np.diff(tau)))
+    inside = []
+    for start, stop in itertools.pairwise(knots):
+        first, last = np.interp([start, stop], tau, before)
+        # Equal within each piece, so that no sliver is left beside a knot.
+        count = max(1, math.ceil(last - first - SLIVER))
+        if isinstance(parts, Parts):
+            edges = np.interp(np.linspace(first, last, count + 1), before, tau)
+        else:
+            edges = np.linspace(start, stop, count + 1)
+        inside += [[start], edges[1:-1]]
+    return np.concatenate([*inside, [1.0]])

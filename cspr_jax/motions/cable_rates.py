@@ -1,0 +1,86 @@
+"""Speeds and accelerations of the cables of all robots whose spools are displaced a little, over blocks of time."""
+
+import numpy as np
+
+from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence, unit_vectors
+from cspr_jax.robots.limits import Limits
+
+
+def rates_hold(known: Enclosure, found: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
+    """Blocks in which every cable of every robot keeps its limits of speed and acceleration: proved.
+
+    Args:
+        known: of k blocks.
+        found: of their middles.
+        limits: the limits.
+        spools: (k,) largest displacement, m.
+
+    Returns:
+        (k,).
+    """
+    is_met, largest = np.ones(len(spools), bool), _limits_of_rates(limits)
+    if largest is None:
+        return is_met
+    # Within the block every ray of every robot is in a ball around the planned one of the middle.
+    ball = np.minimum((known.moved + spools[:, None]) / found.lengths, 1.0)
+    units, rates = known.rays / found.lengths[..., None], known.rates
+    slowest, fastest = _along(units, rates.velocity, ball)
+    least, most = _along(units, rates.acceleration, ball)
+    pace = np.linalg.norm(rates.velocity, axis=2)
+    short, long = found.lengths * (1.0 - ball), found.lengths * (1.0 + ball)
+    speed = np.maximum(np.abs(slowest), np.abs(fastest)) + rates.velocity_change
+    low = np.where(slowest * fastest > 0.0, np.minimum(np.abs(slowest), np.abs(fastest)), 0.0) - rates.velocity_change
+    across = (pace + rates.velocity_change) ** 2 - np.maximum(low, 0.0) ** 2
+    inward = np.maximum(np.maximum(pace - rates.velocity_change, 0.0) ** 2 - speed**2, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        up = across / short + most + rates.acceleration_change
+        down = inward / long + least - rates.acceleration_change
+    bend = np.where(short > 0.0, np.maximum(np.abs(up), np.abs(down)), np.inf)
+    return ((speed <= largest[0]) & (bend <= largest[1])).all(1)
+
+
+def _limits_of_rates(limits: Limits) -> tuple[np.ndarray, np.ndarray] | None:
+    given = limits.cable_speed_max, limits.cable_acceleration_max
+    if all(x is None for x in given):
+        return None
+    speed, acceleration = (np.array(np.inf) if x is None else np.asarray(x) * (1.0 + TOUCHED) for x in given)
+    return speed, acceleration
+
+
+def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    # Smallest and largest component of vectors along all rays within a part `ball` of their length of given ones.
+    component, size = np.sum(units * vectors, axis=2), np.linalg.norm(vectors, axis=2)
+    across = np.sqrt(np.maximum(size**2 - component**2, 0.0))
+    angle, own = np.arcsin(ball), np.arctan2(across, component)
+    return size * np.cos(np.minimum(own + angle, np.pi)), size * np.cos(np.maximum(own - angle, 0.0))
+
+
+def rates_fail(known: Enclosure, found: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
+    """Blocks in whose middles a cable of some robot breaks a limit of speed or acceleration.
+
+    Spools are displaced along their rays, and across them in the way of the velocity or the acceleration.
+
+    Args:
+        known: of k blocks.
+        found: of their middles.
+        limits: the limits.
+        spools: (k,) displacement, m.
+
+    Returns:
+        (k,).
+    """
+    broken, largest = np.zeros(len(spools), bool), _limits_of_rates(limits)
+    if largest is None:
+        return broken
+    units, (velocity, acceleration, _, _) = known.rays / found.lengths[..., None], known.rates
+    ways = [units]
+    for vectors in (velocity, acceleration):
+        ways.append(unit_vectors(vectors - np.sum(vectors * units, axis=2, keepdims=True) * units))
+    for way in ways:
+        for sign in (1.0, -1.0):
+            rays = known.rays - sign * spools[:, None, None] * way
+            lengths = np.linalg.norm(rays, axis=2)
+            rate = np.sum(rays * velocity, axis=2) / lengths
+            bend = (np.sum(velocity**2 + rays * acceleration, axis=2) - rate**2) / lengths
+            broken |= ((np.abs(rate) > largest[0]) | (np.abs(bend) > largest[1])).any(1)
+    return broken

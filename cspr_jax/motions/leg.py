@@ -1,0 +1,87 @@
+"""Leg of a plan: consecutive poses, and how a trajectory family joins them."""
+
+import abc
+
+import jax
+import numpy as np
+
+from cspr_jax.motions.answers import Answers, joined
+from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.waypoints import Stops
+
+
+class Leg(abc.ABC):
+    """Consecutive poses of a plan, joined by one family.
+
+    Args:
+        stops: the poses.
+
+    Raises:
+        ConfigError: poses, or keys of the plan, that the family cannot use.
+    """
+
+    def __init__(self, stops: Stops) -> None:
+        """Keep the poses; a family refuses what it cannot join."""
+        self.stops = stops
+
+    def __len__(self) -> int:
+        return len(self.stops)
+
+    def check(self, problem: Problem) -> None:  # noqa: B027
+        """Refuse poses at which no motion can begin or end; called before z0 is chosen.
+
+        Args:
+            problem: robot, limits and amplitude.
+
+        Raises:
+            ConfigError: which pose, and why.
+        """
+
+    @abc.abstractmethod
+    def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
+        """Join the poses.
+
+        Args:
+            problem: robot, limits and amplitude.
+            z0: depth of P0 below the centroid of the spools, m.
+
+        Returns:
+            answers of the n segments, and their motions: of the number of arcs found, else of the best candidate.
+        """
+
+    def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
+        """Answers for several depths of P0.
+
+        Args:
+            problem: robot, limits and amplitude.
+            depths: (n_depths,) m.
+
+        Returns:
+            the answers of n_depths * n_segments, those of one depth side by side.
+        """
+        return joined([self.join(problem, float(z0))[0] for z0 in depths])
+
+    def warnings(self, problem: Problem) -> list[str]:
+        """Warnings for the user of the plan.
+
+        Args:
+            problem: robot, limits and amplitude.
+
+        Returns:
+            one line each.
+        """
+        return []
+
+
+def each(leaves, count: int) -> list:
+    """Parts of a pytree whose leaves have a leading dimension.
+
+    Args:
+        leaves: (count, ...) each.
+        count: how many.
+
+    Returns:
+        one pytree each, with NumPy leaves.
+    """
+    return [jax.tree.map(lambda leaf, i=i: np.asarray(leaf)[i], leaves) for i in range(count)]

@@ -1,0 +1,69 @@
+"""Answers of motions that are only sampled: refuted by a sample, or undecided. They serve families without a proof."""
+
+from functools import partial
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.minima import narrowed
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.slacks import flags, slacks
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+BATCH = 512
+
+
+@partial(jax.jit, static_argnums=0)
+def _slacks(structure, leaves, problem: Problem, tau) -> jax.Array:
+    motion = jax.tree.unflatten(structure, leaves)
+    return jax.vmap(lambda t: slacks(problem, motion, t))(tau)
+
+
+def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400) -> Answers:
+    """Answers of motions that are only sampled.
+
+    Args:
+        problem: robot, limits and amplitude.
+        motions: n of them, from the centroid of the spools, z down.
+        samples: intervals between instants; the smallest slacks are then narrowed down.
+
+    Returns:
+        the answers: no numbers of arcs, since nothing is proved; margins are smallest slacks.
+    """
+    tau = np.linspace(0.0, 1.0, samples + 1)
+    least, duration = [], []
+    for motion in motions:
+        leaves, structure = jax.tree.flatten(motion)
+        kernel = partial(_slacks, structure, leaves, problem)
+
+        def at(points: np.ndarray, kernel=kernel) -> np.ndarray:
+            return in_batches(kernel, points.ravel(), size=BATCH).reshape(*points.shape, -1)
+
+        least.append(narrowed(at, tau, at(tau[None]))[0])
+        duration.append(float(motion.duration()))
+    slack, every = np.array(least), flags(problem)
+    broken = sum((np.where(column <= 0.0, flag.value, 0) for flag, column in _by_flag(every, slack)), np.zeros(1, int))
+    verdict = np.where(broken == 0, Verdict.UNDECIDED.value, broken)
+    verdict = np.where(np.isfinite(slack).all(1), verdict, Verdict.NOT_FINITE.value)
+    is_limit = np.arange(len(every)) > every.index(Verdict.ABOVE_SPOOLS)
+    none = np.zeros(len(motions), int)
+    return Answers(
+        arcs=none,
+        tried_arcs=none,
+        verdict=verdict.astype(FLAGS),
+        duration=np.array(duration),
+        margin=slack[:, ~is_limit].min(1),
+        margin_bound=np.full(len(motions), np.nan),
+        limit_margin=slack[:, is_limit].min(1, initial=np.inf),
+        feasible_at_infinity=np.full(len(motions), np.nan),
+        tolerated=np.full(len(motions), np.nan),
+        not_tolerated=np.full(len(motions), np.nan),
+    )
+
+
+def _by_flag(every: tuple[Verdict, ...], slack: np.ndarray) -> list[tuple[Verdict, np.ndarray]]:
+    # The smallest slack of each flag, so that no flag is counted twice.
+    return [(flag, slack[:, [own is flag for own in every]].min(1)) for flag in dict.fromkeys(every)]

@@ -1,0 +1,95 @@
+"""Slacks of any motion: numbers that are positive exactly while a criterion is met, from the state of one instant.
+
+They serve every robot and family, and can be differentiated; searches use faster forms of the same criteria. In this
+order, with n the number of cables, kappa_k the tension of cable k over its length, and values at rest in P0 below:
+
+    taut       kappa_k over its value at rest, of a point mass with the pseudotension; of a platform n z0 mu_k / g
+    regular    of a platform: normalised determinant of the structure matrix over its value at rest
+    below      depth of the mass centre below the spool plane over z0
+    limits     that are given, one for each cable, of the floor one: `motions.limits.slack`
+"""
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.motions.limits import given, scales, slack, values
+from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots import force_balance, wrench_balance
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, rest_point
+from cspr_jax.robots.state import State
+from cspr_jax.schema.verdicts import Verdict
+
+
+def slacks(problem: Problem, motion: Motion, tau: Array) -> Array:
+    """Slacks of all criteria at one instant of a motion.
+
+    Args:
+        problem: robot, limits and amplitude.
+        motion: from the centroid of the spools, z down.
+        tau: () normalised time in [0, 1].
+
+    Returns:
+        (n_slacks,) without a unit; all positive while the motion is feasible.
+    """
+    robot, state, z0 = problem.robot, motion.state(tau), motion.z0
+    balance = _of_platform if isinstance(robot, PlatformRobot) else _of_point_mass
+    terms = [*balance(robot, state, z0), jnp.atleast_1d(plane_normal(robot) @ state.position / z0)]
+    rows = given(problem.limits)
+    if rows:
+        now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
+        for row in rows:
+            limit = jnp.asarray(getattr(problem.limits, row.name))
+            terms.append(jnp.atleast_1d(slack(row, limit, getattr(now, row.quantity), scale)))
+    return jnp.concatenate(terms)
+
+
+def flags(problem: Problem) -> tuple[Verdict, ...]:
+    """Flag that each slack breaks.
+
+    Args:
+        problem: robot, limits and amplitude.
+
+    Returns:
+        n_slacks flags, in the order of `slacks`.
+    """
+    robot, verdicts = problem.robot, [Verdict.SLACK_CABLE] * problem.robot.n_cables
+    if isinstance(robot, PlatformRobot):
+        verdicts.append(Verdict.SINGULAR)
+    verdicts.append(Verdict.ABOVE_SPOOLS)
+    for row in given(problem.limits):
+        verdicts += [row.flag] * (robot.n_cables if row.per_cable else 1)
+    return tuple(verdicts)
+
+
+def _of_point_mass(robot: PointMassRobot, state: State, z0: Array) -> list[Array]:
+    hub = rest_point(z0)
+    at_rest = force_balance.pseudotensions(robot, hub, jnp.zeros_like(hub))
+    return [force_balance.pseudotensions(robot, state.position, state.acceleration) / at_rest]
+
+
+def _of_platform(robot: PlatformRobot, state: State, z0: Array) -> list[Array]:
+    hub = rest_point(z0)
+    at_rest = wrench_balance.normalised_determinant(robot, hub, jnp.eye(3))
+    here = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
+    per_length = wrench_balance.tensions_per_length(robot, state)
+    return [robot.n_cables * z0 / robot.gravity * per_length, jnp.atleast_1d(here / at_rest)]
+
+
+def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array:
+    """Smallest slack at equidistant instants of a motion: positive says that no sample refutes it, and no more.
+
+    Its gradient is that of the smallest slack at the instant where it is smallest.
+
+    Args:
+        problem: robot, limits and amplitude.
+        motion: from the centroid of the spools, z down.
+        samples: number of intervals between instants, ends included.
+
+    Returns:
+        () without a unit.
+    """
+    tau = jnp.linspace(0.0, 1.0, samples + 1)
+    return jnp.min(jax.vmap(lambda t: slacks(problem, motion, t))(tau))

@@ -1,0 +1,363 @@
+"""Verdicts about all robots within an uncertainty, over blocks of time: proved, or refuted by one of these robots.
+
+The motion is the planned one; spools, mass centre and mass differ from the plan's. With W the structure matrix and w
+the wrench per mass in the middle of a block, W mu = w, and E what rays within the block and displaced spools add to W,
+the tensions mu' of another robot differ from the planned ones mu at the same instant by d = mu' - mu,
+
+    |d| <= A |d| + B mu + b,    so |d| <= (1 - A)^-1 (B mu + b)  where the spectral radius of A = G + B is below 1,
+
+component by component: G_kj is |g_kj . the way of ray j| and |g_kj| times what the ray leaves its tangent, B_kj is
+|g_kj across ray j| times the largest displacement of spool j, b is what the mass centre does: docs/theory.md. Then no
+such robot is singular either.
+"""
+
+import dataclasses
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.motions.cable_rates import rates_fail, rates_hold
+from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence, inverted, structure, unit_vectors
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.limits import Limits, Uncertainty
+
+# Of the slacks of taut cables, as in other proofs.
+TOLERANCE = 1e-6
+# Blocks of which nothing is known have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
+UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
+# What solving for a deviation may be wrong by, as a part of it, and of the tensions.
+ROUNDING = 1e-9
+# Rounds in which functionals are corrected, and by how much more than is known to be needed.
+ROUNDS, SPARE = 8, 0.01
+
+
+@dataclasses.dataclass(frozen=True)
+class Requirements:
+    """What is asked of all robots within an uncertainty.
+
+    Fields:
+        mass: kg.
+        slack: tension per mass and length over the slack of a taut cable, g / (n z0), 1/s^2, one a motion (n,).
+        limits: the limits, NumPy.
+        uncertainty: the uncertainty.
+    """
+
+    mass: float
+    slack: np.ndarray
+    limits: Limits
+    uncertainty: Uncertainty
+
+
+def requirements_of(problem: Problem, slack: np.ndarray) -> Requirements:
+    """What is asked of all robots within the uncertainty of a problem.
+
+    Args:
+        problem: robot, and limits with the uncertainty.
+        slack: (n,) as in `Requirements`.
+
+    Returns:
+        the requirements.
+
+    Raises:
+        ValueError: no uncertainty is given.
+    """
+    limits = jax.tree.map(np.asarray, problem.limits)
+    if limits.uncertainty is None:
+        raise ValueError("limits of robots within an uncertainty have none")
+    return Requirements(float(problem.robot.mass), slack, limits, limits.uncertainty)
+
+
+class _Share(NamedTuple):
+    # A multiple of an uncertainty, one a block: radii (k,) m, and the factor of the mass.
+    spools: np.ndarray
+    centre: np.ndarray
+    factor: np.ndarray
+
+
+def _share(asked: Requirements, multiple: np.ndarray) -> _Share:
+    given = asked.uncertainty
+    return _Share(
+        multiple * float(given.spool_positions),
+        multiple * float(given.mass_centre),
+        float(given.mass_factor) ** multiple,
+    )
+
+
+class _Reaches(NamedTuple):
+    # By how much rays differ within k blocks and a multiple of the uncertainty: across ray j, at the planned length
+    # (k, n_cables); as parts of lengths from the middle; and what the mass centre does to each tension.
+    off: np.ndarray
+    turned: np.ndarray
+    centre: np.ndarray
+
+
+def _reaches(known: Enclosure, found: Influence, spools: np.ndarray, centre: np.ndarray) -> _Reaches:
+    near = found.lengths - known.moved
+    share = spools[:, None] / np.where(near > 0.0, near, np.nan)
+    # A displaced spool as one that is displaced across its ray alone, at the planned length.
+    off = np.where(share < 1.0, spools[:, None] / np.sqrt(1.0 - share**2), np.nan)
+    own, moment, force = (np.linalg.norm(x, axis=2) for x in (found.centre, found.moments, found.forces))
+    whirl, radius = np.linalg.norm(known.whirl, axis=(1, 2)) + known.whirl_change, centre[:, None]
+    rest = own + force * known.whirl_change[:, None] + moment * (known.force_change + centre * whirl)[:, None]
+    return _Reaches(off, np.minimum(known.moved / found.lengths, 1.0), radius * rest)
+
+
+def _changes(known: Enclosure, found: Influence, vectors: np.ndarray, far: _Reaches) -> tuple[np.ndarray, np.ndarray]:
+    # Largest components of what blocks, and displaced spools, do to rays, along vectors (k, ..., n_cables, 3).
+    shape = (len(vectors), *(1,) * (vectors.ndim - 3), *known.bent.shape[1:])
+    whole = np.linalg.norm(vectors, axis=-1)
+    units = (known.rays / found.lengths[..., None]).reshape(*shape, 3)
+    way, bent, off, turned = (
+        known.way.reshape(*shape, 3),
+        *(x.reshape(shape) for x in (known.bent, far.off, far.turned)),
+    )
+    along = np.sum(vectors * units, axis=-1)
+    across = np.sqrt(np.maximum(whole**2 - along**2, 0.0))
+    return np.abs(np.sum(vectors * way, axis=-1)) + whole * bent, off * np.minimum(whole, across + whole * turned)
+
+
+@UNKNOWN
+def deviations(known: Enclosure, found: Influence, spools: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Largest differences between tensions of robots and the planned ones, at the same instant of a block.
+
+    Args:
+        known: of k blocks.
+        found: of their middles.
+        spools: (k,) largest displacement, m.
+        centre: (k,) likewise of the mass centre, m.
+
+    Returns:
+        (k, n_cables) per mass and length, 1/s^2; infinite where nothing is known, also that no robot is singular.
+    """
+    far = _reaches(known, found, spools, centre)
+    within, displaced = _changes(known, found, found.spools, far)
+    rest = (displaced @ known.high[..., None])[..., 0] + ROUNDING * known.high + far.centre
+    return _solved(within + displaced, rest)
+
+
+class Changes(NamedTuple):
+    """Largest changes of tensions, per mass and length.
+
+    Fields:
+        down: (k, n_cables) 1/s^2; infinite where nothing is known.
+        up: (k, n_cables) likewise.
+    """
+
+    down: np.ndarray
+    up: np.ndarray
+
+
+@UNKNOWN
+def closer_changes(
+    known: Enclosure,
+    found: Influence,
+    spools: np.ndarray,
+    centre: np.ndarray,
+    off: np.ndarray,
+    least: np.ndarray,
+    *,
+    upwards: bool,
+) -> Changes:
+    """Largest changes of tensions, which are less as long as none is below its smallest value.
+
+    On the way from the planned robot to another one, the first tension that comes to its smallest value finds all
+    others above theirs, all of them at least 0. With c_j the terms of row k of B, it has changed by no more than the
+    largest sum of c_j mu'_j that such tensions can have, its own of them known. That is at most y . w for every
+    functional y of wrenches whose products with the columns of the other robot's W are at least c_j.
+
+    Args:
+        known: of k blocks.
+        found: of their middles.
+        spools: (k,) largest displacement, m.
+        centre: (k,) likewise of the mass centre, m.
+        off: (k, n_cables) of `deviations`, finite.
+        least: (k, n_cables) smallest tensions per mass and length, at least 0, 1/s^2.
+        upwards: whether gains are wanted.
+
+    Returns:
+        the changes; infinite where they would lead below the smallest tensions, or nothing is known, or wanted.
+    """
+    far = _reaches(known, found, spools, centre)
+    within, displaced = _changes(known, found, found.spools, far)
+    own = np.eye(displaced.shape[1])[None] * displaced
+    rest = np.sum(within * off[:, None], axis=2) + far.centre + ROUNDING * known.high
+    down = _largest_sum(known, found, displaced - own, far) + rest + np.sum(own, axis=2) * least
+    is_valid = (known.low - down > least).all(1)
+    up = _largest_sum(known, found, displaced, far) + rest if upwards else np.full_like(down, np.inf)
+    return Changes(*(np.where(is_valid[:, None], x, np.inf) for x in (down, up)))
+
+
+def _largest_sum(known: Enclosure, found: Influence, weights: np.ndarray, far: _Reaches) -> np.ndarray:
+    # Of tensions of any robot, none below 0, times each of rows of weights (k, n_cables, n_cables).
+    more = np.zeros_like(weights)
+    for _ in range(ROUNDS):
+        functional = np.einsum("kij,kjlx->kilx", weights + more, found.spools)
+        moved, shifted = _changes(known, found, functional, far)
+        more, last = (moved + shifted) * (1.0 + SPARE) + ROUNDING * np.max(weights, axis=2, keepdims=True), more
+    # The last one was enough for the functional of the one before; it must be for its own.
+    functional = np.einsum("kij,kjlx->kilx", weights + last, found.spools)
+    moved, shifted = _changes(known, found, functional, far)
+    total = np.sum((weights + last) * (known.high + far.centre)[:, None] + moved * known.high[:, None], axis=2)
+    is_valid = (moved + shifted <= last).all(2)
+    return np.where(is_valid, total, np.inf)
+
+
+def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    # x with x >= matrix x + rest, all of them positive, which proves the spectral radius of the matrix below 1.
+    is_finite = np.isfinite(matrix).all((1, 2)) & np.isfinite(rest).all(1)
+    count = matrix.shape[1]
+    system = np.where(is_finite[:, None, None], np.eye(count) - matrix, np.eye(count))
+    system = np.where((np.linalg.det(system) != 0.0)[:, None, None], system, np.eye(count))
+    x = np.linalg.solve(system, np.where(is_finite[:, None], rest, 0.0)[..., None])[..., 0] * (1.0 + ROUNDING)
+    holds = is_finite & (x > 0.0).all(1) & (rest > 0.0).all(1)
+    holds &= ((matrix @ x[..., None])[..., 0] + rest <= x).all(1)
+    return np.where(holds[:, None], x, np.inf)
+
+
+@UNKNOWN
+def holds(known: Enclosure, found: Influence, asked: Requirements, multiple: np.ndarray) -> np.ndarray:
+    """Blocks in which every robot within a multiple of the uncertainty meets everything: proved.
+
+    Args:
+        known: of k blocks.
+        found: of their middles.
+        asked: its slack is that of each block, (k,).
+        multiple: (k,).
+
+    Returns:
+        (k,).
+    """
+    some = _share(asked, multiple)
+    is_met = np.ones(len(multiple), bool)
+    if float(asked.uncertainty.spool_positions) > 0.0:
+        is_met &= known.distances.hold(some.spools)
+        is_met &= rates_hold(known, found, asked.limits, some.spools)
+    off = deviations(known, found, some.spools, some.centre)
+    is_taut = _tensions_hold(known, found, asked, some, Changes(off, off))
+    again = np.flatnonzero(is_met & ~is_taut & np.isfinite(off).all(1))
+    if len(again):
+        part = known.some(again), found.some(again)
+        own, less = _Share(*(x[again] for x in some)), dataclasses.replace(asked, slack=asked.slack[again])
+        upwards = asked.limits.tension_max is not None
+        closer = closer_changes(*part, own.spools, own.centre, off[again], _least(*part, less, own), upwards=upwards)
+        is_taut[again] = _tensions_hold(*part, less, own, closer)
+    return is_met & is_taut
+
+
+def _least(known: Enclosure, found: Influence, asked: Requirements, some: _Share) -> np.ndarray:
+    # Smallest tensions per mass and length that are allowed within blocks.
+    least = np.repeat(TOLERANCE * asked.slack[:, None], found.lengths.shape[1], axis=1)
+    limit = asked.limits.tension_min
+    if limit is None:
+        return least
+    near = found.lengths - known.moved
+    return np.maximum(least, (limit - _unit(asked)[:, None]) / (near * (asked.mass / some.factor)[:, None]))
+
+
+def _tensions_hold(
+    known: Enclosure, found: Influence, asked: Requirements, some: _Share, changes: Changes
+) -> np.ndarray:
+    is_met, limit = (known.low - changes.down > _least(known, found, asked, some)).all(1), asked.limits.tension_max
+    if limit is None:
+        return is_met
+    near, far = found.lengths - known.moved, found.lengths + known.moved
+    longest = far / np.sqrt(1.0 - np.minimum(some.spools[:, None] / near, 1.0) ** 2)
+    most = (known.high + changes.up) * longest * (asked.mass * some.factor)[:, None]
+    return is_met & (most <= limit + _unit(asked)[:, None]).all(1)
+
+
+def _unit(asked: Requirements) -> np.ndarray:
+    # Of tensions, by which limits may be missed: as in proofs of the planned motion.
+    return TOUCHED * asked.mass * asked.slack
+
+
+class Worst(NamedTuple):
+    """Robots that are worst to first order in the middles of k blocks, per displacement.
+
+    Fields:
+        spools: (1 or 2, k, n_cables, 3) unit displacements: of the cable that falls slack first and, where a largest
+            tension is given, of the one that comes to it first.
+        centre: (1 or 2, k, 3) likewise.
+    """
+
+    spools: np.ndarray
+    centre: np.ndarray
+
+
+@UNKNOWN
+def worst(known: Enclosure, found: Influence, asked: Requirements) -> Worst:
+    """Robots that are worst to first order.
+
+    Args:
+        known: of k blocks.
+        found: of their middles.
+        asked: what of.
+
+    Returns:
+        the displacements.
+    """
+    given, every = asked.uncertainty, np.arange(len(found.mu))
+    size = np.sum(np.linalg.norm(found.across, axis=3) * np.abs(found.mu)[:, None], axis=2)
+    change = float(given.spool_positions) * size
+    change += float(given.mass_centre) * np.linalg.norm(found.centre, axis=2)
+    limits, pull = asked.limits, asked.mass * found.lengths
+    low = 0.0 if limits.tension_min is None else limits.tension_min / pull
+    rooms = [(found.mu - low, 1.0)]
+    if limits.tension_max is not None:
+        rooms.append((np.asarray(limits.tension_max) / pull - found.mu, -1.0))
+    spools, centre = [], []
+    for room, sign in rooms:
+        cable = np.argmin(np.nan_to_num(room / change, nan=np.inf), axis=1)
+        spools.append(sign * unit_vectors(found.across[every, cable] * np.sign(found.mu)[..., None]))
+        centre.append(-sign * unit_vectors(found.centre[every, cable]))
+    return Worst(np.stack(spools), np.stack(centre))
+
+
+@UNKNOWN
+def fails(known: Enclosure, found: Influence, worst: Worst, asked: Requirements, multiple: np.ndarray) -> np.ndarray:
+    """Blocks in whose middles one of the worst robots within a multiple of the uncertainty breaks something.
+
+    Args:
+        known: of k blocks.
+        found: of their middles.
+        worst: of these.
+        asked: its slack is that of each block, (k,).
+        multiple: (k,).
+
+    Returns:
+        (k,).
+    """
+    some, limits = _share(asked, multiple), asked.limits
+    broken = np.zeros(len(multiple), bool)
+    for spools, centre in zip(*worst, strict=True):
+        mu, lengths = tensions(known, some.spools[:, None, None] * spools, some.centre[:, None] * centre)
+        broken |= (mu < -TOLERANCE * asked.slack[:, None]).any(1)
+        pull, unit = asked.mass * mu * lengths, _unit(asked)[:, None]
+        if limits.tension_min is not None:
+            broken |= (pull / some.factor[:, None] < limits.tension_min - unit).any(1)
+        if limits.tension_max is not None:
+            broken |= (pull * some.factor[:, None] > limits.tension_max * (1.0 + TOUCHED) + unit).any(1)
+    if float(asked.uncertainty.spool_positions) > 0.0:
+        broken |= known.distances.fail(some.spools)
+        broken |= rates_fail(known, found, limits, some.spools)
+    return broken
+
+
+def tensions(known: Enclosure, spools: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Tensions of other robots in the middles of blocks.
+
+    Args:
+        known: of k blocks.
+        spools: (k, n_cables, 3) displacements of the spools, m.
+        centre: (k, 3) of the mass centre, m.
+
+    Returns:
+        (k, n_cables) per mass and length of the other robot, 1/s^2; these lengths, m.
+    """
+    rays, is_platform = known.rays - spools, bool(known.arms.any())
+    extra = np.einsum("kij,kj->ki", known.whirl, centre)
+    force = known.force + extra
+    wrench = np.concatenate([force, known.moment + np.cross(centre, force)], axis=1) if is_platform else force
+    inverse = inverted(structure(rays, known.arms, is_platform=is_platform))
+    return (inverse @ wrench[..., None])[..., 0], np.linalg.norm(rays, axis=2)

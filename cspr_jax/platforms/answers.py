@@ -1,0 +1,223 @@
+"""Answers about motions between poses, once their numbers of arcs are known."""
+
+import dataclasses
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.fewest_limits import Refused, rank
+from cspr_jax.platforms.arcs import (
+    Candidates,
+    Found,
+    best_candidates,
+    refused_by_limits,
+    segments_with,
+    smallest_arcs,
+    unavoidable,
+)
+from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.motion_checker import MotionChecker, PoseChecks
+from cspr_jax.platforms.motions import rows
+from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+NEVER = np.iinfo(int).max
+
+
+@dataclasses.dataclass(frozen=True)
+class PoseAnswers(Answers):
+    """One answer a segment between poses.
+
+    Fields:
+        beta_hat: (n, 2) at both ends.
+        det_margin: (n,) smallest determinant over its value at rest in P0; NaN on more than six cables, where there is
+            none, and cables are not held against the platform.
+        cable_distance: (n,) smallest distance between cables that can meet, m.
+        refuted_at: (n,) time at which the motion of `tried_arcs` is refuted, s: by its tensions, else by limits or
+            contacts; NaN where it is not, and of contacts where they were only sampled.
+    """
+
+    beta_hat: np.ndarray
+    det_margin: np.ndarray
+    cable_distance: np.ndarray
+    refuted_at: np.ndarray
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Determinant, contacts and beta-hat; see `Answers.details`."""
+        verdict, has_determinant = Verdict(int(self.verdict[i])), not np.isnan(self.det_margin[i])
+        return {
+            "det_sign_constant": bool(self.det_margin[i] > 0.0) if has_determinant else None,
+            "det_margin": float(self.det_margin[i]),
+            "cable_interference": bool(verdict & Verdict.CABLE_CABLE),
+            "cable_distance_min": float(self.cable_distance[i]),
+            "platform_interference": bool(verdict & Verdict.CABLE_PLATFORM) if has_determinant else None,
+            "refuted_at": float(self.refuted_at[i]),
+            "beta_hat": [float(value) for value in self.beta_hat[i]],
+        }
+
+    def rows(self, which: np.ndarray) -> "PoseAnswers":
+        """Answers chosen by indices, or by a mask (n,)."""
+        return PoseAnswers(**{name: values[which] for name, values in vars(self).items()})
+
+
+def settled(
+    checker: MotionChecker,
+    candidates: Candidates,
+    smallest: Found,
+    *,
+    refused: Refused,
+    max_arcs: int,
+    fixed: np.ndarray | None = None,
+    margins: bool = True,
+) -> tuple[PoseAnswers, PoseSegment]:
+    """Answers of motions, whether a number of arcs was found or not.
+
+    Args:
+        checker: of the robot.
+        candidates: one of each of n motions.
+        smallest: of these; its checks are completed.
+        refused: those of them that only limits refuse.
+        max_arcs: largest number tried.
+        fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
+        margins: whether those of motions without a number of arcs are wanted, and not only why they fail.
+
+    Returns:
+        the answers; (2.55) does not apply: NaN. The segments that they belong to.
+    """
+    tried = np.where(smallest.arcs > 0, smallest.arcs, refused.arcs)
+    if fixed is not None:
+        tried = np.where(tried > 0, tried, fixed)
+    none = np.flatnonzero(tried == 0)
+    tried[none] = best_candidates(checker, candidates.rows(none), max_arcs=max_arcs)
+    segments, checks = segments_with(checker.problem.robot, candidates, tried), smallest.checks
+    others = np.flatnonzero(smallest.arcs == 0)
+    checks.put(others, checker.check(rows(segments, others), tried[others], margins=margins))
+    known = np.flatnonzero(~np.isnan(checks.tolerated))
+    found = checker.tolerated(rows(segments, known), tried[known])
+    checks.tolerated[known] = np.maximum(checks.tolerated[known], found.proved)
+    checks.not_tolerated[known] = np.minimum(checks.not_tolerated[known], found.refuted)
+    duration = checker.durations(segments, tried)
+    beta_hats = np.stack(candidates.beta_hats, axis=1)
+    if checker.kind.plain:  # (3.66) has the one that its cosine has
+        beta_hats = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
+    doubtful = (smallest.undecided > 0) & ((smallest.arcs == 0) | (smallest.undecided < smallest.arcs))
+    parts = checker, candidates, smallest, refused, checks
+    reasons = _reasons(*parts, margins=margins, max_arcs=max_arcs, fixed=fixed)
+    none = np.where(doubtful, Verdict.UNDECIDED.value, reasons | Verdict.NO_ARCS.value)
+    less = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
+    nothing = np.full(len(tried), np.nan)
+    answers = PoseAnswers(
+        arcs=smallest.arcs,
+        tried_arcs=tried,
+        verdict=np.where(smallest.arcs > 0, less, none).astype(FLAGS),
+        duration=duration,
+        margin=np.minimum(checks.slack[:, 0], checks.slack[:, 2]),
+        margin_bound=checks.bound,
+        limit_margin=checks.slack[:, 3:].min(1, initial=np.inf),
+        feasible_at_infinity=nothing,
+        tolerated=checks.tolerated,
+        not_tolerated=checks.not_tolerated,
+        beta_hat=beta_hats,
+        det_margin=checks.slack[:, 1],
+        cable_distance=checks.gap,
+        refuted_at=checks.instant * duration,
+    )
+    return answers, segments
+
+
+def _reasons(
+    checker: MotionChecker,
+    candidates: Candidates,
+    smallest: Found,
+    refused: Refused,
+    checks: PoseChecks,
+    *,
+    margins: bool,
+    max_arcs: int,
+    fixed: np.ndarray | None,
+) -> np.ndarray:
+    # Flags of what stands in the way of motions without a number of arcs.
+    limits = sum({flag.value for flag in itertools.compress(checker.flags, checker.is_limit)})
+    basic = checks.verdict & ~(limits & ~Verdict.SLACK_CABLE.value)
+    by_limits = refused.arcs > 0
+    broken = refused.broken.copy()
+    if margins:
+        others = np.flatnonzero((smallest.arcs == 0) & ~by_limits & (basic != checks.verdict))
+        suspects = checker.breaks(checks.slack[others]) & checker.is_limit
+        part = None if fixed is None else fixed[others]
+        motions = candidates.motions(others)
+        broken[others] = unavoidable(checker, motions, suspects, max_arcs=max_arcs, fixed=part)
+    named = np.zeros(len(basic), int)
+    for flag, column in zip(checker.flags, broken.T, strict=True):
+        named |= np.where(column, flag.value, 0)
+    # Proved but for limits, or for what a closer look at all of the robots within the uncertainty says.
+    alone = named | (checks.verdict & (Verdict.UNCERTAINTY | Verdict.UNDECIDED).value)
+    return np.where(by_limits, alone, basic | named)
+
+
+def trials(motions: Candidates, values: np.ndarray, *, same: bool = False) -> tuple[np.ndarray, Candidates]:
+    """Motions with each of several values of beta-hat at their ends.
+
+    Args:
+        motions: n of them, one candidate each, with the values at their starts.
+        values: (n, n_values) in the order in which they are tried; NaN for none.
+        same: whether the value at the end holds at the start too.
+
+    Returns:
+        which motion each candidate is of, (k,); the candidates.
+    """
+    cell, option = np.nonzero(~np.isnan(values))
+    return cell, _with_ends(motions.rows(cell), values[cell, option], same=same)
+
+
+def reached(
+    checker: MotionChecker,
+    motions: Candidates,
+    values: np.ndarray,
+    *,
+    max_arcs: int,
+    same: bool = False,
+    margins: bool = True,
+) -> PoseAnswers:
+    """Smallest numbers of arcs of motions, each with several values of beta-hat at its end.
+
+    Args:
+        checker: of the robot.
+        motions: n of them, one candidate each, with the values at their starts.
+        values: (n, n_values) in the order in which they are tried; NaN for none.
+        max_arcs: largest number tried.
+        same: whether the value at the end holds at the start too.
+        margins: whether they are wanted.
+
+    Returns:
+        the answers; where there is none, those of the first value, or of that at rest.
+    """
+    cell, trial = trials(motions, values, same=same)
+    of_trials = smallest_arcs(checker, trial, max_arcs=max_arcs, margins=margins)
+    arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
+    beta_hats = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
+    # Several values of one motion may have passed: the one tried first is last here.
+    best = np.flatnonzero(of_trials.arcs > 0)[::-1]
+    arcs[cell[best]], beta_hats[cell[best]] = of_trials.arcs[best], trial.beta_hats[1][best]
+    checks.put(cell[best], of_trials.checks.rows(best))
+    np.minimum.at(undecided, cell, np.where(of_trials.undecided > 0, of_trials.undecided, NEVER))
+    smallest = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
+    # Where there is none, the value at which the fewest limits refuse the motion, if there is one.
+    open_ones = np.flatnonzero(((arcs == 0) & (undecided == NEVER))[cell])
+    of_limits = refused_by_limits(checker, trial.rows(open_ones), max_arcs=max_arcs)
+    refused = Refused(np.zeros(len(values), int), np.zeros((len(values), len(checker.flags)), bool))
+    ranks = rank(checker.flags, of_limits.broken)
+    best = np.lexsort((of_limits.arcs, ranks))[::-1]  # written last: the fewest limits, then the fewest arcs
+    best = best[of_limits.arcs[best] > 0]
+    which = cell[open_ones[best]]
+    refused.arcs[which], refused.broken[which] = of_limits.arcs[best], of_limits.broken[best]
+    beta_hats[which] = trial.beta_hats[1][open_ones[best]]
+    chosen = _with_ends(motions, beta_hats, same=same)
+    return settled(checker, chosen, smallest, refused=refused, max_arcs=max_arcs, margins=margins)[0]
+
+
+def _with_ends(motions: Candidates, beta_hats: np.ndarray, *, same: bool) -> Candidates:
+    return motions._replace(beta_hats=(beta_hats if same else motions.beta_hats[0], beta_hats))

@@ -1,0 +1,297 @@
+"""Smallest numbers of arcs between many pairs of poses, over values of beta-hat at their ends."""
+
+import dataclasses
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.motions.fewest_limits import FewestLimits, Refused
+from cspr_jax.platforms.motion_checker import MotionChecker, PoseChecks
+from cspr_jax.platforms.motions import rows
+from cspr_jax.platforms.platform_segment import PoseSegment, pose_segment
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.runtime.stages import stage
+from cspr_jax.schema.verdicts import Verdict
+
+BATCH = 2048
+# So many candidates are held at a time.
+CANDIDATES = 262_144
+# Instants of the first look, in arcs before the end: those at which most motions fail, the most telling ones first;
+# then those at which most of the rest fail, with one beside the start, where the amplitude function may bend most.
+# Chosen one by one among motions of the MSSM with three amplitude functions; any others are as right, and slower.
+TELLING = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
+OTHERS = np.array([338, 192, 260, 3, 74, 63, 32, 330, 1, 49, 134, 56, 436, 168, 8]) / 96.0
+BESIDE_START = 6.0 / 96.0
+# So many instants an arc where only the best of bad candidates is looked for.
+COARSEST = 4
+
+
+class Candidates(NamedTuple):
+    """Motions whose smallest number of arcs is asked for, with values of beta-hat to be tried.
+
+    Fields:
+        start: position (m, 3) m and quaternion (m, 4) of each motion.
+        end: likewise.
+        z0: (m,) m.
+        motion: (n,) which motion each candidate is of, in any order; those of one motion that are tried first come
+            first.
+        beta_hats: beta-hat at the start (n,) and at the end (n,).
+    """
+
+    start: tuple[np.ndarray, np.ndarray]
+    end: tuple[np.ndarray, np.ndarray]
+    z0: np.ndarray
+    motion: np.ndarray
+    beta_hats: tuple[np.ndarray, np.ndarray]
+
+    def rows(self, which: np.ndarray) -> "Candidates":
+        """Candidates chosen by indices, or by a mask (n,)."""
+        return self._replace(motion=self.motion[which], beta_hats=(self.beta_hats[0][which], self.beta_hats[1][which]))
+
+    def motions(self, which: np.ndarray) -> "Candidates":
+        """Motions of one candidate each, chosen by indices."""
+        start, end, beta_hats = ((a[which], b[which]) for a, b in (self.start, self.end, self.beta_hats))
+        return Candidates(start, end, self.z0[which], np.arange(len(which)), beta_hats)
+
+
+class Found(NamedTuple):
+    """Smallest numbers of arcs.
+
+    Fields:
+        arcs: (n,) 0 where none passes all tests, or none was asked for any more; several of a motion may have one.
+        undecided: (n,) the smallest number that stayed undecided; 0: none did.
+        checks: of the motions with `arcs`; all else is to be ignored.
+    """
+
+    arcs: np.ndarray
+    undecided: np.ndarray
+    checks: PoseChecks
+
+
+@jax.jit
+def _motions(robot: PlatformRobot, odd, motions) -> PoseSegment:
+    def one(start, end, z0):
+        return pose_segment(robot, start, end, z0, (jnp.zeros_like(z0), jnp.zeros_like(z0)), odd=odd)
+
+    return jax.vmap(one)(*motions)
+
+
+class _Segments:
+    # Of candidates: all but beta-hat is of the motion, and is found once for each parity of the number of arcs.
+
+    def __init__(self, robot: PlatformRobot, candidates: Candidates) -> None:
+        self._candidates = candidates
+        self._of_motions = [
+            in_batches(partial(_motions, robot, np.asarray(odd)), candidates[:3], size=BATCH) for odd in (False, True)
+        ]
+
+    def __call__(self, arcs: int, which: np.ndarray) -> PoseSegment:
+        # (k,) indices of candidates.
+        motion, (first, last) = self._candidates.motion[which], self._candidates.beta_hats
+        segments = rows(self._of_motions[arcs % 2], motion)
+        return dataclasses.replace(
+            segments, turn=segments.turn._replace(start_beta_hat=first[which], end_beta_hat=last[which])
+        )
+
+
+def smallest_arcs(
+    checker: MotionChecker,
+    candidates: Candidates,
+    *,
+    max_arcs: int,
+    fixed: np.ndarray | None = None,
+    beyond: int = -1,
+    margins: bool = True,
+) -> Found:
+    """The smallest number of arcs that passes all tests.
+
+    A few instants refute most motions before they are checked in full.
+
+    Args:
+        checker: of the robot.
+        candidates: n of them.
+        max_arcs: largest number tried.
+        fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
+        beyond: how many arcs beyond the smallest one of a motion are tried for its other candidates; -1: the first
+            one that passes is enough.
+        margins: whether the checks are to have more than verdicts.
+
+    Returns:
+        what was found.
+    """
+    motion, count = candidates.motion, len(candidates.motion)
+    smallest, undecided, checks = np.zeros(count, int), np.zeros(count, int), checker.nothing(count)
+    if not count:
+        return Found(smallest, undecided, checks)
+    last = np.full(len(candidates.z0), max_arcs)
+    only = np.zeros(len(last), int) if fixed is None else fixed
+    segments = _Segments(checker.problem.robot, candidates)
+    for arcs in range(1, max_arcs + 1):
+        if not (last >= arcs).any():
+            break
+        stage(f"arcs {arcs} of {max_arcs}")
+        is_open = (last >= arcs) & ((only == 0) | (only == arcs))
+        alive = np.flatnonzero((smallest == 0) & is_open[motion])
+        alive = _sieved(checker, segments, arcs, alive, _instants(arcs, TELLING))
+        first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
+        # The first candidate of each motion, then all others of motions where it fails: few and large batches.
+        for turn in (alive[first], np.delete(alive, first)):
+            turn = turn[last[motion[turn]] >= arcs]
+            turn = _sieved(checker, segments, arcs, turn, np.append(BESIDE_START / arcs, _instants(arcs, OTHERS)))
+            if not len(turn):
+                continue
+            got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False, margins=margins)
+            checks.put(turn, got)
+            passed, unsure = (turn[got.verdict == verdict] for verdict in (0, Verdict.UNDECIDED))
+            smallest[passed] = arcs
+            undecided[unsure] = np.where(undecided[unsure] > 0, undecided[unsure], arcs)
+            last[motion[passed]] = np.minimum(last[motion[passed]], arcs + beyond)
+    return Found(smallest, undecided, checks)
+
+
+def _instants(arcs: int, before: np.ndarray) -> np.ndarray:
+    # So many arcs before the end; at the start, where nothing fails, those of shorter motions.
+    return np.maximum(1.0 - before / arcs, 0.0)
+
+
+def _sieved(
+    checker: MotionChecker,
+    segments: _Segments,
+    arcs: int,
+    alive: np.ndarray,
+    tau: np.ndarray,
+    *,
+    limits: bool = True,
+) -> np.ndarray:
+    # Those that some instants do not refute.
+    if not len(alive):
+        return alive
+    return alive[~checker.prefilter.refuted(segments(arcs, alive), arcs, tau, limits=limits)]
+
+
+def refused_by_limits(
+    checker: MotionChecker, candidates: Candidates, *, max_arcs: int, fixed: np.ndarray | None = None
+) -> Refused:
+    """Candidates of motions, none of which is feasible, that only limits refuse.
+
+    Args:
+        checker: of the robot.
+        candidates: n of them.
+        max_arcs: largest number tried.
+        fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
+
+    Returns:
+        one for each candidate.
+    """
+    motion, count = candidates.motion, len(candidates.motion)
+    fewest, is_limit = FewestLimits(count, checker.flags), checker.is_limit
+    if not count or not is_limit.any():
+        return fewest.refused()
+    only = np.zeros(len(candidates.z0), int) if fixed is None else fixed
+    segments = _Segments(checker.problem.robot, candidates)
+    for arcs in range(1, max_arcs + 1):
+        stage(f"why not, arcs {arcs} of {max_arcs}")
+        alive = np.flatnonzero(~fewest.is_best & ((only == 0) | (only == arcs))[motion])
+        for tau in (TELLING, OTHERS):
+            alive = _sieved(checker, segments, arcs, alive, _instants(arcs, tau), limits=False)
+        if len(alive):
+            is_proved, broken = _but_for_limits(checker, segments(arcs, alive), arcs)
+            fewest.take(alive[is_proved], np.full(is_proved.sum(), arcs), broken[is_proved])
+    return fewest.refused()
+
+
+def _but_for_limits(checker: MotionChecker, segments: PoseSegment, arcs: int) -> tuple[np.ndarray, np.ndarray]:
+    # Which motions are proved but for the limits that they break, (n,), and these limits, (n, n_criteria).
+    each, is_limit = np.full(len(segments.rate), arcs), checker.is_limit
+    first = checker.check(segments, each, whole=False, margins=False, ignored=is_limit)
+    is_proved, broken = first.verdict == 0, checker.breaks(first.slack) & is_limit
+    unclear = np.flatnonzero(is_proved & ~(broken == is_limit).all(1))
+    for _ in range(int(is_limit.sum())):
+        if not len(unclear):
+            break
+        left = []
+        for ignored in np.unique(broken[unclear], axis=0):
+            alike = unclear[(broken[unclear] == ignored).all(1)]
+            again = checker.check(rows(segments, alike), each[alike], margins=False, ignored=ignored)
+            is_proved[alike] = again.verdict == 0
+            more = checker.breaks(again.slack) & is_limit & ~ignored & (again.verdict != 0)[:, None]
+            broken[alike] |= more
+            left.append(alike[more.any(1)])
+        unclear = np.concatenate(left)
+        is_proved[unclear] = True  # but for more limits
+    is_proved[unclear] &= (broken[unclear] == is_limit).all(1)
+    return is_proved, broken
+
+
+def unavoidable(
+    checker: MotionChecker, candidates: Candidates, suspects: np.ndarray, *, max_arcs: int, fixed: np.ndarray | None
+) -> np.ndarray:
+    """Criteria that every number of arcs breaks.
+
+    Args:
+        checker: of the robot.
+        candidates: n of them, one of each motion.
+        suspects: (n, n_criteria) criteria that are asked about, which some number of arcs breaks.
+        max_arcs: largest number tried.
+        fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
+
+    Returns:
+        (n, n_criteria): no instant that was looked at says otherwise of these, and some instant says it of each.
+    """
+    if not suspects.any():
+        return suspects
+    only = np.zeros(len(suspects), int) if fixed is None else fixed
+    segments, ends = _Segments(checker.problem.robot, candidates), np.array([0.0, 1.0])
+    # What is broken at an end of a motion is so with every number of arcs.
+    certain = suspects & checker.breaks(checker.sampled(segments(2, np.arange(len(only))), 2, ends))
+    suspects = suspects & ~certain
+    for arcs in range(1, max_arcs + 1):
+        alive = np.flatnonzero(suspects.any(1) & ((only == 0) | (only == arcs)))
+        if len(alive):
+            tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
+            suspects[alive] &= checker.breaks(checker.sampled(segments(arcs, alive), arcs, tau))
+    return suspects | certain
+
+
+def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:
+    """The number of arcs with the largest smallest tension over some samples, where none is feasible.
+
+    Args:
+        checker: of the robot.
+        candidates: n of them.
+        max_arcs: largest number tried.
+
+    Returns:
+        (n,).
+    """
+    every = np.arange(len(candidates.motion))
+    best, highest = np.ones(len(every), int), np.full(len(every), -np.inf)
+    if not len(best):
+        return best
+    segments = _Segments(checker.problem.robot, candidates)
+    for arcs in range(1, max_arcs + 1):
+        stage(f"best of what fails, arcs {arcs} of {max_arcs}")
+        tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
+        lowest = checker.prefilter.lowest(segments(arcs, every), arcs, tau)
+        best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)
+    return best
+
+
+def segments_with(robot: PlatformRobot, candidates: Candidates, arcs: np.ndarray) -> PoseSegment:
+    """The segments for given numbers of arcs.
+
+    Args:
+        robot: the robot.
+        candidates: n of them.
+        arcs: (n,).
+
+    Returns:
+        leaves (n, ...), each of the parity of its number of arcs.
+    """
+    segments, every = _Segments(robot, candidates), np.arange(len(arcs))
+    even, odd = (segments(k, every) for k in (0, 1))
+    return jax.tree.map(lambda a, b: np.where((arcs % 2 == 1).reshape(-1, *[1] * (a.ndim - 1)), b, a), even, odd)

@@ -1,0 +1,141 @@
+"""Accessible orientations of a place that a horizontal transition from rest attains, thesis section 3.12.3."""
+
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_parts
+from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
+from cspr_jax.motions.answers import joined
+from cspr_jax.platforms.answers import PoseAnswers, reached, trials
+from cspr_jax.platforms.arcs import CANDIDATES, Candidates, smallest_arcs
+from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.pose_ends import end_options
+from cspr_jax.robots.point_mass import rest_point
+from cspr_jax.robots.symmetries import NONE, Symmetries, alike
+
+# Values of beta-hat tried at the target.
+VALUES = 20
+# Of other values than the preferred one, one in so many is tried before the rest.
+FEWER = 5
+# Large parts fill their batches: candidates of a search for the smallest numbers of arcs, motions of one that only asks
+# whether.
+LARGE, PART, MIXED = 4 * CANDIDATES, CANDIDATES // 4, 16
+
+
+def attainable(
+    checker: PoseChecker,
+    places: np.ndarray,
+    angles: np.ndarray,
+    z0: np.ndarray,
+    *,
+    max_arcs: int,
+    values: int = VALUES,
+    symmetry: Symmetries = NONE,
+    margins: bool = True,
+) -> PoseAnswers:
+    """Smallest numbers of arcs from rest to orientations of places.
+
+    Args:
+        checker: of motions from rest.
+        places: (n, 3) from the centroid of the spools, z down, m.
+        angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
+        z0: (n,) m.
+        max_arcs: largest number tried.
+        values: of beta-hat, the preferred one first.
+        symmetry: symmetries of the robot; orientations that they join are computed once.
+        margins: whether they are wanted, and not only why orientations are not attained.
+
+    Returns:
+        the answers.
+    """
+    some, own = _once(checker, places, angles, z0, symmetry)
+
+    def part(which):
+        which = some[which]
+        motions, beta_hats = _motions(checker, places[which], angles[which], z0[which], values)
+        return reached(checker, motions, beta_hats, max_arcs=max_arcs, margins=margins)
+
+    return joined(in_parts(part, len(some), LARGE // values)).rows(own)
+
+
+def attained(
+    checker: PoseChecker,
+    places: np.ndarray,
+    angles: np.ndarray,
+    z0: np.ndarray,
+    *,
+    max_arcs: int,
+    values: int = VALUES,
+    tried: np.ndarray | None = None,
+    symmetry: Symmetries = NONE,
+) -> np.ndarray:
+    """Orientations of places that some number of arcs and some value of beta-hat attains.
+
+    What `attainable` says too, which tells how, and why not; with half of the work.
+
+    Args:
+        checker: of motions from rest.
+        places: (n, 3) from the centroid of the spools, z down, m.
+        angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
+        z0: (n,) m.
+        max_arcs: largest number tried.
+        values: of beta-hat, the preferred one first.
+        tried: which of these, (k,) numbers from 0 on; None: all, in `turns`.
+        symmetry: symmetries of the robot; orientations that they join are computed once.
+
+    Returns:
+        (n,).
+    """
+    some, own = _once(checker, places, angles, z0, symmetry)
+    each = turns(values) if tried is None else (tried,)
+
+    def part(which):
+        which = some[which]
+        motions, beta_hats = _motions(checker, places[which], angles[which], z0[which], values)
+        is_attained = np.zeros(len(which), bool)
+        for turn in each:
+            left, options = np.flatnonzero(~is_attained), beta_hats[:, turn]
+            size = max(CANDIDATES // max(options.shape[1], 1), 1)
+            for piece in (left[k : k + size] for k in range(0, len(left), size)):
+                cell, trial = trials(motions.motions(piece), options[piece])
+                arcs = smallest_arcs(checker, trial, max_arcs=max_arcs, margins=False).arcs
+                is_attained[piece[cell[arcs > 0]]] = True
+        return is_attained
+
+    # Places differ in what they take: each part gets some of all.
+    mixed = np.argsort(np.arange(len(some)) % MIXED, kind="stable")
+    found = np.empty(len(some), bool)
+    some[:] = some[mixed]
+    found[mixed] = np.concatenate(in_parts(part, len(some), PART))
+    return found[own]
+
+
+def turns(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Turns in which values of beta-hat are tried, each with every number of arcs, where the one before fails.
+
+    Args:
+        values: how many there are, the preferred one first.
+
+    Returns:
+        numbers of values from 0 on: the preferred one; some of the others; the rest.
+    """
+    every = np.arange(1, values)
+    return np.array([0]), every[every % FEWER == 0], every[every % FEWER != 0]
+
+
+def _once(checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
+    # Orientations that stand for others too, and where each of all is among them.
+    some, own = np.unique(alike(symmetry, np.c_[places, z0], angles), return_inverse=True)
+    return some, own.ravel()
+
+
+def _motions(
+    checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
+) -> tuple[Candidates, np.ndarray]:
+    # Transitions from rest, and (n, values) of beta-hat at their ends.
+    robot, count = checker.problem.robot, len(angles)
+    ends = (places, from_tilt_torsion(angles + cylindrical_frames(places)))
+    beta_hats, can_end = end_options(robot, *ends, z0, values)
+    start = (rest_point(z0), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
+    rest = np.full(count, AT_REST)
+    return Candidates(start, ends, z0, np.arange(count), (rest, rest)), np.where(can_end[:, None], beta_hats, np.nan)

@@ -1,0 +1,231 @@
+"""Feasibility of a platform's motions: proved on blocks of time, or refuted by an instant; and their margins.
+
+A first look at a few instants refutes most of what is infeasible. Tensions, the determinant and the limits on the
+motion are then proved by `proof`, contacts and the limits on the pose by `place_proof`. Margins are
+smallest values that are attained, narrowed down around the smallest samples of every criterion; beside them stands what
+is proved.
+"""
+
+import threading
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches, in_threads
+from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.tolerances import Tolerated
+from cspr_jax.platforms.enclosures import Robustness
+from cspr_jax.platforms.end_acceleration import endpoint
+from cspr_jax.platforms.kernels import slacks_at
+from cspr_jax.platforms.margins import Samples, narrowed
+from cspr_jax.platforms.motion_checker import BESIDE_KNOT, FEW, MANY, MotionChecker, PoseChecks
+from cspr_jax.platforms.motions import Motions
+from cspr_jax.platforms.place_proof import PlaceCertifier, PlaceProof
+from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.proof import Certifier, TensionProof
+from cspr_jax.platforms.sieve import FIRST, Prefilter
+from cspr_jax.platforms.slack_lanes import order
+from cspr_jax.platforms.slacks import flags
+from cspr_jax.platforms.tension_blocks import of_motion
+from cspr_jax.platforms.work_list import TOLERANCE, allowance
+from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.verdicts import Verdict
+
+# Blocks of a call at most; so many arcs are held at a time.
+BLOCKS, ARCS = 1024, 32 * MANY
+# Instants that are looked at together.
+SAMPLES = 1 << 18
+# Where margins are asked for no bound is less than this part of what is attained.
+NEAR = 0.5
+
+
+# One function for XLA instead of some hundred small ones.
+_end = jax.jit(endpoint)
+
+
+class PoseChecker(MotionChecker):
+    """Checker of motions of one robot on six cables.
+
+    Args:
+        problem: robot, limits, amplitude.
+        kind: of the motions.
+        batch: how many are computed at a time.
+
+    Fields:
+        prefilter: the first look, which comes before checks.
+        done: how many instants of motions were looked at so far, in the first look and in checks, and how many motions
+            were checked.
+    """
+
+    def __init__(self, problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> None:
+        """Find what can meet."""
+        super().__init__(problem, kind, batch=batch)
+        self._lock, self.done = threading.Lock(), {"prefilter": 0, "motions": 0, "checks": 0}
+        self._compiling, self._compiled = threading.Lock(), set[bool]()
+        self.flags = flags(problem.limits)
+        knots = np.asarray(problem.amplitude.knots)
+        count, count_checks = partial(self._count, "prefilter"), partial(self._count, "checks")
+        self.prefilter = Prefilter(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
+        self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+        self._places = PlaceCertifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+        self._robustness = None
+        if problem.limits.uncertainty is not None:
+            self._robustness = Robustness(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+        self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
+        self._allowed = allowance(np.arange(len(self.flags)) >= len(flags(Limits())))
+        # Where each criterion is among those that depend on the motion, and then those that depend on the pose alone.
+        self._order = np.array(order(problem.limits))
+        self._n_moving = 1 + len(of_motion(problem))
+
+    def _count(self, what: str, many: int) -> None:
+        with self._lock:
+            self.done[what] += many
+
+    def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
+        """Values of (3.91) and (3.92); see `MotionChecker.end_interval`."""
+        end = _end(self.problem.robot, position, quaternion, jnp.asarray(z0))
+        return float(end.preferred), float(end.lowest), float(end.highest)
+
+    def breaks(self, slack: np.ndarray) -> np.ndarray:
+        """Criteria that are broken for certain; see `MotionChecker.breaks`."""
+        return slack + self._allowed < -TOLERANCE
+
+    def sampled(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slacks at some instants; see `MotionChecker.sampled`."""
+        motions, size = Motions(segments, np.full(len(segments.rate), arcs)), max(SAMPLES // len(tau), 1)
+        kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
+        least = []
+        for start in range(0, len(motions.arcs), size):
+            row = np.repeat(np.arange(start, min(start + size, len(motions.arcs))), len(tau))
+            instants = np.tile(tau, len(row) // len(tau))
+            every = in_batches(kernel, (*motions.items(row), instants), size=self.batch)
+            least.append(np.stack(every[:-1], axis=1).reshape(-1, len(tau), len(self.flags)).min(1))
+        return np.concatenate(least)
+
+    def check(
+        self,
+        segments: PoseSegment,
+        arcs: np.ndarray,
+        *,
+        whole: bool = True,
+        margins: bool = True,
+        ignored: np.ndarray | None = None,
+    ) -> PoseChecks:
+        """Check motions in full; see `MotionChecker.check`."""
+        checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
+        self._count("motions", len(arcs))
+        size = max(ARCS // max(arcs, default=1), 1)
+        for start in range(0, len(arcs), size):
+            piece = np.arange(start, min(start + size, len(arcs)))
+            checks.put(piece, self._checked(motions.rows(piece), whole=whole, margins=margins, ignored=ignored))
+        return checks
+
+    def _checked(self, motions: Motions, *, whole: bool, margins: bool, ignored: np.ndarray | None) -> PoseChecks:
+        checks = self.nothing(len(motions.arcs))
+        self._compile(motions, margins=margins)
+        moving, still = self._narrowed_criteria()
+        moving_ignored, still_ignored = (None if ignored is None else ignored[x] for x in (moving, still[:-1]))
+        near = NEAR if margins else 0.0
+        tensions = self._tensions.prove(*motions, near=near, margins=margins, ignored=moving_ignored)
+        checks.verdict[:] = np.where(tensions.is_refuted, Verdict.SLACK_CABLE.value, Verdict.UNDECIDED.value)
+        checks.instant[:] = np.where(tensions.is_refuted, tensions.instant, np.nan)
+        some = np.flatnonzero(np.logical_or(whole, ~tensions.is_refuted))
+        if not len(some):
+            return checks
+        part = motions.rows(some)
+        places = self._places.prove(*part, margins=margins, ignored=still_ignored)
+        checks.instant[some] = np.where(tensions.is_refuted[some], tensions.instant[some], places.instant)
+        is_finite = ~np.isnan(tensions.attained[some]).any(1) & ~np.isnan(places.attained).any(1)
+        is_finite &= self.durations(*part) > 0.0
+        is_proved = tensions.is_proved[some] & places.is_proved & is_finite
+        checks.bound[some] = np.where(is_proved, np.minimum(tensions.bound[some, 0], places.bound[:, 0]), np.nan)
+        least = self._attained(tensions.attained[some], places.attained)
+        if margins:
+            samples = _samples(moving, tensions, some), _samples(still, places, np.arange(len(some)))
+            self._narrow(least, part, samples, np.logical_or(whole, is_proved))
+        verdict = self._verdict(least[:-1], is_proved, places, ignored)
+        if ignored is None:
+            self._weigh(checks, some, part, verdict)
+        checks.verdict[some] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
+        checks.slack[some] = np.where(is_finite, least[:-1], np.nan).T
+        checks.gap[some] = np.where(is_finite, least[-1], np.nan)
+        return checks
+
+    def _compile(self, motions: Motions, *, margins: bool) -> None:
+        # Both proofs at once, before the first: XLA takes seconds for each, on one core. Other threads wait.
+        with self._compiling:
+            if margins not in self._compiled:
+                one = motions.rows(np.arange(1))
+                in_threads(lambda proofs: proofs.prove(*one, margins=margins), [self._tensions, self._places])
+                self._compiled.add(margins)
+
+    def tolerated(self, segments: PoseSegment, arcs: np.ndarray) -> Tolerated:
+        """Multiples of the uncertainty that motions stand; see `MotionChecker.tolerated`."""
+        if self._robustness is None:
+            return super().tolerated(segments, arcs)
+        return self._robustness.tolerated(segments, arcs)
+
+    def _weigh(self, checks: PoseChecks, some: np.ndarray, motions: Motions, verdict: np.ndarray) -> None:
+        # Judges motions that are feasible as they are planned by all robots within the uncertainty.
+        which = np.flatnonzero(verdict == Verdict.FEASIBLE)
+        if self._robustness is None or not len(which):
+            return
+        found = self._robustness.tolerated(*motions.rows(which), whole=False)
+        checks.tolerated[some[which]], checks.not_tolerated[some[which]] = found
+        open_ones = np.where(found.refuted <= 1.0, Verdict.UNCERTAINTY.value, Verdict.UNDECIDED.value)
+        verdict[which] = np.where(found.proved >= 1.0, Verdict.FEASIBLE.value, open_ones)
+
+    def _verdict(
+        self, least: np.ndarray, is_proved: np.ndarray, places: PlaceProof, ignored: np.ndarray | None
+    ) -> np.ndarray:
+        # What is broken for certain is said alone.
+        verdict = Verdict.CABLE_CABLE.value * places.met | Verdict.CABLE_PLATFORM.value * places.hit
+        broken = self.breaks(least.T) & (True if ignored is None else ~ignored)
+        for flag, column in zip(self.flags, broken.T, strict=True):
+            verdict |= np.where(column, flag.value, 0)
+        return np.where(is_proved | (verdict != 0), verdict, Verdict.UNDECIDED.value)
+
+    def _attained(self, moving: np.ndarray, still: np.ndarray) -> np.ndarray:
+        # (n_criteria + 1, n) in the order of the flags, then the distance between cables. Proofs have the determinant
+        # among what depends on the motion, second.
+        every = np.concatenate([moving[:, :1], moving[:, 2:], moving[:, 1:2], still[:, :-1]], axis=1)
+        return np.concatenate([every[:, self._order], still[:, -1:]], axis=1).T
+
+    def _narrowed_criteria(self) -> tuple[np.ndarray, np.ndarray]:
+        # Where the values of both proofs are among the criteria, the distance between cables last. The determinant
+        # stands second among what depends on the motion, and first after it among all.
+        own = np.argsort(self._order)
+        moving = own[[0, self._n_moving, *range(1, self._n_moving)]]
+        return moving, np.append(own[self._n_moving + 1 :], len(self.flags))
+
+    def _narrow(self, least: np.ndarray, motions: Motions, samples: tuple[Samples, ...], wanted: np.ndarray) -> None:
+        # Puts margins of wanted motions into what was attained, (n_criteria + 1, n).
+        def values_at(row: np.ndarray, tau: np.ndarray) -> np.ndarray:
+            kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
+            return np.stack(in_batches(kernel, (*motions.items(row), tau), size=self.batch))
+
+        every = np.flatnonzero(wanted)
+        if not len(every):
+            return
+        # Limits on speeds and accelerations are proved as other functions of the same sign, and beyond a singularity
+        # nothing is: only true slacks count.
+        least[np.argsort(self._order)[1 : self._n_moving]] = np.inf
+        least[np.isneginf(least)] = np.inf
+        # The ends of motions, and what may jump at a knot.
+        for tau in (0.0, 1.0, *self._knots):
+            least[:, every] = np.fmin(least[:, every], values_at(every, np.full(len(every), tau)))
+        for one in samples:
+            narrowed(values_at, least, one, wanted)
+
+
+def _samples(which: np.ndarray, proof: TensionProof | PlaceProof, some: np.ndarray) -> Samples:
+    # At the instants of blocks of some of the motions, numbered among these.
+    own = np.full(len(proof.is_proved), -1)
+    own[some] = np.arange(len(some))
+    row = own[proof.row]
+    # Not by a mask as an index, which would leave blocks as the slowest axis in memory.
+    row, tau, nodes = (np.compress(row >= 0, x, axis=-1) for x in (row, proof.first.tau, proof.first.nodes))
+    return Samples(which, row, tau, nodes)

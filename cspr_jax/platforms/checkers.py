@@ -1,0 +1,22 @@
+"""The checker of a platform's motions: by its number of cables."""
+
+from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.motion_checker import FEW, MotionChecker
+from cspr_jax.platforms.redundant_checker import RedundantChecker
+
+
+def pose_checker(problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> MotionChecker:
+    """Checker of motions of a platform.
+
+    Args:
+        problem: robot, limits, amplitude.
+        kind: of the motions.
+        batch: how many are computed at a time.
+
+    Returns:
+        on six cables that of their only tensions, on more that of the margin of all tensions.
+    """
+    is_determined = problem.robot.n_cables == problem.robot.dof
+    return (PoseChecker if is_determined else RedundantChecker)(problem, kind, batch=batch)

@@ -1,0 +1,152 @@
+"""Transitions of a platform from rest, one lane a segment: the fewest operations that give a state.
+
+Such a motion is a straight swing and a rotation about one axis. What depends on the number of arcs and on the instant
+is a table: position and acceleration are one number each times a vector of the segment, and angle, angular speed and
+angular acceleration are linear in the two values of beta-hat. The same mechanics as `pose_lanes` (tests compare them).
+"""
+
+import math
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis
+from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.platforms.platform_segment import PoseSegment
+
+
+class Swings(NamedTuple):
+    """Segments from rest.
+
+    Fields:
+        hub: the point p0, m.
+        reach: from p0 to the end, along the first arc; m.
+        axis: unit vector of the rotation.
+        angle: whole angle of the envelope, in half turns; (n,).
+        start_beta_hat: beta-hat in p0, (n,).
+        end_beta_hat: beta-hat at the end, (n,).
+        rate: lambda of (3.50), 1/s^2; (n,).
+    """
+
+    hub: Vector
+    reach: Vector
+    axis: Vector
+    angle: Array
+    start_beta_hat: Array
+    end_beta_hat: Array
+    rate: Array
+
+
+class Swing(NamedTuple):
+    """Their state at one instant.
+
+    Fields:
+        position: m.
+        acceleration: m/s^2.
+        turn: rows of the rotation matrix.
+        squared_speed: of the rotation, (n,) rad^2/s^2.
+        spin: angular acceleration about the axis, (n,) rad/s^2.
+    """
+
+    position: Vector
+    acceleration: Vector
+    turn: Matrix
+    squared_speed: Array
+    spin: Array
+
+
+def swings(segments: PoseSegment) -> Swings:
+    """Swings of segments from rest.
+
+    Args:
+        segments: leaves (n, ...).
+
+    Returns:
+        the same motions.
+    """
+    how = segments.turn
+    return Swings(
+        tuple(segments.hub[:, i] for i in range(3)),
+        tuple(segments.plane[:, i, 0] * segments.end_radius for i in range(3)),
+        tuple(how.across[:, i] for i in range(1, 4)),
+        how.angle * (2.0 / math.pi),
+        how.start_beta_hat,
+        how.end_beta_hat,
+        segments.rate,
+    )
+
+
+def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: Kind) -> Array:
+    """Table that segments from rest of one number of arcs share.
+
+    Args:
+        amplitude: A.
+        arcs: () number of arcs, a float.
+        tau: (m,) instants.
+        kind: of the motions.
+
+    Returns:
+        (m, 11): position and acceleration; angle, speed and acceleration of the rotation, of each what is constant and
+        what multiplies beta-hat in p0 and at the end. In units of the phase pi p tau; angles in half turns.
+    """
+    theta = math.pi * arcs
+    a, a1, a2, a3 = (x / theta**k for k, x in enumerate(derivatives(amplitude, tau, order=3)))
+    sine, cosine = sincospi(arcs * tau)
+    if kind.variable:  # (3.44)
+        place = a * cosine - a1 * sine
+        bend = -((a + a2) * cosine + (a1 + a3) * sine)
+    else:
+        place = a * cosine
+        bend = (a2 - a) * cosine - 2.0 * a1 * sine
+    beat = _plain(sine, cosine) if kind.plain else _with_beta_hats(sine, cosine, tau, theta)
+    turns = []
+    for b, b1, b2 in beat:
+        turns.append((a * b, math.pi * (a1 * b + a * b1), math.pi * (a2 * b + 2.0 * a1 * b1 + a * b2)))
+    return jnp.stack([place, bend, *(turn[k] for k in range(3) for turn in turns)], axis=1)
+
+
+def _plain(sine: Array, cosine: Array) -> list[tuple[Array, ...]]:
+    # beta_1 of (3.66) and its derivatives.
+    nothing = jnp.zeros_like(sine)
+    return [(cosine, -sine, -cosine), (nothing,) * 3, (nothing,) * 3]
+
+
+def _with_beta_hats(sine: Array, cosine: Array, tau: Array, theta: Array) -> list[tuple[Array, ...]]:
+    # beta_ff of (3.93): (9 c - c3) / 8 + h (c - c3) / 8, where h goes from one beta-hat to the other.
+    sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
+    steady = ((9.0 * cosine - cosine3) / 8.0, (3.0 * sine3 - 9.0 * sine) / 8.0, 9.0 * (cosine3 - cosine) / 8.0)
+    c, c1, c2 = (cosine - cosine3) / 8.0, (3.0 * sine3 - sine) / 8.0, (9.0 * cosine3 - cosine) / 8.0
+    parts = [
+        (h * c, h * c1 + slope * c, h * c2 + 2.0 * slope * c1)
+        for h, slope in ((1.0 - tau, -1.0 / theta), (tau, 1.0 / theta))
+    ]
+    return [steady, *parts]
+
+
+def swing(which: Swings, row: Array) -> Swing:
+    """The state at one instant.
+
+    Args:
+        which: the segments.
+        row: (11,) of `rest_table`.
+
+    Returns:
+        the state.
+    """
+
+    def blended(k):
+        return row[k] + which.start_beta_hat * row[k + 1] + which.end_beta_hat * row[k + 2]
+
+    speed, spin = which.angle * blended(5), which.angle * blended(8)
+    sine, cosine = sincospi(which.angle * blended(2))
+    pull = which.rate * row[1]
+    return Swing(
+        tuple(h + row[0] * r for h, r in zip(which.hub, which.reach, strict=True)),
+        tuple(pull * r for r in which.reach),
+        about_axis(which.axis, sine, cosine),
+        which.rate * speed * speed,
+        which.rate * spin,
+    )

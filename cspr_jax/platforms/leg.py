@@ -1,0 +1,262 @@
+"""Leg of poses of a platform: orientations, values of beta-hat, and the search along the leg: chapter 3."""
+
+import itertools
+from pathlib import Path
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.build import given_quaternion, orientations
+from cspr_jax.config.hints import plan_hints
+from cspr_jax.config.plan import Pose
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.motions.fewest_limits import Refused
+from cspr_jax.motions.leg import Leg, each
+from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.waypoints import Stops
+from cspr_jax.platforms.answers import PoseAnswers, settled
+from cspr_jax.platforms.arcs import Candidates, Found, refused_by_limits, smallest_arcs
+from cspr_jax.platforms.beta_hat import BEYOND, cheapest_path, options
+from cspr_jax.platforms.checkers import pose_checker
+from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.motion_checker import FEW, MANY, TOUCH, MotionChecker
+from cspr_jax.platforms.platform_segment import PlatformMotion, PoseSegment
+from cspr_jax.robots.interference import contacts, gaps
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.reference_pose import reference_pose
+from cspr_jax.robots.wrench_balance import determinant_share, is_regular
+from cspr_jax.schema.families import WITHOUT_BETA_HAT
+
+# A third derivative that changes more than this, relative to its largest value, just beside a knot makes tensions jump.
+JUMP, NEAR_KNOT = 1e-6, 1e-12
+_JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
+# Arcs that a motion that limits alone refuse counts for, beside its own: more than a sequence of feasible ones has.
+REFUSED = 100_000
+# Up to so many segments compiling for large batches takes longer than it saves.
+SOME = 1000
+
+
+class _Poses(Leg):
+    # Poses of a platform, joined by the motions of chapter 3; what they are, `variable` says.
+
+    variable: ClassVar[bool]
+
+    def __init__(self, stops: Stops) -> None:
+        """Refuse keys of other families and orientations that are none."""
+        keys, path = stops.keys, stops.path
+        if keys.inclination is not None:
+            raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
+        if keys.beat in WITHOUT_BETA_HAT:
+            for i, pose in enumerate(stops.poses):
+                if pose.beta_hat is not None:
+                    raise ConfigError(path, f'{stops.name(i)}.beta_hat: must be absent with beat = "{keys.beat}"')
+        super().__init__(stops)
+        self._kind = Kind(self.variable, keys.beat == "beta_1")
+        self._given = np.array([_orientation(stops.name(i), pose, path) for i, pose in enumerate(stops.poses)])
+
+    def _quaternions(self, points: np.ndarray) -> np.ndarray:
+        # Orientations (n_poses, 4) in the kernels' axes; tilt is seen from the vertical through the centroid.
+        poses, frame = self.stops.poses, self.stops.frame
+        angles = np.array([[0.0] * 3 if p.rest else p.tilt_torsion or [0.0] * 3 for p in poses])
+        is_given = np.array([pose.rest or pose.tilt_torsion is None for pose in poses])
+        return np.where(is_given[:, None], frame.turned_quaternions(self._given), orientations(frame, points, angles))
+
+    def check(self, problem: Problem) -> None:
+        """Refuse poses at which no motion can begin or end; see `Leg.check`."""
+        stops = self.stops
+        points = stops.points(1.0)
+        hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.spec))
+        for i, (position, quaternion) in enumerate(zip(points, self._quaternions(points), strict=True)):
+            # On more cables poses are judged by the margin of their tensions alone.
+            if not stops.poses[i].rest and _is_determined(problem):
+                _check_pose(problem.robot, stops.name(i), position, quaternion, stops.path, hint)
+
+    def join(self, problem: Problem, z0: float) -> tuple[PoseAnswers, list[Motion]]:
+        """Join the poses; see `Leg.join`."""
+        try:
+            if _is_determined(problem):
+                reference_pose(problem.robot, z0)
+        except InputError as error:
+            raise ConfigError(self.stops.path, self.stops.spec.typed(error)) from error
+        answers, segments = self._found(problem, np.array([z0]))
+        pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
+        return answers, [PlatformMotion(own, problem.amplitude, leaf(arcs), self._kind) for own, arcs in pairs]
+
+    def answers(self, problem: Problem, depths: np.ndarray) -> PoseAnswers:
+        """Answers for several depths; see `Leg.answers`."""
+        return self._found(problem, depths)[0]
+
+    def warnings(self, problem: Problem) -> list[str]:
+        """Tensions that jump; see `Leg.warnings`."""
+        return [_JUMPS.format(problem.amplitude.name)] if self.variable and _jumps(problem.amplitude) else []
+
+    def _found(self, problem: Problem, depths: np.ndarray) -> tuple[PoseAnswers, PoseSegment]:
+        # The values of beta-hat that give the fewest arcs in sum.
+        count, z0 = len(self), np.repeat(depths, len(self))
+        points = self.stops.points(depths)
+        quaternions = self._quaternions(points[0])
+        checker = pose_checker(problem, self._kind, batch=FEW if len(z0) <= SOME else MANY)
+        beta_hats = [
+            self._beta_hats(checker, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)
+        ]
+        if len(depths) == 1:
+            self._refuse_slack(beta_hats[0])
+        # Every pair of values at the ends of every segment, for every depth.
+        pairs = [[self._pairs(i, own[i], own[i + 1]) for i in range(count)] for own in beta_hats]
+        motion = np.repeat(np.arange(len(z0)), [pair[0].size for own in pairs for pair in own])
+        first, last = (np.concatenate([pair[k].ravel() for own in pairs for pair in own]) for k in (0, 1))
+        trial = self._candidates(points, quaternions, z0, motion, (first, last))
+        fixed, largest = np.tile(self.stops.arcs, len(depths)), self.stops.max_arcs
+        of_trials = smallest_arcs(checker, trial, max_arcs=largest, fixed=fixed, beyond=BEYOND)
+        refused = self._refused(checker, trial, of_trials, fixed)
+        path = _best_paths(of_trials.arcs, refused.arcs, pairs)
+        best = Found(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.rows(path))
+        why = Refused(refused.arcs[path], refused.broken[path])
+        return settled(checker, trial.rows(path), best, refused=why, max_arcs=largest, fixed=fixed)
+
+    def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: Found, fixed: np.ndarray) -> Refused:
+        # Of candidates of segments of which none is feasible, or nearly so.
+        is_open = np.ones(len(trial.z0), bool)
+        is_open[trial.motion[(of_trials.arcs > 0) | (of_trials.undecided > 0)]] = False
+        rows, count = np.flatnonzero(is_open[trial.motion]), len(trial.motion)
+        part = refused_by_limits(checker, trial.rows(rows), max_arcs=self.stops.max_arcs, fixed=fixed)
+        refused = Refused(np.zeros(count, int), np.zeros((count, len(checker.flags)), bool))
+        refused.arcs[rows], refused.broken[rows] = part.arcs, part.broken
+        return refused
+
+    def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        # Values at both ends of segment i, (n_first, n_last) each.
+        starts, ends = np.meshgrid(first, last, indexing="ij")
+        if self.stops.keys.beat == "beta_f":
+            return (starts, starts) if self.stops.poses[i + 1].rest else (ends, ends)
+        return starts, ends
+
+    def _candidates(
+        self, points: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, motion: np.ndarray, beta_hats: tuple
+    ) -> Candidates:
+        # The motions are the segments, counted over all depths.
+        depth, i = np.divmod(np.arange(len(z0)), len(self))
+        start, end = ((points[depth, i + k], quaternions[i + k]) for k in (0, 1))
+        return Candidates(start, end, z0, motion, beta_hats)
+
+    def _beta_hats(
+        self, checker: MotionChecker, points: np.ndarray, quaternions: np.ndarray, z0: float
+    ) -> list[np.ndarray]:
+        # Values of beta-hat to try at each pose; NaN where none keeps every cable taut.
+        tries: list[np.ndarray] = []
+        stops, changes = self.stops, self._changes()
+        for i, (pose, position, quaternion) in enumerate(zip(stops.poses, points, quaternions, strict=True)):
+            if stops.keys.beat in WITHOUT_BETA_HAT:
+                tries.append(np.zeros(1))
+                continue
+            if pose.beta_hat is not None or pose.rest:
+                tries.append(np.array([AT_REST if pose.beta_hat is None else pose.beta_hat]))
+                continue
+            end = checker.end_interval(position, quaternion, z0)
+            preferred, lowest, highest = (np.atleast_1d(x) for x in end)
+            values = options(preferred, lowest, highest)[0]
+            if np.isnan(values[0]) and not _is_determined(checker.problem):
+                values[0] = end[0]  # the verdict says what is wrong
+            is_one = np.isnan(values[0]) or i in changes
+            tries.append(values[:1] if is_one else values[~np.isnan(values)])
+        return tries
+
+    def _changes(self) -> set[int]:
+        # Poses where another family goes on: both take the value that is tried first, so that accelerations meet.
+        ends = {0: self.stops.first > 0, len(self): self.stops.last < len(self.stops.keys.pose) - 1}
+        return {i for i, changes in ends.items() if changes}
+
+    def _refuse_slack(self, beta_hats: list[np.ndarray]) -> None:
+        for i, values in enumerate(beta_hats):
+            if np.isnan(values).any():
+                name = self.stops.name(i)
+                raise ConfigError(
+                    self.stops.path, f"{name}: must be another pose, or z0: no beta_hat keeps every cable taut there"
+                )
+
+
+class StandardPoses(_Poses):
+    """Poses of a platform, joined by standard hypocycloids; see `Leg`."""
+
+    variable = False
+
+
+class VariablePoses(_Poses):
+    """Poses of a platform, joined by hypocycloids of variable amplitude; see `Leg`."""
+
+    variable = True
+
+
+def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarray:
+    # Which candidate of each segment of each depth, (n_depths * n_segments,); rather one that limits alone refuse than
+    # another one that fails.
+    arcs = np.where(arcs > 0, arcs, np.where(refused > 0, refused + REFUSED, 0))
+    places, last = [], 0
+    for own in pairs:
+        costs, starts = [], []
+        for first, _ in own:
+            starts.append(last)
+            last += first.size
+            counts = arcs[starts[-1] : last].reshape(first.shape)
+            costs.append(np.where(counts > 0, counts, np.inf))
+        steps = itertools.pairwise(cheapest_path(costs))
+        for start, cost, step in zip(starts, costs, steps, strict=True):
+            places.append(start + int(np.ravel_multi_index(step, cost.shape)))
+    return np.array(places)
+
+
+def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
+    # Of a pose in the file's axes; that of tilt and torsion follows from the place.
+    reference = np.array([1.0, 0.0, 0.0, 0.0])
+    if pose.tilt_torsion is not None and pose.quaternion is not None:
+        raise ConfigError(path, f"{name}.quaternion: cannot be combined with tilt_torsion")
+    if pose.rest:
+        turned = pose.quaternion is not None and np.abs(np.asarray(pose.quaternion) - reference).max() > 1e-9
+        if turned or (pose.tilt_torsion is not None and (pose.tilt_torsion[1] != 0.0 or pose.tilt_torsion[2] != 0.0)):
+            raise ConfigError(path, f"{name}: must have the reference orientation at rest")
+        return reference
+    return given_quaternion(pose.quaternion, f"{name}.quaternion", path)
+
+
+def _is_determined(problem: Problem) -> bool:
+    # Whether the motion determines the tensions, and a reference pose what is singular.
+    return problem.robot.n_cables == problem.robot.dof
+
+
+@jax.jit
+def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: Array):
+    # Depth below the spool plane, determinant over that of the reference orientation in the middle at the same depth,
+    # distances between cables.
+    where = (position, rotations.matrix(quaternion))
+    depth = plane_normal(robot) @ position
+    apart = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)
+    return depth, determinant_share(robot, *where), apart
+
+
+def _check_pose(
+    robot: PlatformRobot, name: str, position: np.ndarray, quaternion: np.ndarray, path: Path, hint: str
+) -> None:
+    depth, share, apart = map(np.asarray, _standing(robot, position, quaternion, contacts(robot).pairs))
+    if not depth > 0.0:
+        raise ConfigError(path, f"{name}.position: must be below the spool plane{hint}")
+    if not is_regular(abs(share)):
+        raise ConfigError(
+            path, f"{name}: must be another orientation: singular there (relative determinant {share:.1g})"
+        )
+    if apart.min(initial=np.inf) < TOUCH * float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max()):
+        raise ConfigError(path, f"{name}: must be another orientation: two cables touch there")
+
+
+def _jumps(amplitude: Amplitude) -> bool:
+    # Whether A''' jumps between pieces.
+    sides = [derivatives(amplitude, jnp.asarray(amplitude.knots) + s, order=3)[3] for s in (-NEAR_KNOT, NEAR_KNOT)]
+    return bool((np.abs(np.asarray(sides[1] - sides[0])) > JUMP * float(amplitude.largest[3])).any())

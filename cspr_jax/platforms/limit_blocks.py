@@ -1,0 +1,203 @@
+"""Limits on a platform's motion as analytic functions on blocks, one row a quantity.
+
+    tension         |x_k| kappa_k / z0 over D, against the limit over the weight a cable
+    speed           (|x_k|^2 - (x_k . x_k')^2 / limit^2) / z0^2
+    acceleration    (|x_k|^3 -+ ((x_k'^2 + x_k . x_k'') |x_k|^2 - (x_k . x_k')^2) / limit) / z0^3
+
+with x_k cable k as a vector, primes derivatives in time. They are positive exactly while the limit is met.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic.lanes import dot
+from cspr_jax.platforms.platform_lanes import State
+from cspr_jax.robots.wrench_lanes import CABLES, Cables, cable_rates
+
+# A length is analytic where its ray changes by less than this part of it: sqrt(2) - 1.
+STRAIGHT = 0.414
+Pair = tuple[Array, Array]
+
+
+class Here(NamedTuple):
+    """Instant of n blocks.
+
+    Fields:
+        state: of the platform.
+        wires: the cables.
+        kappa: of the taut cables, one (n,) each.
+        squared: T^2, s^2.
+        z0: m.
+    """
+
+    state: State
+    wires: Cables
+    kappa: Sequence[Array]
+    squared: Array
+    z0: Array
+
+
+class Sizes(NamedTuple):
+    """Bounds on an ellipse of complex time, one (n,) a cable.
+
+    Fields:
+        kappa: of the taut cables.
+        rays: of lengths, m.
+        paces: of the derivative of rays in normalised time, m.
+        pulls: of their second derivative, m.
+        is_straight: whether lengths are analytic.
+        squared: (n,) T^2, s^2.
+        z0: (n,) m.
+    """
+
+    kappa: Sequence[Array]
+    rays: Sequence[Array]
+    paces: Sequence[Array]
+    pulls: Sequence[Array]
+    is_straight: Sequence[Array]
+    squared: Array
+    z0: Array
+
+
+class Enclosed(NamedTuple):
+    """A quantity on n blocks, and at their nodes, (m, n_cables, n) each; of D (m, 1, n).
+
+    Fields:
+        coefficients: Bernstein's, less and more what the polynomials leave out.
+        nodes: values there, less and more what may be rounding.
+        regular: coefficients of D.
+        share: D at the nodes.
+    """
+
+    coefficients: Pair
+    nodes: Pair
+    regular: Pair
+    share: Pair
+
+
+class Quantity(NamedTuple):
+    """A quantity of the motion that limits bound.
+
+    Fields:
+        width: how many values it has.
+        values: from an instant and the limit, (n_cables,), values in pairs of (n,).
+        sizes: from sizes and the limit, as many bounds of them as values.
+        slacks: of limits at least and at most so large, from what is enclosed and the limit over the scale of slacks:
+            upper bounds of the smallest ones at the nodes (m, n), and a lower bound of all (n,).
+    """
+
+    width: int
+    values: Callable[[Here, Array], list[Pair]]
+    sizes: Callable[[Sizes, Array], list[Array]]
+    slacks: Callable[[Enclosed, Array, bool], Pair]
+
+
+def ratio(top: Array, regular: Pair) -> Array:
+    """Lower bounds of quotients of polynomials: the smallest one that their coefficients allow.
+
+    Args:
+        top: (...) coefficients of the numerator.
+        regular: lower and upper bounds of those of the denominator, (...) each.
+
+    Returns:
+        (...); -inf where the denominator may vanish.
+    """
+    low, high = regular
+    bottom = jnp.where(top > 0.0, high, low)
+    return jnp.where(bottom > 0.0, top / jnp.where(bottom > 0.0, bottom, 1.0), -jnp.inf)
+
+
+def at_most(top: Array, regular: Pair) -> Array:
+    """Upper bounds of quotients where the denominator is positive.
+
+    Args:
+        top: (...) those of the numerator.
+        regular: lower and upper bounds of the denominator, (...) each.
+
+    Returns:
+        (...); infinite where the denominator is not positive for certain, nor the numerator negative.
+    """
+    return -ratio(-top, regular)
+
+
+def _paired(values: Sequence[Array]) -> list[Pair]:
+    return list(zip(values[::2], values[1::2], strict=True))
+
+
+def _tensions(here: Here, _: Array) -> list[Pair]:
+    lengths = [jnp.sqrt(dot(ray, ray)) / here.z0 for ray in here.wires.rays]
+    return _paired([x * length for x, length in zip(here.kappa, lengths, strict=True)])
+
+
+def _tension_sizes(sizes: Sizes, _: Array) -> list[Array]:
+    each = zip(sizes.kappa, sizes.rays, sizes.is_straight, strict=True)
+    return [jnp.where(is_straight, kappa * ray / sizes.z0, jnp.inf) for kappa, ray, is_straight in each]
+
+
+def _tension_slacks(found: Enclosed, limit: Array, is_least: bool) -> Pair:
+    limit, (low, high), (under, over) = limit[None, :, None], found.coefficients, found.nodes
+    if is_least:
+        here, bound = at_most(over, found.share) - limit, ratio(low, found.regular) - limit
+    else:
+        here, bound = limit + at_most(-under, found.share), limit + ratio(-high, found.regular)
+    return jnp.min(here, axis=1), jnp.min(bound, axis=(0, 1))
+
+
+def _rates(here: Here) -> list[tuple[Array, Array, Array]]:
+    state = here.state
+    rows = cable_rates(here.wires, state.velocity, state.acceleration, state.omega, state.spin)
+    return list(zip(*rows, strict=True))
+
+
+def _speeds(here: Here, limit: Array) -> list[Pair]:
+    every = []
+    for k, (length, rate, _) in enumerate(_rates(here)):
+        share = rate * rate / (here.squared * limit[k] ** 2)
+        every.append((length / here.z0) ** 2 * (1.0 - share))
+    return _paired(every)
+
+
+def _speed_sizes(sizes: Sizes, limit: Array) -> list[Array]:
+    return [
+        (ray / sizes.z0) ** 2 * (1.0 + pace**2 / (sizes.squared * limit[k] ** 2))
+        for k, (ray, pace) in enumerate(zip(sizes.rays, sizes.paces, strict=True))
+    ]
+
+
+def _speed_slacks(found: Enclosed, _: Array, __: bool) -> Pair:
+    return jnp.min(found.nodes[1], axis=1), jnp.min(found.coefficients[0], axis=(0, 1))
+
+
+def _accelerations(here: Here, limit: Array) -> list[Pair]:
+    every = []
+    for k, (length, _, bend) in enumerate(_rates(here)):
+        cubed = (length / here.z0) ** 3
+        every.append((cubed, cubed * bend / (here.squared * limit[k])))
+    return every
+
+
+def _acceleration_sizes(sizes: Sizes, limit: Array) -> list[Array]:
+    every = []
+    for k, (ray, pace, pull) in enumerate(zip(sizes.rays, sizes.paces, sizes.pulls, strict=True)):
+        bend = ray**2 * (2.0 * pace**2 + ray * pull) / (sizes.squared * sizes.z0**3 * limit[k])
+        every += [jnp.where(sizes.is_straight[k], (ray / sizes.z0) ** 3, jnp.inf), bend]
+    return every
+
+
+def _acceleration_slacks(found: Enclosed, _: Array, __: bool) -> Pair:
+    (low, high), (under, over) = found.coefficients, found.nodes
+    worst = jnp.maximum(jnp.abs(low[:, 1::2]), jnp.abs(high[:, 1::2]))
+    # As near to zero as rounding lets it be.
+    bends = jnp.maximum(jnp.maximum(under[:, 1::2], -over[:, 1::2]), 0.0)
+    return jnp.min(over[:, ::2] - bends, axis=1), jnp.min(low[:, ::2] - worst, axis=(0, 1))
+
+
+# By the name that rows of `schema.limits` call them.
+QUANTITIES = {
+    "tension": Quantity(CABLES, _tensions, _tension_sizes, _tension_slacks),
+    "speed": Quantity(CABLES, _speeds, _speed_sizes, _speed_slacks),
+    "acceleration": Quantity(2 * CABLES, _accelerations, _acceleration_sizes, _acceleration_slacks),
+}

@@ -1,0 +1,229 @@
+"""Checkers of a platform's motions: what searches and plans ask of them, whatever the number of cables."""
+
+import abc
+import dataclasses
+from typing import Protocol
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.tolerances import Tolerated
+from cspr_jax.platforms.platform_segment import PoseSegment, duration
+from cspr_jax.schema.verdicts import Verdict
+
+# Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
+FEW, MANY = 256, 2048
+TOLERANCE = 1e-7
+TOUCH = 1e-6  # of the platform's size: poses nearer to a contact cannot be asked for
+BESIDE_KNOT = 1e-12
+BASIC = 3  # criteria that are no limits
+
+
+@dataclasses.dataclass(frozen=True)
+class PoseChecks:
+    """Verdicts, slacks and gaps of n motions.
+
+    Fields:
+        verdict: (n,) `Verdict` flags; 0 is feasible.
+        slack: (n, n_criteria) smallest of each criterion of `MotionChecker.flags`; NaN where unknown.
+        gap: (n,) smallest distance between cables that can meet, m; infinite where none can.
+        bound: (n,) proved lower bound of the slack of taut cables and of the depth below the spools; NaN where nothing
+            is proved.
+        instant: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a small
+            step of it); NaN where it is not, and of contacts where they were only sampled.
+        tolerated: (n,) multiple of the uncertainty that it is proved to stand, 1 or 0 as far as verdicts need it; NaN
+            where none is given, or the motion is not feasible as planned.
+        not_tolerated: (n,) one that it does not, likewise; infinite where none was found.
+    """
+
+    verdict: np.ndarray
+    slack: np.ndarray
+    gap: np.ndarray
+    bound: np.ndarray
+    instant: np.ndarray
+    tolerated: np.ndarray
+    not_tolerated: np.ndarray
+
+    def put(self, which: np.ndarray, others: "PoseChecks") -> None:
+        """Write others into it.
+
+        Args:
+            which: (m,) their places.
+            others: of m motions.
+        """
+        for mine, theirs in zip(vars(self).values(), vars(others).values(), strict=True):
+            mine[which] = theirs
+
+    def rows(self, which: np.ndarray) -> "PoseChecks":
+        """Checks of some of the motions.
+
+        Args:
+            which: (m,) indices.
+
+        Returns:
+            those of m motions.
+        """
+        return PoseChecks(**{name: values[which] for name, values in vars(self).items()})
+
+
+class FirstLook(Protocol):
+    """First look at motions: a few instants that refute most of what is infeasible."""
+
+    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slack of the tensions over some instants.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants.
+
+        Returns:
+            (n,); -inf where not finite.
+        """
+        ...
+
+    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
+        """Motions that some instants refute.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants, the most telling ones first.
+            limits: whether limits may refute them, too.
+
+        Returns:
+            (n,).
+        """
+        ...
+
+
+@jax.jit
+def _durations(arguments) -> jax.Array:
+    return jax.vmap(duration)(*arguments)
+
+
+class MotionChecker(abc.ABC):
+    """Checker of motions of one robot.
+
+    Args:
+        problem: robot, limits, amplitude.
+        kind: of the motions.
+        batch: how many are computed at a time.
+
+    Fields:
+        flags: of each criterion, the verdict where it is broken: of the tensions, of singular poses, of poses above the
+            spools, then of the other limits. Where one does not apply, its slack is NaN or infinite.
+        prefilter: the first look, which comes before checks.
+    """
+
+    flags: tuple[Verdict, ...]
+    prefilter: FirstLook
+
+    def __init__(self, problem: Problem, kind: Kind, *, batch: int) -> None:
+        """Keep what is asked about."""
+        self.problem, self.kind, self.batch = problem, kind, batch
+
+    def durations(self, segments: PoseSegment, arcs: np.ndarray) -> np.ndarray:
+        """Durations of segments.
+
+        Args:
+            segments: leaves (n, ...).
+            arcs: (n,).
+
+        Returns:
+            (n,) s.
+        """
+        return in_batches(_durations, (segments, arcs.astype(float)), size=self.batch)
+
+    def nothing(self, count: int) -> PoseChecks:
+        """Checks to be filled.
+
+        Args:
+            count: of motions.
+
+        Returns:
+            verdicts 0, the rest NaN.
+        """
+        numbers = [np.full(count, np.nan) for _ in range(5)]
+        return PoseChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
+
+    def tolerated(self, segments: PoseSegment, arcs: np.ndarray) -> Tolerated:
+        """Multiples of the uncertainty that motions stand, as closely as they can be found.
+
+        Args:
+            segments: leaves (n, ...), of the parity of `arcs`; feasible as they are planned.
+            arcs: (n,).
+
+        Returns:
+            the multiples; NaN where there is no uncertainty.
+        """
+        return Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
+
+    @property
+    def is_limit(self) -> np.ndarray:
+        """Whether each criterion of `flags` is one of a limit, (n_criteria,)."""
+        return np.arange(len(self.flags)) >= BASIC
+
+    @abc.abstractmethod
+    def breaks(self, slack: np.ndarray) -> np.ndarray:
+        """Criteria that slacks break for certain.
+
+        Args:
+            slack: (n, n_criteria).
+
+        Returns:
+            (n, n_criteria).
+        """
+
+    @abc.abstractmethod
+    def sampled(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slacks at some instants.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) the instants.
+
+        Returns:
+            (n, n_criteria) in the order of `flags`.
+        """
+
+    @abc.abstractmethod
+    def check(
+        self,
+        segments: PoseSegment,
+        arcs: np.ndarray,
+        *,
+        whole: bool = True,
+        margins: bool = True,
+        ignored: np.ndarray | None = None,
+    ) -> PoseChecks:
+        """Check motions in full.
+
+        Args:
+            segments: leaves (n, ...), of the parity of `arcs`.
+            arcs: (n,).
+            whole: whether to go on where the motion itself is infeasible; else the rest is NaN there.
+            margins: whether more than the verdict is wanted; else slacks and gaps are ignored.
+            ignored: (n_criteria,) whether each criterion has no part in the verdict, nor has the uncertainty; None:
+                all have.
+
+        Returns:
+            the checks.
+        """
+
+    @abc.abstractmethod
+    def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
+        """Values of beta-hat at which a segment can end in a pose.
+
+        Args:
+            position: (3,) from the centroid of the spools, z down, m.
+            quaternion: (4,) unit.
+            z0: m.
+
+        Returns:
+            the preferred value; the lowest and the highest feasible one, the other way round if there are none.
+        """

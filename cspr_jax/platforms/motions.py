@@ -1,0 +1,51 @@
+"""Many motions of a platform, and some of them."""
+
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.platforms.platform_segment import PoseSegment
+
+
+def rows(segments: PoseSegment, which: np.ndarray) -> PoseSegment:
+    """Segments chosen from many.
+
+    Args:
+        segments: leaves (n, ...).
+        which: indices, or (n,) a mask.
+
+    Returns:
+        leaves (m, ...), NumPy's, whichever the given ones are.
+    """
+    # Four times as fast as by an index, where a leaf is no vector.
+    index = np.asarray(which)
+    index = np.flatnonzero(index) if index.dtype == bool else index
+    return jax.tree.map(lambda x: np.asarray(x).take(index, axis=0), segments)
+
+
+class Motions(NamedTuple):
+    """Motions of a platform.
+
+    Fields:
+        segments: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n,) how many each has.
+    """
+
+    segments: PoseSegment
+    arcs: np.ndarray
+
+    def rows(self, which: np.ndarray) -> "Motions":
+        """Motions chosen by indices, or by a mask (n,)."""
+        return Motions(rows(self.segments, which), self.arcs[which])
+
+    def items(self, which: np.ndarray) -> tuple[PoseSegment, np.ndarray]:
+        """Chosen motions as kernels take them.
+
+        Args:
+            which: (m,) indices.
+
+        Returns:
+            leaves (m, ...), and (m,) numbers of arcs as floats.
+        """
+        return rows(self.segments, which), self.arcs[which].astype(float)

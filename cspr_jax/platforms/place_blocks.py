@@ -1,0 +1,221 @@
+"""Bounds of what depends on a platform's pose alone on blocks of its motions: contacts, depth, limits on the pose.
+
+Two cables are apart where some unit vector e has e . (x_j - x_i) > 0 for all points x of both: linear in the points, so
+that their ends are enough. A cable is off the platform where its vector v from its corner, in platform axes, has
+e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a whole block; that of its
+middle is taken, the shortest vector between the cables, and the residual of the projection onto the sector (Moreau).
+Between instants h apart a function f with |f''| <= C stays above its smaller end less C h^2 / 8.
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.arithmetic.lanes import Vector, dot, largest, smallest, stored, turned_back
+from cspr_jax.motions.limits import given, scales
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.least_nodes import least_nodes
+from cspr_jax.platforms.platform_lanes import State, state
+from cspr_jax.platforms.platform_reach import instant_beside, middle_of, reach
+from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.work_list import allowance
+from cspr_jax.robots import contact_lanes
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.wrench_lanes import CABLES, Cables, cables
+from cspr_jax.schema.limits import Limit
+
+# Steps of a block, and the instants between them.
+STEPS = 4
+PLACES = np.linspace(-1.0, 1.0, STEPS + 1)
+# Of coordinates of some size: what lengths and heights may be wrong by.
+ROUNDING = 1e-13
+TINY = 1e-30
+
+
+class PlaceBounds(NamedTuple):
+    """What is known of n blocks.
+
+    Fields:
+        clear: (n,) lower bound of the distance between cables that can meet, and of that of the cables from the sectors
+            of their corners, m.
+        slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
+        nodes: (n_instants, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between
+            cables, m. Where no margins are wanted, the least of each: (1, n_criteria + 1, n).
+        place: (n,) where the smallest of the least slacks is, from -1 to 1; 0 where margins are wanted.
+        bends: (3, n) what may be missed between two instants, C h^2 / 8: of the mass centre, m; of a point of the
+            platform beside it, over its distance; of vectors as the platform sees them, m.
+    """
+
+    clear: Array
+    slacks: Array
+    nodes: Array
+    place: Array
+    bends: Array
+
+
+class _Bends(NamedTuple):
+    # (n,) what second derivatives take off between two instants, m: of the centre, of a unit arm, of unit vectors seen
+    # from the platform.
+    centre: Array
+    arm: Array
+    seen: Array
+
+
+def of_pose(problem: Problem) -> list[Limit]:
+    """Limits on the pose that are given.
+
+    Args:
+        problem: robot, limits.
+
+    Returns:
+        their rows.
+    """
+    return [row for row in given(problem.limits) if not row.of_motion]
+
+
+@partial(jax.jit, static_argnames=("pairs", "kind", "margins"))
+def place_blocks(
+    problem: Problem, platform, one: Array, items, *, pairs: tuple, kind: Kind, margins: bool
+) -> PlaceBounds:
+    """Bounds on blocks.
+
+    Args:
+        problem: robot, limits, amplitude.
+        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
+        one: () the number 1; see `arithmetic.lanes.stored`.
+        items: segments (leaves (n, ...)), arcs (n,), and where blocks start (n,) and stop (n,), with no knot inside.
+        pairs: of cables that can meet.
+        kind: of the motions.
+        margins: whether all instants and distances between cables are wanted; else these are infinite.
+
+    Returns:
+        the bounds.
+    """
+    segments, arcs, start, stop = items
+    middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
+
+    def at(off):
+        return state(segments, arcs, instant_beside(middle, segments.sense, arcs, off * half), kind, one)
+
+    bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
+    share = (2.0 * half / STEPS) ** 2 / 8.0
+    turning = bounds.spin + bounds.omega**2
+    now = stored(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
+    here = state(segments, arcs, now, kind, one)
+    position, turn = stored((here.position, here.turn), one)
+    away = [
+        dot(x, x) for x in ([position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
+    ]
+    seen = turning * (jnp.sqrt(largest(away)) + half * bounds.speed) + bounds.bend + 2.0 * bounds.omega * bounds.speed
+    bends = stored(_Bends(bounds.bend * share, turning * share, seen * share), one)
+    gaps, left = _separators(problem.robot, platform, pairs, (position, turn), one)
+
+    def on(place):
+        now = at(place)
+        lines = cables(problem.robot, now.position, now.turn)
+        apart = _apart(problem.robot, pairs, gaps, lines, bends)
+        away = zip(left, contact_lanes.cable_directions(lines, now.turn), strict=True)
+        clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
+        values = _slacks(problem, segments, now, lines)
+        if margins and pairs:
+            found = [dot(x, x) for x in contact_lanes.gaps(problem.robot.base_points, pairs, lines)]
+            values.append(jnp.sqrt(smallest(found)))
+        # Two numbers a loop.
+        return lax.complex(clear, values[0]), *values[1:]
+
+    first, *others = lax.map(on, PLACES)
+    nodes = [jnp.imag(first), *others]
+    if not (margins and pairs):
+        nodes.append(jnp.full_like(nodes[0], jnp.inf))
+    steps = _steps(problem, segments, bends)
+    if margins:
+        every, place = jnp.stack(nodes, axis=1), jnp.zeros_like(half)
+    else:
+        every, place = least_nodes(nodes, allowance(np.arange(len(nodes) - 1) >= 1), PLACES)
+    size = jnp.max(jnp.abs(problem.robot.base_points)) + segments.hub[:, 2]
+    return PlaceBounds(
+        jnp.min(jnp.real(first), axis=0) - ROUNDING * size,
+        jnp.stack([jnp.min(x, axis=0) - step - ROUNDING for x, step in zip(nodes[:-1], steps, strict=True)]),
+        every,
+        place,
+        jnp.stack(bends),
+    )
+
+
+def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array) -> tuple[list[Vector], list[Vector]]:
+    # Unit vectors between cables, one a pair, and off the sectors, one a cable, by position and turn in the middle.
+    # Of all pairs, or cables, at a time: components (m, n), lanes last, which XLA writes with vectors, in little code.
+    position, turn = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
+    points, base = ([x[:, k, None] for k in range(3)] for x in (robot.platform_points, robot.base_points))
+    rays = stored([position[k] + dot(turn[k], points) - base[k] for k in range(3)], one)
+    seen = turned_back(turn, [-x for x in rays])
+    sides, normal = platform
+    first, last = ([sides[:, which, k, None] for k in range(3)] for which in range(2))
+    left = _units(contact_lanes.residual((first, last), [normal[k] for k in range(3)], seen))
+    if not pairs:
+        return [], left
+    i, j = (np.array([pair[k] for pair in pairs]) for k in range(2))
+    apart = [x[j] - x[i] for x in base]
+    return _units(contact_lanes.gap(apart, [x[i] for x in rays], [x[j] for x in rays])), left
+
+
+def _units(vectors: Vector) -> list[Vector]:
+    # Unit vectors along vectors with components (m, n), one after the other.
+    scale = 1.0 / jnp.sqrt(jnp.maximum(dot(vectors, vectors), TINY))
+    columns = [x * scale for x in vectors]
+    return [tuple(x[k] for x in columns) for k in range(columns[0].shape[0])]
+
+
+def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: Cables, bends: _Bends) -> Array:
+    # The least over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed between instants.
+    if not pairs:
+        return jnp.full_like(bends.centre, jnp.inf)
+    sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
+    values = []
+    for (i, j), e in zip(pairs, gaps, strict=True):
+        first, last = dot(e, wires.rays[i]), dot(e, wires.rays[j])
+        spools = dot(e, [robot.base_points[j, k] - robot.base_points[i, k] for k in range(3)])
+        between = jnp.sqrt(jnp.sum((robot.platform_points[i] - robot.platform_points[j]) ** 2))
+        values += [
+            spools,
+            spools + last - bends.centre - sizes[j] * bends.arm,
+            spools - first - bends.centre - sizes[i] * bends.arm,
+            spools + last - first - between * bends.arm,
+        ]
+    return smallest(values)
+
+
+def _slacks(problem: Problem, segments: PoseSegment, here: State, wires: Cables) -> list[Array]:
+    # Of the depth below the spools, and of limits on the pose.
+    robot, z0 = problem.robot, problem.robot.gravity / segments.rate
+    normal = plane_normal(robot)
+    values = [dot([normal[i] for i in range(3)], here.position) / z0]
+    factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
+    for row in of_pose(problem):
+        limit = getattr(problem.limits, row.name)
+        if row.quantity == "depth":
+            values.append((limit - here.position[2]) * factor / size)
+        else:
+            values.append(smallest([1.0 - jnp.sqrt(dot(ray, ray)) / limit[k] for k, ray in enumerate(wires.rays)]))
+    return values
+
+
+def _steps(problem: Problem, segments: PoseSegment, bends: _Bends) -> list[Array]:
+    # What these may fall below their values at two instants; a length is convex along the chord of its ray.
+    robot, z0 = problem.robot, problem.robot.gravity / segments.rate
+    steps = [jnp.sqrt(jnp.sum(plane_normal(robot) ** 2)) * bends.centre / z0]
+    factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]
+    arms = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
+    for row in of_pose(problem):
+        limit = getattr(problem.limits, row.name)
+        if row.quantity == "depth":
+            steps.append(bends.centre * factor / size)
+        else:
+            steps.append(largest([(bends.centre + arms[k] * bends.arm) / limit[k] for k in range(CABLES)]))
+    return steps

@@ -1,0 +1,174 @@
+"""Proofs about what depends on a platform's pose alone: contacts, depth, limits on the pose.
+
+A motion is clear if all of its blocks are (`place_blocks`); it meets if two cables, or a cable and the platform, are
+proved to meet between two instants (`meetings`); else, after many halvings, it is undecided.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from functools import partial
+
+import jax
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.motions.blocks import Blocks, growing, parts_of_arcs
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.meetings import Cables, cables_hit, cables_meet
+from cspr_jax.platforms.motions import rows
+from cspr_jax.platforms.place_blocks import PLACES, PlaceBounds, of_pose, place_blocks
+from cspr_jax.platforms.platform_lanes import state
+from cspr_jax.platforms.platform_reach import instant_beside, middle_of
+from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.work_list import Looked, WorkList
+from cspr_jax.robots import contact_lanes
+from cspr_jax.robots.interference import contacts
+from cspr_jax.robots.wrench_lanes import cables
+
+# Parts of an arc that are looked at first: where margins are wanted; else, as in `proof`, at cusps and halfway
+# between two, where a platform moves fastest.
+PARTS = 8
+FROM_REST, BETWEEN = ((0.7, 3.7), (0.7, 15.7)), ((4.0, 4.0), (11.0, 11.0))
+TOUCH = 1e-9  # nearer than this part of the platform's size is undecided
+# From so many halvings on meetings are looked for. Instants halfway between those of a block.
+NEAR_CONTACT = 5
+MIDDLES = 0.5 * (PLACES[1:] + PLACES[:-1])
+
+
+@dataclasses.dataclass(frozen=True)
+class PlaceProof:
+    """Proofs about n motions; criteria are the depth below the spools and the limits on the pose that are given.
+
+    Fields:
+        is_proved: (n,) nothing meets, and every criterion is met, at every instant.
+        is_refuted: (n,) something meets, or a criterion is broken at an instant.
+        met: (n,) two cables meet.
+        hit: (n,) a cable lies on the platform.
+        attained: (n, n_criteria + 1) smallest slacks at the instants that were looked at, and distance between cables.
+        bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
+        instant: (n,) tau at which a criterion is broken by most, or in the middle of a step in which something meets;
+            NaN where there is none.
+        row: (k,) whose blocks were looked at first.
+        first: what was found of these.
+    """
+
+    is_proved: np.ndarray
+    is_refuted: np.ndarray
+    met: np.ndarray
+    hit: np.ndarray
+    attained: np.ndarray
+    bound: np.ndarray
+    instant: np.ndarray
+    row: np.ndarray
+    first: Looked
+
+
+@partial(jax.jit, static_argnames="kind")
+def wires_beside(problem: Problem, items, *, kind: Kind) -> tuple[Array, Array]:
+    """Cables at one instant beside the middle of each of many blocks.
+
+    Args:
+        problem: robot, limits, amplitude.
+        items: segments (leaves (n, ...)), arcs (n,), middles (n,) and how far beside them (n,), of tau.
+        kind: of the motions.
+
+    Returns:
+        (n, n_cables, 3) from spool to platform, and from platform to spool in platform axes, m.
+    """
+    segments, arcs, middles, off = items
+    now = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
+    here = state(segments, arcs, now, kind)
+    wires = cables(problem.robot, here.position, here.turn)
+    return contact_lanes.as_arrays(wires.rays, contact_lanes.cable_directions(wires, here.turn))
+
+
+class PlaceCertifier:
+    """Certifier of contacts, depth and limits on the pose along motions of one robot on six cables.
+
+    Args:
+        problem: robot, limits, amplitude.
+        kind: of the motions.
+        batch: how many blocks are computed at a time.
+        count_instants: is told how many were looked at.
+
+    Fields:
+        pairs: of cables that can meet.
+    """
+
+    def __init__(self, problem: Problem, kind: Kind, *, batch: int, count_instants: Callable[[int], None]) -> None:
+        """Find what can meet."""
+        self._problem, self._kind, self._batch, self._count = problem, kind, batch, count_instants
+        near, points = contacts(problem.robot), np.asarray(problem.robot.platform_points)
+        self.pairs = tuple((int(i), int(j)) for i, j in near.pairs)
+        self._near, self._arms = near, np.linalg.norm(points, axis=1)
+        self._knots = np.asarray(problem.amplitude.knots)
+        self._limits = np.arange(1 + len(of_pose(problem))) >= 1
+        self._parts = PARTS, growing(problem.amplitude, *(FROM_REST if kind.from_rest else BETWEEN))
+
+    def prove(
+        self, segments: PoseSegment, arcs: np.ndarray, *, margins: bool = False, ignored: np.ndarray | None = None
+    ) -> PlaceProof:
+        """Prove motions clear, or that something meets or is broken.
+
+        Args:
+            segments: leaves (n, ...), of the parity of `arcs`.
+            arcs: (n,).
+            margins: whether distances between cables are wanted.
+            ignored: (n_criteria,) whether each criterion does not count; None: all do.
+
+        Returns:
+            the proofs.
+        """
+        blocks, work = parts_of_arcs(arcs, self._knots, self._parts[not margins]), WorkList(arcs, self._limits, ignored)
+        met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
+
+        def look(some: Blocks, level: int) -> Looked:
+            found = self._bounds(some, segments, arcs, margins=margins)
+            is_clear = np.asarray(found.clear) > touch
+            doubtful = np.flatnonzero(~is_clear)
+            if level >= NEAR_CONTACT and len(doubtful):
+                own = some.some(doubtful)
+                cables = self._cables(own, np.asarray(found.bends)[:, doubtful], (segments, arcs))
+                base, between = np.asarray(self._problem.robot.base_points), own.instants(MIDDLES[:, None])
+                for flag, step in (
+                    (met, cables_meet(base, self._near.pairs, cables)),
+                    (hit, cables_hit(self._near.sides, self._near.normal, cables)),
+                ):
+                    which = np.flatnonzero(step >= 0)
+                    flag[own.row[which]] = True
+                    work.refute(own.row[which], between[step[which], which])
+            nodes, bound = np.asarray(found.nodes), np.asarray(found.slacks)
+            tau = some.instants(PLACES[:, None] if margins else np.asarray(found.place)[None])
+            return Looked(nodes, bound, tau, lambda _: is_clear)
+
+        first = work.work_off(blocks, look)
+        is_proved = ~work.is_refuted & ~work.is_stuck
+        known = work.attained, work.bound, work.instant
+        return PlaceProof(is_proved, work.is_refuted, met, hit, *known, blocks.row, first)
+
+    def _bounds(self, blocks: Blocks, segments: PoseSegment, arcs: np.ndarray, *, margins: bool) -> PlaceBounds:
+        self._count(len(blocks.row) * len(PLACES))
+        kernel = partial(
+            place_blocks,
+            self._problem,
+            (self._near.sides, self._near.normal),
+            np.ones(()),
+            pairs=self.pairs,
+            kind=self._kind,
+            margins=margins,
+        )
+        items = (rows(segments, blocks.row), arcs[blocks.row].astype(float), blocks.start, blocks.stop)
+        return in_batches(kernel, items, size=self._batch, axis=-1)
+
+    def _cables(self, blocks: Blocks, bends: np.ndarray, motions) -> Cables:
+        # At the instants of blocks.
+        segments, arcs = motions
+        own = np.tile(np.arange(len(blocks.row)), len(PLACES))
+        row, middle = blocks.row[own], 0.5 * (blocks.start + blocks.stop)[own]
+        items = rows(segments, row), arcs[row].astype(float), middle, blocks.instants(PLACES[:, None]).ravel() - middle
+        found = in_batches(partial(wires_beside, self._problem, kind=self._kind), items, size=self._batch)
+        rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in found)
+        centre, arm, platform = bends
+        return Cables(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)

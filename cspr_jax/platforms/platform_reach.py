@@ -1,0 +1,244 @@
+"""Bounds of a platform's motion on an ellipse of complex time, one lane a block.
+
+A motion is analytic between the knots of its amplitude function. Around the middle m of a block, on the ellipse with
+the semi-axes a (along time) and b, every quantity of the motion is bounded in the Hermitian norm: polynomials by their
+terms, sines and cosines by those of the middle, and turns by the imaginary part of half their rotation vector, v =
+beta u: for a complex v
+
+    |exp(2 [v])| <= exp(2 |Im v|) = G,    omega = 2 beta' u + 2 beta (integral over s from 0 to 1 of exp(2 s [v]) u')
+
+since a turn leaves its own axis alone. With b = 0 these are bounds on an interval of real time: docs/theory.md.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic.elementary import polynomial, sincospi
+from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.platforms.platform_lanes import Instant
+from cspr_jax.platforms.platform_segment import PoseSegment
+
+# 1 - s up to which arccos(s) / sqrt(1 - s^2) is bounded: it is singular at 2. Less than the least counts as that.
+FARTHEST, NEAREST = 1.9, 0.1
+
+
+class Middle(NamedTuple):
+    """The middle of a block, and the amplitude function around it.
+
+    Fields:
+        tau: (n,) normalised time.
+        terms: Taylor coefficients of A there, of the polynomial piece that holds it; (n,) each.
+    """
+
+    tau: Array
+    terms: Sequence[Array]
+
+
+class Reach(NamedTuple):
+    """Bounds on an ellipse, (n,) each; derivatives in normalised time.
+
+    Fields:
+        speed: of |p'|, m.
+        bend: of |p''|, m.
+        growth: of the norm of the rotation matrix.
+        turn: of the norm of its derivative.
+        omega: of |omega|, rad.
+        spin: of |omega'|, rad.
+    """
+
+    speed: Array
+    bend: Array
+    growth: Array
+    turn: Array
+    omega: Array
+    spin: Array
+
+
+def middle_of(amplitude: Amplitude, tau: Array) -> Middle:
+    """The middle of a block.
+
+    Args:
+        amplitude: A.
+        tau: (n,) no knot.
+
+    Returns:
+        the middle.
+    """
+    values = derivatives(amplitude, tau, order=amplitude.coefficients.shape[1] - 1)
+    return Middle(tau, [value / math.factorial(j) for j, value in enumerate(values)])
+
+
+def instant_beside(middle: Middle, sense: Array, arcs: Array, off: Array) -> Instant:
+    """Instant beside the middle of a block, by the polynomial piece of the middle.
+
+    Args:
+        middle: of the block.
+        sense: (n,) +1 (odd) or -1 (even).
+        arcs: (n,) number of arcs, a float.
+        off: (n,) of tau.
+
+    Returns:
+        the instant, (n,) each.
+    """
+    tau, terms = middle.tau + off, middle.terms
+    a, a1, a2, a3 = (polynomial([math.perm(i, j) * terms[i] for i in range(j, len(terms))], off) for j in range(4))
+    return Instant(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
+
+
+def reach(segment: PoseSegment, arcs: Array, middle: Middle, axes: tuple[Array, Array], kind: Kind) -> Reach:
+    """Bounds of motions around the middles of blocks.
+
+    Args:
+        segment: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n,) number of arcs, a float.
+        middle: of the blocks.
+        axes: a and b of the ellipses, (n,) of tau each.
+        kind: of the motions.
+
+    Returns:
+        the bounds; infinite where there is none.
+    """
+    along, aside = axes
+    sizes = _polynomial_sizes(middle.terms, along)
+    phase = math.pi * arcs * along, jnp.exp(math.pi * arcs * aside)
+    sine, cosine = sincospi(arcs * middle.tau)
+    first = _trigonometric((jnp.abs(sine), jnp.abs(cosine)), *phase)
+    speed, bend = _swing(segment, arcs, middle, (along, aside), sizes, first, kind)
+    if kind.plain:
+        omega = math.pi * arcs
+        beats = _Beats(first.cosine, omega * first.sine, omega * omega * first.cosine, first.aside)
+    else:
+        sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
+        third = _trigonometric((jnp.abs(sine3), jnp.abs(cosine3)), 3.0 * phase[0], phase[1] * phase[1] * phase[1])
+        beats = _beat(segment, arcs, middle, (along, aside), first, third)
+    angle = jnp.abs(segment.turn.angle)
+    if kind.from_rest:
+        u, u1, u2 = (angle * size for size in sizes[:3])
+    else:
+        u, u1, u2 = _half_vector(segment, middle, (along, aside), sizes, angle)
+    beta, beta1, beta2, beta_aside = beats
+    v1 = beta1 * u + beta * u1
+    grown = jnp.exp(2.0 * jnp.minimum(beta_aside * u + beta * aside * u1, beta * u))
+    beside = 1.0 if kind.from_rest else grown  # then all is about one axis
+    omega = beta1 * u + beside * beta * u1
+    spin = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
+    if not kind.from_rest:
+        spin = spin + grown * beta * u1 * v1
+    return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * spin)
+
+
+def _polynomial_sizes(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
+    # Of |A|, |A'|, |A''|, |A'''|.
+    sizes = [jnp.abs(term) for term in terms]
+    return tuple(polynomial([math.perm(i, j) * sizes[i] for i in range(j, len(sizes))], along) for j in range(4))
+
+
+class _Trigonometric(NamedTuple):
+    # Of |sin|, |cos|, and the imaginary part of the cosine.
+    sine: Array
+    cosine: Array
+    aside: Array
+
+
+class _Beats(NamedTuple):
+    # Of |beta|, |beta'|, |beta''|, and the imaginary part of beta.
+    value: Array
+    rate: Array
+    bend: Array
+    aside: Array
+
+
+def _trigonometric(middle: tuple[Array, Array], along: Array, growth: Array) -> _Trigonometric:
+    # Within `along` of an angle whose |sin| and |cos| are `middle`; growth is exp of the largest imaginary part.
+    shrunk = 1.0 / growth
+    cosh, sinh = 0.5 * (growth + shrunk), 0.5 * (growth - shrunk)
+    near = jnp.minimum(along, 1.0)
+    off = jnp.sqrt(near * near + sinh * sinh)
+    sine, cosine = middle
+    return _Trigonometric(
+        jnp.minimum(cosh, sine * cosh + cosine * off),
+        jnp.minimum(cosh, cosine * cosh + sine * off),
+        jnp.minimum(1.0, sine + cosine * near) * sinh,
+    )
+
+
+def _swing(segment: PoseSegment, arcs: Array, middle: Middle, axes, sizes, first, kind: Kind) -> tuple[Array, Array]:
+    # Of |p'| and |p''|: the terms of `platform_lanes`, and the growth of the frame that turns with the ellipse.
+    omega = math.pi * arcs
+    sine, cosine, _ = first
+    if kind.from_rest:
+        r, r1, r2, r3 = (jnp.abs(segment.end_radius) * size for size in sizes)
+        nu, steady, frame = 0.0 * r, omega * omega, jnp.ones_like(r)
+    else:
+        span = segment.end_radius - segment.start_radius
+        r1, r2, r3 = (jnp.abs(span) * size for size in sizes[1:])
+        r = jnp.abs(segment.start_radius + span * middle.terms[0]) + axes[0] * r1
+        nu = segment.precession / arcs
+        steady = omega * omega * (1.0 - nu) * (1.0 + nu)
+        frame = jnp.exp(math.pi * segment.precession * axes[1])
+    if kind.variable:
+        w, across = (r * steady + r2) / omega, 2.0 * nu * r1
+        w1 = 2.0 * nu * nu * r1 * omega + (r1 * steady + r3) / omega
+        across1 = nu * (r * steady + 3.0 * r2)
+        speed = sine * _hypotenuse(w, across)
+        bend = _hypotenuse(omega * cosine * w + sine * w1, omega * cosine * across + sine * across1)
+    else:
+        inner = r2 + r * steady
+        speed = _hypotenuse(r1 * cosine + r * steady / omega * sine, nu * r1 * sine)
+        bend = _hypotenuse(inner * cosine + 2.0 * r1 * steady / omega * sine, nu * inner * sine)
+    return frame * speed, frame * bend
+
+
+def _hypotenuse(a: Array, b: Array) -> Array:
+    return jnp.sqrt(a * a + b * b)
+
+
+def _beat(segment: PoseSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
+    # Of (3.93), by terms.
+    how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
+    share = (1.0 - nu) * (1.0 + nu)
+    slope = (how.end_beta_hat - how.start_beta_hat) * share
+    h, steep = how.start_beta_hat * share + slope * middle.tau, jnp.abs(slope)
+    nine, one = jnp.abs(9.0 + h) + steep * axes[0], jnp.abs(1.0 + h) + steep * axes[0]
+    value = nine * first.cosine + one * third.cosine
+    rate = steep * (first.cosine + third.cosine) + omega * (3.0 * one * third.sine + nine * first.sine)
+    bend = 2.0 * steep * omega * (3.0 * third.sine + first.sine)
+    bend = bend + omega * omega * (9.0 * one * third.cosine + nine * first.cosine)
+    aside = nine * first.aside + one * third.aside + steep * axes[1] * (first.cosine + third.cosine)
+    return _Beats(value * 0.125, rate * 0.125, bend * 0.125, aside * 0.125)
+
+
+def _half_vector(segment: PoseSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:
+    # Of |u|, |u'|, |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
+    how = segment.turn
+    rate, bend = angle * sizes[1], angle * sizes[2]
+    grown = jnp.exp(axes[1] * rate)
+    shrunk = 1.0 / grown
+    cosh = 0.5 * (grown + shrunk)
+    size = jnp.sqrt(0.5 * (grown * grown + shrunk * shrunk))
+    sine, cosine = sincospi(how.angle * middle.terms[0] / math.pi)
+    largest = _hypotenuse(how.start[:, 0], how.across[:, 0]) * cosh
+    off = jnp.abs(1.0 - how.start[:, 0] * cosine - how.across[:, 0] * sine) + axes[0] * rate * largest
+    w, w1, w2 = _angle_ratio(jnp.maximum(off, NEAREST))
+    s, s1 = jnp.minimum(1.0 + off, largest), largest
+    by_angle = size * (w + w1 * s1)
+    by_square = size * (w + 2.0 * w1 * s1 + w2 * s1 * s1 + w1 * s)
+    return size * w, by_angle * rate, by_square * rate * rate + by_angle * bend
+
+
+def _angle_ratio(off: Array) -> tuple[Array, ...]:
+    # Of W = arccos(s) / sqrt(1 - s^2) and the sizes of its derivatives where |1 - s| is at most so large: their series
+    # in 1 - s have positive terms alone, so that they are largest on the axis.
+    is_inside = off < FARTHEST
+    s = 1.0 - jnp.where(is_inside, off, 1.0)
+    square = 1.0 - s * s
+    sine = jnp.sqrt(square)
+    w = jnp.arctan2(sine, s) / sine
+    w1 = (1.0 - s * w) / square
+    w2 = (w - 3.0 * s * w1) / square
+    return tuple(jnp.where(is_inside, x, jnp.inf) for x in (w, w1, w2))

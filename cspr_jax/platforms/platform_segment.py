@@ -1,0 +1,233 @@
+"""Point-to-point motions of a platform, thesis chapter 3: position and orientation together.
+
+The position is a hypocycloid of variable amplitude (3.44), or the standard one of chapter 2; the orientation an
+oscillating SLERP in step with it. In the precessing frame of `hypocycloid`, with s the sense, nu the ratio of the
+ellipse's axes, S = theta_h^2 (n_h - 1) = T^2 lambda, C and S_ the cosine and sine of Phi = s pi p tau,
+
+    c  = (r C - s r' S_ / (pi p)) e_r + nu r S_ e_t
+    c' = S_ [-(r S + r'') s / (pi p) e_r + 2 nu r' e_t]
+
+so that the platform stands still at every cusp, not only at the ends as with the standard hypocycloid.
+"""
+
+import dataclasses
+import math
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.swing_plane import swing_plane
+from cspr_jax.platforms.oscillating_slerp import Turn, beat, orientation, rates, turn
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import rest_point, spool_radius
+from cspr_jax.robots.state import State
+from cspr_jax.robots.wrench_balance import normalised_determinant
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class PoseSegment:
+    """Parameters of one segment between two poses, for one parity of the number of arcs.
+
+    Fields:
+        plane: (3, 2) q_h1 and q_h2 of (3.42), as columns.
+        hub: (3,) the point p0, m.
+        start_radius: () r1 of (3.46), m.
+        end_radius: () r2, m.
+        precession: () of the ellipse, in half turns, in [0, 1].
+        sense: () +1 (p odd) or -1 (p even).
+        rate: () lambda of (3.50), 1/s^2.
+        turn: of the orientation.
+        regular: () determinant (`wrench_balance.normalised_determinant`) at rest in P0, whose sign must not change; 1
+            of a robot on more cables, which has none.
+    """
+
+    plane: Array
+    hub: Array
+    start_radius: Array
+    end_radius: Array
+    precession: Array
+    sense: Array
+    rate: Array
+    turn: Turn
+    regular: Array
+
+
+def pose_segment(
+    robot: PlatformRobot,
+    start: tuple[Array, Array],
+    end: tuple[Array, Array],
+    z0: Array,
+    beta_hats: tuple[Array, Array],
+    *,
+    odd: Array,
+) -> PoseSegment:
+    """The segment from one pose to another.
+
+    Args:
+        robot: the robot, centred.
+        start: position (3,) m and orientation (4,) of the first pose.
+        end: position (3,) m and orientation (4,) of the last.
+        z0: () depth of p0 below the centroid of the spools, m.
+        beta_hats: beta-hat of the first and of the last pose, () each.
+        odd: () whether the number of arcs is odd.
+
+    Returns:
+        the segment for arcs of that parity.
+    """
+    hub = rest_point(z0)
+    upright = jnp.zeros_like(hub).at[2].set(1.0)
+    plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, spool_radius(robot), upright, odd)
+    sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
+    how = turn(start[1], end[1], *beta_hats, odd=odd)
+    is_determined = robot.n_cables == robot.dof
+    one = jnp.eye(3, dtype=hub.dtype)
+    regular = normalised_determinant(robot, hub, one) if is_determined else one[0, 0]
+    return PoseSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, how, regular)
+
+
+def duration(segment: PoseSegment, arcs: Array) -> Array:
+    """Duration T of a segment, (3.77).
+
+    Args:
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs.
+
+    Returns:
+        () seconds; 0 for p = 1 between points on one ray from p0, which is no trajectory.
+    """
+    return math.pi * arcs * jnp.sqrt(_share(segment, arcs) / segment.rate)
+
+
+def _share(segment: PoseSegment, arcs: Array) -> Array:
+    # theta_h^2 (n_h - 1) over (pi p)^2; 1 - ratio is what vanishes for p = 1 and psi -> 0.
+    ratio = segment.precession / arcs
+    return (1.0 - ratio) * (1.0 + ratio)
+
+
+@partial(jax.jit, static_argnames="kind")
+def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: Kind = USUAL) -> State:
+    """The state of the platform at one instant.
+
+    Args:
+        segment: of the parity of `arcs`.
+        amplitude: A; with a variable amplitude its third derivative enters the acceleration.
+        arcs: () number of arcs, a float.
+        tau: () normalised time in [0, 1].
+        kind: of the motion.
+
+    Returns:
+        the state, in time.
+    """
+    values = derivatives(amplitude, tau, order=3)
+    time = duration(segment, arcs)
+    c, c1, c2 = _swing(segment, values, arcs, tau, variable=kind.variable)
+    quaternions = _quaternions(segment, values, arcs, tau, kind)
+    omega, omega1 = rates(quaternions)
+    return State(
+        segment.hub + segment.plane @ c,  # (3.43)
+        segment.plane @ c1 / time,
+        segment.plane @ c2 / time**2,
+        rotations.matrix(quaternions[0]),
+        omega / time,
+        omega1 / time**2,
+    )
+
+
+def quaternion_at(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: Kind = USUAL) -> Array:
+    """The orientation at one instant.
+
+    Args:
+        segment: of the parity of `arcs`.
+        amplitude: A.
+        arcs: () number of arcs, a float.
+        tau: () normalised time in [0, 1].
+        kind: of the motion.
+
+    Returns:
+        (4,) unit quaternion; continuous along the segment.
+    """
+    return _quaternions(segment, derivatives(amplitude, tau, order=3), arcs, tau, kind)[0]
+
+
+def _quaternions(
+    segment: PoseSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: Kind
+) -> tuple[Array, Array, Array]:
+    share = _share(segment, arcs)
+    beta_hats = (-1.0 / share, -1.0 / share) if kind.plain else (segment.turn.start_beta_hat, segment.turn.end_beta_hat)
+    beats = beat(*beta_hats, share, arcs, tau)
+    return orientation(segment.turn, values, beats)
+
+
+def _swing(
+    segment: PoseSegment, values: tuple[Array, ...], arcs: Array, tau: Array, *, variable: bool
+) -> tuple[Array, Array, Array]:
+    # c, c' and c'' in the plane, derivatives in tau.
+    span = segment.end_radius - segment.start_radius
+    r, r1, r2, r3 = segment.start_radius + span * values[0], span * values[1], span * values[2], span * values[3]
+    omega, nu = segment.sense * math.pi * arcs, segment.precession / arcs
+    steady = (math.pi * arcs) ** 2 * _share(segment, arcs)
+    sine, cosine = sincospi(segment.sense * arcs * tau)
+    lateral, axial = sincospi(segment.sense * segment.precession * tau)
+    if variable:
+        place = (r * cosine - r1 * sine / omega, nu * r * sine)
+        w = (-(r * steady + r2) / omega, 2.0 * nu * r1)
+        w1 = (2.0 * nu**2 * r1 * omega - (r1 * steady + r3) / omega, nu * (r * steady + 3.0 * r2))
+        pace = (sine * w[0], sine * w[1])
+        bend = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
+    else:
+        place = (r * cosine, nu * r * sine)
+        pace = (r1 * cosine - r * steady / omega * sine, nu * r1 * sine)
+        bend = (
+            (r2 - r * steady) * cosine - 2.0 * r1 * steady / omega * sine,
+            nu * (r2 + r * steady) * sine,
+        )
+
+    def turned(vector):
+        return jnp.stack([axial * vector[0] + lateral * vector[1], axial * vector[1] - lateral * vector[0]])
+
+    return turned(place), turned(pace), turned(bend)
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class PlatformMotion:
+    """Motion of a platform between two poses; see `Motion`.
+
+    Fields:
+        segment: of the parity of `arcs`.
+        amplitude: A.
+        arcs: () number of arcs, a float.
+        kind: of the motion; known when a function is compiled.
+    """
+
+    segment: PoseSegment
+    amplitude: Amplitude
+    arcs: Array
+    kind: Kind = dataclasses.field(default=USUAL, metadata={"static": True})
+
+    @property
+    def z0(self) -> Array:
+        """Depth of P0 below the centroid of the spools, () m."""
+        return self.segment.hub[..., 2]
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return duration(self.segment, self.arcs)
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+        tau = jnp.asarray(tau, float)
+        quaternion = quaternion_at(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        state = motion(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        return state._replace(quaternion=quaternion)
+
+    def breaks(self) -> Array:
+        """Knots of the amplitude function; see `Motion.breaks`."""
+        return self.amplitude.knots

@@ -1,0 +1,86 @@
+"""Smallest numbers of arcs of motions of a platform to many poses, over values of beta-hat at their ends."""
+
+from typing import Literal
+
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_parts
+from cspr_jax.motions.answers import joined
+from cspr_jax.platforms.answers import PoseAnswers, reached
+from cspr_jax.platforms.arcs import CANDIDATES, Candidates
+from cspr_jax.platforms.beta_hat import OPTIONS
+from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.pose_ends import end_options
+from cspr_jax.robots.point_mass import rest_point
+from cspr_jax.schema.families import WITHOUT_BETA_HAT
+
+# Time functions of the rotation with a beta-hat of its own at each end; None is the default.
+_OWN = (None, "beta_ff")
+REFERENCE = (1.0, 0.0, 0.0, 0.0)
+Poses = tuple[np.ndarray, np.ndarray]
+
+
+def rest_poses(z0: np.ndarray) -> Poses:
+    """Poses at rest in P0.
+
+    Args:
+        z0: (n,) m.
+
+    Returns:
+        positions (n, 3), m, and quaternions (n, 4).
+    """
+    return rest_point(z0), np.tile(REFERENCE, (len(z0), 1))
+
+
+def start_beta_hat(checker: PoseChecker, starts: Poses, z0: np.ndarray) -> np.ndarray:
+    """Beta-hat at starts beyond P0: the preferred one of (3.91), else that at rest.
+
+    Args:
+        checker: of the robot.
+        starts: positions (n, 3) and quaternions (n, 4), from the centroid of the spools, z down.
+        z0: (n,) m.
+
+    Returns:
+        (n,).
+    """
+    # Starts are few, and end_options costs as much for each.
+    every, own = np.unique(np.c_[starts[0], starts[1], z0], axis=0, return_inverse=True)
+    values = end_options(checker.problem.robot, every[:, :3], every[:, 3:7], every[:, 7], 1)[0][:, 0]
+    return np.where(np.isnan(values), AT_REST, values)[own.ravel()]
+
+
+def pose_arcs(
+    checker: PoseChecker,
+    motions: Candidates,
+    *,
+    beta_hat: float | Literal["preferred"] | None = None,
+    beat: str | None = None,
+    max_arcs: int = 30,
+) -> PoseAnswers:
+    """Smallest number of arcs of each motion.
+
+    Args:
+        checker: of the robot.
+        motions: n of them, one candidate each, with the values of beta-hat at their starts.
+        beta_hat: at the ends: a number, "preferred" (3.91), or None: several are tried, the preferred one first.
+        beat: time function of the rotation; None: "beta_ff".
+        max_arcs: largest number tried.
+
+    Returns:
+        the answers.
+    """
+
+    def part(which: slice) -> PoseAnswers:
+        some = motions.motions(np.arange(len(motions.z0))[which])
+        values, can_end = end_options(
+            checker.problem.robot, *some.end, some.z0, 1 if beta_hat == "preferred" else OPTIONS
+        )
+        if beat in WITHOUT_BETA_HAT:
+            values = np.zeros((len(some.z0), 1))
+        elif isinstance(beta_hat, float):
+            values = np.full((len(some.z0), 1), beta_hat)
+        values = np.where(can_end[:, None], values, np.nan)
+        return reached(checker, some, values, max_arcs=max_arcs, same=beat not in _OWN)
+
+    return joined(in_parts(part, len(motions.z0), CANDIDATES // (OPTIONS if beta_hat is None else 1)))

@@ -1,0 +1,74 @@
+"""Maps of smallest numbers of arcs of platforms to poses."""
+
+import numpy as np
+
+from cspr_jax.build import given_quaternion, motion_kind, orientations
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.maps.grid_map import PlatformMap
+from cspr_jax.platforms.arcs import Candidates
+from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.motion_checker import MANY
+from cspr_jax.platforms.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
+from cspr_jax.robots.reference_pose import reference_pose
+from cspr_jax.schema.axes import TILT_TORSION
+from cspr_jax.schema.tiles import Grid
+
+
+class PosesMap(PlatformMap):
+    """The smallest number of arcs to each pose; see `GridMap`."""
+
+    proves = True
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse a start that is no pose."""
+        super().__init__(spec, keys, file)
+        start = keys.trajectory.start
+        self._quaternion = given_quaternion(
+            None if start is None else start.quaternion, "trajectory.from.quaternion", file
+        )
+        from_rest = start is None or start.rest
+        self._checker = PoseChecker(self._problem, motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        z0, targets = np.asarray(cells["z0"], float), self._targets(cells)
+        angles = np.stack([cells.get(name, np.zeros(len(z0))) for name in TILT_TORSION], axis=1)
+        starts, beta_hats = self._starts(z0)
+        ends = (targets, orientations(self._frame, targets, angles))
+        trajectory = self._keys.trajectory
+        answers = pose_arcs(
+            self._checker,
+            Candidates(starts, ends, z0, np.arange(len(z0)), (beta_hats, beta_hats)),
+            beta_hat=trajectory.beta_hat,
+            beat=trajectory.beat,
+            max_arcs=trajectory.max_arcs,
+        )
+        return vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
+
+    def _starts(self, z0: np.ndarray) -> tuple[Poses, np.ndarray]:
+        # Poses and values of beta-hat.
+        start, count = self._keys.trajectory.start, len(z0)
+        if start is None or start.position is None:
+            return rest_poses(z0), np.full(count, AT_REST)
+        place = np.tile(self._frame.inward(start.position), (count, 1))
+        turned = np.tile(self._frame.turned_quaternions(self._quaternion), (count, 1))
+        if start.tilt_torsion is not None:
+            turned = orientations(self._frame, place, np.tile(start.tilt_torsion, (count, 1)))
+        own = start.beta_hat
+        beta_hats = start_beta_hat(self._checker, (place, turned), z0) if own is None else np.full(count, own)
+        return (place, turned), beta_hats
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""
+        super().refuse_hopeless(grid)
+        errors = []
+        for z0 in grid.axes["z0"]:
+            try:
+                reference_pose(self._problem.robot, float(z0))
+            except InputError as error:
+                errors.append(error)
+        if len(errors) == len(grid.axes["z0"]):
+            raise ConfigError(self._file, f"robot.{errors[0]}") from errors[0]

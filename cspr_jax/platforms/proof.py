@@ -1,0 +1,255 @@
+"""Proofs about the tensions and the determinant of a platform's motions, between the instants too.
+
+Every block of a motion (`tension_blocks`) is proved, or refuted by an instant, or halved. So is the motion:
+
+    proved       if every block is: no cable slack, no singularity, limits on the motion met
+    refuted      if some instant breaks a criterion by more than the tolerance
+    undecided    if a block still holds zero where its slack is known to half the tolerance, or after many halvings
+
+A limit that is touched counts as met, as with point masses: limits are allowed twice the tolerance.
+"""
+
+import dataclasses
+import itertools
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic import chebyshev
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.motions.blocks import Blocks, growing, parts_of_arcs
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.motions import rows
+from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.tension_blocks import (
+    BASIC,
+    BlockBounds,
+    TensionRange,
+    of_motion,
+    tension_blocks,
+    tension_ranges,
+)
+from cspr_jax.platforms.work_list import TOLERANCE, Looked, WorkList
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.wrench_lanes import CABLES
+from cspr_jax.schema.limits import LIMITS
+
+# Parts of an arc that are looked at first, from rest and between poses, where orientations turn faster. Where verdicts
+# alone are wanted, and no instants to narrow margins down from, they go from the first to the second number with the
+# amplitude; see `blocks.growing`.
+WITH_MARGINS, FROM_REST, BETWEEN = (3, 6), (1.0, 5.0), (6.0, 6.0)
+# Orders of the cables that are tried, one after the other, where rounding keeps a block open.
+ORDERS = 6
+MATTERS = 0.1  # part of all that is allowed for
+
+
+@dataclasses.dataclass(frozen=True)
+class TensionProof:
+    """Proofs about n motions; criteria are those of `tension_blocks.BlockBounds`.
+
+    Fields:
+        is_proved: (n,) every criterion is met at every instant.
+        is_refuted: (n,) some criterion is broken at an instant.
+        attained: (n, n_criteria) smallest slacks at the instants that were looked at.
+        bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
+        instant: (n,) tau at which a criterion is broken by most; NaN where none is.
+        row: (k,) whose blocks were looked at first.
+        first: what was found of these.
+    """
+
+    is_proved: np.ndarray
+    is_refuted: np.ndarray
+    attained: np.ndarray
+    bound: np.ndarray
+    instant: np.ndarray
+    row: np.ndarray
+    first: Looked
+
+
+class _Order(NamedTuple):
+    # The same robot, its cables in another order, and the sign that this gives to determinants.
+    problem: Problem
+    sign: float
+    cables: list[int]
+
+
+class Certifier:
+    """Certifier of the tensions, the determinant and the limits on the motion of one robot on six cables.
+
+    Args:
+        problem: robot, limits, amplitude.
+        kind: of the motions.
+        batch: how many blocks are computed at a time.
+        count_instants: is told how many were looked at.
+    """
+
+    def __init__(self, problem: Problem, kind: Kind, *, batch: int, count_instants: Callable[[int], None]) -> None:
+        """Order the cables."""
+        self._kind, self._batch, self._count = kind, batch, count_instants
+        self._knots, self._orders = np.asarray(problem.amplitude.knots), _orders(problem)
+        self._limits = np.arange(BASIC + len(of_motion(problem))) >= BASIC
+        ramp = FROM_REST if kind.from_rest else BETWEEN
+        self._parts = WITH_MARGINS[not kind.from_rest], growing(problem.amplitude, ramp, ramp)
+
+    def prove(
+        self,
+        segments: PoseSegment,
+        arcs: np.ndarray,
+        *,
+        near: float = 0.0,
+        margins: bool = False,
+        ignored: np.ndarray | None = None,
+    ) -> TensionProof:
+        """Prove motions, or refute them.
+
+        Args:
+            segments: leaves (n, ...), of the parity of `arcs`.
+            arcs: (n,).
+            near: part of the smallest slack that is attained of taut cables below which no bound of it may stay.
+            margins: whether the nodes of the normalised determinant are wanted.
+            ignored: (n_criteria,) whether each criterion does not count; None: all do.
+
+        Returns:
+            the proofs.
+        """
+        blocks = parts_of_arcs(arcs, self._knots, self._parts[not margins])
+        motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
+
+        def look(some: Blocks, _: int) -> Looked:
+            found = self._looked_at(some, motions, margins=margins)
+            tau = some.instants(chebyshev.nodes()[:, None] if margins else np.asarray(found.place)[None])
+            nodes, bound = np.asarray(found.nodes), np.asarray(found.bound)
+            return Looked(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[some.row, 0], 0.0))
+
+        work = WorkList(arcs, self._limits, ignored)
+        first = work.work_off(blocks, look)
+        is_proved = ~work.is_refuted & ~work.is_stuck
+        return TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.instant, blocks.row, first)
+
+    def _looked_at(self, blocks: Blocks, motions, *, margins: bool) -> BlockBounds:
+        found = self.bounds(0, blocks, motions, margins=margins, least=not margins)
+        for k in range(1, len(self._orders)):
+            # What is not proved because the first three cables lie nearly in one plane.
+            open_ones = np.flatnonzero(_rounding_matters(found) & ~(found.bound > TOLERANCE).all(0))
+            if not len(open_ones):
+                break
+            better = self.bounds(k, blocks.some(open_ones), motions, margins=margins, least=not margins)
+            # Values of nodes too: where such cables are in one plane they are rounding, and could refute.
+            surer = better.rounding < found.rounding[open_ones]
+            found.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
+            found.place[open_ones[surer]] = better.place[surer]
+            found.bound[:, open_ones] = np.fmax(found.bound[:, open_ones], better.bound)
+            found.rounding[open_ones] = np.minimum(found.rounding[open_ones], better.rounding)
+            found.allowed[open_ones] = np.minimum(found.allowed[open_ones], better.allowed)
+        return found
+
+    def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool, least: bool = False) -> BlockBounds:
+        """Bounds on blocks.
+
+        Args:
+            order: of the cables, from 0 on, below `ORDERS`.
+            blocks: k of them.
+            motions: segments (leaves (n, ...)), arcs (n,), and det J(P0) (n,) by the first order.
+            margins: whether the nodes of the normalised determinant are wanted.
+            least: whether of the nodes only the smallest values are.
+
+        Returns:
+            the bounds, NumPy arrays.
+        """
+        problem, items = self._items(order, blocks, motions)
+        kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins, least=least)
+        return in_batches(kernel, items, size=self._batch, axis=-1)
+
+    def _items(self, order: int, blocks: Blocks, motions) -> tuple[Problem, tuple]:
+        # The robot with its cables in an order, and its blocks as kernels take them.
+        segments, arcs, standing = motions
+        problem, sign, _ = self._orders[order]
+        self._count(len(blocks.row) * (chebyshev.DEGREE + 1))
+        own = rows(segments, blocks.row), arcs[blocks.row].astype(float), sign * standing[blocks.row]
+        return problem, (*own, blocks.start, blocks.stop)
+
+    def ranges(self, blocks: Blocks, segments: PoseSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Ranges of the tensions on blocks.
+
+        Args:
+            blocks: k of them.
+            segments: leaves (n, ...), of the parity of `arcs`.
+            arcs: (n,).
+
+        Returns:
+            (k, n_cables) proved lower and upper bounds, per mass and length, over those of equal ones at rest in P0.
+        """
+        motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
+        count = len(blocks.row)
+        low, high = np.full((count, CABLES), -np.inf), np.full((count, CABLES), np.inf)
+        which = np.arange(count)
+        for k, order in enumerate(self._orders):
+            problem, items = self._items(k, blocks.some(which), motions)
+            kernel = partial(tension_ranges, problem._replace(limits=Limits()), np.ones(()), kind=self._kind)
+            found = in_batches(kernel, items, size=self._batch, axis=-1)
+            own = np.ix_(which, np.array(order.cables))
+            low[own], high[own] = np.fmax(low[own], found.low.T), np.fmin(high[own], found.high.T)
+            # As in `_looked_at`, where the first three cables lie nearly in one plane.
+            which = which[_rounding_matters(found)]
+            if not len(which):
+                break
+        return low, high
+
+
+def _rounding_matters(found: BlockBounds | TensionRange) -> np.ndarray:
+    # Elsewhere no other order of the cables gives better bounds: only shorter blocks do.
+    rounding, allowed = np.asarray(found.rounding), np.asarray(found.allowed)
+    return (rounding > 0.25 * TOLERANCE) & (rounding >= MATTERS * allowed)
+
+
+def _orders(problem: Problem) -> list[_Order]:
+    # As it is, then those whose first, third and fifth ray span the largest volumes at rest, a unit below the spools.
+    robot = problem.robot
+    base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
+    rays = arms + np.array([0.0, 0.0, float(np.abs(base).max())]) - base
+    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    threes = sorted(
+        itertools.combinations(range(CABLES), 3), key=lambda three: -abs(float(np.linalg.det(rays[list(three)])))
+    )
+    every = [list(range(CABLES))]
+    for three in threes[: ORDERS - 1]:
+        others = [k for k in range(CABLES) if k not in three]
+        every.append([k for pair in zip(three, others, strict=True) for k in pair])
+    return [_Order(_reordered(problem, order), _sign(order), order) for order in every]
+
+
+def _sign(order: list[int]) -> float:
+    return float((-1) ** sum(a > b for a, b in itertools.combinations(order, 2)))
+
+
+def _reordered(problem: Problem, order: list[int]) -> Problem:
+    # No point is shared, so that one compiled function serves every order.
+    robot, limits = problem.robot, problem.limits
+    points = {name: np.asarray(getattr(robot, name))[order] for name in ("base_points", "platform_points")}
+    changed = dataclasses.replace(robot, **points, joints=tuple(range(CABLES)), limits=Limits())
+    each = {row.name: getattr(limits, row.name) for row in LIMITS}
+    own: dict[str, Any] = {
+        row.name: np.asarray(each[row.name])[order] if row.per_cable and each[row.name] is not None else each[row.name]
+        for row in LIMITS
+    }
+    return problem._replace(robot=changed, limits=Limits(**own))
+
+
+def determinant_at_rest(problem: Problem, segments: PoseSegment) -> np.ndarray:
+    """Determinant of the Jacobian J (3.5) in the rest point, with the sign that `wrench_lanes.balance` gives it.
+
+    Args:
+        problem: robot.
+        segments: leaves (n, ...).
+
+    Returns:
+        (n,) m^9.
+    """
+    robot, (depths, own) = problem.robot, np.unique(np.asarray(segments.hub)[:, 2], return_inverse=True)
+    arms = np.asarray(robot.platform_points)
+    forces = np.asarray(robot.base_points) - arms - np.array([0.0, 0.0, 1.0]) * depths[:, None, None]
+    wrenches = np.concatenate([forces, np.cross(arms, forces)], axis=2)
+    return -np.linalg.det(wrenches)[own.ravel()]

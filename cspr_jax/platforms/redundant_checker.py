@@ -1,0 +1,238 @@
+"""Feasibility of motions of a platform on more cables than six, with margins: samples, finer where it matters.
+
+Motion and limits leave a choice of tensions. The margin of an instant is that of a workspace at its pose, for the
+wrench that the motion asks for: the largest s such that tensions between f_min + s and f_max - s supply it,
+`workspaces`. No determinant is asked about, nor which side of the spools the platform is on: where the
+cables cannot supply the wrench there is no s. Nothing here is a proof that a motion is feasible. Cables are held
+against each other, thick ones too, but not against the platform, whose attachment points need not lie in a plane.
+"""
+
+from functools import partial
+
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.minima import narrowed_places
+from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.beta_hat import LARGEST
+from cspr_jax.platforms.crossings import CableVectors, passed_over
+from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.motion_checker import BASIC, BESIDE_KNOT, FEW, TOLERANCE, TOUCH, MotionChecker, PoseChecks
+from cspr_jax.platforms.motions import Motions, rows
+from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.redundant_kernels import cable_vectors, end_wrenches, instants, other_limits
+from cspr_jax.robots.platform import pairs_apart
+from cspr_jax.schema.verdicts import Verdict, conjunction
+from cspr_jax.workspaces import exact
+from cspr_jax.workspaces.questions import FEASIBLE, question
+from cspr_jax.workspaces.search import WorkspaceSearch
+
+# So many samples are held at a time, instants of the first look computed at a time.
+ROOM, CHUNK = 200_000, 8
+SAMPLES = 64  # an arc
+# Halvings of an interval of beta-hat: to rounding. Slopes below this, over the margins, are none.
+HALVINGS, FLAT = 60, 1e-12
+# An interval of no values.
+NONE = (LARGEST, -LARGEST)
+
+
+class MarginLook:
+    """First look at motions by the margins of their tensions, and other limits; see `FirstLook`.
+
+    Args:
+        checker: of the motions.
+    """
+
+    def __init__(self, checker: "RedundantChecker") -> None:
+        """Of a checker."""
+        self._checker = checker
+
+    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest margin over some instants; see `FirstLook.lowest`."""
+        return self._least(segments, arcs, tau)[:, 0]
+
+    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
+        """Motions that some instants refute; see `FirstLook.refuted`."""
+        is_refuted = np.zeros(len(segments.rate), bool)
+        for start in range(0, len(tau), CHUNK):
+            alive = np.flatnonzero(~is_refuted)
+            if not len(alive):
+                break
+            least = self._least(rows(segments, alive), arcs, tau[start : start + CHUNK])
+            is_refuted[alive] = ~(least[:, : None if limits else 1] > -TOLERANCE).all(1)
+        return is_refuted
+
+    def _least(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        # (n, n_slacks) the margin first; not the distances between cables.
+        motions = Motions(segments, np.full(len(segments.rate), arcs))
+        found = self._checker.values(motions, np.tile(tau, (len(motions.arcs), 1)))[:, :, :-1].min(1)
+        return np.where(np.isnan(found), -np.inf, found)
+
+
+class RedundantChecker(MotionChecker):
+    """Checker of motions of one robot on more cables than six; see `MotionChecker`."""
+
+    def __init__(self, problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> None:
+        """Find what can meet."""
+        super().__init__(problem, kind, batch=batch)
+        robot, limits = problem.robot, problem.limits
+        self._rows = other_limits(limits)
+        basic = (Verdict.WRENCH_INFEASIBLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS)
+        self.flags, self.prefilter = (*basic, *(row.flag for row in self._rows)), MarginLook(self)
+        self._asked = question(robot, FEASIBLE, limits)
+        self._workspace = WorkspaceSearch(robot, self._asked)
+        self._weight = float(robot.mass * robot.gravity) / robot.n_cables
+        self._pairs = np.array(pairs_apart(robot), int).reshape(-1, 2)
+        size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
+        self._diameter = 0.0 if robot.cable_diameter is None else float(robot.cable_diameter)
+        self._touch = TOUCH * size
+        knots = np.asarray(problem.amplitude.knots)
+        self._knots = np.clip(np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT]), 0.0, 1.0)
+
+    def values(self, motions: Motions, tau: np.ndarray) -> np.ndarray:
+        """Margins, other slacks and distances along motions.
+
+        Args:
+            motions: n of them.
+            tau: (n, m) when.
+
+        Returns:
+            (n, m, n_values) the margin of the tensions over the weight that a cable would carry if all carried the
+            same, -inf where the cables do not span the wrench; the slacks of other limits; the smallest distance
+            between cables, m.
+        """
+        row = np.repeat(np.arange(len(tau)), tau.shape[1])
+        kernel = partial(instants, self.problem, self._pairs, kind=self.kind)
+        now = in_batches(kernel, (*motions.items(row), tau.ravel()), size=self.batch)
+        is_finite = (
+            np.isfinite(now.position).all(1) & np.isfinite(now.quaternion).all(1) & np.isfinite(now.wrench).all(1)
+        )
+        margin = np.full(len(row), np.nan)
+        some = now.position[is_finite], now.quaternion[is_finite], now.wrench[is_finite]
+        margin[is_finite] = self._workspace(*some).margin
+        values = np.concatenate([margin[:, None] / self._weight, now.slacks], axis=1)
+        return values.reshape(*tau.shape, -1)
+
+    def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
+        """The value of the largest margin, and those of positive ones; see `MotionChecker.end_interval`."""
+        # The wrench is linear in beta-hat, and so is the distance from each plane: the margin, the least, is concave.
+        matrix, wrenches = (np.asarray(x) for x in end_wrenches(self.problem.robot, position, quaternion, z0))
+        unit = self._workspace.unit
+        planes = exact.margin_planes(matrix / unit[:, None], self._asked.low, self._asked.high)
+        if exact.is_outside(wrenches / unit, planes.basis):
+            return AT_REST, *NONE
+        first, second = planes.offsets - (wrenches / unit) @ planes.normals.T
+        slope = second - first
+        if len(slope) == 0 or np.abs(slope).max() <= FLAT * self._weight:
+            is_held = first.min(initial=np.inf) > 0.0
+            return AT_REST, *((-np.inf, np.inf) if is_held else NONE)
+        low, high = -LARGEST, LARGEST
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            rises = slope[np.argmin(first + middle * slope)] > 0.0
+            low, high = (middle, high) if rises else (low, middle)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            zero = -first / slope
+        is_held = (first[slope == 0.0] > 0.0).all()
+        lowest, highest = zero[slope > 0.0].max(initial=-np.inf), zero[slope < 0.0].min(initial=np.inf)
+        return 0.5 * (low + high), *((lowest, highest) if is_held else NONE)
+
+    def breaks(self, slack: np.ndarray) -> np.ndarray:
+        """Criteria that are broken for certain; see `MotionChecker.breaks`."""
+        return slack <= -TOLERANCE
+
+    def sampled(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slacks at some instants; see `MotionChecker.sampled`."""
+        motions = Motions(segments, np.full(len(segments.rate), arcs))
+        return _in_order(self.values(motions, np.tile(tau, (len(motions.arcs), 1))).min(1))
+
+    def check(
+        self,
+        segments: PoseSegment,
+        arcs: np.ndarray,
+        *,
+        whole: bool = True,
+        margins: bool = True,
+        ignored: np.ndarray | None = None,
+    ) -> PoseChecks:
+        """Check motions in full, by samples: nothing is proved; see `MotionChecker.check`."""
+        checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
+        for count in np.unique(arcs).tolist():
+            # Those of one number of samples together.
+            alike = np.flatnonzero(arcs == count)
+            size = max(ROOM // (SAMPLES * count), 1)
+            for start in range(0, len(alike), size):
+                some = alike[start : start + size]
+                checks.put(some, self._checked(motions.rows(some), count, whole, ignored))
+        return checks
+
+    def _checked(self, motions: Motions, count: int, whole: bool, ignored: np.ndarray | None) -> PoseChecks:
+        tau = np.linspace(0.0, 1.0, SAMPLES * count + 1)
+        samples = self.values(motions, np.tile(tau, (len(motions.arcs), 1)))
+        counted = np.ones(len(self.flags), bool) if ignored is None else ~ignored
+        first = samples[:, :, :-1][:, :, np.append(True, counted[BASIC:])]
+        is_open = np.logical_or(whole, (first.min((1, 2)) > -TOLERANCE))
+        checks = self.nothing(len(motions.arcs))
+        checks.verdict[~is_open] = Verdict.WRENCH_INFEASIBLE.value
+        if not is_open.any():
+            return checks
+        motions, samples = motions.rows(is_open), samples[is_open]
+        least, when = narrowed_places(partial(self.values, motions), tau, samples)
+        if len(self._knots):  # the motion may jump there
+            beside = self.values(motions, np.tile(self._knots, (len(least), 1)))
+            when = np.where(beside.min(1) < least, self._knots[beside.argmin(1)], when)
+            least = np.minimum(least, beside.min(1))
+        judged = self._judged(least, self._met(motions, tau), self.durations(*motions), counted[BASIC:])
+        judged.instant[:] = _refuted_at(least[:, :-1], when[:, :-1])
+        checks.put(np.flatnonzero(is_open), judged)
+        return checks
+
+    def _met(self, motions: Motions, tau: np.ndarray) -> np.ndarray:
+        # Motions in which cables pass through each other between samples.
+        many, steps = len(motions.arcs), len(tau) - 1
+        ends = tuple(np.tile(part, many) for part in (tau[:-1], tau[1:]))
+        row = np.repeat(np.arange(many), steps)
+
+        def vectors(which: np.ndarray, when: np.ndarray) -> CableVectors:
+            kernel = partial(cable_vectors, self.problem, self._pairs, kind=self.kind)
+            return in_batches(kernel, (*motions.items(which), when), size=self.batch)
+
+        if not len(self._pairs):
+            return np.zeros(many, bool)
+        return passed_over(vectors, None, row, (ends[0], ends[1]), many)[0]
+
+    def _judged(self, least: np.ndarray, met: np.ndarray, duration: np.ndarray, counted: np.ndarray) -> PoseChecks:
+        margin, nearest, others = least[:, 0], least[:, -1], least[:, 1:-1]
+        free = nearest - self._diameter
+        verdict = Verdict.CABLE_CABLE.value * (met | (free <= -self._touch))
+        verdict |= np.where(~met & (np.abs(free) < self._touch), Verdict.UNDECIDED.value, 0)
+        verdict |= np.where(np.isneginf(margin), Verdict.SINGULAR.value, 0)
+        is_short = np.isfinite(margin) & (margin <= -TOLERANCE)
+        verdict |= np.where(is_short, Verdict.WRENCH_INFEASIBLE.value, 0)
+        for row, value, counts in zip(self._rows, others.T, counted, strict=True):
+            verdict |= np.where(counts & (value <= -TOLERANCE), row.flag.value, 0)
+        close = (np.abs(least[:, :-1]) <= TOLERANCE) & np.append(True, counted)
+        verdict |= np.where(close.any(1), Verdict.UNDECIDED.value, 0)
+        verdict = conjunction(verdict)
+        is_finite = ~np.isnan(least).any(1) & (duration > 0.0)
+        return PoseChecks(
+            np.where(is_finite, verdict, Verdict.NOT_FINITE.value),
+            np.where(is_finite[:, None], _in_order(least), np.nan),
+            np.where(is_finite, nearest, np.nan),
+            *(np.full(len(margin), np.nan) for _ in range(4)),
+        )
+
+
+def _refuted_at(least: np.ndarray, when: np.ndarray) -> np.ndarray:
+    # Of smallest values (n, n_values), the margin first, when the margin is below zero, else the worst of the others.
+    worst = np.where(least[:, 0] <= -TOLERANCE, 0, least.argmin(1))
+    row = np.arange(len(least))
+    return np.where(least[row, worst] <= -TOLERANCE, when[row, worst], np.nan)
+
+
+def _in_order(values: np.ndarray) -> np.ndarray:
+    # Of margin, other limits and distance those that have a flag (n, n_criteria): there is no determinant, and no side
+    # of the spools to be on.
+    nothing, always = np.full((len(values), 1), np.nan), np.full((len(values), 1), np.inf)
+    return np.concatenate([values[:, :1], nothing, always, values[:, 1:-1]], axis=1)

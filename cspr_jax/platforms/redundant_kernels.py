@@ -1,0 +1,120 @@
+"""Compiled states of motions of a platform on more cables than six: what they ask of the cables at many instants."""
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.motions.limits import Values, given, scales, slack
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.end_acceleration import end_state
+from cspr_jax.platforms.platform_segment import PlatformMotion, PoseSegment
+from cspr_jax.robots.cables import cable_motion
+from cspr_jax.robots.interference import cable_directions, gaps
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.schema.limits import Limit
+
+
+class Instants(NamedTuple):
+    """What motions ask for at n instants.
+
+    Fields:
+        position: (n, 3) m.
+        quaternion: (n, 4).
+        wrench: (n, 6) what the cables must supply, N and N m.
+        slacks: (n, n_rows) of limits other than those of the tensions, and the smallest distance between cables, m.
+    """
+
+    position: Array
+    quaternion: Array
+    wrench: Array
+    slacks: Array
+
+
+def other_limits(limits: Limits) -> list[Limit]:
+    """Rows of the limits that are given, but for those of the tensions, which are within the margin.
+
+    Args:
+        limits: the limits.
+
+    Returns:
+        the rows.
+    """
+    return [row for row in given(limits) if row.quantity != "tension"]
+
+
+@partial(jax.jit, static_argnames="kind")
+def instants(problem: Problem, pairs: Array, items: tuple[PoseSegment, Array, Array], *, kind: Kind) -> Instants:
+    """What motions ask for, each at an instant.
+
+    Args:
+        problem: robot, limits, amplitude.
+        pairs: (n_pairs, 2) of cables that can meet.
+        items: segments (leaves (n, ...)), arcs (n,), instants (n,).
+        kind: of the motions.
+
+    Returns:
+        the same, n of them.
+    """
+    robot, limits = problem.robot, problem.limits
+
+    def one(segment, arcs, tau):
+        motion = PlatformMotion(segment, problem.amplitude, arcs, kind)
+        state = motion.state(tau)
+        length, rate, bend = cable_motion(robot, state)
+        now = Values(jnp.zeros_like(length), state.position[2], length, jnp.abs(rate), jnp.abs(bend))
+        scale = scales(robot.n_cables, robot.mass * robot.gravity, motion.z0)
+        each = (
+            slack(row, getattr(limits, row.name), getattr(now, row.quantity), scale) for row in other_limits(limits)
+        )
+        apart = jnp.linalg.norm(gaps(robot, pairs, state.position, state.rotation), axis=1)
+        nearest = jnp.min(apart, initial=jnp.inf)
+        slacks = jnp.stack([*(jnp.min(x) for x in each), nearest])
+        return Instants(state.position, state.quaternion, robot.inertial_wrench(state), slacks)
+
+    return jax.vmap(one)(*items)
+
+
+@partial(jax.jit, static_argnames="kind")
+def cable_vectors(
+    problem: Problem, pairs: Array, items: tuple[PoseSegment, Array, Array], *, kind: Kind
+) -> tuple[Array, Array]:
+    """The vectors between cables, and the directions of cables, of motions, each at an instant.
+
+    Args:
+        problem: robot, limits, amplitude.
+        pairs: (n_pairs, 2) of cables that can meet.
+        items: segments (leaves (n, ...)), arcs (n,), instants (n,).
+        kind: of the motions.
+
+    Returns:
+        (n, n_pairs, 3) m, and (n, n_cables, 3).
+    """
+
+    def one(segment, arcs, tau):
+        state = PlatformMotion(segment, problem.amplitude, arcs, kind).state(tau)
+        where = state.position, state.rotation
+        return gaps(problem.robot, pairs, *where), cable_directions(problem.robot, *where)
+
+    return jax.vmap(one)(*items)
+
+
+@jax.jit
+def end_wrenches(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array) -> tuple[Array, Array]:
+    """Wrenches at one end of a segment.
+
+    Args:
+        robot: the robot.
+        position: (3,) from the centroid of the spools, z down, m.
+        quaternion: (4,) unit.
+        z0: () m.
+
+    Returns:
+        the wrench matrix (6, n_cables); (2, 6) what the cables must supply with beta-hat 0 and 1, N and N m.
+    """
+    states = [end_state(robot, position, quaternion, z0, jnp.asarray(value)) for value in (0.0, 1.0)]
+    return robot.wrench_matrix(states[0]), jnp.stack([robot.inertial_wrench(state) for state in states])

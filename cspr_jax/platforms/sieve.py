@@ -1,0 +1,198 @@
+"""The first look at many motions of a platform: instants that refute most of them.
+
+In float32, where a sample costs half; the instant with the smallest tension is then looked at in float64. So the first
+look refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full anyway.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.batches import in_batches, room, row_by_row
+from cspr_jax.arithmetic.lanes import cross, dot
+from cspr_jax.motions.amplitudes import Amplitude
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.platforms.from_rest_lanes import rest_table, swing, swings
+from cspr_jax.platforms.motions import rows
+from cspr_jax.platforms.platform_lanes import instant
+from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.slack_lanes import certain_tension, lowest_tension
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.wrench_lanes import balance, cables
+
+# Instants of one call; how many more motions are looked at than checked at a time, and what part of them is few.
+CHUNK, FIRST, FEWER = 8, 2, 8
+
+
+@partial(jax.jit, static_argnames=("kind", "rough"))
+def smallest_tensions(
+    robot: PlatformRobot,
+    amplitude: Amplitude,
+    arcs: Array,
+    tau: Array,
+    segments: PoseSegment,
+    *,
+    kind: Kind,
+    rough: bool = False,
+) -> tuple[Array, Array]:
+    """Smallest normalised tension of many segments over some instants.
+
+    Args:
+        robot: in its reference axes.
+        amplitude: A.
+        arcs: () number of arcs, the same for all, a float.
+        tau: (m,) instants.
+        segments: leaves (n, ...), of the parity of `arcs`.
+        kind: of the motions.
+        rough: whether in float32.
+
+    Returns:
+        (n,) of `slack_lanes.certain_tension`; and which instant it belongs to, (n,) from 0 on.
+    """
+    if rough:
+        robot, segments = _of_one_size(robot, segments)
+    kept = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if rough else x.dtype))
+    robot, segments, number = kept((robot, segments, jnp.asarray(arcs)))
+    if kind.from_rest:
+        at, table = _from_rest(robot, segments), kept(rest_table(amplitude, arcs, tau, kind))
+    else:
+        table = kept(jax.vmap(lambda t: instant(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
+
+        def at(now):
+            return lowest_tension(robot, segments, number, now, kind)
+
+    # One number a loop: XLA would compute the tension once for each of several.
+    values = row_by_row(at, table)
+    lowest = values.min(0)
+    return lowest, jnp.where(values == lowest[None], jnp.arange(len(tau))[:, None], len(tau)).min(0)
+
+
+def _of_one_size(robot: PlatformRobot, segments: PoseSegment) -> tuple[PlatformRobot, PoseSegment]:
+    # With the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
+    # eighteenth, which float32 has no room for. Tensions over their value at rest do not depend on the unit.
+    unit = jnp.sqrt(jnp.mean(robot.base_points**2))
+    smaller = dataclasses.replace(
+        robot,
+        base_points=robot.base_points / unit,
+        platform_points=robot.platform_points / unit,
+        inertia=robot.inertia / unit**2,
+        gravity=robot.gravity / unit,
+    )
+    return smaller, dataclasses.replace(
+        segments,
+        hub=segments.hub / unit,
+        start_radius=segments.start_radius / unit,
+        end_radius=segments.end_radius / unit,
+        regular=jnp.sign(segments.regular),
+    )
+
+
+def _from_rest(robot: PlatformRobot, segments: PoseSegment):
+    which, inertia = swings(segments), robot.inertia / robot.mass
+    # I e has the same direction in platform axes as about the fixed ones before the turn, which leaves the axis alone.
+    own = tuple(dot([inertia[i, j] for j in range(3)], which.axis) for i in range(3))
+
+    def at(row):
+        here = swing(which, row)
+        wires = cables(robot, here.position, here.turn)
+        weight = tuple(dot(line, own) for line in here.turn)
+        whirl = cross(which.axis, weight)
+        moment = tuple(here.spin * a + here.squared_speed * b for a, b in zip(weight, whirl, strict=True))
+        force = (here.acceleration[0], here.acceleration[1], here.acceleration[2] - robot.gravity)
+        return certain_tension(which.rate, segments.regular, wires, balance(wires, force, moment))
+
+    return at
+
+
+@partial(jax.jit, static_argnames="kind")
+def _rough_and_certain(
+    robot: PlatformRobot, amplitude: Amplitude, arcs: Array, tau: Array, segments: PoseSegment, *, kind: Kind
+) -> tuple[Array, Array]:
+    # As `smallest_tensions`, in float32; and in float64 at the instant of that, (n,) each.
+    lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, rough=True)
+    when = jnp.minimum(when, len(tau) - 1)  # there is none where all are NaN
+    if kind.from_rest:
+        return lowest, _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
+    return lowest, lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau[when]), kind)
+
+
+class Prefilter(NamedTuple):
+    """Prefilter of motions of one robot, by their tensions at a few instants.
+
+    Fields:
+        robot: the robot.
+        amplitude: A.
+        kind: of the motions.
+        least: a tension no larger than that refutes.
+        size: how many are looked at in one call.
+        count_instants: is told how many.
+    """
+
+    robot: PlatformRobot
+    amplitude: Amplitude
+    kind: Kind
+    least: float
+    size: int
+    count_instants: Callable[[int], None]
+
+    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest tension over some instants.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants.
+
+        Returns:
+            (n,) of `smallest_tensions`; -inf where not finite.
+        """
+        lowest = np.full(len(segments.rate), np.inf)
+        for chunk in _chunks(tau):
+            lowest = np.minimum(lowest, self._lowest(segments, arcs, chunk))
+        return np.where(np.isnan(lowest), -np.inf, lowest)
+
+    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
+        """Motions that some instants refute.
+
+        Args:
+            segments: leaves (n, ...), all of this number of arcs.
+            arcs: the number.
+            tau: (m,) instants, the most telling ones first.
+            limits: whether limits may refute them, which are not looked at here.
+
+        Returns:
+            (n,) where a tension is, or is none, or the determinant has changed its sign.
+        """
+        del limits
+        is_refuted = np.zeros(len(segments.rate), bool)
+        for chunk in _chunks(tau):
+            alive = np.flatnonzero(~is_refuted)
+            if not len(alive):
+                break
+            some = segments if len(alive) == len(is_refuted) else rows(segments, alive)
+            if len(alive) <= room(self.size // FEWER):  # not worth two looks
+                is_refuted[alive] = ~(self._lowest(some, arcs, chunk) > self.least)
+                continue
+            self.count_instants(len(alive) * (len(chunk) + 1))
+            kernel = partial(_rough_and_certain, self.robot, self.amplitude, float(arcs), chunk, kind=self.kind)
+            lowest, certain = in_batches(kernel, some, size=self.size)
+            is_refuted[alive] = (lowest < 0.0) & ~(certain > self.least)
+        return is_refuted
+
+    def _lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        # Of few motions, in float64.
+        self.count_instants(len(segments.rate) * len(tau))
+        kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
+        return in_batches(kernel, segments, size=self.size // FEWER)[0]
+
+
+def _chunks(tau: np.ndarray) -> np.ndarray:
+    # One shape for all: the last instant is repeated.
+    length = -(-len(tau) // CHUNK) * CHUNK
+    return np.pad(tau, (0, length - len(tau)), mode="edge").reshape(-1, CHUNK)

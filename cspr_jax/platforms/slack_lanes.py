@@ -1,0 +1,168 @@
+"""The slacks of `pose_slacks` for many platforms, one lane a case, and their part that the first look needs."""
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic.lanes import dot, smallest
+from cspr_jax.motions.limits import given, scales, slack
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.platform_lanes import Instant, State, squared_duration, state
+from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.wrench_lanes import (
+    CABLES,
+    Balance,
+    Cables,
+    balance,
+    cable_rates,
+    cables,
+    inertial_wrench,
+    normalised_determinant,
+)
+from cspr_jax.schema.limits import Limit
+
+# The volume of three of the cables over the product of their lengths below which no tension is told: they are nearly in
+# one plane, and the rounding of the fast balance grows with the third power of the inverse. It must refute nothing.
+FLAT = 1e-3
+
+
+def _balanced(robot: PlatformRobot, now: State, wires: Cables, squared: Array) -> Balance:
+    def slowed(vector):
+        return tuple(x / squared for x in vector)
+
+    # The moment is of second order in time like the force: omega enters squared.
+    force, moment = inertial_wrench(robot, slowed(now.acceleration), now.turn, now.omega, now.spin)
+    return balance(wires, force, slowed(moment))
+
+
+def _is_flat(wires: Cables, balance: Balance) -> Array:
+    # Where three of the cables are nearly in one plane.
+    a, b, c = (dot(wires.rays[k], wires.rays[k]) for k in range(0, CABLES, 2))
+    return balance.volume * balance.volume < FLAT**2 * a * b * c
+
+
+def _smallest_tension(rate: Array, balance: Balance) -> Array:
+    # Over its value at rest in P0 if all were equal.
+    share = CABLES / (rate * balance.denominator)
+    return smallest([x * share for x in balance.numerators])
+
+
+def certain_tension(rate: Array, regular: Array, wires: Cables, balance: Balance) -> Array:
+    """The smallest tension, where the fast balance gives one.
+
+    Args:
+        rate: (n,) lambda of (3.50), 1/s^2.
+        regular: (n,) determinant at rest in P0, whose sign must not change.
+        wires: the cables.
+        balance: the tensions.
+
+    Returns:
+        (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign, infinite
+        where the fast balance has too few digits.
+    """
+    lowest = jnp.where(balance.signed * regular > 0.0, _smallest_tension(rate, balance), -jnp.inf)
+    return jnp.where(_is_flat(wires, balance), jnp.inf, lowest)
+
+
+def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> Array:
+    """The smallest tension at one instant of many segments.
+
+    Args:
+        robot: in its reference axes.
+        segment: leaves (n, ...), of the parity of `arcs`.
+        arcs: () or (n,) number of arcs, a float.
+        now: of these arcs.
+        kind: of the motions.
+
+    Returns:
+        (n,) of `certain_tension`.
+    """
+    here = state(segment, arcs, now, kind)
+    wires = cables(robot, here.position, here.turn)
+    balance = _balanced(robot, here, wires, squared_duration(segment, arcs))
+    return certain_tension(segment.rate, segment.regular, wires, balance)
+
+
+def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> list[Array]:
+    """Smallest slacks of the criteria that depend on the motion, at one instant of many segments.
+
+    Args:
+        problem: robot, limits.
+        segment: leaves (n, ...), of the parity of `arcs`.
+        arcs: () or (n,) number of arcs, a float.
+        now: of these arcs.
+        kind: of the motions.
+
+    Returns:
+        (n,) each: the taut cables', then those of limits on the motion; infinite where the fast balance has too few
+        digits.
+    """
+    robot, limits = problem.robot, problem.limits
+    here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
+    wires = cables(robot, here.position, here.turn)
+    balance = _balanced(robot, here, wires, squared)
+    is_flat = _is_flat(wires, balance)
+    values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment.rate, balance))]
+    rows = _given(limits, of_motion=True)
+    if not rows:
+        return values
+    lengths, rates, bends = cable_rates(wires, here.velocity, here.acceleration, here.omega, here.spin)
+    pace, scale = jnp.sqrt(squared), scales(CABLES, robot.mass * robot.gravity, robot.gravity / segment.rate)
+    each = {
+        "tension": [robot.mass * x / balance.denominator * y for x, y in zip(balance.numerators, lengths, strict=True)],
+        "speed": [jnp.abs(rate) / pace for rate in rates],
+        "acceleration": [jnp.abs(bend) / squared for bend in bends],
+    }
+    for row in rows:
+        least = _least(row, limits, each[row.quantity], scale)
+        values.append(jnp.where(is_flat, jnp.inf, least) if row.quantity == "tension" else least)
+    return values
+
+
+def still_slacks(problem: Problem, segment: PoseSegment, here: State, wires: Cables) -> list[Array]:
+    """Smallest slacks of the criteria that depend on the pose alone, at one instant of many segments.
+
+    Args:
+        problem: robot, limits.
+        segment: leaves (n, ...).
+        here: the state.
+        wires: the cables there.
+
+    Returns:
+        (n,) each: regular, below the spools, then those of limits on the pose.
+    """
+    robot, limits, z0 = problem.robot, problem.limits, problem.robot.gravity / segment.rate
+    normal = plane_normal(robot)
+    below = dot([normal[i] for i in range(3)], here.position) / z0
+    values = [normalised_determinant(robot, wires) / segment.regular, below]
+    scale = scales(CABLES, robot.mass * robot.gravity, z0)
+    each = {"depth": [here.position[2]], "length": [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]}
+    return values + [_least(row, limits, each[row.quantity], scale) for row in _given(limits, of_motion=False)]
+
+
+def _given(limits: Limits, *, of_motion: bool) -> list[Limit]:
+    return [row for row in given(limits) if row.of_motion == of_motion]
+
+
+def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
+    # Smallest slack of a limit, of a quantity of each cable or of one alone.
+    limit = getattr(limits, row.name)
+    own = [limit[k] for k in range(len(each))] if row.per_cable else [limit]
+    return smallest([slack(row, x, value, scale) for x, value in zip(own, each, strict=True)])
+
+
+def order(limits: Limits) -> list[int]:
+    """Order of the criteria of `slacks.flags` among moving slacks and still ones, one after the other.
+
+    Args:
+        limits: which limits are given.
+
+    Returns:
+        n_criteria indices.
+    """
+    moving, still = _given(limits, of_motion=True), _given(limits, of_motion=False)
+    every = ["taut", *moving, "regular", "below", *still]
+    return [every.index(which) for which in ("taut", "regular", "below", *given(limits))]

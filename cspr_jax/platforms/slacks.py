@@ -1,0 +1,61 @@
+"""Criteria of a platform's motion as slacks at one instant: taut cables, no singularity, below the spools, limits.
+
+With n the number of cables, f the tensions, m the mass:
+
+    taut           n z0 mu / g, the tension over its value at rest in P0 if all were equal
+    regular        determinant (`robots.wrench_balance.normalised_determinant`) over its value at rest in P0
+    below          depth of the mass centre below the spool plane, over z0
+    tension        (f - f_min) n / (m g),  (f_max - f) n / (m g)
+    floor          (floor - z) / z0
+    length, speed, acceleration    1 - value / largest
+"""
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.motions.limits import given, scales, slack, values
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots import wrench_balance
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.state import State
+from cspr_jax.schema.verdicts import Verdict
+
+
+def flags(limits: Limits) -> tuple[Verdict, ...]:
+    """The flag that says that a criterion is broken, for each criterion.
+
+    Args:
+        limits: which limits are given.
+
+    Returns:
+        n_criteria flags.
+    """
+    return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(row.flag for row in given(limits)))
+
+
+def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Array:
+    """The smallest slack of each criterion at one instant.
+
+    Args:
+        problem: robot, limits.
+        state: the state.
+        z0: () m.
+        regular: () determinant at rest in P0.
+
+    Returns:
+        (n_criteria,) in the order of `flags`.
+    """
+    robot, limits = problem.robot, problem.limits
+    per_length = wrench_balance.tensions_per_length(robot, state)
+    basic = [
+        robot.n_cables * z0 / robot.gravity * jnp.min(per_length),
+        wrench_balance.normalised_determinant(robot, state.position, state.rotation) / regular,
+        plane_normal(robot) @ state.position / z0,
+    ]
+    rows = given(limits)
+    if not rows:
+        return jnp.stack(basic)
+    now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
+    every = (slack(row, getattr(limits, row.name), getattr(now, row.quantity), scale) for row in rows)
+    return jnp.stack([*basic, *(jnp.min(x) for x in every)])

@@ -1,0 +1,321 @@
+"""Bounds of tensions and of the determinant on blocks of a platform's motions, one lane a block.
+
+With N_k and det J the determinants of Cramer's rule for the tension of cable k,
+
+    kappa_k = 6 z0 N_k / (g det J(P0)),    D = det J / det J(P0),    slack of a taut cable = kappa_k / D
+
+are analytic on a block. They are taken at Chebyshev's nodes; what the polynomials through these leave out is bounded
+on ellipses of complex time, by Hadamard's inequality. With Bernstein coefficients k_i of kappa and d_i of D, and
+remainders r and q, no slack is below the smallest (k_i - r) / (d_i + q). Likewise for limits on tensions, speeds and
+accelerations of cables, `limit_blocks`: docs/theory.md.
+"""
+
+import math
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.arithmetic import chebyshev, packed
+from cspr_jax.arithmetic.lanes import dot, stored
+from cspr_jax.motions.limits import given, scales
+from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.least_nodes import least_nodes
+from cspr_jax.platforms.limit_blocks import QUANTITIES, STRAIGHT, Enclosed, Here, Pair, Sizes, at_most, ratio
+from cspr_jax.platforms.platform_lanes import State, squared_duration, state
+from cspr_jax.platforms.platform_reach import Reach, instant_beside, middle_of, reach
+from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.work_list import allowance
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.wrench_lanes import CABLES, balance, cables, inertial_wrench
+from cspr_jax.schema.limits import Limit
+
+# Part of a bound on real time by which a value at a node may be wrong (tests: by a tenth of that), and by which the
+# polynomial through such values may be. What computing its Bernstein coefficients adds is a part of the values.
+ROUNDING = 1e-13 * chebyshev.LEBESGUE
+COEFFICIENTS = 2.0 * np.finfo(float).eps * (chebyshev.DEGREE + 1) * float(np.abs(chebyshev.bernstein()).sum(1).max())
+REGULAR = CABLES  # the place of D among the values
+BASIC = 2  # criteria that are no limits
+
+
+class BlockBounds(NamedTuple):
+    """Slacks on n blocks: of taut cables, of the determinant (D), of the limits on the motion that are given.
+
+    Fields:
+        nodes: (n_nodes, n_criteria, n) smallest ones at the nodes, and what may be rounding: no lower than they truly
+            are. Infinite where D is not positive for certain. Of the determinant that of
+            `wrench_lanes.normalised_determinant` over its value at rest in P0, where margins are asked for. Where only
+            the least are: (1, n_criteria, n).
+        place: (n,) where the smallest of the least is, from -1 to 1; 0 where all are asked for.
+        bound: (n_criteria, n) proved lower bounds.
+        rounding: (n,) largest allowance for rounding in those of taut cables, before these are divided by D.
+        allowed: (n,) largest allowance in all: also for what the polynomials leave out.
+    """
+
+    nodes: Array
+    place: Array
+    bound: Array
+    rounding: Array
+    allowed: Array
+
+
+class _Block(NamedTuple):
+    # Of n blocks.
+    segments: PoseSegment
+    squared: Array  # T^2, s^2
+    regular: Array  # det J(P0), m^9
+    z0: Array
+
+
+def of_motion(problem: Problem) -> list[Limit]:
+    """Limits on the motion that are given.
+
+    Args:
+        problem: robot, limits.
+
+    Returns:
+        their rows.
+    """
+    return [row for row in given(problem.limits) if row.of_motion]
+
+
+@partial(jax.jit, static_argnames=("kind", "margins", "least"))
+def tension_blocks(
+    problem: Problem, one: Array, items, *, kind: Kind, margins: bool, least: bool = False
+) -> BlockBounds:
+    """Bounds of slacks on blocks.
+
+    Args:
+        problem: robot, limits, amplitude.
+        one: () the number 1; see `arithmetic.lanes.stored`.
+        items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start (n,) and stop (n,), with
+            no knot inside.
+        kind: of the motions.
+        margins: whether the normalised determinant is wanted.
+        least: whether of the nodes only the smallest values are.
+
+    Returns:
+        the bounds.
+    """
+    found = _taken(problem, one, items, kind=kind, margins=margins, rough=least)
+    # What margins alone need comes last, and is not bounded.
+    nodes, bound = _bounds(problem, found)
+    if margins:
+        nodes[1] = nodes[1] * found.values[:, len(found.rests)]
+    if least:
+        every, place = least_nodes(nodes, allowance(np.arange(len(nodes)) >= BASIC), chebyshev.nodes())
+    else:
+        every, place = jnp.stack(nodes, axis=1), jnp.zeros_like(bound[0])
+    return BlockBounds(every, place, jnp.stack(bound), *_allowances(found))
+
+
+class TensionRange(NamedTuple):
+    """Tensions on n blocks, per mass and length, over those of six equal cables at rest in P0.
+
+    Fields:
+        low: (n_cables, n) proved lower bounds.
+        high: (n_cables, n) proved upper bounds; infinite where the determinant may vanish.
+        rounding: (n,) as in `BlockBounds`.
+        allowed: (n,) likewise.
+    """
+
+    low: Array
+    high: Array
+    rounding: Array
+    allowed: Array
+
+
+@partial(jax.jit, static_argnames="kind")
+def tension_ranges(problem: Problem, one: Array, items, *, kind: Kind) -> TensionRange:
+    """Ranges of the tensions of each cable on blocks.
+
+    Args:
+        problem: robot, limits, amplitude.
+        one: () the number 1; see `arithmetic.lanes.stored`.
+        items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start (n,) and stop (n,), with
+            no knot inside.
+        kind: of the motions.
+
+    Returns:
+        the ranges.
+    """
+    found = _taken(problem, one, items, kind=kind, margins=False)
+    low, high = (_coefficients(found.values) + sign * found.rests[None] for sign in (-1.0, 1.0))
+    regular = low[:, REGULAR, None], high[:, REGULAR, None]
+    least, most = ratio(low[:, :CABLES], regular), ratio(-high[:, :CABLES], regular)
+    return TensionRange(jnp.min(least, axis=0), -jnp.min(most, axis=0), *_allowances(found))
+
+
+def _coefficients(values: Array) -> Array:
+    # Bernstein coefficients of polynomials through values (m, n_values, n) at the nodes.
+    matrix = jnp.asarray(chebyshev.bernstein())
+    return (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
+
+
+def _allowances(found: "_Taken") -> tuple[Array, Array]:
+    return jnp.max(found.rounding[:CABLES], axis=0), jnp.max(found.rests[:CABLES], axis=0)
+
+
+class _Taken(NamedTuple):
+    # Values of blocks at the nodes (m, n_values, n), what polynomials through the first of them leave out (n_rests, n),
+    # and the part of it that is rounding.
+    block: _Block
+    values: Array
+    rests: Array
+    rounding: Array
+
+
+def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool, rough: bool = False) -> _Taken:
+    segments, arcs, regular, start, stop = items
+    middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
+    block = _Block(segments, squared_duration(segments, arcs), regular, problem.robot.gravity / segments.rate)
+
+    def at(off):
+        now = instant_beside(middle, segments.sense, arcs, off * half)
+        return state(segments, arcs, stored(now, one), kind, one)
+
+    def values_at(node):
+        return [x for pair in _values(problem, block, at(node), margins=margins) for x in pair]
+
+    together, apart = (packed.packed, packed.unpacked) if rough else (packed.paired, packed.parts)
+    values = jnp.stack(apart(lax.map(lambda node: together(values_at(node)), chebyshev.nodes())), axis=1)
+    lengths = stored(_lengths(problem.robot, at(0.0)), one)
+    radii = np.array(chebyshev.RADII)
+    axes = np.vstack([chebyshev.semi_axes(radii), [1.0, 0.0]])
+
+    def reach_on(ellipse):
+        along, aside = ellipse
+        return packed.paired(reach(segments, arcs, middle, (along * half, aside * half), kind))
+
+    def sizes_on(ellipse):
+        along, pairs, factor = ellipse
+        found = _sizes(problem, block, Reach(*packed.parts(pairs)), along * half, lengths)
+        return packed.paired([jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in found])
+
+    factors = np.append(chebyshev.remainders(radii), ROUNDING)
+    sizes = jnp.stack(packed.parts(lax.map(sizes_on, (axes[:, 0], lax.map(reach_on, axes), factors))))
+    amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
+    largest = jnp.max(jnp.abs(values[:, : len(sizes)]), axis=0)
+    largest = jnp.where(jnp.isnan(largest), jnp.inf, largest)  # of three cables in one plane
+    rounding = sizes[:, -1] * amplified[None] + COEFFICIENTS * largest
+    rests = jnp.min(sizes[:, :-1], axis=1) + rounding
+    if rough:
+        rests = rests + chebyshev.LEBESGUE * packed.ROUNDING * largest
+    return _Taken(block, values, rests, rounding)
+
+
+def _values(problem: Problem, block: _Block, here: State, *, margins: bool) -> list[Pair]:
+    # At one node, two at a time, which XLA then computes in one loop: kappa and D, what rounding is multiplied with,
+    # what the limits need, and what makes of D the normalised determinant.
+    robot = problem.robot
+    wires = cables(robot, here.position, here.turn)
+
+    def slowed(vector):
+        return tuple(x / block.squared for x in vector)
+
+    force, moment = inertial_wrench(robot, slowed(here.acceleration), here.turn, here.omega, here.spin)
+    found = balance(wires, force, slowed(moment))
+    inverse = 1.0 / found.volume
+    squares = [dot(ray, ray) for ray in wires.rays]
+    amplified = math.prod(squares[2::2], start=squares[0]) * inverse * inverse
+    share = inverse * inverse * inverse / block.regular
+    kappa = [x * (share * (CABLES * block.z0 / robot.gravity)) for x in found.numerators]
+    regular = found.denominator * share
+    pairs = [*zip(kappa[::2], kappa[1::2], strict=True), (regular, amplified)]
+    instant = Here(here, wires, kappa, block.squared, block.z0)
+    for quantity, row in _quantities(problem).items():
+        pairs += QUANTITIES[quantity].values(instant, getattr(problem.limits, row[0].name))
+    if margins:
+        standing = cables(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
+        rest = [dot(ray, ray) for ray in standing.rays]
+        lengths = [jnp.sqrt(a / b) for a, b in zip(rest, squares, strict=True)]
+        shortened = math.prod(lengths[1:], start=lengths[0])
+        pairs.append((shortened, shortened))
+    return pairs
+
+
+def _level(like: Array):
+    one, nothing = jnp.ones_like(like), jnp.zeros_like(like)
+    return tuple(tuple(one if i == j else nothing for j in range(3)) for i in range(3))
+
+
+def _quantities(problem: Problem) -> dict[str, list[Limit]]:
+    # Quantities that limits bound, each with its limits.
+    rows: dict[str, list[Limit]] = {}
+    for row in of_motion(problem):
+        rows.setdefault(row.quantity, []).append(row)
+    return rows
+
+
+def _lengths(robot: PlatformRobot, here: State) -> tuple[list[Array], list[Array]]:
+    # Of the cables, and from the spools to the mass centre.
+    wires = cables(robot, here.position, here.turn)
+    offs = [tuple(here.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]
+    rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (wires.rays, offs))
+    return rays, away
+
+
+def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths) -> list[Array]:
+    # Largest sizes on an ellipse of what `_values` gives, in its order, by Hadamard's inequality: moments in platform
+    # axes, over the mean arm times the growth.
+    robot, squared, z0 = problem.robot, block.squared, block.z0
+    sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
+    arm, arms = jnp.sqrt(jnp.mean(sizes**2)), [sizes[k] for k in range(CABLES)]
+    shift, turn = along * bounds.speed, jnp.minimum(along * bounds.turn, bounds.growth + 1.0)
+    moved = [shift + own * turn for own in arms]
+    rays = [ray + move for ray, move in zip(lengths[0], moved, strict=True)]
+    columns = [
+        jnp.sqrt(ray**2 + (own / arm * (away + shift)) ** 2)
+        for ray, own, away in zip(rays, arms, lengths[1], strict=True)
+    ]
+    inertia = robot.inertia / robot.mass
+    apart = inertia - jnp.trace(inertia) / 3.0 * jnp.eye(3)
+    whirl = jnp.sqrt(jnp.sum(inertia**2)) * bounds.spin + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
+    force = bounds.bend / squared + robot.gravity
+    wrench = jnp.sqrt(force**2 + (whirl / squared / (arm * bounds.growth)) ** 2)
+    whole = (arm * bounds.growth) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
+    kappa = [CABLES * z0 / robot.gravity * whole * wrench / column for column in columns]
+    paces = [bounds.speed + own * bounds.turn for own in arms]
+    pulls = [bounds.bend + own * bounds.growth * (bounds.spin + bounds.omega**2) for own in arms]
+    is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
+    found = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0)
+    every = [*kappa, whole, jnp.zeros_like(whole)]
+    for quantity, row in _quantities(problem).items():
+        every += QUANTITIES[quantity].sizes(found, getattr(problem.limits, row[0].name))
+    return every
+
+
+def _bounds(problem: Problem, found: _Taken) -> tuple[list[Array], list[Array]]:
+    # Smallest slacks at the nodes, (m, n) each, as large as rounding lets them be; and their lower bounds, (n,) each.
+    rests, block = found.rests, found.block
+    values = found.values[:, : len(rests)]
+    every = _coefficients(values)
+
+    def around(middle, off, part):
+        return middle[:, part] - off[None, part], middle[:, part] + off[None, part]
+
+    one = slice(REGULAR, REGULAR + 1)
+    regular, share = around(every, rests, one), around(values, found.rounding, one)
+    # Of quotients with one denominator the smallest has the smallest numerator.
+    least = jnp.min(every[:, :CABLES] - rests[None, :CABLES], axis=1, keepdims=True)
+    doubt = jnp.max(found.rounding[None, :CABLES], axis=1, keepdims=True)
+    kappa = jnp.min(values[:, :CABLES], axis=1, keepdims=True) + doubt
+    nodes = [at_most(kappa, share)[:, 0], share[1][:, 0]]
+    bound = [jnp.min(ratio(least, regular), axis=(0, 1)), jnp.min(regular[0], axis=(0, 1))]
+    scale = scales(CABLES, problem.robot.mass * problem.robot.gravity, block.z0)
+    part, slacks = slice(0, REGULAR + 2), {}
+    for quantity, rows in _quantities(problem).items():
+        factor, size = scale.get(quantity, (1.0, jnp.ones(())))
+        part = slice(part.stop, part.stop + QUANTITIES[quantity].width)
+        enclosed = Enclosed(around(every, rests, part), around(values, found.rounding, part), regular, share)
+        for row in rows:
+            limit = getattr(problem.limits, row.name) * (factor / size)
+            slacks[row.name] = QUANTITIES[quantity].slacks(enclosed, limit, row.sense == "least")
+    for row in of_motion(problem):
+        nodes.append(slacks[row.name][0])
+        bound.append(slacks[row.name][1])
+    return nodes, bound

@@ -1,0 +1,141 @@
+"""Work list of a proof: blocks of motions are closed, or halved until they are, or until their motion is refuted."""
+
+import itertools
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.motions.blocks import Blocks
+
+TOLERANCE = 1e-6
+# So many times a block is halved at most, and so many of an arc may be open.
+HALVINGS, OPEN = 21, 64
+# How many times at once, the first time, the second time, and then: few blocks are open by then, and a batch of them
+# costs as much as a full one.
+AT_ONCE = (1, 2, 3)
+
+
+class Looked(NamedTuple):
+    """What was found of k blocks.
+
+    Fields:
+        nodes: (m, n_criteria or more, k) values at instants: slacks first.
+        bound: (n_criteria, k) proved lower bounds of the slacks.
+        tau: (m, k) the instants.
+        is_enough: of smallest values so far, (n, n_criteria or more): which blocks need not be halved if their slacks
+            are proved, (k,).
+    """
+
+    nodes: np.ndarray
+    bound: np.ndarray
+    tau: np.ndarray
+    is_enough: Callable[[np.ndarray], np.ndarray]
+
+
+class WorkList:
+    """Work list of n motions.
+
+    Args:
+        arcs: (n,) numbers of arcs.
+        limits: (n_criteria,) whether each slack is one of a limit, which may be touched.
+        ignored: (n_criteria,) whether each neither refutes nor need be proved; None: none is.
+
+    Fields:
+        is_refuted: (n,) an instant breaks a criterion, or `refute` was called.
+        is_stuck: (n,) undecided.
+        attained: (n, n_criteria or more) smallest values at the instants that were looked at.
+        bound: (n, n_criteria) proved lower bounds of motions that are neither.
+        instant: (n,) tau of what broke a criterion by most, else of what else refutes the motion; NaN where nothing
+            does.
+    """
+
+    def __init__(self, arcs: np.ndarray, limits: np.ndarray, ignored: np.ndarray | None = None) -> None:
+        """Nothing is known yet."""
+        self._ignored = np.zeros(len(limits), bool) if ignored is None else ignored
+        self._arcs, self._allowed = arcs, np.where(self._ignored, np.inf, allowance(limits))
+        self.is_refuted, self.is_stuck = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool)
+        self.bound, self.instant = np.full((len(arcs), len(limits)), np.inf), np.full(len(arcs), np.nan)
+        self.attained, self._worst = np.zeros((len(arcs), 0)), np.full(len(arcs), -TOLERANCE)
+
+    def work_off(self, blocks: Blocks, look: Callable[[Blocks, int], Looked]) -> Looked:
+        """Look at blocks, and at halves of what stays open.
+
+        Args:
+            blocks: of the motions.
+            look: of blocks that were halved so many times.
+
+        Returns:
+            what was found of the blocks that were given.
+        """
+        first = found = look(blocks, 0)
+        self.attained = np.full((len(self._arcs), found.nodes.shape[1]), np.inf)
+        halved = 0
+        for more in itertools.chain(AT_ONCE, itertools.repeat(AT_ONCE[-1])):
+            is_open = self._told(blocks, found, last=halved >= HALVINGS)
+            self.is_stuck |= np.bincount(blocks.row[is_open], minlength=len(self._arcs)) > OPEN * self._arcs
+            is_open &= ~self.is_stuck[blocks.row]
+            if not is_open.any():
+                break
+            blocks = blocks.some(is_open)
+            for _ in range(more):
+                blocks = blocks.halves()
+            halved += more
+            found = look(blocks, halved)
+        self.bound[self.is_refuted | self.is_stuck] = np.nan
+        return first
+
+    def refute(self, row: np.ndarray, tau: np.ndarray) -> None:
+        """Note that motions are refuted by other things than criteria.
+
+        Args:
+            row: (k,) motions.
+            tau: (k,) when.
+        """
+        self.is_refuted[row] = True
+        is_new = np.isnan(self.instant[row])
+        self.instant[row[is_new]] = tau[is_new]
+
+    def _told(self, blocks: Blocks, found: Looked, *, last: bool) -> np.ndarray:
+        # Takes in what was found of blocks; which of them are to be halved.
+        least, low = found.nodes.min(0).T, found.bound.T
+        _lower(self.attained, blocks.row, least)
+        slack = least[:, : low.shape[1]]
+        # NaN refutes nothing, and proves nothing.
+        self._note_instants(blocks, found)
+        self.is_refuted[blocks.row[(slack + self._allowed < -TOLERANCE).any(1)]] = True
+        is_above = (low > TOLERANCE - self._allowed) | self._ignored
+        is_proved = is_above.all(1) & found.is_enough(self.attained)
+        with np.errstate(invalid="ignore"):  # of infinities: singular poses, blocks without a bound
+            is_known = ((slack - low <= 0.5 * TOLERANCE) & ~is_above).any(1)
+        is_done = is_proved | is_known | last | np.isnan(least).any(1)
+        self.is_stuck[blocks.row[is_done & ~is_proved]] = True
+        _lower(self.bound, blocks.row[is_done], low[is_done])
+        return ~is_done & ~(self.is_refuted | self.is_stuck)[blocks.row]
+
+    def _note_instants(self, blocks: Blocks, found: Looked) -> None:
+        worst = (found.nodes[:, : len(self._allowed)] + self._allowed[None, :, None]).min(1)
+        place = worst.argmin(0)
+        value, tau = worst[place, np.arange(len(place))], found.tau[place, np.arange(len(place))]
+        breaks = np.flatnonzero(value < self._worst[blocks.row])
+        breaks = breaks[np.argsort(-value[breaks], kind="stable")]  # the worst of a motion is written last
+        self._worst[blocks.row[breaks]], self.instant[blocks.row[breaks]] = value[breaks], tau[breaks]
+
+
+def _lower(values: np.ndarray, row: np.ndarray, others: np.ndarray) -> None:
+    # Takes values of rows, which stand side by side, into the smallest ones.
+    if len(row):
+        first = np.flatnonzero(np.diff(row, prepend=-1))
+        values[row[first]] = np.minimum(values[row[first]], np.minimum.reduceat(others, first))
+
+
+def allowance(limits: np.ndarray) -> np.ndarray:
+    """What slacks may be below zero: limits may be touched; cables may not be slack, and the rest may not be reached.
+
+    Args:
+        limits: (n_criteria,) whether each is the slack of a limit.
+
+    Returns:
+        (n_criteria,).
+    """
+    return 2.0 * TOLERANCE * limits

@@ -1,1 +1,0 @@
-"""Searches: numbers of arcs, oscillations, beta-hat and orientations that make a motion feasible."""

@@ -1,0 +1,164 @@
+"""Smallest number of arcs of many segments, with duration, margin and verdict.
+
+A sieve bounds the margin of every number of arcs from above; `answers` decides about the survivors.
+"""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches, in_parts, room
+from cspr_jax.errors import InputError
+from cspr_jax.motions.amplitudes import boundary_errors
+from cspr_jax.motions.answers import Answers, joined
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
+from cspr_jax.runtime.stages import stage
+from cspr_jax.swings import hypocycloid, sieve
+from cspr_jax.swings.decide import decided, end_slacks
+from cspr_jax.swings.hypocycloid import Segment
+
+# So many segments are held at a time by each thread.
+PART = 16 * sieve.BATCH
+
+
+@jax.jit
+def _segments(problem: Problem, points) -> tuple[Segment, Segment, jax.Array]:
+    def one(start, end, z0):
+        even, odd = (hypocycloid.segment(problem.robot, start, end, z0, odd=jnp.asarray(odd)) for odd in (False, True))
+        return even, odd, hypocycloid.feasibility_at_infinity(even, problem.amplitude)
+
+    return jax.vmap(one)(*points)
+
+
+def segments_between(
+    problem: Problem, starts: np.ndarray, ends: np.ndarray, z0: np.ndarray
+) -> tuple[dict[int, Segment], np.ndarray]:
+    """Segments of many pairs of points.
+
+    Args:
+        problem: gives the robot and the amplitude function.
+        starts: (n, 3) from the centroid of the spools, z down, m.
+        ends: (n, 3) likewise.
+        z0: (n,) m.
+
+    Returns:
+        the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...), and the
+        left-hand side of (2.55), (n,).
+    """
+    even, odd, infinity = in_batches(partial(_segments, problem), (starts, ends, z0), size=sieve.BATCH)
+    return {0: even, 1: odd}, infinity
+
+
+def minimum_arcs(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    z0: np.ndarray,
+    *,
+    max_arcs: int = 30,
+    arcs=None,
+    dtype="float64",
+) -> Answers:
+    """Smallest number of arcs of each segment from a start to an end.
+
+    Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
+
+    Args:
+        problem: robot, limits and amplitude.
+        starts: (n, 3) from the centroid of the spools, z down, m.
+        ends: (n, 3) likewise.
+        z0: (n,) depth of p0 below the centroid of the spools, m; positive.
+        max_arcs: largest number of arcs tried.
+        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
+        dtype: precision of the sieve, "float64" or "float32"; the verdicts are the same.
+
+    Returns:
+        the answers.
+
+    Raises:
+        InputError: an amplitude function that breaks (2.49); max_arcs below 1; z0 not positive; jax without 64 bits.
+    """
+    check_numbers(problem.robot, z0, max_arcs)
+
+    def part(which: slice) -> Answers:
+        fixed = None if arcs is None else np.asarray(arcs)[which]
+        points = (starts[which], ends[which], z0[which])
+        return arcs_and_segments(problem, *points, max_arcs=max_arcs, arcs=fixed, dtype=dtype)[0]
+
+    # Not two batches where one has room for all.
+    return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(sieve.BATCH) else part(slice(None))
+
+
+def arcs_and_segments(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    z0: np.ndarray,
+    *,
+    max_arcs: int = 30,
+    arcs=None,
+    dtype="float64",
+) -> tuple[Answers, Segment]:
+    """Smallest number of arcs of each segment, with the segments: `minimum_arcs` in one part.
+
+    Args:
+        problem: robot, limits and amplitude.
+        starts: (n, 3) from the centroid of the spools, z down, m.
+        ends: (n, 3) likewise.
+        z0: (n,) depth of p0 below the centroid of the spools, m; positive.
+        max_arcs: largest number of arcs tried.
+        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
+        dtype: precision of the sieve, "float64" or "float32"; the verdicts are the same.
+
+    Returns:
+        the answers, and the segments that they belong to, leaves (n, ...).
+
+    Raises:
+        InputError: as `minimum_arcs` does.
+    """
+    check_numbers(problem.robot, z0, max_arcs)
+    broken = boundary_errors(problem.amplitude)
+    if broken:
+        raise InputError(
+            "amplitude", problem.amplitude.name, "an amplitude function that meets (2.49): " + "; ".join(broken)
+        )
+    stage(f"numbers of arcs, 1 to {max_arcs}")
+    parities, infinity = segments_between(problem, starts, ends, z0)
+    upper, at_ends = _sieved(problem, parities[0], parities[1], max_arcs, dtype)
+    return decided(problem, parities, upper, at_ends, infinity, arcs=arcs)
+
+
+def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
+    """Refuse what no search can use.
+
+    Args:
+        robot: that is to be centred.
+        z0: (n,) m.
+        max_arcs: largest number of arcs tried.
+
+    Raises:
+        InputError: max_arcs below 1; z0 not positive; jax without 64 bits; a robot that is not centred.
+    """
+    if not jax.config.read("jax_enable_x64"):
+        raise InputError("jax_enable_x64", False, "true: verdicts need float64")
+    if max_arcs < 1:
+        raise InputError("max_arcs", max_arcs, "an integer >= 1")
+    if np.abs(np.asarray(robot.base_points).mean(0)).max() > AT_P0 * float(spool_radius(robot)):
+        raise InputError(
+            "base_points", np.asarray(robot.base_points).tolist(), "from their centroid; see `build.centred`"
+        )
+    fits = (np.asarray(z0) > 0.0) & (np.asarray(z0) <= LARGEST_LENGTH)
+    if not fits.all():
+        raise InputError("z0", float(np.asarray(z0)[~fits][0]), "a number > 0, at most 1e6 m")
+
+
+def _sieved(problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype: str) -> tuple[np.ndarray, np.ndarray]:
+    # Upper bounds (n, max_arcs) of the sieve, and slacks (n, n_criteria) at the two ends, where every one is known.
+    cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
+    kernel = partial(sieve.upper_bounds, max_arcs=max_arcs)
+    upper = in_batches(lambda pair: kernel(problem.amplitude, *pair), cast, size=sieve.BATCH).astype(float)
+    at_ends = in_batches(partial(end_slacks, problem, 3.0), odd, size=sieve.BATCH)
+    return np.where(np.isnan(upper), -np.inf, upper), at_ends

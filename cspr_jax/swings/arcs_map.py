@@ -1,0 +1,57 @@
+"""Maps of smallest numbers of arcs of point masses."""
+
+import numpy as np
+
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError
+from cspr_jax.maps.grid_map import PointMassMap
+from cspr_jax.schema.tiles import Grid
+from cspr_jax.swings.arcs import minimum_arcs
+
+_OF_STARTS = ("from_x", "from_y", "from_z", "z0")
+
+
+class MinimumArcsMap(PointMassMap):
+    """The smallest number of arcs to each target; see `GridMap`."""
+
+    proves = True
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse a planar robot; build what all tiles share."""
+        if spec.is_planar:
+            raise ConfigError(file, f'robot "{spec.name}" is planar: must have three cables in this map')
+        super().__init__(spec, keys, file)
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        starts, ends = self._starts(cells), self._targets(cells)
+        answers = minimum_arcs(
+            self._problem,
+            starts,
+            ends,
+            cells["z0"],
+            max_arcs=self._keys.trajectory.max_arcs,
+            dtype=self._keys.run.dtype,
+        )
+        return vars(answers)
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""
+        super().refuse_hopeless(grid)
+        self._refuse_out_of_reach(self._starts(self._corners(grid, _OF_STARTS)), "trajectory.from")
+        self._refuse_long(grid)
+
+    def _refuse_long(self, grid: Grid) -> None:
+        # The nearest point of a product grid to a spool is nearest in each coordinate.
+        longest = self._problem.limits.cable_length_max
+        if longest is None or "radius" in grid.axes:
+            return
+        base = self._frame.outward(self._problem.robot.base_points)
+        for cable in range(len(base)):
+            gaps = [np.abs(grid.axes[name] - base[cable, i]).min() for i, name in enumerate("xyz")]
+            if np.linalg.norm(gaps) > np.asarray(longest)[cable]:
+                raise ConfigError(
+                    self._file,
+                    f"axes: every target is farther than cable_length_max from spool {cable + 1}: must be some nearer",
+                )

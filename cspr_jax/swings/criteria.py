@@ -1,0 +1,119 @@
+"""All criteria of a segment together, in one order: taut cables, below the spools, then the limits that are given."""
+
+import functools
+import itertools
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.motions.amplitudes import Amplitude
+from cspr_jax.motions.limits import given
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.swings.hypocycloid import Segment
+from cspr_jax.swings.limit_slacks import count, limit_curvatures, limit_slacks
+from cspr_jax.swings.slacks import instant, row_bounds, stretch, taut_bounds
+
+
+def flags(limits: Limits) -> tuple[Verdict, ...]:
+    """The flag that says that a criterion is broken, for each criterion.
+
+    Args:
+        limits: which limits are given.
+
+    Returns:
+        n_criteria flags.
+    """
+    return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in given(limits)))
+
+
+def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
+    """Numbers of smooth functions of which each criterion is the smallest.
+
+    Args:
+        robot: a point mass on cables.
+        limits: which limits are given.
+
+    Returns:
+        n_criteria numbers.
+    """
+    return (robot.n_cables, 1, *(count(row, robot.n_cables) for row in given(limits)))
+
+
+@jax.jit
+def smooth_slacks(
+    robot: PointMassRobot, limits: Limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array
+) -> tuple[Array, ...]:
+    """Every slack of every criterion, at one instant: smooth functions of tau.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: what else must be met.
+        amplitude: A.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        tau: () normalised time.
+
+    Returns:
+        numbers (), as many as `counts` adds up to, criterion by criterion.
+    """
+    now = instant(segment, amplitude, arcs, tau)
+    terms = [*now.kappa, now.eta]
+    for slack in limit_slacks(robot, limits, segment, arcs, tau, now):
+        terms += slack
+    return tuple(terms)
+
+
+def slacks(
+    robot: PointMassRobot, limits: Limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array
+) -> tuple[Array, ...]:
+    """The smallest slack of each criterion, at one instant.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: what else must be met.
+        amplitude: A.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        tau: () normalised time.
+
+    Returns:
+        n_criteria numbers ().
+    """
+    every = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
+    return tuple(functools.reduce(jnp.minimum, itertools.islice(every, n)) for n in counts(robot, limits))
+
+
+def curvatures(
+    robot: PointMassRobot,
+    limits: Limits,
+    amplitude: Amplitude,
+    segment: Segment,
+    arcs: Array,
+    start: Array,
+    stop: Array,
+) -> tuple[Array, ...]:
+    """Bound of the second derivative of each criterion's slacks over an interval.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: what else must be met.
+        amplitude: A.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        start: () tau.
+        stop: () tau, larger; no knot between.
+
+    Returns:
+        n_criteria numbers ().
+    """
+    over = stretch(segment, amplitude, arcs, start, stop)
+    kappa = taut_bounds(segment, arcs, over)
+    eta = row_bounds(segment, arcs, over, segment.tilt)
+    return (
+        jnp.max(kappa.curvature),
+        eta.curvature,
+        *limit_curvatures(robot, limits, segment, arcs, over, kappa),
+    )

@@ -1,0 +1,268 @@
+"""Answers from upper bounds of the margin, one for each number of arcs: proofs first, margins after.
+
+The candidates of a point mass that the bounds leave are proved or refuted in increasing order, until one is proved
+feasible. Never by bisection: more arcs can lose margin (tests). Where none is feasible, `swings.refusals` says which
+limits refuse those whose cables stay taut, and one of these is reported; where there is none, the candidate with the
+largest margin is. Answers of platforms are those of `platforms.answers`.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.limits import given
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.tolerances import Tolerated
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.swings import criteria, hypocycloid
+from cspr_jax.swings.enclosures import tolerated_by_point_masses
+from cspr_jax.swings.hypocycloid import Segment
+from cspr_jax.swings.margins import margins
+from cspr_jax.swings.parities import pick, rows_of
+from cspr_jax.swings.proof import SMALLEST_MARGIN, prove
+from cspr_jax.swings.refusals import BASIC, refusals, unavoidable
+
+# Segments computed at a time where little is computed for each.
+BATCH = 4096
+# Candidates whose margins differ by less are equally good; the first of them is reported.
+TIE = 1e-9
+
+
+@jax.jit
+def _durations(arguments) -> jax.Array:
+    return jax.vmap(hypocycloid.duration)(*arguments)
+
+
+class Known(NamedTuple):
+    """Numbers of arcs proved feasible by other means than the certificate.
+
+    Fields:
+        arcs: (n,) one for each segment; 0: none.
+        bound: (n,) proved lower bound of its margin.
+    """
+
+    arcs: np.ndarray
+    bound: np.ndarray
+
+
+def decided(
+    problem: Problem,
+    parities: dict[int, Segment],
+    upper: np.ndarray,
+    at_ends: np.ndarray,
+    infinity: np.ndarray,
+    *,
+    arcs: np.ndarray | None = None,
+    known: Known | None = None,
+    measure: Callable[[Problem, Segment, np.ndarray], np.ndarray] = margins,
+) -> tuple[Answers, Segment]:
+    """Answers from upper bounds.
+
+    Args:
+        problem: robot, limits and amplitude.
+        parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
+        upper: (n, max_arcs) upper bounds of the slack of the cables and of the depth, column p - 1 for p arcs; -inf
+            where it is out of the question.
+        at_ends: (n, n_criteria) of `end_slacks`.
+        infinity: (n,) left-hand side of (2.55).
+        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
+        known: what is proved already; None: nothing.
+        measure: finds the margins, as `margins` does.
+
+    Returns:
+        the answers; the segments that durations and margins belong to, leaves (n, ...).
+    """
+    known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
+    every = only(np.minimum(upper, at_ends.min(1)[:, None] + SMALLEST_MARGIN), arcs)
+    basic = only(np.minimum(upper, at_ends[:, :BASIC].min(1)[:, None] + SMALLEST_MARGIN), arcs)
+    search = _search(problem, parities, every, known)
+    smallest, bound = search.smallest, search.bound
+    tried, slack, broken = _shown(problem, parities, search, every, basic, measure)
+    chosen = pick(parities, np.arange(len(smallest)), tried)
+    duration = in_batches(_durations, (chosen, tried.astype(float)), size=BATCH)
+    none = np.flatnonzero(smallest == 0)
+    is_feasible = smallest > 0
+    if len(none):
+        proof = prove(problem, pick(parities, none, tried[none]), tried[none])
+        bound[none], is_feasible[none] = proof.bound[:, :BASIC].min(1), proof.feasible
+    multiples = _tolerated(problem, chosen, tried, np.flatnonzero(is_feasible))
+    answers = Answers(
+        smallest,
+        tried,
+        _verdicts(problem, search, slack, broken, multiples),
+        duration,
+        slack[:, :BASIC].min(1),
+        bound,
+        slack[:, BASIC:].min(1, initial=np.inf),
+        infinity,
+        *multiples,
+    )
+    return answers, chosen
+
+
+@jax.jit
+def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
+    """Smallest slack of each criterion at the two ends.
+
+    There the velocity is zero and the acceleration a pendulum's, whatever the number of arcs.
+
+    Args:
+        problem: robot, limits and amplitude.
+        arcs: any number of arcs of the segments' parity.
+        segments: leaves (n, ...).
+
+    Returns:
+        (n, n_criteria) in the order of `criteria.flags`.
+    """
+
+    def one(segment):
+        at_ends = jax.vmap(lambda t: jnp.stack(criteria.slacks(*problem, segment, jnp.asarray(arcs), t)))(
+            jnp.asarray([0.0, 1.0])
+        )
+        return jnp.min(at_ends, axis=0)
+
+    return jax.vmap(one)(segments)
+
+
+def only(upper: np.ndarray, arcs) -> np.ndarray:
+    """Upper bounds where the number of arcs of some segments is fixed.
+
+    Args:
+        upper: (n, max_arcs).
+        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
+
+    Returns:
+        (n, max_arcs), -inf at numbers of arcs that are not wanted.
+    """
+    if arcs is None:
+        return upper
+    fixed = np.asarray(arcs)[:, None]
+    return np.where((fixed == 0) | (fixed == np.arange(1, upper.shape[1] + 1)), upper, -np.inf)
+
+
+class _Search(NamedTuple):
+    # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, the proved margin, and
+    # whether some number of arcs is feasible as it is planned, if not for every robot within the uncertainty.
+    smallest: np.ndarray
+    doubtful: np.ndarray
+    bound: np.ndarray
+    is_planned: np.ndarray
+
+
+def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: Known) -> _Search:
+    smallest, doubtful, bound = np.zeros(len(upper), int), np.zeros(len(upper), bool), np.full(len(upper), -np.inf)
+    is_planned = np.zeros(len(upper), bool)
+    alive = upper >= -SMALLEST_MARGIN
+    while True:
+        rows = np.flatnonzero((smallest == 0) & alive.any(1))
+        if not len(rows):
+            return _Search(smallest, doubtful, bound, is_planned)
+        arcs = np.argmax(alive[rows], axis=1) + 1
+        given = arcs == known.arcs[rows]
+        smallest[rows[given]], bound[rows[given]] = arcs[given], known.bound[rows[given]]
+        rows, arcs = rows[~given], arcs[~given]
+        if not len(rows):
+            continue
+        proof = prove(problem, pick(parities, rows, arcs), arcs)
+        is_feasible, is_refuted = proof.feasible.copy(), proof.infeasible.copy()
+        is_planned[rows] |= is_feasible
+        if problem.limits.uncertainty is not None:
+            some = np.flatnonzero(is_feasible)
+            found = tolerated_by_point_masses(problem, pick(parities, rows[some], arcs[some]), arcs[some], whole=False)
+            is_feasible[some], is_refuted[some] = found.proved >= 1.0, found.refuted <= 1.0
+        smallest[rows[is_feasible]] = arcs[is_feasible]
+        bound[rows] = proof.bound[:, :2].min(1)
+        doubtful[rows[~is_feasible & ~is_refuted]] = True
+        alive[rows, arcs - 1] = False
+
+
+class _Shown(NamedTuple):
+    # Numbers of arcs that are shown (n,), their smallest slacks, and what stands in the way, (n, n_criteria) each.
+    tried: np.ndarray
+    slack: np.ndarray
+    broken: np.ndarray
+
+
+def _shown(
+    problem: Problem,
+    parities: dict[int, Segment],
+    search: _Search,
+    every: np.ndarray,
+    basic: np.ndarray,
+    measure: Callable,
+) -> _Shown:
+    # Upper bounds (n, max_arcs) of all criteria, and of those that are no limits.
+    fixed, by_cables = search.smallest.copy(), np.zeros(len(every), bool)
+    # Without limits, or near to zero, the largest margin says enough.
+    is_refused = (fixed == 0) & ~search.doubtful & ~search.is_planned
+    refused = np.flatnonzero(is_refused & bool(given(problem.limits)))
+    why = refusals(problem, rows_of(parities, refused), basic[refused])
+    fixed[refused], by_cables[refused] = why.arcs, why.arcs == 0
+    upper = np.where(by_cables[:, None], basic, every)
+    tried, slack = _best(problem, parities, upper, fixed, by_cables, measure)
+    broken = slack <= 0.0
+    broken[refused] = why.broken
+    # Where no candidate is taut: a cable or the spools, and limits that no number of arcs keeps.
+    rows, is_limit = np.flatnonzero(by_cables), np.arange(slack.shape[1]) >= BASIC
+    broken[rows] = slack[rows] <= 0.0
+    suspects = broken[rows] & is_limit
+    broken[rows] &= unavoidable(problem, rows_of(parities, rows), upper[rows], suspects) | ~is_limit
+    return _Shown(tried, slack, broken)
+
+
+def _best(
+    problem: Problem,
+    parities: dict[int, Segment],
+    upper: np.ndarray,
+    fixed: np.ndarray,
+    by_cables: np.ndarray,
+    measure: Callable,
+) -> tuple[np.ndarray, np.ndarray]:
+    # Slacks at the fixed number of arcs, else at that with the largest margin, of the cables alone or of all criteria;
+    # upper bounds say where to look next.
+    def margin(slack: np.ndarray, rows) -> np.ndarray:
+        return np.where(by_cables[rows], slack[:, :BASIC].min(1), slack.min(1))
+
+    tried = np.where(fixed > 0, fixed, np.argmax(upper, axis=1) + 1)
+    slack = measure(problem, pick(parities, np.arange(len(fixed)), tried), tried)
+    best = margin(slack, slice(None))
+    rest = np.where(fixed[:, None] > 0, -np.inf, upper)
+    rest[np.arange(len(rest)), tried - 1] = -np.inf
+    while True:
+        rows = np.flatnonzero(rest.max(1) > np.where(np.isnan(best), -np.inf, best) + TIE * (1.0 + np.abs(best)))
+        if not len(rows):
+            return tried, slack
+        arcs = np.argmax(rest[rows], axis=1) + 1
+        candidate = measure(problem, pick(parities, rows, arcs), arcs)
+        rest[rows, arcs - 1] = -np.inf
+        reached = margin(candidate, rows)
+        better = reached > best[rows]
+        tried[rows[better]], slack[rows[better]] = arcs[better], candidate[better]
+        best[rows[better]] = reached[better]
+
+
+def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, which: np.ndarray) -> Tolerated:
+    # Of all segments, of which some are feasible as they are planned; NaN of the others, and without an uncertainty.
+    every = Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
+    if problem.limits.uncertainty is not None and len(which):
+        some = jax.tree.map(lambda leaf: np.asarray(leaf)[which], segments)
+        for own, found in zip(every, tolerated_by_point_masses(problem, some, arcs[which]), strict=True):
+            own[which] = found
+    return every
+
+
+def _verdicts(
+    problem: Problem, search: _Search, slack: np.ndarray, broken: np.ndarray, multiples: Tolerated
+) -> np.ndarray:
+    flags = np.where(multiples.refuted <= 1.0, Verdict.UNCERTAINTY.value, 0).astype(FLAGS)
+    for flag, column in zip(criteria.flags(problem.limits), broken.T, strict=True):
+        flags |= np.where(column, flag.value, 0).astype(FLAGS)
+    flags |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(FLAGS)
+    none = np.where(search.doubtful, Verdict.UNDECIDED.value, Verdict.NO_ARCS.value | flags)
+    some = np.where(search.doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
+    return np.where(search.smallest > 0, some, none).astype(FLAGS)

@@ -1,0 +1,45 @@
+"""Leg of standard hypocycloids between any points: chapter 2."""
+
+import numpy as np
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.errors import ConfigError
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.leg import Leg, each
+from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.waypoints import Stops
+from cspr_jax.swings.arcs import arcs_and_segments
+from cspr_jax.swings.hypocycloid import Hypocycloid, Segment
+
+
+class Hypocycloids(Leg):
+    """Any points, joined by standard hypocycloids; see `Leg`."""
+
+    def __init__(self, stops: Stops) -> None:
+        """Refuse what belongs to transitions."""
+        if stops.keys.inclination is not None:
+            raise ConfigError(stops.path, 'inclination: must be absent unless family = "transition"')
+        super().__init__(stops)
+
+    def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
+        """Join the points; see `Leg.join`."""
+        answers, segments = self._found(problem, np.array([z0]))
+        pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
+        return answers, [Hypocycloid(segment, problem.amplitude, leaf(arcs)) for segment, arcs in pairs]
+
+    def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
+        """Answers for several depths; see `Leg.answers`."""
+        return self._found(problem, depths)[0]
+
+    def _found(self, problem: Problem, depths: np.ndarray) -> tuple[Answers, Segment]:
+        points = self.stops.points(depths)
+        starts, ends = points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
+        return arcs_and_segments(
+            problem,
+            starts,
+            ends,
+            np.repeat(depths, len(self)),
+            max_arcs=self.stops.max_arcs,
+            arcs=np.tile(self.stops.arcs, len(depths)),
+        )

@@ -1,0 +1,240 @@
+"""Limits of tension, height, cable length, speed and acceleration, as slacks.
+
+In the notation of `slacks`, with m the number of cables, rho_k the length of cable k, F the tension over
+the weight, and rates with respect to tau; w_k = (p - a_k) . p'. F of cable k is kappa_k rho_k / (m z0 eta).
+
+    tension        kappa_k rho_k / (m z0) - F_min eta,   F_max eta - kappa_k rho_k / (m z0)
+    floor          (floor - z) / z0
+    length         (rho_max^2 - rho_k^2) / (2 z0^2)
+    speed          (rho_k^2 - (w_k / (T v_max))^2) / (2 z0^2)
+    acceleration   (a_max T^2 rho_k^3 -+ (rho_k^2 w_k' - w_k^2)) / (a_max T^2 z0^3)
+
+Each is dimensionless and free of a division that could blow up.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic.bounds import Bounds
+from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.motions.limits import given
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
+from cspr_jax.schema.limits import Limit
+from cspr_jax.swings.hypocycloid import Segment, duration, oscillation
+from cspr_jax.swings.slacks import Instant, Stretch, row_bounds
+
+
+class _Now(NamedTuple):
+    # A segment at one instant: numbers, and (n_cables,) of the cables; derivatives in tau.
+    z0: Array
+    time: Array
+    weight: Array
+    eta: Array
+    lift: Array
+    depth: Array
+    length: Array
+    rate: Array
+    rate_slope: Array
+
+
+class _Over(NamedTuple):
+    # Bounds over an interval; `square` of (rho^2)'', without rho's own division.
+    n_cables: int
+    z0: Array
+    time: Array
+    weight: Array
+    kappa: Bounds
+    eta: Bounds
+    depth: Bounds
+    length: Bounds
+    pace: Bounds
+    pull: Bounds
+    square: Array
+
+
+class _Closed(NamedTuple):
+    # A limit's slacks, how many a cable (or one of a height), and the bound of their second derivatives.
+    slack: Callable[[_Now, Array], Array]
+    curvature: Callable[[_Over, Array], Array]
+    sides: int = 1
+
+
+def _bends(now: _Now, limit: Array) -> Array:
+    bend = (now.length**2 * now.rate_slope - now.rate**2) / (limit * now.time**2)
+    return jnp.concatenate([now.length**3 - bend, now.length**3 + bend]) / now.z0**3
+
+
+def _lifted(over: _Over, limit: Array) -> Array:
+    whole = over.kappa._replace(value=1.0 + over.kappa.value)
+    lift = (whole * over.length).times(1.0 / (over.n_cables * over.z0))
+    return (lift + over.eta.times(limit / over.weight)).curvature
+
+
+def _rated(over: _Over, limit: Array) -> Array:
+    rate = _rate(over.length, over.pace, over.pull)
+    return 0.5 * (over.square + (rate * rate).curvature / (over.time * limit) ** 2) / over.z0**2
+
+
+def _bent(over: _Over, limit: Array) -> Array:
+    length, bend = over.length, _bend(over.length, over.pace, over.pull, over.square)
+    cube = 6.0 * length.value * over.pace.slope**2 + 3.0 * length.value**2 * over.pace.curvature
+    return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
+
+
+# One of each row of `schema.limits.LIMITS`.
+CLOSED = {
+    "tension_min": _Closed(lambda now, limit: now.lift - limit / now.weight * now.eta, _lifted),
+    "tension_max": _Closed(lambda now, limit: limit / now.weight * now.eta - now.lift, _lifted),
+    "floor": _Closed(lambda now, limit: (limit - now.depth) / now.z0, lambda over, _: over.depth.curvature / over.z0),
+    "cable_length_max": _Closed(
+        lambda now, limit: (limit**2 - now.length**2) / (2.0 * now.z0**2),
+        lambda over, _: 0.5 * over.square / over.z0**2,
+    ),
+    "cable_speed_max": _Closed(
+        lambda now, limit: (now.length**2 - (now.rate / (now.time * limit)) ** 2) / (2.0 * now.z0**2), _rated
+    ),
+    "cable_acceleration_max": _Closed(_bends, _bent, 2),
+}
+
+
+def count(row: Limit, n_cables: int) -> int:
+    """Number of smooth functions of which the slack of a limit is the smallest.
+
+    Args:
+        row: the limit's.
+        n_cables: of the robot.
+
+    Returns:
+        one of a height, one a cable, or two a cable for either sign.
+    """
+    return CLOSED[row.name].sides * (n_cables if row.per_cable else 1)
+
+
+@jax.jit
+def limit_slacks(
+    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, now: Instant
+) -> tuple[list[Array], ...]:
+    """The slacks of each limit, at one instant: smooth functions, one a cable or more.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: the limits.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        tau: () normalised time.
+        now: the state at `tau`.
+
+    Returns:
+        a list of () for each limit of `given`, as long as `count` says.
+    """
+    if not given(limits):
+        return ()
+    position, slope, curvature = _path(segment, arcs, tau, now)
+    rays = position[None] - robot.base_points
+    length = jnp.linalg.norm(rays, axis=1)
+    rate = rays @ slope
+    rate_slope = jnp.dot(slope, slope) + rays @ curvature
+    z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
+    lift = jnp.stack(now.kappa) * length / (len(now.kappa) * z0)
+    here = _Now(z0, time, weight, now.eta, lift, position[2], length, rate, rate_slope)
+    slacks = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in given(limits))
+    return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in slacks)
+
+
+def _path(segment: Segment, arcs: Array, tau: Array, now: Instant) -> tuple[Array, Array, Array]:
+    # Position and its first two derivatives in tau.
+    ratio, steady, period = oscillation(segment, arcs)
+    span = segment.end_radius - segment.start_radius
+    r, r1 = segment.start_radius + span * now.amplitude_values[0], span * now.amplitude_values[1]
+    sine, cosine = sincospi(segment.sense * arcs * tau)
+    lateral, axial = sincospi(segment.sense * segment.precession * tau)
+    slope_r = r1 * cosine - r * segment.sense * steady / (math.pi * arcs) * sine
+    slope_t = r1 * ratio * sine
+    slope = jnp.stack([axial * slope_r + lateral * slope_t, axial * slope_t - lateral * slope_r])
+    return segment.hub + segment.plane @ now.c, segment.plane @ slope, segment.plane @ (period * (now.d - now.c))
+
+
+def limit_curvatures(
+    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, over: Stretch, kappa: Bounds
+) -> tuple[Array, ...]:
+    """Bound of the second derivative of each limit's slack over an interval.
+
+    Args:
+        robot: a point mass on three cables.
+        limits: the limits.
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        over: the interval.
+        kappa: bounds of the variable part of the pseudotensions over it, leaves (n_cables,).
+
+    Returns:
+        one () for each limit of `given`, the largest over the cables.
+    """
+    if not given(limits):
+        return ()
+    z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
+    pace, pull = pace_bounds(segment, arcs, over)
+    eta = row_bounds(segment, arcs, over, segment.tilt)
+    length = _length(robot, segment, over, pace, eta)
+    depth = row_bounds(segment, arcs, over, segment.plane[2])
+    square = 2.0 * (pace.slope**2 + length.value * pace.curvature)
+    here = _Over(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
+    return tuple(jnp.max(CLOSED[row.name].curvature(here, getattr(limits, row.name))) for row in given(limits))
+
+
+def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]:
+    """Bounds of how the mass moves over an interval, derivatives in normalised time.
+
+    Args:
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+        over: the interval.
+
+    Returns:
+        the bounds, () each: of the distance from P0 and of its first two derivatives, m; of the second derivative and
+        of its first two.
+    """
+    ratio, steady, period = oscillation(segment, arcs)
+    omega, gain = math.pi * arcs, steady / period
+    turn = math.pi * segment.precession
+    one = jnp.ones_like(omega)
+    wave = Bounds(one, omega, omega**2)
+    rho = (over.bend + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
+    c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(turn)
+    d_r = rho * wave + (over.growth * wave).times(2.0 * gain / omega)
+    d_t = ((rho + over.size.times(2.0 * gain)) * wave).times(ratio)
+    return c, (d_r.combined(d_t).turned(turn) + c).times(period)  # c'' = T^2 lambda (d - c)
+
+
+def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Bounds:
+    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (n_cables,). No cable is shorter than
+    # the distance from the spool plane.
+    at_middle = jnp.linalg.norm((segment.hub + segment.plane @ over.place)[None] - robot.base_points, axis=1)
+    change = over.radius * pace.slope
+    depth = (1.0 + segment.tilt @ over.place - over.radius * eta.slope) * segment.hub[2]
+    nearest = jnp.maximum(jnp.maximum(at_middle - change, depth / jnp.linalg.norm(plane_normal(robot))), 0.0)
+    slope = jnp.broadcast_to(pace.slope, nearest.shape)
+    return Bounds(at_middle + change, slope, slope**2 / nearest + pace.curvature)
+
+
+def _rate(length: Bounds, pace: Bounds, pull: Bounds) -> Bounds:
+    # w = ray . p'
+    return Bounds(
+        length.value * pace.slope,
+        pace.slope**2 + length.value * pace.curvature,
+        3.0 * pace.slope * pace.curvature + length.value * pull.slope,
+    )
+
+
+def _bend(length: Bounds, pace: Bounds, pull: Bounds, square: Array) -> Bounds:
+    # rho^2 w' - w^2, with w' = |p'|^2 + ray . p'' and the bounds of rho^2 that need no division.
+    rate = _rate(length, pace, pull)
+    last = 3.0 * pace.curvature**2 + 4.0 * pace.slope * pull.slope + length.value * pull.curvature
+    slope = Bounds(rate.slope, rate.curvature, last)
+    return Bounds(length.value**2, 2.0 * length.value * pace.slope, square) * slope + rate * rate

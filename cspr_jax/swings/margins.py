@@ -1,0 +1,188 @@
+"""The smallest value along a segment of functions of one instant, refined between the samples.
+
+Every block is sampled; where its smallest sample lies, a parabola estimates the minimum. The best
+three estimates of a group of functions over all blocks are then refined by parabolas, each narrower.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import vertex
+from cspr_jax.motions.problem import Problem
+from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
+from cspr_jax.swings.criteria import counts, smooth_slacks
+from cspr_jax.swings.hypocycloid import Segment
+from cspr_jax.swings.proof import BATCH
+
+CANDIDATES = 3
+# Distance of the points of the first refining parabola, in steps between samples; how much narrower each next one is.
+FIRST_WIDTH, NARROWER, ROUNDS = 1.0 / 4.0, 1.0 / 6.0, 7
+
+
+def _block_estimates(function, problem: Problem, segment: Segment, arcs: Array, start: Array, stop: Array):
+    # For each function: an estimate of its minimum in the block, and where.
+    weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
+    tau = start * (1.0 - weight) + stop * weight
+    values = jnp.stack(jax.vmap(partial(function, *problem, segment, arcs))(tau))
+    # A parabola through every three neighbours: the lowest sample may be of the valley of another block.
+    moves, vertices = vertex(values[:, :-2], values[:, 1:-1], values[:, 2:])
+    return _lowest(vertices, tau[None, 1:-1] + moves * (tau[1] - tau[0]))
+
+
+def _lowest(estimates: Array, places: Array) -> tuple[Array, Array]:
+    # The smallest of the last axis and its place, without an argmin, which XLA computes one number at a time.
+    smallest = jnp.min(estimates, axis=-1)
+    return smallest, jnp.max(jnp.where(estimates == smallest[..., None], places, -jnp.inf), axis=-1)
+
+
+def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[Array, Array]:
+    # Keep the candidates in order, the new one in its place; leaves (CANDIDATES, n_values, n). A segment with fewer
+    # blocks than others sees its last block again: what is known is not new.
+    estimate = jnp.where((best[1] == place[None]).any(0), jnp.inf, estimate)
+    estimates, places = [], []
+    for old_estimate, old_place in zip(*best, strict=True):
+        first = estimate < old_estimate
+        estimates.append(jnp.where(first, estimate, old_estimate))
+        places.append(jnp.where(first, place, old_place))
+        estimate, place = jnp.where(first, old_estimate, estimate), jnp.where(first, old_place, place)
+    return jnp.stack(estimates), jnp.stack(places)
+
+
+def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array) -> Array:
+    """Smallest value of a continuous function near an estimated minimum, by ever narrower parabolas.
+
+    A parabola is believed only where its middle is the lowest of its three points; else they move to the lowest. So a
+    minimum that is steep on one side, or a kink beside it, is found too.
+
+    Args:
+        function: of one instant, () to ().
+        tau: () the estimate.
+        step: () distance of the samples that it came from.
+
+    Returns:
+        () a value that the function attains.
+    """
+
+    def narrow(i, state):
+        smallest, at, width = state
+        middle_point = jnp.clip(at, width, 1.0 - width)  # equidistant points, the ends of the motion among them
+        points = jnp.stack([middle_point - width, middle_point, middle_point + width])
+        left, middle, right = jax.vmap(function)(points)
+        bracketed = (middle <= left) & (middle <= right)
+        lower = jnp.where(left < right, points[0], points[2])
+        at = jnp.where(bracketed, middle_point + width * vertex(left, middle, right)[0], lower)
+        is_narrower = bracketed | (lower <= 0.0) | (lower >= 1.0)
+        width = jnp.where(is_narrower, width * NARROWER, width)
+        return jnp.minimum(smallest, jnp.minimum(middle, jnp.minimum(left, right))), at, width
+
+    first = (jnp.full_like(tau, jnp.inf), tau, step * FIRST_WIDTH)
+    # The last round evaluates where the one before ended.
+    return lax.fori_loop(0, ROUNDS, narrow, first)[0]
+
+
+class Functions(NamedTuple):
+    """Smooth functions of one instant in groups, whose smallest values are wanted.
+
+    Fields:
+        evaluate: (robot, limits, amplitude, segment, arcs, tau) -> numbers (), group by group; hashable.
+        groups: how many functions each group has.
+    """
+
+    evaluate: Callable
+    groups: tuple[int, ...]
+
+
+def _best_of_groups(groups: tuple[int, ...], estimates: Array, places: Array) -> tuple[Array, Array]:
+    # Of each group its best candidates, whatever function they are of: which function, and where;
+    # (n_groups, CANDIDATES, n) each, from (CANDIDATES, n_functions, n).
+    functions, taus, first = [], [], 0
+    for size in groups:
+        mine = slice(first, first + size)
+        values, where = (x[:, mine].reshape(CANDIDATES * size, -1) for x in (estimates, places))
+        number = jnp.broadcast_to(jnp.arange(CANDIDATES * size)[:, None], values.shape)
+        for _ in range(CANDIDATES):
+            is_lowest = values == jnp.min(values, axis=0, keepdims=True)
+            chosen = jnp.min(jnp.where(is_lowest, number, CANDIDATES * size), axis=0)
+            is_chosen = number == chosen[None]
+            functions.append(first + chosen % size)
+            taus.append(jnp.sum(jnp.where(is_chosen, where, 0.0), axis=0))
+            values = jnp.where(is_chosen, jnp.inf, values)
+        first += size
+    shape = (len(groups), CANDIDATES, -1)
+    return jnp.stack(functions).reshape(shape), jnp.stack(taus).reshape(shape)
+
+
+@partial(jax.jit, static_argnums=0)
+def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array, arguments) -> Array:
+    segments, arcs = arguments
+    evaluate, groups = functions
+
+    def step(state, start, stop):
+        fresh = jax.vmap(partial(_block_estimates, evaluate, problem), out_axes=1)(segments, arcs, start, stop)
+        return _insert(state, *fresh)
+
+    nothing = jnp.full((CANDIDATES, sum(groups), *arcs.shape), jnp.inf, arcs.dtype)
+    nowhere = jnp.full_like(nothing, -1.0)
+    estimates, places = over_blocks(edges, counts, arcs, (nothing, nowhere), step)
+    which, where = _best_of_groups(groups, estimates, places)
+    steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)]).astype(arcs.dtype)
+
+    def refine(segment, p, which, where, width):
+        # which, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.
+        def one(which, tau):
+            return refined_minimum(lambda t: jnp.stack(evaluate(*problem, segment, p, t))[which], tau, width)
+
+        return jnp.min(jax.vmap(jax.vmap(one))(which, where), axis=1)
+
+    return jax.vmap(refine, in_axes=(0, 0, 2, 2, 0))(segments, arcs, which, where, steps)
+
+
+def smallest_values(
+    functions: Functions, problem: Problem, segments: Segment, arcs: np.ndarray, table, *, batch: int = BATCH
+) -> np.ndarray:
+    """Smallest values along each segment of functions of one instant.
+
+    Args:
+        functions: of one instant, in groups.
+        problem: robot, limits and amplitude.
+        segments: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n,) number of arcs, 1 or more.
+        table: blocks to sample, from `blocks.blocks`.
+        batch: segments computed at a time.
+
+    Returns:
+        (n, n_groups).
+    """
+    arcs = np.asarray(arcs, float)
+    order = np.argsort(arcs, kind="stable")
+    arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
+    minima = in_batches(partial(_minima, functions, problem, *table), arguments, size=batch)
+    return minima[np.argsort(order, kind="stable")]
+
+
+def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
+    """Smallest slack of each criterion along each segment.
+
+    The smallest sample of every block is refined, so the value does not depend on where the samples lie.
+
+    Args:
+        problem: robot, limits and amplitude.
+        segments: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n,) number of arcs, 1 or more.
+
+    Returns:
+        (n, n_criteria) in the order of `criteria.flags`; NaN where the motion is not finite.
+    """
+    table = blocks(problem.amplitude, int(np.max(arcs)))
+    # The smallest over the cables has kinks, each cable's own slack has none.
+    functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))
+    smallest = smallest_values(functions, problem, segments, arcs, table)
+    # A compiled minimum may pass over NaN; what has no finite minimum has none.
+    return np.where(np.isfinite(smallest), smallest, np.nan)

@@ -1,0 +1,53 @@
+"""Maps of smallest numbers of oscillations of transitions from rest."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.maps.grid_map import PointMassMap
+from cspr_jax.schema.tiles import Grid
+from cspr_jax.swings.oscillations import best_inclinations, minimum_oscillations, transitions_to
+from cspr_jax.swings.transition import depth_for
+
+# Where a target above the spools has no p0 below it: its verdict does not depend on it.
+_ANY_DEPTH = 1.0
+
+
+class MinimumOscillationsMap(PointMassMap):
+    """The smallest number of oscillations to each target; see `GridMap`."""
+
+    proves = True
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Build what all tiles share; bounds may be asked for."""
+        super().__init__(spec, keys, file, for_bounds=True)
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        targets = self._targets(cells)
+        z0 = self._depths(cells, targets)
+        segments = transitions_to(self._problem, targets, z0)
+        return vars(minimum_oscillations(self._problem, segments, z0, max_arcs=self._keys.trajectory.max_arcs))
+
+    def _depths(self, cells: dict[str, np.ndarray], targets: np.ndarray) -> np.ndarray:
+        if "z0" in cells:
+            return cells["z0"]
+        given = self._keys.trajectory.inclination
+        if "inclination" in cells:
+            inclination = cells["inclination"]
+        elif isinstance(given, float):
+            inclination = np.full(len(targets), given)
+        else:
+            inclination = best_inclinations(self._problem, targets)
+        points = (jnp.asarray(targets), jnp.asarray(inclination))
+        z0 = np.asarray(jax.vmap(partial(depth_for, self._problem.robot))(*points))
+        return np.where(z0 > 0.0, z0, _ANY_DEPTH)
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse targets that are all out of reach, or out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
+        self._refuse_out_of_plane(grid)
+        super().refuse_hopeless(grid)

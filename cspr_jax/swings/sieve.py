@@ -1,0 +1,132 @@
+"""A first sieve over all numbers of arcs at once: upper bounds of the margin, fast.
+
+The closed form splits a pseudotension into what depends on the points and what depends only on the
+number of arcs and tau. The second is a table; the precession is the same for all numbers of arcs of
+one parity. What is left of a check is some fifty multiplications and additions without a division.
+A fusion runs over the segments of a batch and takes several samples at a time, so that a segment's
+own numbers stay in registers and no array of segments by samples is made but the precession.
+
+The sieve rejects candidates; it accepts none. `swings.proof` decides about the rest.
+"""
+
+import math
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.batches import row_by_row
+from cspr_jax.arithmetic.elementary import lesser, sincospi
+from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.swings.hypocycloid import Segment, oscillation
+from cspr_jax.swings.slacks import largest_term
+
+SAMPLES = 32
+BATCH = 2048
+# Samples in one pass over the batch; measured.
+UNROLL = 4
+# Below this T^2 lambda a segment has no duration (p = 1, psi -> 0) and is no trajectory.
+SMALLEST_PERIOD = 1e-9
+# Units of rounding of the largest term by which a sampled value is raised to be an upper bound.
+ROUNDING = 256.0
+
+
+def sample_table(amplitude: Amplitude, arcs: np.ndarray, tau: np.ndarray, dtype) -> Array:
+    """Table of what a check needs that does not depend on the points: of the phase pi p tau and of A.
+
+    Args:
+        amplitude: A.
+        arcs: (n_arcs,) numbers of arcs.
+        tau: (n_samples,).
+        dtype: of the table.
+
+    Returns:
+        (n_arcs, 6, n_samples): cosine, sine, A, A'', A'' times cosine, A' times sine.
+    """
+    phase = math.pi * arcs[:, None] * tau
+    cosine, sine = jnp.asarray(np.cos(phase)), jnp.asarray(np.sin(phase))
+    size, slope, bend = (jnp.broadcast_to(v, phase.shape) for v in derivatives(amplitude, jnp.asarray(tau), order=2))
+    return jnp.stack([cosine, sine, size, bend, bend * cosine, slope * sine], axis=1).astype(dtype)
+
+
+def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, tau: np.ndarray) -> Array:
+    """Smallest normalised pseudotension, or depth ratio, over samples, for several numbers of arcs of one parity.
+
+    Args:
+        amplitude: A.
+        segments: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n_arcs,) all odd or all even.
+        tau: (n_samples,), a multiple of 4.
+
+    Returns:
+        (n_arcs, n): an upper bound of the margin; -inf where there is no trajectory.
+    """
+    dtype = segments.rate.dtype
+    start, span = segments.start_radius, segments.end_radius - segments.start_radius
+    laterals, axials = sincospi(jnp.asarray(tau, dtype)[:, None] * segments.precession[None, :])
+    # The sense of the rotation mirrors the second axis; after that every quantity is that of sense +1.
+    mirror = jnp.stack([jnp.ones_like(span), segments.sense], axis=-1)
+    tilt = tuple((segments.tilt * mirror).T)
+    rows = [(*(segments.pull[:, k] * mirror).T, segments.twist[:, k] * segments.sense) for k in range(3)]
+
+    def one(candidate):
+        p, table = candidate
+        ratio, _, period = oscillation(segments, p)
+        exists = period > SMALLEST_PERIOD
+        bend, growth = span / jnp.where(exists, period, 1.0), span * ((2.0 / math.pi) / p)
+
+        def check(i, smallest):
+            cosine, sine, size, a2, a2_cosine, a1_sine = (table[column, i] for column in range(6))
+            lateral, axial, r, small = laterals[i], axials[i], start + span * size, ratio * sine
+            c_r, c_t = r * cosine, small * r
+            d_r, d_t = bend * a2_cosine - growth * a1_sine, small * (bend * a2 + 2.0 * r)
+            c0, c1 = axial * c_r + lateral * c_t, axial * c_t - lateral * c_r
+            d0, d1 = axial * d_r + lateral * d_t, axial * d_t - lateral * d_r
+            cross = c_r * d_t - c_t * d_r
+            eta = 1.0 + tilt[0] * c0 + tilt[1] * c1
+            pulls = [row[0] * d0 + row[1] * d1 + row[2] * cross for row in rows]
+            # kappa_k = eta + pull_k; eta itself is the depth ratio
+            # A NaN may be forgotten, which leaves an upper bound: what decides is the certificate.
+            lowest = lesser(lesser(pulls[0], pulls[1]), lesser(pulls[2], jnp.zeros_like(eta)))
+            return lesser(smallest, eta + lowest)
+
+        def several(j):
+            smallest = check(UNROLL * j, jnp.full_like(span, jnp.inf))
+            for i in range(1, UNROLL):
+                smallest = check(UNROLL * j + i, smallest)
+            return smallest
+
+        # Not carried from one to the next: what a loop stacks XLA leaves on one core, as its caller's threads want it.
+        smallest = row_by_row(several, jnp.arange(len(tau) // UNROLL)).min(0)
+        return jnp.where(exists, smallest, -jnp.inf)
+
+    return row_by_row(one, (jnp.asarray(arcs, dtype), sample_table(amplitude, arcs, tau, dtype)))
+
+
+@partial(jax.jit, static_argnames="max_arcs")
+def upper_bounds(amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs: int) -> Array:
+    """Upper bounds of the margin of segments, for every number of arcs; rounding is allowed for.
+
+    Args:
+        amplitude: A.
+        even: the segments for even numbers of arcs, leaves (n, ...).
+        odd: the segments for odd numbers of arcs, leaves (n, ...).
+        max_arcs: largest number of arcs.
+
+    Returns:
+        (n, max_arcs): column p - 1 for p arcs.
+    """
+    tau = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    numbers = np.arange(1, max_arcs + 1)
+    dtype = even.rate.dtype
+    bounds = jnp.zeros((max_arcs, len(even.rate)), dtype)
+    scale = jax.vmap(partial(largest_term, amplitude), in_axes=(0, None))
+    for first, segments in ((0, odd), (1, even)):
+        mine = numbers[first::2]
+        if len(mine):
+            terms = jax.vmap(scale, in_axes=(None, 0))(segments, jnp.asarray(mine, dtype))
+            guard = ROUNDING * jnp.finfo(dtype).eps * jnp.where(jnp.isfinite(terms), terms, 0.0)
+            bounds = bounds.at[first::2].set(smallest_sampled(amplitude, segments, mine, tau) + guard)
+    return bounds.T

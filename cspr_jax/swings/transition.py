@@ -1,0 +1,97 @@
+"""Transitions between rest and a point beyond the static workspace, thesis chapter 1, in the product's axes.
+
+The effector swings about p0 on the straight line through the target, in n oscillations whose size
+grows like the amplitude function A: p = p0 + u A cos(2 pi n tau), (1.20), (1.21), (1.89). With the
+duration (1.29) its end acceleration is that of a pendulum hung from the centroid of the spools.
+
+It is a segment of chapter 2 from rest with an even number of arcs p = 2 n, but for A''(1), which
+need not vanish here. Backwards in time it is the way back to rest, (1.56) to (1.58). At one size it
+is a swing that stays between the target and its opposite point.
+"""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, rest_point
+from cspr_jax.swings import hypocycloid
+from cspr_jax.swings.hypocycloid import Segment
+
+
+@jax.jit
+def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: Array) -> Segment:
+    """The transition from rest in p0 to a target.
+
+    Args:
+        robot: a point mass on three cables, any triangle; or on two in a plane.
+        amplitude: A, which meets (1.27) and (1.28).
+        target: (3,) from the centroid of the spools, z down, m.
+        z0: () depth of p0 below the centroid of the spools, m.
+
+    Returns:
+        the segment, for even numbers of arcs.
+    """
+    segment = hypocycloid.segment(robot, rest_point(z0), target, z0, odd=jnp.asarray(False))
+    bend = derivatives(amplitude, jnp.ones_like(z0), order=2)[2]
+    return dataclasses.replace(segment, end_curvature=bend)
+
+
+@jax.jit
+def steady(segment: Segment) -> Segment:
+    """The swing of one size that a transition ends in.
+
+    Args:
+        segment: a transition.
+
+    Returns:
+        the segment between the target and itself, for even numbers of arcs.
+    """
+    return dataclasses.replace(
+        segment, start_radius=segment.end_radius, end_curvature=jnp.zeros_like(jnp.asarray(segment.end_curvature))
+    )
+
+
+def inclination(segment: Segment) -> Array:
+    """Extra depth of the target below the spools, against p0, over z0: v of (1.31).
+
+    Args:
+        segment: a transition; leaves (...).
+
+    Returns:
+        (...) v.
+    """
+    return segment.end_radius * segment.tilt[..., 0]
+
+
+@jax.jit
+def weights(segment: Segment) -> Array:
+    """The weighted trajectory parameters w_k: (1.37) and (1.93) for their robots.
+
+    They follow from the robot's own spools: v + w_k is what the acceleration along u takes from cable k.
+
+    Args:
+        segment: a transition; leaves (...).
+
+    Returns:
+        (..., n_cables).
+    """
+    load = -segment.end_radius[..., None] * segment.pull[..., 0]
+    return load - inclination(segment)[..., None]
+
+
+@jax.jit
+def depth_for(robot: PointMassRobot, target: Array, inclination: Array) -> Array:
+    """The depth z0 of p0 that gives a target an inclination, from (1.31).
+
+    Args:
+        robot: a point mass on three cables, any triangle; or on two in a plane; centred.
+        target: (3,) from the centroid of the spools, z down, m.
+        inclination: () v, above -1.
+
+    Returns:
+        () z0, m; positive where the target is below the spools.
+    """
+    return plane_normal(robot) @ target / (1.0 + inclination)

@@ -1,1 +1,0 @@
-"""Trajectory families, one file each."""

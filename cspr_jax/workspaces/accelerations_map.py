@@ -1,0 +1,49 @@
+"""Maps of feasible accelerations: static, wrench-feasible and wrench-closure workspaces of point masses."""
+
+import numpy as np
+
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError
+from cspr_jax.maps.grid_map import PointMassMap
+from cspr_jax.motions.acceleration_sets import TOLERANCE
+from cspr_jax.schema.tiles import Grid
+from cspr_jax.schema.verdicts import FLAGS
+from cspr_jax.workspaces.acceleration_search import reach_of
+
+MOST_CABLES = 20
+
+
+class FeasibleAccelerationMap(PointMassMap):
+    """The accelerations that are feasible at each place; see `GridMap`."""
+
+    any_cables = True
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse more cables than there is room for the corners of their faces."""
+        super().__init__(spec, keys, file)
+        if self._problem.robot.n_cables > MOST_CABLES:
+            place, key = spec.placed("base_points", file)
+            raise ConfigError(place, f"{key}: must be at most {MOST_CABLES} in this map")
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        answers = reach_of(self._problem.robot, self._problem.limits, self._targets(cells))._asdict()
+        return answers | {"verdict": answers["verdict"].astype(FLAGS)}
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
+        self._refuse_out_of_plane(grid)
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        feasible, margin = answers["verdict"] == 0, answers["acceleration_margin"]
+        room = TOLERANCE * float(np.asarray(self._problem.robot.gravity))
+        level, most = answers["level_acceleration"], answers["level_acceleration_max"]
+        return {
+            "a feasible cell with a margin below zero": feasible & ~(margin > 0.0),
+            "an infeasible cell with a margin above zero": ~feasible & (margin > room) & (answers["verdict"] != 2048),
+            "a margin that limits of the tensions make larger": margin > answers["static_margin"] + room,
+            "a level acceleration above the largest": level > most * (1.0 + TOLERANCE) + room,
+            "a number that is none": sum(np.isnan(values) for values in answers.values()) > 0,
+        }

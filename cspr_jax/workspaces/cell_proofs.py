@@ -1,0 +1,136 @@
+"""Proofs of cells at one orientation: which keep their tensions, or lack them, at every position; without halving."""
+
+import numpy as np
+
+from cspr_jax.arithmetic import lanes
+from cspr_jax.arithmetic.batches import in_batches, in_parts
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.platform import PlatformRobot, across_line
+from cspr_jax.robots.tension_rules import distributions
+from cspr_jax.robots.wrench_sets import spanning
+from cspr_jax.workspaces.cells import Cells, cells_about
+from cspr_jax.workspaces.inside_cells import least_margins
+from cspr_jax.workspaces.outside_cells import are_beyond, are_one_sided
+from cspr_jax.workspaces.questions import CLOSURE, Question
+from cspr_jax.workspaces.search import WorkspaceSearch
+from cspr_jax.workspaces.worst_cocircuits import worst_cocircuits
+
+# Cells that are proved at a time, whose arrays fit a cache, and poses whose cocircuits are compared at a time.
+PART, BATCH = 256, 1024
+# Of the margin at the centre: how far the tensions there keep from their limits. At all of it nothing but one point is
+# left, which rounding can miss.
+KEPT = 0.98
+
+
+class CellProofs:
+    """Proofs of cells at one orientation, without halving."""
+
+    def __init__(self, robot: AnyRobot, asked: Question, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
+        """Of a robot without pulleys, and the search of the same question."""
+        self._asked, self._is_closure = asked, asked.condition == CLOSURE
+        self._unbounded = tuple(np.isinf(asked.high).tolist())
+        self._exits, self._forces = _geometry(robot, quaternion, search.unit)
+        # The same at every place, for the robot does not turn.
+        required = search.required(np.zeros(3), quaternion)
+        self._wrenches, self._is_finite = required.corners, not required.ellipsoids
+        self._subsets = spanning(robot.n_cables, robot.dof)
+
+    def matrices(self, positions: np.ndarray) -> np.ndarray:
+        """Wrench matrices.
+
+        Args:
+            positions: (n, 3) m.
+
+        Returns:
+            (n, dof, n_cables), moments over a length.
+        """
+        rays = self._exits - positions[:, None]
+        units = rays / np.linalg.norm(rays, axis=2, keepdims=True)
+        return np.einsum("nik,kmi->nmi", units, self._forces)
+
+    def least_margins(self, positions: np.ndarray, half: np.ndarray, margin: np.ndarray) -> np.ndarray:
+        """Lower bounds of margins over cells.
+
+        Args:
+            positions: (n, 3) centres, m.
+            half: (n, 3) half sizes, m.
+            margin: (n,) at the centres, positive.
+
+        Returns:
+            (n,) N: tensions keep so far from their limits at every position, or -inf; of wrench closure a number that
+            is positive where the closure of the whole cell is proved. Of ellipsoids of wrenches nothing is.
+        """
+        if not (self._is_finite or self._is_closure):
+            return np.full(len(positions), -np.inf)
+        units, count = self.matrices(positions), self._exits.shape[0]
+        low, high, loads = self._asked.low, self._asked.high, self._wrenches
+        if self._is_closure:  # by any tensions that pull on nothing
+            low, high, loads = np.zeros(count), np.full(count, np.inf), np.zeros((1, units.shape[1]))
+            kept = np.ones((1, 1))
+        else:
+            size = (np.abs(loads).max() + np.abs(low).max()) or 1.0
+            kept = KEPT * np.where(np.isfinite(margin), margin, size)[:, None]
+        found = [_tensions(units, load, low + kept, high - kept) for load in loads]
+
+        def part(chosen):
+            cells = self._cells(positions[chosen], half[chosen])
+            each = zip(found, loads, strict=True)
+            return np.min([least_margins(cells, x[chosen], load, low, high) for x, load in each], axis=0)
+
+        return np.concatenate(in_parts(part, len(positions), PART))
+
+    def outside(self, positions: np.ndarray, half: np.ndarray) -> np.ndarray:
+        """Whether cells lie wholly outside.
+
+        Args:
+            positions: (n, 3) centres, m.
+            half: (n, 3) half sizes, m.
+
+        Returns:
+            (n,) whether it is proved.
+        """
+        low, high = self._asked.low, self._asked.high
+        finite = np.where(self._unbounded, 0.0, high)
+        options = {"condition": "closure" if self._is_closure else "tensions", "unbounded": self._unbounded}
+        worst = in_batches(
+            lambda x: worst_cocircuits(x, self._wrenches, low, finite, **options), self.matrices(positions), size=BATCH
+        )
+        held, loads = self._subsets[worst.subset], self._wrenches[worst.load]
+
+        def proved(chosen, normals, held):
+            cells = self._cells(positions[chosen], half[chosen])
+            if self._is_closure:
+                return are_one_sided(cells, normals, held)
+            return are_beyond(cells, normals, held, loads[chosen], low, high)
+
+        def part(chosen):
+            found = proved(chosen, worst.inner[chosen], None)
+            left = np.arange(chosen.start, chosen.stop)[~found]
+            found[~found] = proved(left, worst.normal[left], held[left])
+            return found
+
+        return np.concatenate(in_parts(part, len(positions), PART))
+
+    def _cells(self, positions: np.ndarray, half: np.ndarray) -> Cells:
+        return cells_about(positions, half, self._exits, self._forces)
+
+
+def _tensions(units: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    shape = len(units), units.shape[2]
+    limits = [np.broadcast_to(limit, shape) for limit in (low, high)]
+    return np.asarray(distributions(units, np.broadcast_to(wrench, (len(units), len(wrench))), *limits).tensions)
+
+
+def _geometry(robot: AnyRobot, quaternion: np.ndarray, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Base points less arms, (n_cables, 3) m; (3, dof, n_cables) wrenches of unit forces at the attachment points."""
+    row, count = PATTERNS[robot.pattern], robot.n_cables
+    base, axes = np.asarray(robot.base_points), np.eye(3)
+    forces = np.repeat(axes[list(row.forces)].T[..., None], count, axis=2)
+    if not isinstance(robot, PlatformRobot):
+        return base, forces / unit[:, None]
+    turn = np.array([[float(x) for x in line] for line in lanes.rotation(tuple(quaternion))])
+    arms = np.asarray(robot.platform_points) @ turn.T
+    moments = np.cross(arms, axes[:, None])  # (3, n_cables, 3)
+    kept = turn @ np.asarray(across_line(robot)) if row.along_line else axes[:, list(row.moments)]
+    return base - arms, np.concatenate([forces, (moments @ kept).transpose(0, 2, 1)], axis=1) / unit[:, None]

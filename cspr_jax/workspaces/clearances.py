@@ -1,0 +1,89 @@
+"""Clearance of robots at rest among obstacles, for maps of workspaces. Arrays in, answers out."""
+
+from collections.abc import Sequence
+from typing import get_args
+
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.clearance import Clearances, Kind, Scene, clearances, scene
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.shapes import Body, Obstacle, inward, turned
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.workspaces import geometry
+
+BATCH = 4096
+# Numbers of `schema.meanings.NEAREST_BODIES`; of a pose that has nothing to meet the last.
+KINDS = dict(zip(get_args(Kind), range(1, 5), strict=True))
+
+
+def surroundings(robot: AnyRobot, frame: Frame, obstacles: Sequence[Obstacle] = (), body: Body | None = None) -> Scene:
+    """A robot at rest among what its cables can meet.
+
+    Args:
+        robot: centred, z down.
+        frame: axes of the robot file.
+        obstacles: fixed in space, in the axes of the file.
+        body: shape of the platform, in platform axes as in the file, from the mass centre, or from the joint.
+
+    Returns:
+        the scene in the kernels' coordinates.
+    """
+    diameter = 0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter)
+    own = None if body is None else turned(body, frame)
+    return scene(robot, diameter=diameter, obstacles=[inward(one, frame) for one in obstacles], body=own)
+
+
+def at_rest(robot: AnyRobot, around: Scene, positions: np.ndarray, quaternions: np.ndarray) -> Clearances:
+    """Clearances of poses.
+
+    Args:
+        robot: centred, z down.
+        around: of `surroundings`.
+        positions: (n, 3) of the mass centre, or of the joint, m.
+        quaternions: (n, 4) unit quaternions, scalar first.
+
+    Returns:
+        the clearances.
+    """
+    turns, ends = quaternions if PATTERNS[robot.pattern].is_body else None, None
+    pulleys = robot.pulleys
+    if pulleys is not None:
+        ends = in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
+    return clearances(around, positions, turns, ends=ends)
+
+
+def flags(found: Clearances) -> np.ndarray:
+    """Reasons why poses are not free of interference.
+
+    Args:
+        found: of `at_rest`.
+
+    Returns:
+        (n,) flags of `Verdict`.
+    """
+    verdict = np.zeros(len(found.clearance), FLAGS)
+    for values, flag in (
+        (found.cables, Verdict.CABLE_CABLE),
+        (found.obstacles, Verdict.OBSTACLE),
+        (found.platform, Verdict.CABLE_PLATFORM),
+    ):
+        # NaN is open.
+        verdict |= np.where(values <= 0.0, flag, 0).astype(FLAGS)
+    return np.where(found.is_open, Verdict.UNDECIDED, verdict).astype(FLAGS)
+
+
+def nearest_bodies(around: Scene, found: Clearances) -> np.ndarray:
+    """What is nearest at each pose.
+
+    Args:
+        around: of `surroundings`.
+        found: of `at_rest`.
+
+    Returns:
+        (n,) numbers of `schema.meanings.NEAREST_BODIES`.
+    """
+    numbers = np.array([*(KINDS[meeting.kind] for meeting in around.meetings), 0], np.int16)
+    return numbers[found.nearest]

@@ -1,0 +1,156 @@
+"""Margins of poses one by one, by singular values: of any robot, and where the wrench matrix loses rank; no jax."""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.workspaces.cocircuits import Choices
+from cspr_jax.workspaces.required import RequiredWrenches
+
+# Of unit columns: smaller singular values, of the largest and at all, are zero.
+RANK, NOTHING = 1e-9, 1e-13
+# Of the largest component of a cocircuit: smaller ones are zero.
+ZERO = 1e-10
+# Of a wrench: what may lie outside of the span of the cables.
+OUTSIDE = 1e-9
+
+
+def cocircuits(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cocircuits of a wrench matrix, and a basis of its span.
+
+    Args:
+        matrix: (dof, n_cables).
+
+    Returns:
+        (k, n_cables) of unit length, one sign of each; (k, dof) the normals c with c^T W = y, in the span; (dof, rank)
+        an orthonormal basis of the span.
+    """
+    left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
+    rank = int((sizes > max(RANK * sizes[0], NOTHING)).sum())
+    rows = right[:rank]
+    if rank == 0:
+        return np.zeros((0, matrix.shape[1])), np.zeros((0, matrix.shape[0])), left[:, :0]
+    if rank == 1:
+        normals = np.ones((1, 1))
+    else:
+        chosen = np.array(list(itertools.combinations(range(matrix.shape[1]), rank - 1)))
+        _, values, vectors = np.linalg.svd(rows.T[chosen])
+        normals = vectors[values[:, -1] > RANK, -1]
+    found = normals @ rows
+    found[np.abs(found) < ZERO * np.abs(found).max(1, keepdims=True)] = 0.0
+    return found, (normals / sizes[:rank]) @ left[:, :rank].T, left[:, :rank]
+
+
+class Planes(NamedTuple):
+    """What bounds the margin of a wrench w: offsets - normals @ w, and half of the narrowest range of tensions.
+
+    Fields:
+        offsets: (k,) N.
+        normals: (k, dof).
+        half_range: N; inf without largest tensions.
+        basis: (dof, rank) orthonormal, of the wrenches that the cables span.
+    """
+
+    offsets: np.ndarray
+    normals: np.ndarray
+    half_range: float
+    basis: np.ndarray
+
+
+def margin_planes(matrix: np.ndarray, low: np.ndarray, high: np.ndarray) -> Planes:
+    """Planes whose distances, in newtons of tension, are the margin: one for each cocircuit and sign that bounds it.
+
+    Args:
+        matrix: (dof, n_cables).
+        low: (n_cables,) N.
+        high: (n_cables,) N; inf where there is none.
+
+    Returns:
+        the planes.
+    """
+    found, normals, basis = cocircuits(matrix)
+    rows, normals = np.concatenate([found, -found]), np.concatenate([normals, -normals])
+    finite = np.where(np.isfinite(high), high, 0.0)
+    bounds = ~((rows > 0.0) & np.isinf(high)).any(1)
+    rows, normals = rows[bounds], normals[bounds]
+    sizes = np.abs(rows).sum(1)
+    reach = np.where(rows > 0.0, rows * finite, rows * low).sum(1)
+    return Planes(reach / sizes, normals / sizes[:, None], float(0.5 * (high - low).min()), basis)
+
+
+def wrench_margin(
+    matrix: np.ndarray,
+    wrenches: RequiredWrenches,
+    low: np.ndarray,
+    high: np.ndarray,
+    measure: np.ndarray | None = None,
+) -> float:
+    """Margin of wrenches: the largest s such that tensions between low + s and high - s give each of them; or capacity.
+
+    Args:
+        matrix: (dof, n_cables).
+        wrenches: what the cables must supply.
+        low: (n_cables,) N.
+        high: (n_cables,) N; inf where there is none: a margin counts against finite limits alone.
+        measure: (dof,) by what the components of normals are multiplied, for the capacity margin, the distance of the
+            wrenches from the faces of what can be supplied; None: the margin of the tensions.
+
+    Returns:
+        N; inf where nothing bounds it, -inf where a wrench is outside of the span of the cables.
+    """
+    planes = margin_planes(matrix, low, high)
+    if any(is_outside(some, planes.basis) for some in wrenches.spanning):
+        return -np.inf
+    slacks = planes.offsets - wrenches.supports(planes.normals)
+    if measure is not None:
+        return float((slacks / np.linalg.norm(planes.normals * measure, axis=1)).min(initial=np.inf))
+    return float(min(slacks.min(initial=np.inf), planes.half_range))
+
+
+def is_outside(wrenches: np.ndarray, basis: np.ndarray) -> bool:
+    """Whether some wrench is outside of what the cables span.
+
+    Args:
+        wrenches: (n, dof).
+        basis: (dof, rank) orthonormal.
+
+    Returns:
+        whether it is.
+    """
+    outside = np.linalg.norm(wrenches - wrenches @ basis @ basis.T, axis=1)
+    return bool((outside > OUTSIDE * np.linalg.norm(wrenches, axis=1)).any())
+
+
+def closure_margin(matrix: np.ndarray, choices: Choices) -> float:
+    """Margin of wrench closure; see `workspaces.margins.closure_margin`.
+
+    Args:
+        matrix: (dof, n_cables).
+        choices: of the robot, which say what of its cocircuits is always zero.
+
+    Returns:
+        the margin, in [-1, 1]; -1 where the cables do not span all components.
+    """
+    found, _, basis = cocircuits(matrix)
+    if basis.shape[1] < len(matrix):
+        return -1.0
+    other = found != 0.0
+    most, least = found.max(1, initial=-np.inf, where=other), found.min(1, initial=np.inf, where=other)
+    rarer = np.minimum(most, -least) / np.abs(found).max(1)
+    # A component that is zero here and not everywhere may have either sign.
+    always = len(matrix) - 1 + _always_zero(found, choices)
+    has_more = (~other).sum(1) > always
+    return float(np.where(has_more, np.maximum(rarer, 0.0), rarer).min())
+
+
+def _always_zero(found: np.ndarray, choices: Choices) -> np.ndarray:
+    # How many components more than those of a hyperplane's columns are zero at every pose of the robot.
+    if choices.counts is None:
+        return np.zeros(len(found), int)
+    size = found.shape[1] - choices.counts.shape[1]
+    more: dict[tuple[int, ...], int] = {}
+    for row, counts in zip(choices.table, choices.counts, strict=True):
+        support = tuple(sorted(row[size:][counts > 0.0].tolist()))
+        more[support] = int((counts == 0.0).sum())
+    return np.array([more.get(tuple(np.flatnonzero(row).tolist()), 0) for row in found])

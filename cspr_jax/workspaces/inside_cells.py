@@ -1,0 +1,139 @@
+"""Cells whose every position keeps its tensions within limits, from tensions at the centre; no jax.
+
+With force densities f0 at the centre, Z0 f0 = w, and weights D, those of
+
+    f(x) = f0 + D U^T (I - T)^-1 j,    C^-1 Z0 D = U,    T = sum_k x_k T_k,    j = sum_k x_k j_k,
+    T_k = C^-1 N_k D U^T,    j_k = C^-1 N_k f0
+
+give Z(x) f(x) = w, where C C^T = Z0 D^2 Z0^T, so that U has orthonormal rows: f moves from f0 by the least sum of
+(df_i / D_i)^2 to first order. D_i is the distance of f0_i from its limits, so that cables near them hardly move. Then
+
+    f_i(x) = f0_i + D_i (U_i . j + U_i . T j + e_i),    |e_i| <= |U_i| |T| |T j| / (1 - |T|),
+
+and its product with L_i(x), between L0_i - u_i . dp and that plus |dp|^2 / (2 (L0_i - |dp|)), is the tension. C is
+computed: that C^-1 Z0 D U^T is not quite I, and Z0 f0 not quite w, is part of the bounds. Where |T| < 1 the rank of
+Z(x) is full, too, since C^-1 Z(x) D U^T = I - T.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.workspaces.cells import ROUNDING, Cells, inverse_factor, least_quadratic, norm_reach, pair_norm, reach
+
+
+class _Way(NamedTuple):
+    # Relative change of the force densities over a cell: of first and second order in x, and a bound of the rest.
+    linear: np.ndarray  # (n, n_cables, 3)
+    quadratic: np.ndarray  # (n, n_cables, 3, 3)
+    rest: np.ndarray  # (n, n_cables)
+
+    @property
+    def second(self) -> np.ndarray:
+        """Bound of the absolute value of the second order, (n, n_cables)."""
+        return -np.minimum(least_quadratic(self.quadratic), least_quadratic(-self.quadratic))
+
+
+def least_margins(
+    cells: Cells, tensions: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Lower bounds of the tension margin over cells.
+
+    Args:
+        cells: the cells.
+        tensions: (n, n_cables) at the centres, between the limits, that give the wrench, N.
+        wrench: (m,) what the cables must supply, moments over a length, N.
+        low: (n_cables,) smallest tensions, at least 0, N.
+        high: (n_cables,) largest ones, inf for none, N.
+
+    Returns:
+        (n,) N: at every position of the cell, tensions keep at least so far from their limits; -inf where nothing is
+        proved. Where it is positive, the wrench matrix has full rank in the whole cell.
+    """
+    least, most = tension_bounds(cells, tensions, wrench, low, high)
+    with np.errstate(invalid="ignore"):
+        below = np.where(np.isfinite(high), high - most, np.inf)
+    margin = np.minimum(least - low, below).min(1)
+    return np.where(np.isnan(margin), -np.inf, margin)
+
+
+def tension_bounds(
+    cells: Cells, tensions: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of tensions that give a wrench everywhere in cells.
+
+    Args:
+        cells: the cells.
+        tensions: as for `least_margins`, as what follows.
+        wrench: (m,) N.
+        low: (n_cables,) N.
+        high: (n_cables,) N.
+
+    Returns:
+        (n, n_cables) smallest tensions of a cell and (n, n_cables) largest, N; -inf and inf where nothing is proved.
+    """
+    with np.errstate(all="ignore"):
+        densities = tensions / cells.lengths
+        weights = np.minimum(tensions - low, high - tensions) / cells.lengths
+        way = _way(cells, densities, weights, wrench)
+        least, most = _tension_range(cells, densities, weights, way)
+        lost = ROUNDING * (np.abs(tensions) + np.abs(low) + np.where(np.isfinite(high), np.abs(high), 0.0))
+        is_known = ((weights > 0.0) & (cells.shortest > 0.0) & np.isfinite(way.rest)).all(1, keepdims=True)
+        return np.where(is_known, least - lost, -np.inf), np.where(is_known, most + lost, np.inf)
+
+
+def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.ndarray) -> _Way:
+    weighted = cells.matrices * weights[:, None]
+    inverse = inverse_factor(weighted @ weighted.transpose(0, 2, 1))
+    rows = inverse @ weighted  # U
+    back = rows.transpose(0, 2, 1)
+    changes = inverse[:, None] @ cells.changes
+    turns = (changes * weights[:, None, None]) @ back[:, None]  # T_k
+    first = (changes @ densities[:, None, :, None])[..., 0]  # j_k
+    second = (turns[:, :, None] @ first[:, None, ..., None])[..., 0]  # T_k j_l
+    # What rounding has left, or may have hidden, of C^-1 Z0 D U^T - I and of C^-1 (Z0 f0 - w).
+    size = np.linalg.norm(inverse, axis=(1, 2))
+    parts = np.linalg.norm(weighted, axis=(1, 2)) + norm_reach(cells.changes * weights[:, None, None])
+    lost = size * np.linalg.norm(rows, axis=(1, 2)) * (ROUNDING * parts + _length(cells.rounding * weights))
+    defect = np.linalg.norm(rows @ back - np.eye(rows.shape[1]), axis=(1, 2)) + lost
+    given = (cells.matrices @ densities[..., None])[..., 0]
+    sizes = np.abs(cells.matrices) @ np.abs(densities)[..., None]
+    hidden = ROUNDING * (_length(sizes[..., 0]) + _length(wrench)) + (cells.rounding * np.abs(densities)).sum(1)
+    residual = _length((inverse @ (given - wrench)[..., None])[..., 0]) + size * hidden
+    turn, start = norm_reach(turns) + defect, norm_reach(first)
+    after = np.where(turn < 1.0, 1.0 / (1.0 - turn), np.inf)
+    late = np.minimum(pair_norm(second), norm_reach(turns) * start) + defect * start
+    rest = defect * start + turn * after * late + after * residual
+    columns = _length(back)
+    return _Way((first @ rows).transpose(0, 2, 1), _by_cable(second @ rows[:, None]), columns * rest[:, None])
+
+
+def _length(vectors: np.ndarray) -> np.ndarray:
+    return np.sqrt((vectors * vectors).sum(-1))
+
+
+def _by_cable(values: np.ndarray) -> np.ndarray:
+    return np.moveaxis(values, -1, 1)
+
+
+def _tension_range(
+    cells: Cells, densities: np.ndarray, weights: np.ndarray, way: _Way
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest tensions over cells, (n, n_cables) each."""
+    lengths, shortening = cells.lengths, reach(cells.steps)
+    second = way.second
+    spread = weights * (reach(way.linear) + second + way.rest)
+    lowest, highest = densities - spread, densities + spread
+    # (L0 - u . dp) f, whose first orders may cancel each other.
+    relative = weights * lengths
+    linear = relative[..., None] * way.linear - densities[..., None] * cells.steps
+    mixed = cells.steps[..., :, None] * way.linear[..., None, :]
+    quadratic = relative[..., None, None] * way.quadratic - weights[..., None, None] * mixed
+    rest = weights * (shortening * second + (lengths + shortening) * way.rest)
+    middle = lengths * densities
+    least = middle - reach(linear) + least_quadratic(quadratic) - rest
+    most = middle + reach(linear) - least_quadratic(-quadratic) + rest
+    radius = cells.radius[:, None]
+    least = np.where(lowest >= 0.0, np.maximum(least, cells.shortest * lowest), (lengths + radius) * lowest)
+    most = np.minimum(most + 0.5 * radius**2 / cells.shortest * highest, (lengths + radius) * highest)
+    return least, np.where(highest >= 0.0, most, 0.0)

@@ -1,0 +1,219 @@
+"""Compiled margins of many poses: loops over the cocircuits of a robot, one lane a pose.
+
+The body of a loop is compiled once, whatever the number of cables. Its result is one complex number, the lower bound of
+the margin and the upper one: with two results XLA would compute everything twice.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.arithmetic.lanes import largest
+from cspr_jax.workspaces import margins
+from cspr_jax.workspaces.cocircuits import CABLES, MOST_OTHERS, Choices, Column, block, normal, product, relation
+from cspr_jax.workspaces.margins import BLOCK_ROUNDING, ROUNDING, Pull, Wrenches, length, one_norm
+
+# Up to so many cocircuits there is no loop.
+UNROLLED = 10
+
+
+class Range(NamedTuple):
+    """Limits of the tensions.
+
+    Fields:
+        low: (n_cables,) smallest tensions, N.
+        high: (n_cables,) largest ones, inf for none, N.
+        measure: (dof,) by what the components of a normal are multiplied before its length divides a capacity margin.
+    """
+
+    low: Array
+    high: Array
+    measure: Array
+
+
+@partial(jax.jit, static_argnames=("measure", "is_bounded"))
+def by_normals(
+    every: Sequence[Array],
+    loss: Array,
+    wrenches: Wrenches,
+    asked: Range,
+    choices: Choices,
+    *,
+    measure: str,
+    is_bounded: bool,
+) -> Array:
+    """Margins of poses of any robot, by the normals to dof - 1 cables.
+
+    Args:
+        every: columns of the wrench matrix, of `geometry.wrench_columns`.
+        loss: (n,) their errors over rounding, likewise.
+        wrenches: what the cables must supply.
+        asked: limits.
+        choices: of `cocircuits.choices_of`.
+        measure: "tensions", "capacity" or "closure"; known when this is compiled, as what follows.
+        is_bounded: whether all largest tensions are finite.
+
+    Returns:
+        (...) lower bound + i upper bound.
+    """
+    dof, like = len(every), every[0][0]
+    lanes = wrenches._replace(points=[[jnp.broadcast_to(x, like.shape) for x in point] for point in wrenches.points])
+    noise = jnp.asarray(ROUNDING * jnp.finfo(like.dtype).eps, like.dtype) * loss
+    reach = jnp.where(jnp.isinf(asked.high), 0.0, jnp.abs(asked.high)) + jnp.abs(asked.low)
+    size = _size(wrenches)
+
+    def pull(row, limits):
+        chosen = [[_row(component, row[i]) for component in every] for i in range(dof - 1)]
+        across = normal(chosen) if chosen else [jnp.ones_like(like)]
+        rest = [[_row(component, k) for component in every] for k in row[dof - 1 :]]
+        entries = [product(across, column) for column in rest]
+        low, high, counts, scale = limits
+        over = one_norm(entries)
+        if measure == "capacity":
+            over = length([x * asked.measure[k] for k, x in enumerate(across)])
+        error = 2.0 * noise * (scale + size)
+        return _pull(entries, low, high, counts, over, noise, error), margins.supports(across, lanes)
+
+    rest = choices.table[:, dof - 1 :]
+    limits = asked.low[rest], asked.high[rest], choices.counts, jnp.sum(reach[rest], axis=1)
+    return _least(pull, choices.table, limits, like, asked, measure=measure, is_bounded=is_bounded)
+
+
+def _pull(entries: Sequence[Array], low, high, counts, size: Array, noise: Array, error: Array) -> Pull:
+    noises = [noise] * len(entries)
+    if counts is not None:  # what is a zero of the robot has no rounding either
+        entries, noises = ([x * counts[i] for i, x in enumerate(values)] for values in (entries, noises))
+    return Pull(entries, list(low), list(high), size, noises, error)
+
+
+def _size(wrenches: Wrenches) -> Array:
+    # An upper bound of a wrench.
+    parts = [one_norm(point) for point in wrenches.points]
+    spreads = [jnp.sum(axes) for axes in (wrenches.box, *wrenches.ellipsoids) if axes is not None]
+    return sum(spreads, largest(parts))
+
+
+def _row(array: Array, k: Array) -> Array:
+    return lax.dynamic_index_in_dim(array, k, 0, keepdims=False)
+
+
+def _least(pull, table: np.ndarray, limits, like: Array, asked: Range, *, measure: str, is_bounded: bool) -> Array:
+    # The least of all cocircuits.
+    judged = margins.bounded_margin if is_bounded else margins.free_margin
+
+    def step(found, each):
+        cocircuit, asking = pull(*each)
+        if measure == "closure":
+            lower, upper = margins.closure_margin(cocircuit)
+        else:
+            lower, upper = judged(cocircuit, *asking)
+        least = jnp.minimum(jnp.real(found), lower), jnp.minimum(jnp.imag(found), upper)
+        return lax.complex(*least), None
+
+    largest_one = jnp.inf * jnp.ones_like(like)
+    if measure == "tensions":  # no margin is larger than half of what a cable has
+        largest_one = jnp.minimum(largest_one, 0.5 * jnp.min(asked.high - asked.low))
+    count = len(table)
+    start = lax.complex(largest_one, largest_one)
+    return lax.scan(step, start, (table, limits), unroll=count if count <= UNROLLED else 1)[0]
+
+
+class NullSpace(NamedTuple):
+    """Tensions of six cables and up to two more, of many poses; the cables in the order of the block.
+
+    Fields:
+        rows: for each cable beyond six (n_cables, n), how tensions change with its own, times a common number.
+        held: (n_cables, n) tensions that supply the wrench, N; 0 beyond six.
+        noise: (n,) error of a cocircuit's component.
+        loss: (n,) error of the held tensions, N.
+        largest: (n,) the largest of the held tensions, N.
+    """
+
+    rows: Sequence[Array]
+    held: Array
+    noise: Array
+    loss: Array
+    largest: Array
+
+
+def null_space(every: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]) -> NullSpace:
+    """What pulls on nothing, and what supplies one wrench, of robots on six to eight cables in space.
+
+    Args:
+        every: columns of the wrench matrix, of `geometry.wrench_columns`.
+        loss: (n,) their errors over rounding, likewise.
+        wrench: six components, () or (n,), moments over a length, N.
+        order: of the cables, those of the base block first.
+
+    Returns:
+        the tensions.
+    """
+    return _joined(_by_block(every, wrench, order=order), wrench, loss)
+
+
+@partial(jax.jit, static_argnames=("order",))
+def _by_block(every: Sequence[Array], wrench: Column, *, order: tuple[int, ...]) -> tuple[list[list[Array]], Array]:
+    # Tensions of the six for each cable beyond them and for the wrench, two by two as complex numbers, which halves
+    # what XLA computes again for each result; and what they are multiplied by, with the scale of their last digits.
+    like = every[0][0]
+    cables = [[component[k] for component in every] for k in order]
+    given = [jnp.broadcast_to(x, like.shape) for x in wrench]
+    found = block(cables[:CABLES], [*cables[CABLES:], given])
+    pairs = [[lax.complex(six[i], six[i + 1]) for i in range(0, CABLES, 2)] for six in found.tensions]
+    return pairs, lax.complex(found.common, found.scale)
+
+
+@jax.jit
+def _joined(found: tuple[list[list[Array]], Array], wrench: Column, loss: Array) -> NullSpace:
+    *others, last = [[part for pair in six for part in (jnp.real(pair), jnp.imag(pair))] for six in found[0]]
+    common, scale = jnp.real(found[1]), jnp.imag(found[1])
+    zero, count = jnp.zeros_like(common), len(others)
+    rows = [[*others[j], *(-common if i == j else zero for i in range(count))] for j in range(count)]
+    inverse = 1.0 / common
+    held = [x * inverse for x in last]
+    rounding = jnp.asarray(BLOCK_ROUNDING * jnp.finfo(common.dtype).eps, common.dtype) * loss * scale
+    most_held = largest([jnp.abs(x) for x in held])
+    size = sum((jnp.abs(x) for x in wrench), zero)
+    uncertain = rounding * (size + most_held) * jnp.abs(inverse)
+    noise = rounding if count else zero
+    if count == MOST_OTHERS:
+        noise = 4.0 * noise * largest([jnp.abs(x) for row in rows for x in row])
+    stacked = [jnp.stack(row) for row in rows]
+    return NullSpace(stacked, jnp.stack([*held, *[zero] * count]), noise, uncertain, most_held)
+
+
+@partial(jax.jit, static_argnames=("measure", "is_bounded"))
+def by_null_space(space: NullSpace, asked: Range, choices: Choices, *, measure: str, is_bounded: bool) -> Array:
+    """Margins of poses by the relations among rows of the null space.
+
+    Args:
+        space: of `null_space`.
+        asked: limits, the cables in the order of the block.
+        choices: their tables have the cables of each cocircuit alone, in the order of the block.
+        measure: "tensions" or "closure"; known when this is compiled, as what follows.
+        is_bounded: whether all largest tensions are finite.
+
+    Returns:
+        (...) lower bound + i upper bound.
+    """
+    like = space.loss
+    finite = jnp.where(jnp.isinf(asked.high), 0.0, jnp.abs(asked.high)) + jnp.abs(asked.low)
+    reach = jnp.sum(finite) + space.largest
+
+    def pull(row, limits):
+        rows = [[_row(part, k) for part in space.rows] for k in row]
+        entries = relation(rows) if space.rows else [jnp.ones_like(like)]
+        low, high, counts = limits
+        size = one_norm(entries)
+        asking = product(entries, [_row(space.held, k) for k in row])
+        error = 2.0 * space.noise * reach + size * space.loss
+        return _pull(entries, low, high, counts, size, space.noise, error), (asking, -asking)
+
+    table = choices.table
+    limits = asked.low[table], asked.high[table], choices.counts
+    return _least(pull, table, limits, like, asked, measure=measure, is_bounded=is_bounded)

@@ -1,0 +1,200 @@
+"""Maps of workspaces: whether a robot of any pattern on any number of cables can hold each pose."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.arithmetic.rotations import from_tilt_torsion, products
+from cspr_jax.build import build_limits, build_robot, centred, given_quaternion
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile, axis_points
+from cspr_jax.config.workspace import WorkspaceTable
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, turn_grid
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.schema.axes import TILT_TORSION
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.tiles import Grid
+from cspr_jax.workspaces.clearances import surroundings
+from cspr_jax.workspaces.questions import FEASIBLE, check_cables, question, required_wrenches
+from cspr_jax.workspaces.rest_poses import MARGINS, OrientationSet, RestPoses, over_orientations
+from cspr_jax.workspaces.search import WorkspaceSearch
+from cspr_jax.workspaces.speeds import CableSpeeds, cable_speeds
+
+INTERFERENCE = "interference-free"
+# Limits of poses at rest: others belong to motions.
+TENSIONS = ("tension_min", "tension_max")
+SPEED = "cable_speed_max"
+HELD = (*TENSIONS, "floor", "cable_length_max", SPEED)
+# Of pi, of sets of orientations where the file does not say.
+DIVISIONS = 12
+
+
+class WorkspaceMap(GridMap):
+    """The workspace of a robot: of poses, or of places with sets of orientations; see `GridMap`."""
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse what the robot cannot be asked."""
+        self._keys, self._file = keys, file
+        self._frame, self._z_axis = frame_of(spec.base_points, spec.z_axis), spec.z_axis
+        self._asked = keys.workspace or WorkspaceTable()
+        self._refuse_unused()
+        self._limits = build_limits(spec, keys.limits, file)
+        self._robot = centred(build_robot(spec, keys.trajectory, file))[0]
+        self._row = PATTERNS[self._robot.pattern]
+        if not self._row.is_body:
+            for name in ("orientation", "orientations"):
+                if getattr(self._asked, name) is not None:
+                    raise ConfigError(file, f"workspace.{name}: must be absent: {spec.kind} has none")
+        self._turn = self._given_turns([self._asked.orientation], "workspace.orientation")
+        self._samples, self._volume = self._orientation_set()
+        try:
+            check_cables(self._robot)
+        except InputError as error:
+            raise ConfigError(file, str(error)) from error
+        try:
+            names = [name for name in self._asked.conditions if name != INTERFERENCE]
+            searches = {name: self._search(name) for name in names}
+            length = self._asked.capacity_length
+            capacity = None if length is None else self._search(FEASIBLE, length)
+        except InputError as error:
+            raise ConfigError(file, f"workspace.{error}") from error
+        around, speeds = self._surroundings(spec), self._speeds(spec)
+        self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity)
+
+    def _refuse_unused(self) -> None:
+        for limit in LIMITS:
+            if getattr(self._keys.limits, limit.name) is None:
+                continue
+            if limit.name not in HELD:
+                raise ConfigError(
+                    self._file, f"limits.{limit.name}: must be absent in this map, whose cells are at rest"
+                )
+            if limit.name in TENSIONS and FEASIBLE not in self._asked.conditions:
+                allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
+                raise ConfigError(self._file, f"limits.{limit.name}: {allowed}")
+
+    def _surroundings(self, spec: RobotFile) -> Scene | None:
+        asked, row = self._asked, self._row
+        if INTERFERENCE not in asked.conditions:
+            return None
+        for name in ("platform_box", "platform_hull"):
+            if getattr(asked, name) is not None and not row.is_body:
+                raise ConfigError(self._file, f"workspace.{name}: must be absent: {spec.kind} has no shape")
+        # Shapes are from where the arms of the kernels are: the mass centre, or a joint.
+        centre = None if row.is_jointed else spec.centre_of_mass
+        try:
+            body = asked.body(centre or (0.0, 0.0, 0.0), spec.platform_points or ())
+        except InputError as error:
+            allowed = "must be points: those where the cables are attached lie in a plane"
+            raise ConfigError(self._file, f"workspace.platform_hull = true: {allowed}") from error
+        return surroundings(self._robot, self._frame, [table.shape() for table in asked.obstacle or ()], body)
+
+    def _speeds(self, spec: RobotFile) -> CableSpeeds | None:
+        asked, most = self._asked, self._limits.cable_speed_max
+        given = [name for name in ("speed", "angular_speed") if getattr(asked, name) is not None]
+        if not given:
+            if getattr(self._keys.limits, SPEED) is not None:
+                allowed = "must be absent without workspace.speed and workspace.angular_speed: cells are at rest"
+                raise ConfigError(self._file, f"limits.cable_speed_max: {allowed}")
+            return None
+        for name, has in (("speed", not self._row.is_jointed), ("angular_speed", self._row.is_body)):
+            if name in given and not has:
+                why = "turns about its joint alone" if self._row.is_jointed else "does not turn"
+                raise ConfigError(self._file, f"workspace.{name}: must be absent: {spec.kind} {why}")
+        if most is None:
+            raise ConfigError(self._file, f"workspace.{given[0]}: must be absent without limits.cable_speed_max")
+        values = {"speed": asked.speed or 0.0, "angular_speed": asked.angular_speed or 0.0}
+        return cable_speeds(self._robot, np.asarray(most), **values)
+
+    def _given_turns(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
+        # (k, 4) in the kernels' axes.
+        given = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
+        if self._row.is_planar and given[:, [1, 3]].any():
+            raise ConfigError(self._file, f"{key}: must turn about y: that of a planar robot")
+        return self._frame.turned_quaternions(given)
+
+    def _orientation_set(self) -> tuple[np.ndarray | None, np.ndarray]:
+        # (k, 4) orientations and the part of the set that each stands for; None: there is no set.
+        asked = self._asked
+        if asked.orientations is None:
+            return None, np.ones(1)
+        if asked.quaternions is not None:
+            every = self._given_turns(asked.quaternions, "workspace.quaternions")
+            return products(every, self._turn), np.full(len(every), 1.0 / len(every))
+        divisions = asked.divisions or DIVISIONS
+        tilt = math.pi if asked.tilt_max is None else asked.tilt_max
+        if self._row.is_planar:
+            if asked.torsion_max is not None:
+                raise ConfigError(self._file, "workspace.torsion_max: must be absent for a planar robot")
+            angles, volume = turn_grid(divisions, tilt)
+        elif asked.tilt_max is None:
+            grid = equal_volume_grid(divisions)
+            angles, volume = grid.angles, grid.volume
+        else:
+            angles, volume = cone_grid(divisions, tilt, asked.torsion_max or 0.0)
+        return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._turn), volume
+
+    def _search(self, name: str, capacity_length: float | None = None) -> WorkspaceSearch:
+        loads = None
+        if name == FEASIBLE:
+            asked = self._asked
+            given = {"points": asked.wrenches, "box": asked.wrench_box, "ellipsoid": asked.wrench_ellipsoid}
+            loads = required_wrenches(self._robot, self._frame, **given, acceleration=asked.acceleration)
+        return WorkspaceSearch(self._robot, question(self._robot, name, self._limits, loads, capacity_length))
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        places = self._targets(cells)
+        if self._samples is not None:
+            kind: OrientationSet = "total" if self._asked.orientations in ("total", "dextrous") else "inclusion"
+            found = over_orientations(self._poses, places, self._samples, self._volume, kind)
+            return found | {"cell_side": np.zeros(len(places), np.int16)}
+        turns = np.repeat(self._turn, len(places), axis=0)
+        if any(name in cells for name in TILT_TORSION):
+            angles = np.stack([cells.get(name, np.zeros(len(places))) for name in TILT_TORSION], axis=1)
+            if self._row.is_planar:
+                angles[:, 0] = 0.5 * math.pi
+            turns = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), turns)
+        answers = self._poses(places, turns)
+        sides = np.zeros(len(places), np.int16)
+        if self._asked.prove:
+            sides = self._poses.sides(places, self._half_sizes(cells), self._turn[0])
+        return answers | {"orientation_fraction": (answers["verdict"] == 0).astype(float), "cell_side": sides}
+
+    def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:
+        # (n, 3) of the cells: half of the way to the farther neighbour along each axis.
+        found = []
+        for name in "xyz":
+            points = np.sort(axis_points(getattr(self._keys.axes, name)))
+            gaps = np.diff(points)
+            farther = np.maximum(np.append(gaps, 0.0), np.append(0.0, gaps))
+            found.append(0.5 * farther[np.searchsorted(points, cells[name])])
+        return np.stack(found, axis=1)
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
+        row = self._row
+        if row.is_planar and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
+            raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
+        turning = [name for name in TILT_TORSION if name in grid.axes]
+        if turning and not row.is_body:
+            raise ConfigError(self._file, f"axes.{turning[0]}: must be absent: a point mass has no orientation")
+        if turning and self._samples is not None:
+            raise ConfigError(self._file, f"axes.{turning[0]}: cannot be combined with workspace.orientations")
+        if self._asked.prove and (turning or "radius" in grid.axes):
+            name = turning[0] if turning else "radius"
+            raise ConfigError(self._file, f"axes.{name}: cannot be combined with workspace.prove")
+        if row.is_planar and turning not in ([], ["tilt"]):
+            raise ConfigError(self._file, f"axes.{turning[0]}: must be tilt alone for a planar robot, about y")
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        inside = answers["verdict"] == 0
+        side = answers["cell_side"]
+        found = {f"a cell inside with a {name} below zero": inside & (answers[name] < 0.0) for name in MARGINS}
+        return found | {"a cell proved to be on the other side": (side == 1) & ~inside | (side == 2) & inside}

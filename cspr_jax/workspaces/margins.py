@@ -1,0 +1,170 @@
+"""Margins of poses, cocircuit by cocircuit, between two bounds: what rounding may have decided shows.
+
+Where the bounds lie apart, `workspaces.exact` answers the pose by singular values.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic.lanes import largest
+from cspr_jax.workspaces.cocircuits import Column, product
+
+# Errors that are allowed for, in units of rounding: of a product of unit columns, and of the numbers of a block of six.
+# Estimates, not proofs; margins by singular values lie between the bounds that follow from them wherever tests look.
+ROUNDING = 64.0
+BLOCK_ROUNDING = 8.0
+
+
+class Wrenches(NamedTuple):
+    """Wrenches that cables must supply: all sums of one of a finite set, one of a box and one of each ellipsoid.
+
+    Fields:
+        points: the finite set, of dof components each, () or one a pose, moments over a length, N.
+        box: (dof,) half widths of a box about zero, N; None: there is none.
+        ellipsoids: (dof,) semi-axes each of ellipsoids about zero, N.
+    """
+
+    points: Sequence[Column]
+    box: Array | None = None
+    ellipsoids: Sequence[Array] = ()
+
+
+class Pull(NamedTuple):
+    """A cocircuit, with what the limits of its cables are.
+
+    Fields:
+        entries: components that need not be zero, of any common length.
+        low: smallest tensions of these cables, () each, N.
+        high: largest ones, () each, N; inf where there is none.
+        size: what the margin is over: the sum of the components' sizes for tensions, the length of the normal for the
+            capacity margin.
+        noises: errors of the components.
+        error: error of what the tensions give beyond the wrenches, in units of size times N.
+    """
+
+    entries: Sequence[Array]
+    low: Sequence[Array]
+    high: Sequence[Array]
+    size: Array
+    noises: Sequence[Array]
+    error: Array
+
+
+Bounds = tuple[Array, Array]
+
+
+def one_norm(entries: Sequence[Array]) -> Array:
+    """Sum of the sizes of components.
+
+    Args:
+        entries: arrays (...).
+
+    Returns:
+        (...).
+    """
+    parts = [jnp.abs(entry) for entry in entries]
+    return sum(parts[1:], parts[0])
+
+
+def length(vector: Sequence[Array]) -> Array:
+    """Length of a vector.
+
+    Args:
+        vector: its components (...).
+
+    Returns:
+        (...).
+    """
+    return jnp.sqrt(product(vector, vector))
+
+
+def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
+    """Largest products of a normal, and of its negative, with the wrenches of a set.
+
+    Args:
+        normal: dof components.
+        wrenches: the set.
+
+    Returns:
+        both (...), in units of the normal times N.
+    """
+    products = [product(normal, point) for point in wrenches.points]
+    most, least = largest(products), largest([-value for value in products])
+    spreads = list[Array]()
+    if wrenches.box is not None:
+        spreads.append(product([jnp.abs(x) for x in normal], list(wrenches.box)))
+    spreads += [length([x * axis for x, axis in zip(normal, axes, strict=True)]) for axes in wrenches.ellipsoids]
+    for spread in spreads:
+        most, least = most + spread, least + spread
+    return most, least
+
+
+def bounded_margin(pull: Pull, most: Array, least: Array) -> Bounds:
+    """Bounds of the margin of one cocircuit whose cables all have a largest tension.
+
+    Args:
+        pull: the cocircuit.
+        most: the largest product that a wrench asks for.
+        least: that of the negative.
+
+    Returns:
+        lower and upper bound, N.
+    """
+    limits = list(zip(pull.entries, pull.low, pull.high, strict=True))
+    ranges = [(0.5 * (high - low)) * jnp.abs(y) for y, low, high in limits]
+    middles = [(0.5 * (high + low)) * y for y, low, high in limits]
+    middle = sum(middles[1:], middles[0])
+    slack = sum(ranges[1:], ranges[0]) - jnp.maximum(most - middle, least + middle)
+    return _between(pull, slack, slack)
+
+
+def _between(pull: Pull, sure: Array, possible: Array) -> Bounds:
+    # Over a size that has an error as well.
+    inverse = 1.0 / pull.size
+    lower, upper, loss = sure * inverse, possible * inverse, sum(pull.noises[1:], pull.noises[0])
+    less, more = (jnp.where(jnp.isinf(x), 0.0, loss * jnp.abs(x)) for x in (lower, upper))
+    return lower - (pull.error + less) * inverse, upper + (pull.error + more) * inverse
+
+
+def free_margin(pull: Pull, most: Array, least: Array) -> Bounds:
+    """Bounds of the margin of one cocircuit; any of its cables may have no largest tension.
+
+    A component that rounding may have made of a zero frees the upper bound, and does not free the lower one.
+
+    Args:
+        pull: the cocircuit.
+        most: the largest product that a wrench asks for.
+        least: that of the negative.
+
+    Returns:
+        lower and upper bound, N; inf where a cable without a largest tension frees the cocircuit.
+    """
+    lower, upper = list[Array](), list[Array]()
+    for sign, asked in ((1.0, most), (-1.0, least)):
+        sure = possible = -asked
+        for entry, noise, low, high in zip(pull.entries, pull.noises, pull.low, pull.high, strict=True):
+            y = sign * entry
+            sure = sure + jnp.where(y > noise, y * high, y * low)
+            possible = possible + jnp.where(y > -noise, (y + 2.0 * noise) * high, y * low)
+        lower.append(sure)
+        upper.append(possible)
+    return _between(pull, jnp.minimum(*lower), jnp.minimum(*upper))
+
+
+def closure_margin(pull: Pull) -> Bounds:
+    """Bounds of the margin of wrench closure of one cocircuit.
+
+    Args:
+        pull: the cocircuit.
+
+    Returns:
+        lower and upper bound of its largest component of the rarer sign, over the largest of all, in [-1, 1]; of
+        components of one sign minus the least of them, over the largest.
+    """
+    fewest = jnp.minimum(largest(pull.entries), largest([-entry for entry in pull.entries]))
+    inverse = 1.0 / largest([jnp.abs(entry) for entry in pull.entries])
+    error = 2.0 * largest(pull.noises) * inverse
+    return fewest * inverse - error, fewest * inverse + error

@@ -1,0 +1,196 @@
+"""Cells whose every position lacks tensions within limits, from the worst cocircuit at the centre; no jax.
+
+Let c be normal to the columns S of Z, dof - 1 of them, and move with them: c(x) . Z_S(x) = 0. These cables do nothing
+along it, whatever their tensions, and the wrench is out of reach at x where
+
+    c(x) . w > sum over the others of the largest of low_j y_j and high_j y_j,    y_j = c(x) . Z_j(x) / L_j(x)
+
+(with high_j = inf: y_j <= 0), and no wrench along -c can be given where all y_j are >= 0. With M = [W_S, c0] and
+M C^-T = Q of orthonormal columns,
+
+    c(x) = Q g(x),    g^T = e^T (I - K)^-1,    K = sum_k x_k K_k,    K_k = Q^T [N_kS / L_S, 0] C^-T,
+
+e the last unit vector, so that with z_j = Q^T Z_j0 and its change a_j = sum_k x_k Q^T N_k e_j
+
+    c(x) . Z_j(x) = e . z_j + e . v_j + e . K v_j + rest_j,    v_j = K z_j - a_j,
+    |rest_j| <= |e^T K| |K| |v_j| / (1 - |K|).
+
+Inverse lengths are L0 / L = 1 + u . dp / L0 + rest, |rest| <= |dp|^2 L0 / (L0 - |dp|)^3, since the second derivatives
+of 1 / L have norm 2 / L^3. That Q^T Q is not quite I is part of the bounds. A normal that does not move, K = 0, serves
+as well where the others keep away from it; then the products are affine.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.workspaces.cells import ROUNDING, Cells, inverse_factor, least_quadratic, norm_reach, reach
+
+
+class Products(NamedTuple):
+    """Products of c(x) with the columns of Z(x) over their lengths at the centre, and with the wrench, which is last.
+
+    Fields:
+        value: (n, n_cables + 1) at the centres.
+        linear: (n, n_cables + 1, 3) coefficients of first order in x.
+        quadratic: (n, n_cables + 1, 3, 3) those of second order.
+        rest: (n, n_cables + 1) bounds of what is left.
+    """
+
+    value: np.ndarray
+    linear: np.ndarray
+    quadratic: np.ndarray
+    rest: np.ndarray
+
+    @property
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest values over the cells, (n, n_cables + 1) each."""
+        spread = reach(self.linear) + self.rest
+        return (
+            self.value - spread + least_quadratic(self.quadratic),
+            self.value + spread - least_quadratic(-self.quadratic),
+        )
+
+
+def are_beyond(
+    cells: Cells, normals: np.ndarray, held: np.ndarray | None, wrenches: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Whether a wrench is beyond what tensions can give at every position of cells.
+
+    Args:
+        cells: the cells.
+        normals: (n, m) c at the centres.
+        held: (n, m - 1) the cables S; None: none, and c does not move.
+        wrenches: (n, m) what the cables must supply, moments over a length, N.
+        low: (n_cables,) smallest tensions, N.
+        high: (n_cables,) largest ones, inf for none, N.
+
+    Returns:
+        (n,) whether it is proved.
+    """
+    with np.errstate(all="ignore"):
+        products, others = products_of(cells, normals, held, wrenches), _others(cells, held)
+        least, most = (side[:, :-1] for side in products.ends)
+        # Of each other cable the limit that counts at the centre, and what it costs if the other one counts elsewhere.
+        is_positive = products.value[:, :-1] > 0.0
+        is_bounded = np.isfinite(high)
+        limits = np.where(others, np.where(is_positive & is_bounded, high, low), 0.0)
+        wrong = np.maximum(np.where(is_positive, -least, most), 0.0)
+        is_kept = (~others | is_bounded | (most <= 0.0)).all(1)
+        room = np.where(is_bounded, high - low, 0.0)
+        cost = np.where(others, room * wrong * cells.lengths / cells.shortest, 0.0).sum(1)
+        slack = least_slacks(cells, products, limits) - cost
+        size = (np.abs(limits) * np.abs(products.value[:, :-1])).sum(1) + np.abs(products.value[:, -1])
+        return is_kept & (cells.shortest > 0.0).all(1) & (slack > ROUNDING * size)
+
+
+def are_one_sided(cells: Cells, normals: np.ndarray, held: np.ndarray | None) -> np.ndarray:
+    """Whether cables fail to resist every wrench at every position of cells.
+
+    Args:
+        cells: the cells.
+        normals: (n, m) c at the centres, with which no other cable has a negative product.
+        held: as for `are_beyond`.
+
+    Returns:
+        (n,) whether it is proved.
+    """
+    with np.errstate(all="ignore"):
+        products = products_of(cells, normals, held, np.zeros_like(normals))
+        least = products.ends[0][:, :-1]
+        is_proved = (~_others(cells, held) | (least > ROUNDING * np.abs(products.value[:, :-1]))).all(1)
+        return is_proved & (cells.shortest > 0.0).all(1)
+
+
+def _others(cells: Cells, held: np.ndarray | None) -> np.ndarray:
+    others = np.ones(cells.lengths.shape, bool)
+    if held is not None:
+        np.put_along_axis(others, held, False, axis=1)
+    return others
+
+
+def products_of(cells: Cells, normals: np.ndarray, held: np.ndarray | None, wrenches: np.ndarray) -> Products:
+    """Products of a normal that moves with the cables that are held.
+
+    Args:
+        cells: the cells.
+        normals: as for `are_beyond`, as what follows.
+        held: (n, m - 1).
+        wrenches: (n, m) N.
+
+    Returns:
+        the products, c of unit length at the centres; with a cable that is held they are 0 wherever c is known.
+    """
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    units = np.concatenate([cells.matrices / cells.lengths[:, None], wrenches[..., None]], axis=2)
+    changes = cells.changes / cells.lengths[:, None, None]
+    none = np.zeros((*changes.shape[:3], 1))
+    changes = np.concatenate([changes, none], axis=3)
+    rounding = np.concatenate([cells.rounding / cells.lengths, np.zeros((len(normals), 1))], axis=1)
+    rounding = rounding + ROUNDING * np.maximum(np.linalg.norm(units, axis=1), 1.0)
+    if held is None:
+        return _still(normals, units, changes, rounding)
+    return _moving(normals, held, units, changes, rounding)
+
+
+def _still(normals: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray) -> Products:
+    # Of c that does not move: affine.
+    value, linear = (normals[:, None] @ units)[:, 0], -(normals[:, None, None] @ changes)[:, :, 0]
+    nothing = np.zeros((*value.shape, 3, 3))
+    return Products(value, linear.transpose(0, 2, 1), nothing, rounding + ROUNDING * np.abs(linear).sum(1))
+
+
+def _moving(
+    normals: np.ndarray, held: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray
+) -> Products:
+    # Of c that stays normal to the cables that are held.
+    frame = np.concatenate([np.take_along_axis(units, held[:, None], axis=2), normals[..., None]], axis=2)
+    inverse = inverse_factor(frame.transpose(0, 2, 1) @ frame).transpose(0, 2, 1)  # C^-T
+    rows = (frame @ inverse).transpose(0, 2, 1)  # Q^T
+    moved = np.take_along_axis(changes, held[:, None, None], axis=3) @ inverse[:, None, :-1]
+    turns = rows[:, None] @ moved  # K_k
+    size, count = np.linalg.norm(inverse, axis=(1, 2)), frame.shape[2]
+    lost = np.linalg.norm(rounding[:, :-1], axis=1) + ROUNDING * norm_reach(changes)
+    defect = np.linalg.norm(rows @ rows.transpose(0, 2, 1) - np.eye(count), axis=(1, 2)) + np.sqrt(count) * size * lost
+    columns, shifts = rows @ units, rows[:, None] @ changes
+    first = turns @ columns[:, None] - shifts  # v_j
+    last = turns[:, :, -1]  # e^T K_k
+    turn = (norm_reach(turns) + defect)[:, None]
+    after, defect, ways = np.where(turn < 1.0, 1.0 / (1.0 - turn), np.inf), defect[:, None], _norms(first)
+    rest = norm_reach(last)[:, None] * turn * after * ways
+    rest = rest + after**2 * defect * (np.linalg.norm(columns, axis=1) + _norms(shifts)) + after * rounding
+    quadratic = last[:, :, None, None] @ first[:, None]
+    return Products(columns[:, -1], first[:, :, -1].transpose(0, 2, 1), np.moveaxis(quadratic[..., 0, :], -1, 1), rest)
+
+
+def _norms(vectors: np.ndarray) -> np.ndarray:
+    # Of (n, 3, m, k), linear functions of x, bounds of the norms over the cells, (n, k).
+    columns = vectors.transpose(0, 3, 1, 2)
+    return np.sqrt(np.abs(columns @ columns.transpose(0, 1, 3, 2)).sum((2, 3)))
+
+
+def least_slacks(cells: Cells, products: Products, limits: np.ndarray) -> np.ndarray:
+    """Lower bounds over cells of what a wrench asks for along c, less what some tensions give.
+
+    Args:
+        cells: the cells.
+        products: of `products_of`.
+        limits: (n, n_cables) the tensions, 0 of cables that are held, N.
+
+    Returns:
+        (n,) N.
+    """
+    steps = cells.steps / cells.lengths[..., None]  # of L0 / L
+    value, linear, quadratic = products.value[:, :-1], products.linear[:, :-1], products.quadratic[:, :-1]
+    second = -np.minimum(least_quadratic(quadratic), least_quadratic(-quadratic))
+    middle = products.value[:, -1] - (limits * value).sum(1)
+    along = products.linear[:, -1] - (limits[..., None] * (linear + value[..., None] * steps)).sum(1)
+    bent = quadratic + linear[..., :, None] * steps[..., None, :]
+    bends = products.quadratic[:, -1] - (limits[..., None, None] * bent).sum(1)
+    shift, radius = reach(steps), cells.radius[:, None]
+    curved = radius**2 * cells.lengths / cells.shortest**3
+    own = products.rest[:, :-1]
+    most = np.abs(value) + reach(linear) + second + own
+    rest = own * (1.0 + shift) + second * shift + most * curved
+    rest = products.rest[:, -1] + (np.abs(limits) * rest).sum(1)
+    return middle - reach(along) + least_quadratic(bends) - rest

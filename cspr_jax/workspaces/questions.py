@@ -1,0 +1,154 @@
+"""Questions about workspaces: a condition, limits of the tensions, and the wrenches that the cables must supply."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.errors import InputError
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.schema.given_numbers import numbers
+from cspr_jax.workspaces import geometry
+from cspr_jax.workspaces.required import RequiredWrenches
+
+STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
+CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
+# Of dof - 1 cables each: seconds of a pose, and as many megabytes.
+MOST_CHOICES = 100_000
+UNTURNED = np.array([[1.0, 0.0, 0.0, 0.0]])
+
+
+@dataclasses.dataclass(frozen=True)
+class Question:
+    """What is asked of each pose.
+
+    Fields:
+        condition: one of `CONDITIONS`.
+        low: (n_cables,) smallest tensions, N.
+        high: (n_cables,) largest ones, inf for none, N.
+        wrenches: what the cables must supply, kernels' axes, N and N m.
+        capacity_length: by which moments are divided, m, where the margin is that of capacity; None: it is that of the
+            tensions.
+    """
+
+    condition: str
+    low: np.ndarray
+    high: np.ndarray
+    wrenches: RequiredWrenches
+    capacity_length: float | None = None
+
+
+def check_cables(robot: AnyRobot) -> None:
+    """Refuse more cables than workspaces can be computed for: their number grows with a power of it.
+
+    Args:
+        robot: the robot.
+
+    Raises:
+        InputError: of the robot.
+    """
+    if math.comb(robot.n_cables, robot.dof - 1) > MOST_CHOICES:
+        most = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MOST_CHOICES)
+        allowed = f"at most {most} for workspaces of {robot.dof} degrees of freedom"
+        raise InputError("robot", None, f"must have {allowed}", fault=f"{robot.n_cables} cables")
+
+
+def question(
+    robot: AnyRobot,
+    condition: str,
+    limits: Limits,
+    wrenches: RequiredWrenches | None = None,
+    capacity_length: float | None = None,
+) -> Question:
+    """A question of a condition.
+
+    Args:
+        robot: centred, z down.
+        condition: one of `CONDITIONS`.
+        limits: of the tensions; of account for "wrench-feasible" alone, as is what follows.
+        wrenches: of `required_wrenches`; None: what holds the weight still.
+        capacity_length: as in `Question`.
+
+    Returns:
+        the question.
+    """
+    if condition != FEASIBLE:
+        limits, wrenches, capacity_length = Limits(), None, None
+    low, high = tension_range(robot, limits)
+    return Question(condition, np.asarray(low), np.asarray(high), wrenches or _weight(robot), capacity_length)
+
+
+def _weight(robot: AnyRobot) -> RequiredWrenches:
+    # Of a body on a joint it turns with the body.
+    if PATTERNS[robot.pattern].is_jointed:
+        return RequiredWrenches(None)
+    return RequiredWrenches(np.asarray(geometry.weights(robot, np.zeros((1, 3)), UNTURNED)))
+
+
+def required_wrenches(
+    robot: AnyRobot,
+    frame: Frame,
+    *,
+    points: Any = None,
+    box: Any = None,
+    ellipsoid: Any = None,
+    acceleration: Any = None,
+) -> RequiredWrenches:
+    """Wrenches that cables must supply, as the kernels take them: all sums of one of each that is given.
+
+    Args:
+        robot: centred, z down.
+        frame: of the file.
+        points: (k, dof) in the axes of the file, N and N m; None: what holds the weight still.
+        box: (dof,) half widths of a box, N and N m; None: there is none.
+        ellipsoid: (dof,) semi-axes of an ellipsoid, N and N m; None: there is none.
+        acceleration: radius of a ball of accelerations of the mass centre, m/s^2; None: there is none.
+
+    Returns:
+        the wrenches.
+
+    Raises:
+        InputError: another shape, not finite, a negative half width, semi-axis or radius; moments of a rod; an
+            acceleration of a robot on a joint.
+    """
+    row, ellipsoids = PATTERNS[robot.pattern], list[np.ndarray]()
+    asked = _weight(robot)
+    if points is not None:
+        signs = np.ones(robot.dof)  # moments of a rod are 0
+        signs[: len(row.forces) + len(row.moments)] = [frame.signs[i] for i in (*row.forces, *row.moments)]
+        asked = RequiredWrenches(_finite(robot, "wrenches", points, 2) * signs)
+    half = None if box is None else _not_negative("wrench_box", _finite(robot, "wrench_box", box, 1))
+    if ellipsoid is not None:
+        ellipsoids.append(_not_negative("wrench_ellipsoid", _finite(robot, "wrench_ellipsoid", ellipsoid, 1)))
+    if acceleration is not None:
+        if row.is_jointed:
+            raise InputError("acceleration", acceleration, "must be absent", fault="of a robot on a joint")
+        radius = numbers("acceleration", acceleration, "a number >= 0, in m/s^2")
+        if radius.ndim or not 0.0 <= radius < np.inf:
+            raise InputError("acceleration", acceleration, "a number >= 0, in m/s^2")
+        radius = float(robot.mass) * radius
+        ellipsoids.append(np.where(geometry.scales(robot), 0.0, radius))
+    return dataclasses.replace(asked, box=half, ellipsoids=tuple(ellipsoids))
+
+
+def _finite(robot: AnyRobot, key: str, given: Any, ndim: int) -> np.ndarray:
+    allowed = "finite numbers of shape " + (f"({robot.dof},)" if ndim == 1 else f"(k, {robot.dof}), k >= 1")
+    values = numbers(key, given, allowed)
+    if values.ndim != ndim or not values.size or values.shape[-1] != robot.dof:
+        raise InputError(key, None, f"must be {allowed}", fault=f"an array of shape {values.shape}")
+    if not np.isfinite(values).all():
+        raise InputError(key, values.tolist(), allowed)
+    if PATTERNS[robot.pattern].along_line and values[..., 3:].any():
+        raise InputError(key, "moments of a rod", "0 there: their two axes turn with it")
+    return values
+
+
+def _not_negative(key: str, values: np.ndarray) -> np.ndarray:
+    if not (values >= 0.0).all():
+        raise InputError(key, values.tolist(), "not negative")
+    return values

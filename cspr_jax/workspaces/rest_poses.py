@@ -1,0 +1,196 @@
+"""Poses at rest against all conditions of a workspace, and sets of orientations at places. Arrays in, answers out."""
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.verdicts import FLAGS, OPEN, Verdict, conjunction
+from cspr_jax.workspaces import geometry
+from cspr_jax.workspaces.clearances import at_rest, flags, nearest_bodies
+from cspr_jax.workspaces.geometry import mass_centres
+from cspr_jax.workspaces.questions import CLOSURE
+from cspr_jax.workspaces.search import WorkspaceSearch
+from cspr_jax.workspaces.shifts import shifts
+from cspr_jax.workspaces.speeds import CableSpeeds
+from cspr_jax.workspaces.whole_cells import WorkspaceCells
+
+CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
+MARGINS = (
+    *("wrench_margin", "closure_margin", "capacity_margin"),
+    *("clearance", *CLEARANCES, "floor_margin", "length_margin", "speed_margin"),
+)
+NEAREST = "nearest_bodies"
+BATCH = 4096
+# Rounding of distances, m: far above what coordinates below 1e6 m have, far below what anybody measures.
+CLOSE = 1e-9
+# Poses that are answered at a time, where each place has many orientations.
+AT_ONCE = 1 << 19
+
+Answers = dict[str, np.ndarray]
+OrientationSet = Literal["inclusion", "total"]
+
+
+@dataclasses.dataclass(frozen=True)
+class RestPoses:
+    """Conditions that a pose at rest is to meet.
+
+    Fields:
+        robot: centred, z down.
+        searches: by condition, what is asked of the cables.
+        around: what the cables may not meet, each other included; None: nobody asks.
+        limits: floor and largest cable lengths, kernels' axes; tensions are those of the searches.
+        speeds: velocities that the robot must be able to have; None: nobody asks.
+        capacity: for the capacity margin, which decides nothing; None: nobody asks.
+    """
+
+    robot: AnyRobot
+    searches: Mapping[Any, WorkspaceSearch]
+    around: Scene | None
+    limits: Limits
+    speeds: CableSpeeds | None = None
+    capacity: WorkspaceSearch | None = None
+
+    def __call__(self, origins: np.ndarray, quaternions: np.ndarray) -> Answers:
+        """Whether poses meet all conditions.
+
+        Args:
+            origins: (n, 3) of the platform frame, kernels' coordinates, m.
+            quaternions: (n, 4) unit quaternions, scalar first.
+
+        Returns:
+            (n,) verdict, each of `MARGINS`, NaN where nobody asks, and `NEAREST`.
+        """
+        places, count = mass_centres(self.robot, origins, quaternions), len(origins)
+        found: Answers = {name: np.full(count, np.nan) for name in MARGINS}
+        verdict = np.zeros(count, FLAGS)
+        for condition, asked in self.searches.items():
+            answers = asked(places, quaternions)
+            verdict |= answers.verdict
+            name = "closure_margin" if condition == CLOSURE else "wrench_margin"
+            found[name] = np.fmin(found[name], answers.margin)
+        if self.capacity is not None:
+            found["capacity_margin"] = self.capacity(places, quaternions).margin
+        found[NEAREST] = np.zeros(count, np.int16)
+        if self.around is not None:
+            every = at_rest(self.robot, self.around, places, quaternions)
+            found |= {"clearance": every.clearance, NEAREST: nearest_bodies(self.around, every)}
+            found |= {name: getattr(every, of) for name, of in CLEARANCES.items()}
+            verdict |= flags(every)
+        for name, flag, slack in self._limited(origins, quaternions):
+            verdict |= np.where((slack < 0.0).any(1), flag, 0).astype(FLAGS)
+            found[name] = slack.min(1)
+        return {"verdict": conjunction(verdict), **found}
+
+    def sides(self, origins: np.ndarray, half: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
+        """Which cells, at one orientation, are proved to lie wholly on one side of the workspace.
+
+        While a robot moves by a distance without a turn, its heights and the lengths of its cables change by no more
+        than that; distances and speeds of cables change as `workspaces.shifts` says.
+
+        Args:
+            origins: (n, 3) of the platform frame at the centres of the cells, kernels' coordinates, m.
+            half: (n, 3) half sizes of the cells, m.
+            quaternion: (4,) unit quaternion, scalar first.
+
+        Returns:
+            (n,) 0: neither is proved; 1: inside; 2: outside, as `schema.meanings.CELL_SIDES` has them.
+        """
+        turns = np.repeat(quaternion[None], len(origins), axis=0)
+        places, reach = mass_centres(self.robot, origins, turns), np.linalg.norm(half, axis=1)
+        inside, outside = np.ones(len(origins), bool), np.zeros(len(origins), bool)
+        for asked in self.searches.values():
+            kept, lost = WorkspaceCells(self.robot, asked.asked)(places, half, quaternion, asked(places, turns))
+            inside, outside = inside & kept, outside | lost
+        moved = shifts(self.robot, places, turns, reach)
+        if self.robot.pulleys is not None:
+            # A platform within a pulley has no cable there.
+            inside &= (moved.free > 0.0).all(1)
+        slacks = list[tuple[np.ndarray, np.ndarray]]()
+        if self.around is not None:
+            every = at_rest(self.robot, self.around, places, turns)
+            slacks += [(getattr(every, of)[:, None], getattr(moved, of)[:, None]) for of in ("cables", "obstacles")]
+            inside &= (every.platform > moved.near_platform(self.around) + CLOSE) & ~every.is_open
+            outside |= every.platform < -moved.platform - CLOSE
+        changes = {} if self.speeds is None else {"speed_margin": self.speeds.changes(moved)}
+        slacks += [(slack, changes.get(name, reach[:, None])) for name, _, slack in self._limited(origins, turns)]
+        for slack, change in slacks:
+            inside &= (slack > change + CLOSE).all(1)
+            outside |= (slack < -change - CLOSE).any(1)
+        return np.where(inside, 1, np.where(outside, 2, 0)).astype(np.int16)
+
+    def _lengths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        poses = places, quaternions
+        return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
+
+    def _limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
+        # Of each limit its quantity, its flag, and (n, k) what is left of it.
+        places = mass_centres(self.robot, origins, quaternions)
+        if self.limits.floor is not None:
+            yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - places[:, 2:]
+        if self.limits.cable_length_max is not None:
+            slack = np.asarray(self.limits.cable_length_max) - self._lengths(places, quaternions)
+            yield "length_margin", Verdict.CABLE_TOO_LONG, slack
+        if self.speeds is not None:
+            yield "speed_margin", Verdict.CABLE_TOO_FAST, self.speeds.margins(origins, quaternions)
+
+
+def over_orientations(
+    ask: Callable[[np.ndarray, np.ndarray], Answers],
+    origins: np.ndarray,
+    orientations: np.ndarray,
+    volume: np.ndarray,
+    kind: OrientationSet,
+) -> Answers:
+    """Whether places belong to the workspace of a set of orientations.
+
+    Args:
+        ask: of poses, as `RestPoses` is.
+        origins: (n, 3) m.
+        orientations: (k, 4) unit quaternions, scalar first.
+        volume: (k,) part of the set that each stands for.
+        kind: "inclusion": some of the orientations is inside; "total": every one is.
+
+    Returns:
+        (n,) verdict: where it is not 0, the flags of the most orientations that stand in the way; margins of the best
+        orientation, or of the worst, and what is nearest there; orientation_fraction, the part of the set inside.
+    """
+    parts, count = list[Answers](), len(orientations)
+    step = max(1, AT_ONCE // count)
+    for start in range(0, len(origins), step):
+        some = origins[start : start + step]
+        found = ask(np.repeat(some, count, axis=0), np.tile(orientations, (len(some), 1)))
+        parts.append(_of_places({name: values.reshape(-1, count) for name, values in found.items()}, volume, kind))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _of_places(every: Answers, volume: np.ndarray, kind: OrientationSet) -> Answers:
+    # (n_places, n_orientations) each.
+    verdict = every["verdict"]
+    inside = verdict == 0
+    is_open = ~inside & ((verdict & ~FLAGS(OPEN.value)) == 0)
+    if kind == "inclusion":
+        best, is_met = np.fmax.reduce, inside.any(1)
+        may_be = ~is_met & is_open.any(1)
+    else:
+        best, is_met = np.fmin.reduce, inside.all(1)
+        may_be = ~is_met & (inside | is_open).all(1)
+    # A set that is refuted is so for the orientations that are refuted, however many others are open.
+    reasons = np.where(is_met, 0, _most_frequent(np.where(is_open == may_be[:, None], verdict, 0)))
+    found = {name: best(every[name], axis=1) for name in MARGINS}
+    at = (every["clearance"] == found["clearance"][:, None]).argmax(1)
+    found[NEAREST] = every[NEAREST][np.arange(len(at)), at]
+    return {"verdict": reasons.astype(FLAGS), **found, "orientation_fraction": inside @ volume}
+
+
+def _most_frequent(verdict: np.ndarray) -> np.ndarray:
+    # Of each row the flags that most of those have that are not 0.
+    values = np.unique(verdict[verdict != 0])
+    if len(values) == 0:
+        return np.zeros(len(verdict), FLAGS)
+    return values[np.argmax([(verdict == value).sum(1) for value in values], axis=0)]

@@ -1,0 +1,335 @@
+"""Workspaces: margins of many poses of a robot on any number of cables. Arrays in, answers out.
+
+A pose goes from the fastest way to the surest, until its answer is beyond rounding: by the null space of six to eight
+cables in space, by the normals to dof - 1 cables, by singular values.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.batches import in_batches, in_parts
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.errors import InputError
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.workspaces import cocircuits, exact, geometry, kernels
+from cspr_jax.workspaces.margins import Wrenches
+from cspr_jax.workspaces.questions import CLOSURE, UNTURNED, Question
+from cspr_jax.workspaces.required import RequiredWrenches
+
+# Of the largest limit of the tensions, or of the wrench: a margin nearer to zero is that of the boundary.
+BOUNDARY = 1e-9
+# Likewise: how far apart single precision may leave the bounds of a margin.
+TOLD = 1e-3
+PART = 1 << 18
+# Poses of a batch where few are asked about, and of what is only prepared here.
+BATCH = 1024
+MOST_SHORT = 8  # short batches
+# Of the wrench matrices of a batch where many are: what starts a call is then short beside it, and caches hold most.
+BYTES = 6_400_000
+# Poses by which the base block is chosen, and those by which cocircuits that are none are left out.
+TRIALS, FEW_TRIALS = 200, 8
+# Boxes in which they are sought, each twice as wide as the one before: the largest pulleys have 1e6 m.
+WIDENINGS = 40
+# So many open poses go to singular values at once: to compile for them would take longer.
+FEW = 100
+
+
+@dataclasses.dataclass(frozen=True)
+class WorkspaceAnswers(Columns):
+    """Answers about n poses.
+
+    Fields:
+        verdict: (n,) flags of `Verdict`; 0: the pose belongs to the workspace. Singular: the cables do not span a
+            wrench that they must supply. Undecided: on the boundary, within 1e-9 of the limits.
+        margin: (n,) N: by how much tensions can keep from their limits, negative outside; inf where nothing bounds it,
+            -inf where the cables do not span the wrench. Of wrench closure a pure number in [-1, 1].
+        is_exact: (n,) whether the pose was answered by singular values.
+    """
+
+    verdict: np.ndarray
+    margin: np.ndarray
+    is_exact: np.ndarray
+
+
+class Poses(NamedTuple):
+    """Poses, and what the cables must supply at each.
+
+    Fields:
+        positions: (n, 3) m.
+        quaternions: (n, 4) unit quaternions, scalar first.
+        wrenches: (n, dof) moments over a length, N; None: what is asked at all of them.
+    """
+
+    positions: np.ndarray
+    quaternions: np.ndarray
+    wrenches: np.ndarray | None
+
+    def some(self, which: Any) -> "Poses":
+        """Some of them.
+
+        Args:
+            which: an index of NumPy.
+
+        Returns:
+            those.
+        """
+        wrenches = None if self.wrenches is None else self.wrenches[which]
+        return Poses(self.positions[which], self.quaternions[which], wrenches)
+
+
+Stage = Callable[[Poses], np.ndarray]
+
+
+class WorkspaceSearch:
+    """A question to poses of one robot; what it needs of the robot alone is found once.
+
+    Fields:
+        asked: the question.
+        unit: (dof,) by what the components of wrenches are divided: moments by a length of the robot, m.
+    """
+
+    def __init__(self, robot: AnyRobot, asked: Question, *, precision: str = "float64") -> None:
+        """Of a robot, centred, z down.
+
+        With precision "float32" that decides the poses of which it can, and float64 the others; margins of the former
+        are good to 1e-3 of the limits.
+        """
+        self._robot, self.asked, self._precision, self._length = robot, asked, precision, _length(robot)
+        self.unit = np.where(geometry.scales(robot), self._length, 1.0)
+        self._wrenches = asked.wrenches.over(self.unit)
+        self._measure = "tensions" if asked.capacity_length is None else "capacity"
+        capacity_length = asked.capacity_length or self._length
+        self._normals_unit = np.where(geometry.scales(robot), capacity_length / self._length, 1.0)
+        self._boundary = BOUNDARY
+        if asked.condition == CLOSURE:
+            self._measure = "closure"
+        else:
+            sizes = asked.wrenches.size, float(robot.mass * robot.gravity)
+            self._boundary *= np.abs([*asked.low, *asked.high[np.isfinite(asked.high)], *sizes]).max()
+        matrices = self._trials()
+        self._choices = cocircuits.choices_of(matrices[:FEW_TRIALS])
+        self._order = tuple[int, ...]()
+        is_few = 0 <= robot.n_cables - cocircuits.CABLES <= cocircuits.MOST_OTHERS
+        if robot.dof == cocircuits.CABLES and is_few and self._wrenches.is_one and self._measure != "capacity":
+            self._order = cocircuits.base_order(matrices)
+
+    def __call__(
+        self, positions: np.ndarray, quaternions: np.ndarray | None, wrenches: np.ndarray | None = None
+    ) -> WorkspaceAnswers:
+        """Whether poses belong to the workspace.
+
+        Args:
+            positions: (n, 3) of the mass centre, or of the joint, m.
+            quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
+            wrenches: (n, dof) what the cables must supply at each pose in place of the question's finite set, N and
+                N m; None: that.
+
+        Returns:
+            the answers.
+        """
+        if len(positions) == 0:
+            return WorkspaceAnswers(np.zeros(0, FLAGS), np.zeros(0), np.zeros(0, bool))
+        turns = np.repeat(UNTURNED, len(positions), 0) if quaternions is None else quaternions
+        loads = self._weights(positions, turns) if wrenches is None else wrenches / self.unit
+        poses = Poses(positions, turns, loads)
+        parts = in_parts(lambda part: self._part(poses.some(part)), len(positions), PART)
+        margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
+        verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
+        verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
+        verdict = np.where(is_outside, Verdict.SINGULAR, verdict)
+        verdict = np.where(np.isnan(margin), Verdict.NOT_FINITE, verdict)
+        return WorkspaceAnswers(verdict.astype(FLAGS), margin, is_exact)
+
+    def _trials(self) -> np.ndarray:
+        # Wrench matrices of poses among the spools, all finite: no cable ends within its pulley there. Large pulleys
+        # may leave no such pose among the spools, but they do farther out.
+        rng, base, row = np.random.default_rng(1), np.asarray(self._robot.base_points), PATTERNS[self._robot.pattern]
+        low, high = base.min(0), base.max(0)
+        middle, half = 0.5 * (low + high), 0.4 * (high - low)
+        # Where all spools have one x, what vanishes in their plane does so nowhere else.
+        moves = np.isin(range(3), row.forces or range(3))
+        half = np.where(moves, np.maximum(half, 0.2 * half.max() or 1.0), half)
+        regular = np.zeros((0, self._robot.dof, self._robot.n_cables))
+        for widening in range(WIDENINGS):
+            places = middle + 2.0**widening * half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
+            turns = UNTURNED + 0.2 * rng.normal(size=(TRIALS, 4))
+            if row.is_planar:
+                turns[:, [1, 3]] = 0.0
+            matrices = self._matrices(places, turns / np.linalg.norm(turns, axis=1, keepdims=True))
+            regular = np.concatenate([regular, matrices[np.isfinite(matrices).all((1, 2))]])
+            if len(regular) >= FEW_TRIALS:
+                return regular
+        allowed = "must leave room for poses where no cable ends within its pulley"
+        raise InputError("pulley_radius", None, allowed, fault="none among the spools, nor around them")
+
+    def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        # Wrench matrices, moments over the length.
+        poses = positions, quaternions
+        found = in_batches(lambda x: geometry.wrench_matrices(self._robot, *x), poses, size=TRIALS)
+        return found / self.unit[:, None]
+
+    def _part(self, poses: Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        count = len(poses.positions)
+        margin, is_open, is_outside = np.full(count, np.nan), np.ones(count, bool), np.zeros(count, bool)
+        for stage, accepts in self._stages():
+            places = np.flatnonzero(is_open)
+            if len(places) == 0 or len(places) < min(FEW, count):
+                break
+            found = stage(poses.some(places))
+            is_known = accepts(found)
+            known = found[is_known]
+            margin[places[is_known]] = 0.5 * (known.real + known.imag)
+            is_open[places[is_known]] = False
+        is_open |= np.abs(margin) <= self._boundary
+        places = np.flatnonzero(is_open)
+        if len(places):
+            margin[places], is_outside[places] = self._exactly(poses.some(places))
+        return margin, is_open, is_outside
+
+    def _stages(self):
+        def is_known(found, apart=1.0):
+            with np.errstate(invalid="ignore"):
+                return (found.real == found.imag) | (found.imag - found.real <= apart * self._boundary)
+
+        def is_told(found):
+            is_clear = (found.real > self._boundary) | (found.imag < -self._boundary)
+            return is_clear & is_known(found, TOLD / BOUNDARY)
+
+        if not len(self._choices.table):  # whatever the pose, the cables do not span all components
+            return
+
+        if self._precision == "float32":
+            yield self._stage(np.float32, bool(self._order)), is_told
+        if self._order:
+            yield self._stage(np.float64, True), is_known
+        yield self._stage(np.float64, False), is_known
+
+    def batch(self, dtype: type) -> int:
+        """Length of a batch on a CPU where many poses are asked about.
+
+        Args:
+            dtype: of the numbers.
+
+        Returns:
+            a power of two.
+        """
+        rows = self._robot.dof * self._robot.n_cables
+        return 1 << int(np.log2(BYTES / (rows * np.dtype(dtype).itemsize)))
+
+    def kernel(self, dtype: type, *, by_null_space: bool = False) -> Callable[..., Array]:
+        """Compiled margins of a batch of poses.
+
+        Args:
+            dtype: of the numbers.
+            by_null_space: whether by the null space, which only some robots and questions take.
+
+        Returns:
+            a function of lanes: three arrays (n,) of positions, m; four of quaternions, None of a point mass; dof
+            arrays of wrenches in place of the question's, over `unit`, or None. It gives (n,) lower bound + i upper
+            bound of the margin.
+        """
+
+        def cast(tree):
+            return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
+
+        options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.asked.high).all())}
+        robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
+        limits = leaf(self.asked.low[ordered]), leaf(self.asked.high[ordered]), leaf(self._normals_unit)
+        asked, length, fixed = cast((kernels.Range(*limits), leaf(self._length), self._fixed))
+        choices = self._relations if by_null_space else self._choices
+        choices = choices._replace(counts=cast(choices.counts))
+
+        def compiled(place, turn, load):
+            columns, loss = geometry.wrench_columns(robot, place, turn, length)
+            wrenches = fixed if load is None else fixed._replace(points=[load])
+            if not by_null_space:
+                return kernels.by_normals(columns, loss, wrenches, asked, choices, **options)
+            space = kernels.null_space(columns, loss, wrenches.points[0], order=self._order)
+            return kernels.by_null_space(space, asked, choices, **options)
+
+        return compiled
+
+    def _stage(self, dtype: type, by_null_space: bool) -> Stage:
+        compiled, is_body = self.kernel(dtype, by_null_space=by_null_space), PATTERNS[self._robot.pattern].is_body
+
+        def lanes(array):
+            return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
+
+        def stage(poses):
+            turns = lanes(poses.quaternions) if is_body else None
+            loads = None if poses.wrenches is None else lanes(poses.wrenches)
+            batch = lanes(poses.positions), turns, loads
+            # Two lengths, since each is compiled.
+            size = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch(dtype)
+            return in_batches(lambda x: compiled(*x), batch, size=size)
+
+        return stage
+
+    @property
+    def _relations(self) -> cocircuits.Choices:
+        # Cables of each cocircuit alone, in the order of the block.
+        table, counts = self._choices
+        places = np.argsort(self._order)[table[:, self._robot.dof - 1 :]].astype(np.int32)
+        sorting = np.argsort(places, axis=1)
+        ordered = None if counts is None else np.take_along_axis(counts, sorting, 1)
+        return cocircuits.Choices(np.take_along_axis(places, sorting, 1), ordered)
+
+    def required(self, position: np.ndarray, quaternion: np.ndarray) -> RequiredWrenches:
+        """What the cables must supply at a pose.
+
+        Args:
+            position: (3,) of the mass centre, or of the joint, m.
+            quaternion: (4,) unit quaternion, scalar first.
+
+        Returns:
+            the wrenches over `unit`, N.
+        """
+        load = self._weights(position[None], quaternion[None])
+        return self._wrenches if load is None else self._wrenches.about(load[0])
+
+    def _weights(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray | None:
+        # Of a body on a joint.
+        if self._wrenches.points is not None:
+            return None
+        poses = positions, quaternions
+        return in_batches(lambda x: geometry.weights(self._robot, *x), poses, size=BATCH) / self.unit
+
+    @property
+    def _fixed(self) -> Wrenches:
+        # Without the weight of a body on a joint.
+        asked = self._wrenches
+        points = [] if asked.points is None else [[leaf(x) for x in point] for point in asked.points]
+        return Wrenches(points, None if asked.box is None else leaf(asked.box), [leaf(x) for x in asked.ellipsoids])
+
+    def _exactly(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+        matrices = self._matrices(poses.positions, poses.quaternions)
+        measure = self._normals_unit if self._measure == "capacity" else None
+        margins, is_outside = np.full(len(matrices), np.nan), np.zeros(len(matrices), bool)
+        for i, columns in enumerate(matrices):
+            if not np.isfinite(columns).all():
+                continue
+            if self._measure == "closure":
+                margins[i] = exact.closure_margin(columns, self._choices)
+                is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
+            else:
+                asked = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
+                margins[i] = exact.wrench_margin(columns, asked, self.asked.low, self.asked.high, measure)
+                is_outside[i] = margins[i] == -np.inf
+        return margins, is_outside
+
+
+def _length(robot: AnyRobot) -> float:
+    # By which moments are divided: the size of the platform.
+    if not isinstance(robot, PlatformRobot):
+        return 1.0
+    points = np.asarray(robot.platform_points)
+    return float(np.sqrt((points**2).sum(1).mean())) or 1.0

@@ -1,0 +1,43 @@
+"""Maps of sensitivities to errors of the cable lengths."""
+
+import numpy as np
+
+from cspr_jax.build import kernel_robot
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError
+from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.schema.tiles import Grid
+from cspr_jax.workspaces.sensitivities import SensitivitySearch
+
+ROUNDING = 1e-9
+
+
+class SensitivityMap(GridMap):
+    """The sensitivities of a robot at each place; see `GridMap`."""
+
+    any_cables = True
+
+    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse more cables than degrees of freedom, whose lengths are not independent."""
+        super().__init__(spec, keys, file)
+        robot = kernel_robot(spec, keys.trajectory, file, any_cables=True)
+        if robot.n_cables != robot.dof:
+            place, key = spec.placed("base_points", file)
+            raise ConfigError(place, f"{key}: {robot.n_cables} points: must be {robot.dof} in this map")
+        self._search = SensitivitySearch(robot)
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        return self._search(self._targets(cells))._asdict()
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
+        self._refuse_out_of_plane(grid)
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        return {
+            "a displacement smaller than the error of the cables": ~(answers["sigma_p"] >= 1.0 - ROUNDING),
+            "a negative turn": answers["sigma_r"] < 0.0,
+        }

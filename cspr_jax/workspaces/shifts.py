@@ -1,0 +1,120 @@
+"""Bounds of how far cables move, and turn, while a robot moves within a cell without a turn. Arrays in, answers out.
+
+A cable is a segment from its exit E to its attachment point A. While the robot moves by at most h, A does too, and E by
+at most D: not at all without a pulley. A point (1 - s) E + s A of the cable moves by at most (1 - s) D + s h; it moves
+from the platform by at most (1 - s) (D + h), and from the point with t of another cable by at most
+(1 - s) D + (1 - t) D + |s - t| h. The largest values, at s and t of 0 and 1, bound how distances change:
+
+    cable and obstacle       max(D, h)
+    platform and obstacle    h
+    two cables               max(2 D, D + h)
+    cable and platform       D + h
+
+What is left out of a cable next to its attachment point does not change the last: of a point of the cable at the
+distance r from A, l being the smaller length, the one at the same distance, or the shorter cable's end, is afterwards
+no farther than E moves from the platform.
+
+Of a cable that is attached to its platform's shape, in it or on it, the signed distance from the shape, which is
+convex, grows along the cable from where it is positive on. If it is positive at the distance r from A where the part
+begins that is not left out, it is the least there, and changes by no more than r times the change of the unit vector.
+
+On its pulley of radius r, E moves along the cable's own direction by r / f of what A moves across the cable in the
+plane of the pulley, f being the free length, and with the plane, by (2 r) / w at most of what A moves out of it, w
+being the distance of A from the swivel axis (`robots.pulleys`). Wherever A goes, E stays within a band of width 4 r and
+height 2 r.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.shapes import is_within
+from cspr_jax.workspaces import geometry
+
+BATCH = 4096
+# Diagonal of the band in which exits are, over the radius of the pulley.
+BAND = math.sqrt(20.0)
+
+
+class Shifts(NamedTuple):
+    """Bounds of what moves while robots move within their cells.
+
+    Fields:
+        robot: (n,) how far the robot moves, m.
+        exits: (n,) how far an exit moves, m; 0 without pulleys.
+        units: (n, n_cables) length of the change of the cable's unit vector.
+        free: (n, n_cables) least free lengths of the cables, m.
+    """
+
+    robot: np.ndarray
+    exits: np.ndarray
+    units: np.ndarray
+    free: np.ndarray
+
+    @property
+    def cables(self) -> np.ndarray:
+        """(n,) how far distances of two cables change, m."""
+        return self.exits + np.maximum(self.exits, self.robot)
+
+    @property
+    def obstacles(self) -> np.ndarray:
+        """(n,) how far distances of cables and platform from obstacles change, m."""
+        return np.maximum(self.exits, self.robot)
+
+    @property
+    def platform(self) -> np.ndarray:
+        """(n,) how far distances of cables from their own platform change, m."""
+        return self.exits + self.robot
+
+    def near_platform(self, around: Scene) -> np.ndarray:
+        """How far positive distances of cables from their own platform fall.
+
+        Args:
+            around: the scene.
+
+        Returns:
+            (n,) m.
+        """
+        whole = self.platform[:, None]
+        is_held = is_within(around.body, around.platform_points) if around.body is not None else np.zeros(1, bool)
+        near = np.where(is_held & (self.free >= around.leave), np.minimum(around.leave * self.units, whole), whole)
+        return near.max(1)
+
+
+def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reach: np.ndarray) -> Shifts:
+    """Bounds of what moves while robots move within their cells.
+
+    Args:
+        robot: centred, z down.
+        positions: (n, 3) of the mass centre, or of the joint, at the centres of the cells, m.
+        quaternions: (n, 4) unit quaternions, scalar first.
+        reach: (n,) how far the robot moves from there, m.
+
+    Returns:
+        the bounds.
+    """
+    targets = in_batches(lambda x: geometry.attachments(robot, *x), (positions, quaternions), size=BATCH)
+    rays, most = targets - np.asarray(robot.base_points), reach[:, None]
+    if robot.pulleys is None:
+        free = np.linalg.norm(rays, axis=2) - most
+        return Shifts(reach, np.zeros(len(reach)), _turns(most, free), free)
+    radius, axes = np.asarray(robot.pulleys.radius), np.asarray(robot.pulleys.axes)
+    high = (rays * axes).sum(2)
+    wide = np.linalg.norm(rays - high[..., None] * axes, axis=2)
+    # From the centre of the pulley, which turns with the cable: no farther than the robot this changes.
+    out = np.hypot(wide - radius, high) - most
+    free = np.sqrt(np.maximum(np.square(np.maximum(out, 0.0)) - radius**2, 0.0))
+    wide = np.maximum(wide - most, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        exits = most * np.fmax(radius / free, 2.0 * radius / wide)
+    exits = np.where(radius > 0.0, np.fmin(exits, BAND * radius), 0.0)
+    return Shifts(reach, exits.max(1), _turns(most, np.minimum(free, wide)), free)
+
+
+def _turns(reach: np.ndarray, length: np.ndarray) -> np.ndarray:
+    # Unit vectors differ by 2 at most.
+    return np.where(length > 0.0, np.minimum(reach / np.where(length > 0.0, length, 1.0), 2.0), 2.0)
