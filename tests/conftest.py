@@ -26,7 +26,7 @@ BESIDE = sys.prefix if sys.prefix != sys.base_prefix else tempfile.gettempdir()
 COMPILED = Path(os.environ.setdefault("CSPR_TESTS_COMPILED", f"{BESIDE}/cspr-tests-compiled")).absolute()
 LARGEST = 1_000_000_000  # bytes; beyond that all of it is taken away
 # Most of a test is compiling: these take half of the time for it, and the code is slower. Level 0 would take a third,
-# but moves a verdict. The soak runs with what users run with, and so does what test_xla starts.
+# but moves a verdict. The soak runs with what users run with, and so does what runtime/test_xla starts.
 CHEAP = xla.QUICK
 # Most quick tests ask for a handful of cases, and a batch is padded.
 LARGEST_BATCH = 64
@@ -48,54 +48,16 @@ settings.register_profile("default", deadline=None, derandomize=True, suppress_h
 settings.load_profile("default")
 
 
-# What compiles the same kernels goes to one process, in this order; every other file is a group of its own.
-_POINT_MASSES = (
-    "test_docs",
-    "test_api",
-    "test_sweep",
-    "test_plan",
-    "test_python",
-    "test_minimum_arcs",
-    "test_certificate",
-    "test_random_segments",
-    "test_margins",
-    "test_symmetries",
-    "test_motions",
-    "test_outputs",
-    "test_rows",
-    "test_transition_plans",
-    "test_minimum_oscillations",
-    "test_envelopes",
-    "test_transition",
-    "test_bench",
-    "test_hypocycloid",
-    "test_pages",
-    "test_films",
-    "test_cell_plans",
-    "test_uncertainty_of_point_masses",
-)
-_PLATFORMS = (
-    "test_pose_plans",
-    "test_mujoco",
-    "test_pose_maps",
-    "test_gradients",
-    "test_families",
-    "test_searches",
-    "test_orientation_maps",
-    "test_orientations",
-    "test_first_look",
-    "test_platform",
-)
-_ORDER = {
-    name: place for place, name in enumerate((*_POINT_MASSES, *_PLATFORMS, "test_xla", "test_workers", "test_crashes"))
-}
+def _group(path: str) -> str:
+    """Tests that one process runs: those of a folder compile the same kernels; some folders compile little."""
+    folder = path.rpartition("/")[0]
+    return path if folder.rpartition("/")[2] in ("house", "reliability") else folder
 
 
 class _Groups(LoadScopeScheduling):
     # pytest-xdist's own groups are marks that it writes into names, where this pytest no longer reads them.
     def _split_scope(self, nodeid):
-        stem = nodeid.partition("::")[0].rpartition("/")[2].removesuffix(".py")
-        return "point masses" if stem in _POINT_MASSES else "platforms" if stem in _PLATFORMS else stem
+        return _group(nodeid.partition("::")[0])
 
 
 @pytest.hookimpl
@@ -125,8 +87,12 @@ def pytest_collection_finish():
 
 
 def pytest_collection_modifyitems(items):
-    """The long groups first, so that both processes end together."""
-    items.sort(key=lambda item: _ORDER.get(item.path.stem, len(_ORDER)))
+    """The long groups first, so that both processes end together: those with most to read."""
+    groups = {item.path: _group(item.path.as_posix()) for item in items}
+    sizes: dict[str, int] = {}
+    for path, group in groups.items():
+        sizes[group] = sizes.get(group, 0) + path.stat().st_size
+    items.sort(key=lambda item: (-sizes[groups[item.path]], groups[item.path]))
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -4,9 +4,9 @@ import json
 import re
 import warnings
 
+import config.test_formats as samples
 import numpy as np
 import pytest
-import test_formats as samples
 
 from cspr_jax.config.hints import robot_hints
 from cspr_jax.config.robot import read_foreign

@@ -11,9 +11,9 @@ from concurrent.futures import ThreadPoolExecutor
 import h5py
 import numpy as np
 import pytest
+from outputs.test_outputs import settings_of
 from support.commands import cspr
 from support.reading import read_here
-from test_outputs import settings_of
 
 import cspr_jax
 from cspr_jax.errors import StoreError

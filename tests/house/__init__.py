@@ -1,0 +1,1 @@
+"""The shape of the package, its documents and examples, and whether the tests catch faults."""

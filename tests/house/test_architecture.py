@@ -1,0 +1,266 @@
+"""The shape of the package: layers, what may import what, sizes, docstrings, no paths of one machine."""
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "cspr_jax"
+
+# From the bottom up, as docs/architecture.md draws them. A room is a folder or a loose module, with all modules in it
+# that no longer name has. A room imports from the floors below it alone.
+FLOORS = (
+    ("errors", "arithmetic"),
+    ("schema", "runtime", "robots"),
+    ("config",),
+    ("motions", "store"),
+    ("build",),
+    ("maps",),
+    ("workspaces",),
+    ("swings", "lines", "beziers", "platforms"),
+    ("plans", "sweep", "bench"),
+    ("outputs",),
+    ("published", "outputs.plots"),
+    ("api",),
+    ("cli",),
+    ("__main__",),
+)
+ROOMS = [room for floor in FLOORS for room in floor]
+# Families import nothing of each other: what two of them need lies below. Poses at rest are asked about by platforms.
+FAMILIES = ("swings", "lines", "beziers", "platforms")
+KERNELS = ("errors", "arithmetic", "schema", "robots", "motions", "workspaces", *FAMILIES)
+# What a room is about, what it rests on, and its files in the order in which they are read, stand in its guide.
+GUIDES = ("motions", "workspaces", *FAMILIES)
+# Folders, all of them, and modules that never import jax.
+WITHOUT_JAX = (
+    "api.examples",
+    "api.given",
+    "api.pictures",
+    "api.runs",
+    "api.sweeps",
+    "arithmetic.frames",
+    "cli",
+    "config",
+    "errors",
+    "outputs.plots.draw",
+    "runtime.progress",
+    "runtime.stages",
+    "schema",
+    "store",
+    "sweep.checks",
+    "sweep.claims",
+    "sweep.definition",
+    "sweep.engine",
+    "sweep.environment",
+    "sweep.inspection",
+    "sweep.signals",
+    "sweep.work",
+)
+FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
+
+
+def _name(path: Path) -> str:
+    """Module name below cspr_jax; "" for the package itself."""
+    return ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix("__init__").rstrip(".")
+
+
+MODULES = {_name(path): ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
+PACKAGES = {_name(path.parent / "__init__.py") for path in PACKAGE.rglob("*.py")}
+INNER = [name for name, tree in MODULES.items() if name and not (name in PACKAGES and len(tree.body) == 1)]
+
+
+def _room(name: str) -> str | None:
+    """Room of a module: the longest name of a room that it begins with."""
+    parts = name.split(".")
+    names = (".".join(parts[:length]) for length in range(len(parts), 0, -1))
+    return next((name for name in names if name in FLOOR_OF), None)
+
+
+def _imports(tree: ast.AST) -> Iterator[str]:
+    """Everything imported anywhere in a module, dotted, from "import a" and "from a import b"."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def _inner_imports(name: str) -> set[str]:
+    """Modules of the package that a module imports; `__version__` is the package's own."""
+    found = set()
+    for target in _imports(MODULES[name]):
+        if target.split(".")[0] == "cspr_jax" and target != "cspr_jax.__version__":
+            inner = target.removeprefix("cspr_jax").removeprefix(".")
+            found.add(inner if inner in MODULES else inner.rpartition(".")[0])
+    return found
+
+
+def _functions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    return (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+
+
+def test_every_module_has_a_room():
+    assert [name for name in INNER if _room(name) is None] == []
+    assert {_room(name) for name in INNER} == set(ROOMS)
+    # A folder in a room belongs to it, unless it is one of its own.
+    folders = {_room(_name(path.parent / "__init__.py")) for path in PACKAGE.rglob("*.py")} - {None}
+    loose = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"}
+    assert folders | loose == set(ROOMS)
+
+
+def test_tests_lie_in_folders_like_those_of_the_package():
+    """Beside what they share, and what belongs to no folder."""
+    shared = {"house", "oracles", "properties", "reliability", "support"}
+    folders = {path.parent.relative_to(ROOT / "tests").parts[0] for path in (ROOT / "tests").glob("*/*.py")}
+    assert folders - shared <= {room.split(".")[0] for room in ROOMS}
+    assert not list((ROOT / "tests").glob("test_*.py"))
+
+
+def test_the_house_stays_small():
+    loose = {path.stem for path in PACKAGE.glob("*.py")}
+    assert loose <= {"__init__", "__main__", "cli", "api", "errors", "build"}
+    assert len(ROOMS) <= 26
+    assert len(FLOORS) <= 14
+    assert {FLOOR_OF[room] for room in FAMILIES} == {FLOOR_OF[FAMILIES[0]]}
+
+
+@pytest.mark.parametrize("name", INNER)
+def test_imports_point_down(name):
+    own = _room(name)
+    rooms = {_room(target) for target in _inner_imports(name)} - {own}
+    assert [room for room in rooms if room is None or FLOOR_OF[room] >= FLOOR_OF[own]] == []
+
+
+def test_imports_have_no_cycle():
+    left = {name: _inner_imports(name) - {name} for name in INNER}
+    while left:
+        free = [name for name, targets in left.items() if not targets & left.keys()]
+        assert free, f"cycle among {sorted(left)}"
+        for name in free:
+            del left[name]
+
+
+@pytest.mark.parametrize("room", GUIDES)
+def test_a_guide_names_the_files_of_a_room_in_reading_order(room):
+    """Each once, and none before what it imports."""
+    lines = ast.get_docstring(MODULES[room]).splitlines()
+    files = [line.split()[0] for line in lines if re.match(r" {4}\w+ {2,}\S", line)]
+    assert sorted(files) == sorted(name.removeprefix(f"{room}.") for name in INNER if _room(name) == room)
+    above = set()
+    for file in files:
+        assert {target for target in _inner_imports(f"{room}.{file}") if _room(target) == room} <= above, file
+        above.add(f"{room}.{file}")
+
+
+@pytest.mark.parametrize("name", [name for name in INNER if _room(name) in KERNELS])
+def test_kernels_know_no_files_and_pictures(name):
+    heavy = {target.split(".")[0] for target in _imports(MODULES[name])}
+    assert not heavy & {"h5py", "matplotlib", "rich", "pydantic", "argparse", "tomllib"}
+
+
+def test_no_compiled_function_calls_lapack():
+    """Batches of them can wait for ever for their own threads in jaxlib 0.10; see `arithmetic.elementary.solved`."""
+    calls = re.compile(r"jnp\.linalg\.(?!norm\b)|jax\.scipy\.linalg|lax\.linalg")
+    assert [path.name for path in PACKAGE.rglob("*.py") if calls.search(path.read_text("utf-8"))] == []
+
+
+def test_files_side_loads_no_jax_and_the_command_line_nothing_heavy():
+    without_jax = [name for name in INNER if name.startswith(tuple(f"{room}." for room in WITHOUT_JAX))]
+    without_jax += [name for name in WITHOUT_JAX if name in INNER]
+    code = f"""
+import importlib, sys
+import cspr_jax
+import cspr_jax.cli
+def loaded(*names):
+    return [name for name in names if name in sys.modules]
+found = loaded("jax", "h5py", "matplotlib", "pydantic", "numpy", "rich")
+try:
+    cspr_jax.cli.main(["--help"])
+except SystemExit:
+    found += loaded("jax", "h5py", "matplotlib", "pydantic", "numpy", "rich")
+for name in {without_jax!r}:
+    importlib.import_module("cspr_jax." + name)
+    found += [name for _ in loaded("jax")]
+print("found:", found)
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "found: []"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_sizes(name):
+    path = PACKAGE.joinpath(*name.split(".")) if name else PACKAGE
+    path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    assert len(path.read_text("utf-8").splitlines()) <= 400
+    for function in _functions(MODULES[name]):
+        length = function.end_lineno - function.lineno + 1
+        if ast.get_docstring(function) is not None:
+            length -= function.body[0].end_lineno - function.body[0].lineno + 1
+        assert length <= 60, function.name
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_no_assert_and_no_print(name):
+    nodes = list(ast.walk(MODULES[name]))
+    assert not [node.lineno for node in nodes if isinstance(node, ast.Assert)]
+    calls = [node for node in nodes if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)]
+    assert not [node.lineno for node in calls if node.func.id == "print"]
+
+
+def _public(tree: ast.Module) -> Iterator[tuple[ast.AST, bool]]:
+    """Public functions and classes of a module, methods with True; not the arithmetic of a class on itself."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+            yield node, False
+            if isinstance(node, ast.ClassDef):
+                methods = [n for n in node.body if isinstance(n, ast.FunctionDef) and n.name[0] != "_"]
+                yield from ((n, True) for n in methods if getattr(n.returns, "value", None) != node.name)
+
+
+def _answers(node: ast.AST) -> bool:
+    """Whether a function returns or yields a value, those inside it left out."""
+    if isinstance(node, ast.Return | ast.Yield | ast.YieldFrom):
+        return node.value is not None
+    inner = (child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.FunctionDef | ast.Lambda))
+    return any(_answers(child) for child in inner)
+
+
+def _missing_parts(function: ast.FunctionDef, is_method: bool) -> list[str]:
+    """Sections and parameters that a Google-style docstring lacks."""
+    text = ast.get_docstring(function) or ""
+    if is_method and re.fullmatch(r".*; see `\w+\.\w+`\.", text):
+        return []  # what it overrides says it
+    given = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs][is_method:]
+    missing = [arg.arg for arg in given if not re.search(rf"^Args:\n(.*\n)*? +{arg.arg}: ", text, re.M)]
+    is_property = any(ast.unparse(d).endswith("property") for d in function.decorator_list)
+    if _answers(function) and not is_property and not re.search(r"^(Returns|Yields):", text, re.M):
+        missing.append("Returns")
+    return missing
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_docstrings(name):
+    tree = MODULES[name]
+    assert ast.get_docstring(tree)
+    for node, is_method in _public(tree):
+        assert ast.get_docstring(node), node.name
+        if isinstance(node, ast.FunctionDef):
+            assert _missing_parts(node, is_method) == [], node.name
+
+
+def test_nothing_names_a_machine_or_the_shared_folder():
+    """Neither code, docs nor data hold a path of the machine they were made on."""
+    folders = ("cspr_jax", "tests", "docs", "sweeps", "benchmarks", ".ci", "results/reference")
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*") if path.is_file()]
+    files += [path for path in ROOT.iterdir() if path.suffix in ("", ".md", ".toml") and path.is_file()]
+    files = [path for path in files if path.name != ".git"]  # of a second work tree
+    assert len(files) > 50
+    pattern = re.compile(rb"(?<![\w.])/(work|tmp|root|home)/" + rb"|\.\./" + rb"shared/|shared" + rb"/notes")
+    named = [str(path) for path in files if "__pycache__" not in path.parts and pattern.search(path.read_bytes())]
+    assert named == []

@@ -1,0 +1,241 @@
+"""What the documents show works: Python, commands, sweep files, links, and the generated reference."""
+
+import importlib.util
+import re
+import shlex
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+import cspr_jax
+from cspr_jax import cli
+from cspr_jax.config.plan import PlanFile, read_plan
+from cspr_jax.config.reading import checked, read_toml
+from cspr_jax.config.robot import read_robot
+from cspr_jax.errors import ConfigError
+from cspr_jax.published import tables
+from cspr_jax.schema.map_kinds import MAP_KINDS
+from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.sweep.definition import read_sweep
+
+ROOT = Path(__file__).parents[2]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CHANGELOG.md", "results/README.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
+COLUMNS = 120
+FENCE = re.compile(r"^```([^\n`]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page: Path, *languages: str) -> list[str]:
+    """Fenced blocks of a page, in some languages."""
+    return [text for language, text in FENCE.findall(page.read_text("utf-8")) if language in languages]
+
+
+def commands(page: Path) -> list[list[str]]:
+    """The words of every `cspr` command of a page's shell blocks, comments left out."""
+    lines = [line.removeprefix("$ ") for text in blocks(page, "sh", "console", "bash") for line in text.splitlines()]
+    words = [shlex.split(line, comments=True) for line in lines]
+    return [line for line in words if line[:1] == ["cspr"]]
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """A working directory with the files that documents name, free to be written to."""
+    for name in ("sweeps", "results/reference", "docs/examples"):
+        shutil.copytree(ROOT / name, tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_fences_are_seen():
+    """Every fence opens and closes a block, so no block escapes the tests below."""
+    for page in PAGES:
+        text = page.read_text("utf-8")
+        assert len(re.findall(r"^\s*```", text, re.MULTILINE)) == 2 * len(FENCE.findall(text)), page
+    assert blocks(ROOT / "README.md", "python") and len(commands(ROOT / "docs" / "usage.md")) >= 6
+
+
+@pytest.mark.parametrize(
+    "name", ["README.md", pytest.param("docs/usage.md", marks=pytest.mark.thorough), "docs/get_started.md"]
+)
+def test_python_of_the_first_pages_runs(name, checkout, capsys):
+    namespace: dict[str, object] = {"__name__": "first"}
+    for text in blocks(ROOT / name, "python"):
+        exec(compile(text, name, "exec"), namespace)
+    assert capsys.readouterr().out.strip()
+
+
+@pytest.mark.thorough
+def test_the_page_of_python_runs(checkout, capsys, small_bench):
+    """One block after another; a block of text under one is what it prints."""
+    page = ROOT / "docs" / "python.md"
+    shown = FENCE.findall(page.read_text("utf-8"))
+    namespace: dict[str, object] = {"__name__": "python"}
+    assert len(blocks(page, "python")) >= 8
+    for i, (language, text) in enumerate(shown):
+        if language == "python":
+            exec(compile(text, page.name, "exec"), namespace)
+            printed = capsys.readouterr().out
+            following = shown[i + 1] if i + 1 < len(shown) else ("", "")
+            assert printed == (following[1] if following[0] == "text" else ""), text
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_of_the_documents_parse(page, checkout):
+    for words in commands(page):
+        options = cli._parser().parse_args(words[1:])
+        named = getattr(options, "sweep", None) or getattr(options, "plan", None)
+        if named is not None:
+            assert (ROOT / named).is_file(), words
+        if words[1] == "table" and options.name:
+            assert options.name in tables.TABLES
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_sweeps_of_the_documents_are_read(page, checkout):
+    for text in blocks(page, "toml"):
+        path = checkout / "shown.toml"
+        path.write_text(text, "utf-8")
+        if "map" in read_toml(path):
+            assert read_sweep(path).grid.size > 0
+
+
+def test_the_first_robot_and_plan(checkout, capsys):
+    """They are shown as they are, and what the page shows of them is what the program prints."""
+    page = ROOT / "docs" / "first_robot.md"
+    files = [checkout / "docs" / "examples" / name for name in ("hall.toml", "hall_plan.toml")]
+    assert blocks(page, "toml") == [path.read_text("utf-8") for path in files]
+    assert read_robot(files[0]).z_axis == "up"
+    assert cli.main(["plan", str(files[1])]) == 0
+    printed = capsys.readouterr()
+    shown, line = blocks(page, "text")
+    assert [text.rstrip() for text in printed.out.splitlines()] == shown.splitlines() and printed.err == ""
+    namespace: dict[str, object] = {"__name__": "first_robot"}
+    for text in blocks(page, "python"):
+        exec(compile(text, page.name, "exec"), namespace)
+    assert capsys.readouterr().out.startswith("[3 1 3] [1.12")
+    files[1].write_text(files[1].read_text("utf-8").replace("tension_min = 1.0", "max_tension = 40.0"), "utf-8")
+    with pytest.raises(ConfigError) as caught:
+        read_plan(files[1].read_text(), files[1])
+    assert line == f"cspr: {str(caught.value).replace(str(files[1]), 'hall_plan.toml')}\n"
+
+
+def test_sources_are_named_as_what_they_are():
+    texts = [
+        path for folder in ("cspr_jax", "docs", "sweeps", "tests", "benchmarks") for path in (ROOT / folder).rglob("*")
+    ]
+    texts = [path for path in [*texts, *PAGES] if path.suffix in (".md", ".py", ".toml")]
+    word = re.compile("the " + "seeds")
+    assert [str(path) for path in texts if word.search(path.read_text("utf-8").lower())] == []
+
+
+def test_files_in_sweeps_are_read():
+    for path in sorted((ROOT / "sweeps").rglob("*.toml")):
+        if "pose" in read_toml(path):
+            assert len(checked(PlanFile, read_toml(path), path).pose) > 1
+        else:
+            assert read_sweep(path).grid.size > 0
+
+
+def script(name: str):
+    """A program of docs, as a module."""
+    sys.path.insert(0, str(ROOT / "docs"))  # some of them import others
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.pop(0)
+    return module
+
+
+@pytest.mark.parametrize("name", ["command_line", "api"])
+def test_pages_of_commands_and_functions_are_generated(name):
+    text = (ROOT / "docs" / f"{name}.md").read_text("utf-8")
+    assert script(f"generate_{name}").page_text() == text, "call `make docs`"
+    wanted = {"command_line": [f"## cspr {row.name}\n" for row in cli.COMMANDS], "api": cspr_jax.__all__}
+    assert all(one in text for one in wanted[name])
+
+
+def test_every_kind_of_map_has_its_page():
+    maps = script("generate_maps")
+    assert set(maps.PAGES) == set(MAP_KINDS) == {path.stem for path in (ROOT / "docs" / "maps").iterdir()}
+    for name in MAP_KINDS:
+        text = maps.page_text(name)
+        assert text == (ROOT / "docs" / "maps" / f"{name}.md").read_text("utf-8"), "call `make docs`"
+        assert f'map = "{name}"' in text
+
+
+@pytest.mark.parametrize("name", ["2.1", "4.1"])
+def test_the_page_of_accuracy_shows_what_is_computed(name):
+    text = (ROOT / "docs" / "accuracy.md").read_text("utf-8")
+    accuracy = script("generate_accuracy")
+    assert accuracy.section(name, cspr_jax.table(name)).strip() in text
+    assert re.findall(r"^## Table (\S+)$", text, re.MULTILINE) == list(accuracy.REASONS)
+    assert set(accuracy.REASONS) == set(tables.TABLES) - {"peers"}
+
+
+def test_the_reference_is_generated():
+    text = script("generate_reference").reference_text()
+    assert text == (ROOT / "docs" / "reference.md").read_text("utf-8"), "call `make docs`"
+    wanted = [*QUANTITIES, "schema", "from_x", "cable_speed_max", "epsilon", "z_axis", "max_arcs", "samples", "tile"]
+    assert all(f"`{name}`" in text for name in wanted)
+
+
+def test_every_picture_has_its_commands():
+    """None is left of an older way to make it, and the README gives the arguments that made those it shows."""
+    images = script("make_images")
+    assert images.page_text() == (ROOT / "docs" / "images.md").read_text("utf-8"), "call `make docs`"
+    assert {path.name for path in (ROOT / "docs" / "images").iterdir()} == {f"{name}.png" for name in images.IMAGES}
+    text = "\n".join((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/usage.md"))
+    shown = re.findall(r"!\[[^]]*\]\((?:docs/)?images/(\w+)\.png\)\n\n\*(.*?)\*\n\n", text, re.DOTALL)
+    assert len(shown) >= 4
+    for name, caption in shown:
+        image = images.IMAGES[name]
+        run, plot = (shlex.split(words)[1:] for words in re.findall(r"`(cspr (?:run|plot) [^`]*)`", caption))
+        assert cli._parser().parse_args(run).sweep == Path(f"sweeps/{(image.sources or (name,))[0]}.toml")
+        drawn, wanted = cli._parser().parse_args(plot), cli._parser().parse_args(["plot", "x", *image.plot.split()])
+        assert drawn.result[0].parent == cli._parser().parse_args(run).output
+        assert {**vars(drawn), "result": 0} == {**vars(wanted), "result": 0}, name
+
+
+def long_lines(text: str) -> list[str]:
+    """Lines of prose above `COLUMNS`: without code blocks and tables, and with links counted without their targets."""
+    lines = [re.sub(r"\]\([^)\s]+\)", "]", line) for line in FENCE.sub("", text).splitlines()]
+    return [line for line in lines if len(line) > COLUMNS and not line.startswith("|")]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_prose_is_wrapped(page):
+    assert long_lines(page.read_text("utf-8")) == []
+
+
+def test_long_lines_of_prose_are_noticed():
+    long = "word " * COLUMNS
+    text = f"# Page\n\n| {long} |\n\n```sh\n{long}\n```\n\n[short]({'x' * COLUMNS})\n\n- {long}\n"
+    assert long_lines(text) == [f"- {long}"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    text = FENCE.sub("", page.read_text("utf-8"))
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if not re.match(r"[a-z]+://|mailto:", target):
+            name, _, anchor = target.partition("#")
+            path = (page.parent / name).resolve() if name else page
+            assert path.exists() and path.is_relative_to(ROOT.resolve()), target
+            if anchor:
+                heads = re.findall(r"^#+ (.*)$", path.read_text("utf-8"), re.MULTILINE)
+                slugs = [re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads]
+                assert anchor in slugs, target
+
+
+def test_what_the_readme_names_is_there():
+    names = ("README.md", "docs/usage.md", "docs/comparisons.md", "docs/limits_of_the_program.md")
+    text = "\n".join((ROOT / name).read_text("utf-8") for name in names)
+    named = re.findall(r"\b(?:tests|docs|sweeps|benchmarks)/[\w/-]+(?:\.\w+)?", text)
+    assert len(named) > 5 and all((ROOT / name).exists() for name in named)
+    assert not re.search(r"@[A-Z0-9]+@", text), "a number that was never filled in"
