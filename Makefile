@@ -11,7 +11,7 @@ WHEEL := build/wheel
 LOWEST := build/lowest
 BEGIN := tests/outputs/test_templates.py tests/config/test_reading.py tests/outputs/test_outputs.py tests/plans/test_of_cells.py tests/api/test_python.py
 
-.PHONY: demo test thorough soak check bench docs images gallery site wheel lowest clean
+.PHONY: demo test thorough soak check bench bench-record docs images gallery site wheel lowest clean
 
 demo: $(STAMP)
 	$(BIN)/cspr table 2.1
@@ -68,6 +68,11 @@ bench: $(TESTS)
 	$(BIN)/python benchmarks/attainability.py
 	$(BIN)/python benchmarks/effective_amplitude.py
 	$(BIN)/python benchmarks/store_cost.py
+
+# On an idle machine: a line of benchmarks/history.jsonl, and the page that shows all.
+bench-record: $(TESTS)
+	$(BIN)/python benchmarks/record.py
+	$(BIN)/python docs/generate_rates.py
 
 docs: $(STAMP)
 	$(BIN)/python docs/generate_reference.py

@@ -36,7 +36,7 @@ def main() -> None:
     arcs = 0.5 * (tables.MAX_ARCS + 1)
     every = motions * arcs * (PARTS * (STEPS + 1) + WITH_MARGINS[0] * (DEGREE + 1))
     done = checker.done
-    instants = done["prefilter"] + done["checks"]
+    instants = done["sieve"] + done["checks"]
     print(f"motions: {motions:,} candidates, {done['motions']:,} checked in full ({done['motions'] / motions:.2%})")
     print(f"instants: {every:,.0f} if all were, {instants:,} done ({instants / every:.2%}): {done}")
 

@@ -16,7 +16,7 @@ from cspr_jax.motions import amplitudes
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.arcs import Candidates, smallest_arcs
 from cspr_jax.platforms.beta_hat import OPTIONS
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.limits import Limits
@@ -77,7 +77,7 @@ def main() -> None:
     for name, epsilon in [*names, *(("effective-c3", e) for e in EPSILONS)]:
         begun = time.perf_counter()
         amplitude = amplitudes.named(name, epsilon)
-        found = smallest_arcs(PoseChecker(Problem(robot, Limits(), amplitude), batch=MANY), some, max_arcs=MAX_ARCS)
+        found = smallest_arcs(PlatformChecker(Problem(robot, Limits(), amplitude), batch=MANY), some, max_arcs=MAX_ARCS)
         least = np.zeros(options.segments, int)
         best = np.flatnonzero(found.arcs > 0)
         least[some.motion[best]] = found.arcs[best]

@@ -18,7 +18,7 @@ def main() -> None:
     import numpy as np
 
     jax.config.update("jax_enable_x64", True)
-    from cspr_jax.build import load_robot
+    from cspr_jax.build.robots import load_robot
     from cspr_jax.motions.amplitudes import named
     from cspr_jax.motions.problem import Problem
     from cspr_jax.robots.limits import Limits

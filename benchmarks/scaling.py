@@ -56,7 +56,7 @@ def six_cables(count: int) -> tuple[float, int]:
     given = bench.work(count)
 
     def look(batch):
-        return jax.block_until_ready(bench.tensions(given.robot, batch, rough=True))
+        return jax.block_until_ready(bench.tensions(given.robot, batch, single_precision=True))
 
     batches = bench.batches(given)
     return best(lambda: in_threads(look, batches), repeats=2), count * bench.SAMPLES

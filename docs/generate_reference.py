@@ -8,9 +8,9 @@ from pydantic import BaseModel
 from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.obstacles import ObstacleTable
-from cspr_jax.config.plan import Choice, PlanFile, Pose
+from cspr_jax.config.plan import DepthRule, PlanFile, Pose
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, Run, SweepFile, SweepTrajectory
+from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, RunTable, SweepFile, SweepTrajectory
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ExitCode
@@ -45,9 +45,9 @@ FILES = {
         ("[workspace]", WorkspaceTable),
         ("[[workspace.obstacle]]", ObstacleTable),
         ("[limits]", LimitTable),
-        ("[run]", Run),
+        ("[run]", RunTable),
     ],
-    "Plan files": [("", PlanFile), ("[[pose]]", Pose), ("z0, chosen", Choice), ("[limits]", LimitTable)],
+    "Plan files": [("", PlanFile), ("[[pose]]", Pose), ("z0, chosen", DepthRule), ("[limits]", LimitTable)],
     "Amplitude functions": [
         ("amplitude, with a parameter", NamedAmplitude),
         ("amplitude, your own", PolynomialAmplitude),

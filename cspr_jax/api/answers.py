@@ -13,7 +13,7 @@ from cspr_jax.motions.leg import each
 from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.problem import Problem
 from cspr_jax.plans.causes import Cause, causes
-from cspr_jax.platforms.answers import PoseAnswers
+from cspr_jax.platforms.answers import PlatformMotionAnswers
 from cspr_jax.swings.oscillations import OscillationAnswers
 
 
@@ -57,5 +57,5 @@ class TransitionAnswers(OscillationAnswers, _WithMotions):
 
 
 @dataclasses.dataclass(frozen=True)
-class PlatformAnswers(PoseAnswers, _WithMotions):
-    """Answers of `minimum_pose_arcs`; see `platforms.answers.PoseAnswers`."""
+class PlatformAnswers(PlatformMotionAnswers, _WithMotions):
+    """Answers of `minimum_pose_arcs`; see `platforms.answers.PlatformMotionAnswers`."""

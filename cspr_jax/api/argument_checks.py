@@ -67,7 +67,7 @@ _FLAG = kind_of("True or False", bool, np.bool_)
 _PATH = kind_of("a path", str, os.PathLike)
 _PATH_OR_NONE = kind_of("a path, or None", str, os.PathLike, none=True)
 _FILE = kind_of("the path of a file, or a dictionary of what it holds", str, os.PathLike, Mapping)
-_PLAN = ("answers", "points", "spec")  # attributes of a plan
+_PLAN = ("answers", "points", "robot_file")  # attributes of a plan
 _MOTION = ("state", "duration")
 _POSITIVE = real("a finite number > 0", (), least=0.0, above=True)
 _POSITIVE_OR_NONE = real("a finite number > 0, or None", (), least=0.0, above=True, none=True)

@@ -6,16 +6,16 @@ from typing import Any
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
-from cspr_jax.build import limits_over, prepared
+from cspr_jax.build.limits import limits_over
 from cspr_jax.config.hints import almost_at_rest
 from cspr_jax.errors import InputError
 from cspr_jax.motions.amplitudes import NAMES, Amplitude, boundary_errors, named
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.pose_targets import REFERENCE
+from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot
 from cspr_jax.robots.robot import check_determined
@@ -165,7 +165,7 @@ def quaternions(key: str, given, count: int) -> np.ndarray:
         InputError: another shape, or not of unit length.
     """
     if given is None:
-        return np.tile(REFERENCE, (count, 1))
+        return np.tile(IDENTITY, (count, 1))
     turns = np.asarray(given, float)
     if turns.shape != (count, 4) or not np.abs(np.linalg.norm(turns, axis=1) - 1.0).max() <= UNIT_TOLERANCE:
         raise InputError(key, f"shape {turns.shape}", f"({count}, 4) unit quaternions, scalar first")

@@ -13,9 +13,9 @@ from cspr_jax.beziers.durations import feasible_durations
 from cspr_jax.beziers.margins import depths_of
 from cspr_jax.beziers.motion import Bezier
 from cspr_jax.beziers.verdicts import verdicts
-from cspr_jax.build import prepared
 from cspr_jax.errors import InputError
 from cspr_jax.motions.motion import Placed
+from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
 from cspr_jax.robots.robot import check_determined

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.build import build_robot
+from cspr_jax.build.robots import build_robot
 from cspr_jax.config.formats.table import ENDINGS, Imported, format_of
 from cspr_jax.config.formats.writing import robot_text
 from cspr_jax.config.hints import robot_hints
@@ -82,9 +82,9 @@ def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobo
         raise ConfigError(file, f"must end in {', '.join(ENDINGS)}")
     if not file.is_file():
         raise ConfigError(file, f"no such file{other_case(file)}")
-    spec, found = read_foreign(file, cable_set)
-    return ImportedRobot(_built(spec, file), found.keys, tuple(robot_hints(spec)), found)
+    robot_file, found = read_foreign(file, cable_set)
+    return ImportedRobot(_built(robot_file, file), found.keys, tuple(robot_hints(robot_file)), found)
 
 
-def _built(spec: RobotFile, file: Path) -> PointMassRobot | PlatformRobot:
-    return build_robot(spec, TrajectoryKeys(), file)
+def _built(robot_file: RobotFile, file: Path) -> PointMassRobot | PlatformRobot:
+    return build_robot(robot_file, TrajectoryKeys(), file)

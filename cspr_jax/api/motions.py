@@ -14,19 +14,18 @@ from jax import Array
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import amplitude_of, kernel_problem, warn_of_rest
 from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.build import prepared
+from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.errors import InputError
 from cspr_jax.motions import slacks as motion_slacks
 from cspr_jax.motions.amplitudes import Amplitude, named
 from cspr_jax.motions.motion import Motion, Placed, inward
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.platform_segment import PlatformMotion, pose_segment
-from cspr_jax.platforms.pose_targets import REFERENCE
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
@@ -124,7 +123,7 @@ def platform_motion(
     *,
     z0,
     arcs,
-    orientations=(REFERENCE, REFERENCE),
+    orientations=(IDENTITY, IDENTITY),
     beta_hat=(AT_REST, AT_REST),
     amplitude: str | Amplitude = "quintic",
     variable: bool = True,
@@ -155,7 +154,7 @@ def platform_motion(
     beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
     first, last = zip(places, turns, strict=True)
     geometry = pose_segment(own, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
-    return Placed(PlatformMotion(geometry, function, p, Kind(variable)), frame)
+    return Placed(PlatformMotion(geometry, function, p, PlatformMotionKind(variable)), frame)
 
 
 @checked

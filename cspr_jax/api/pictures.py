@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs.plots.draw import drawn
-from cspr_jax.outputs.plots.kept import with_plan
+from cspr_jax.outputs.plots.motion_source import with_plan
 from cspr_jax.outputs.plots.selection import result_at
 from cspr_jax.outputs.plots.style import Style, in_style, laid_out, rendered, style_of
 from cspr_jax.runtime.stages import stage

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.given import plain, text_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.beziers.landings import LaunchErrors, Scatter
 from cspr_jax.beziers.launch_outcome import scattered
+from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import motion_files, plan_report
@@ -30,8 +30,8 @@ NAME = Path("plan")
 
 
 @dataclasses.dataclass(frozen=True)
-class Plan(planning.Plan):
-    """A planned sequence, and what can be had of it; see `cspr_jax.plans.planning.Plan` for its fields."""
+class Plan(planning.PlannedMotions):
+    """A planned sequence, and what can be had of it; see `cspr_jax.plans.planning.PlannedMotions` for its fields."""
 
     @checked
     def rows(self, rate: float | None = None) -> dict[str, np.ndarray]:
@@ -126,12 +126,12 @@ class Plan(planning.Plan):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
         if not np.isfinite(length):
             raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
-        title = f"{self.spec.name}: {length:.4g} s" + ("" if self.feasible else ", NOT PROVED FEASIBLE")
+        title = f"{self.robot_file.name}: {length:.4g} s" + ("" if self.feasible else ", NOT PROVED FEASIBLE")
         try:
             with double_precision():
                 columns = motion_files.rows(self, rate=max(2.0 * RATES[0], 400.0 / length))
             with in_style(Style()):
-                data = film(path.suffix, title, columns, self.spec, self.keys, speed)
+                data = film(path.suffix, title, columns, self.robot_file, self.keys, speed)
         except InputError as error:
             raise ConfigError(path, str(error)) from error
         publish(Disk(), path, data)

@@ -13,14 +13,14 @@ from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.motion import Placed
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.accessible import DEFINITIONS, Accessible
 from cspr_jax.platforms.accessible import accessible as search_accessible
-from cspr_jax.platforms.answers import PoseAnswers
+from cspr_jax.platforms.answers import PlatformMotionAnswers
 from cspr_jax.platforms.arcs import Candidates, segments_with
 from cspr_jax.platforms.attainable import attainable as search_attainable
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.platforms.platform_segment import PlatformMotion
@@ -73,7 +73,7 @@ def minimum_pose_arcs(  # noqa: PLR0913
         problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",))
         for each in np.unique(depth):
             reference_pose(problem.robot, float(each))
-        checker = PoseChecker(problem, Kind(variable, from_rest=start is None), batch=MANY)
+        checker = PlatformChecker(problem, PlatformMotionKind(variable, from_rest=start is None), batch=MANY)
         ends = (frame.inward(places), frame.turned_quaternions(turns))
         if start is None:
             first, beta_hats = rest_poses(depth), np.full(len(depth), AT_REST)
@@ -85,12 +85,12 @@ def minimum_pose_arcs(  # noqa: PLR0913
         trial = Candidates(first, ends, depth, np.arange(len(depth)), (beta_hats, beta_hats))
         value = float(beta_hat) if isinstance(beta_hat, int) else beta_hat
         answers = pose_arcs(checker, trial, beta_hat=value, max_arcs=max_arcs)
-    make = partial(_motions, problem, frame, trial, Kind(variable))
+    make = partial(_motions, problem, frame, trial, PlatformMotionKind(variable))
     return PlatformAnswers(**vars(answers), make=make, problem=problem)
 
 
 def _motions(
-    problem: Problem, frame: Frame, trial: Candidates, kind: Kind, answers: PoseAnswers
+    problem: Problem, frame: Frame, trial: Candidates, kind: PlatformMotionKind, answers: PlatformMotionAnswers
 ) -> Placed[PlatformMotion]:
     chosen = trial._replace(beta_hats=tuple(answers.beta_hat.T))
     segments = segments_with(problem.robot, chosen, answers.tried_arcs)
@@ -132,7 +132,7 @@ def attainable(
     amplitude: str | Amplitude = "quintic",
     limits: Limits | None = None,
     max_arcs: int = 30,
-) -> tuple[Accessible, PoseAnswers]:
+) -> tuple[Accessible, PlatformMotionAnswers]:
     """Which accessible orientations of a place a motion from rest attains, section 3.12.3.
 
     Args:
@@ -157,7 +157,7 @@ def attainable(
         count = len(inside.angles)
         if not count:
             raise InputError("place", np.asarray(place).tolist(), "a place where some orientation is accessible")
-        checker = PoseChecker(problem, Kind(from_rest=True), batch=MANY)
+        checker = PlatformChecker(problem, PlatformMotionKind(from_rest=True), batch=MANY)
         depth = depths(where[2] if z0 is None else z0, count)
         places = np.tile(where, (count, 1))
         return inside, search_attainable(checker, places, inside.angles, depth, max_arcs=max_arcs)

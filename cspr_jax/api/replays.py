@@ -19,8 +19,8 @@ from cspr_jax.outputs.plots.style import style_of
 
 
 @dataclasses.dataclass(frozen=True)
-class Replay(replays.Replay):
-    """A plan beside what MuJoCo makes of it; see `cspr_jax.outputs.replay.Replay` for its fields."""
+class Replay(replays.PlayedPlan):
+    """A plan beside what MuJoCo makes of it; see `cspr_jax.outputs.replay.PlayedPlan` for its fields."""
 
     @checked
     def plot(

@@ -14,14 +14,14 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import motion_files
 from cspr_jax.outputs.plots.fitting import shortened
-from cspr_jax.outputs.plots.kept import keeps_plan, kept, with_plan
 from cspr_jax.outputs.plots.labels import heading, robot_name, value
+from cspr_jax.outputs.plots.motion_source import keeps_plan, kept, with_plan
 from cspr_jax.outputs.plots.pages.maps import map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import MOST_ROWS, motion_content
 from cspr_jax.outputs.plots.pages.page import page_of
 from cspr_jax.outputs.plots.pages.telling import telling
 from cspr_jax.outputs.plots.selection import nearest, result_at
-from cspr_jax.plans.of_cells import cell_plan
+from cspr_jax.plans.cell_plan import cell_plan
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.disk import Disk
@@ -105,11 +105,11 @@ def _loaded(given: str | Path | Result | Plan) -> Result | Plan:
 
 def _of_motion(given: Result | Plan, name: str) -> tuple[str, dict[str, Any], list[str]]:
     if isinstance(given, Plan):
-        robot, content, feasible = shortened(given.spec.name), _planned(given, "motion"), given.feasible
+        robot, content, feasible = shortened(given.robot_file.name), _planned(given, "motion"), given.feasible
     else:
-        spec, keys = kept(given, name, "report") if keeps_plan(given) else (None, None)
+        robot_file, keys = kept(given, name, "report") if keeps_plan(given) else (None, None)
         robot, columns = robot_name(given), given.axes | given.data
-        content = motion_content("motion", columns, given.data, spec, keys)
+        content = motion_content("motion", columns, given.data, robot_file, keys)
         feasible = bool(given.attributes.get("feasible", 1))
     doubt = "" if feasible else "not proved feasible"
     page: dict[str, Any] = {
@@ -127,7 +127,7 @@ def _planned(planned: Plan, title: str) -> dict[str, Any]:
         length = float(np.sum(planned.answers.duration))
         columns = motion_files.rows(planned, rate=min(RATE, MOST_ROWS / length))
         more = motion_files.flight(planned)
-        return motion_content(title, columns | more, motion_files.segments(planned), planned.spec, planned.keys)
+        return motion_content(title, columns | more, motion_files.segments(planned), planned.robot_file, planned.keys)
 
 
 def _of_map(

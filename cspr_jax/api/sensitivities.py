@@ -8,8 +8,8 @@ import numpy as np
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.build import centred
 from cspr_jax.errors import InputError
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PLANAR, PointMassRobot
 from cspr_jax.workspaces.sensitivities import SensitivitySearch

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.given import plain, text_of
 from cspr_jax.config.hints import robot_hints, sweep_hints
+from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.errors import ConfigError
 from cspr_jax.runtime.processes import check_count
 from cspr_jax.schema import labelled

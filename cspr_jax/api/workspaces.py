@@ -6,15 +6,16 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.build import centred, limits_over
+from cspr_jax.build.limits import limits_over
 from cspr_jax.errors import InputError
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.given_numbers import numbers
 from cspr_jax.workspaces.geometry import mass_centres
-from cspr_jax.workspaces.questions import CONDITIONS, FEASIBLE, check_cables, question, required_wrenches
+from cspr_jax.workspaces.questions import CONDITIONS, FEASIBLE, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceAnswers, WorkspaceSearch
 
 __all__ = ["WorkspaceAnswers", "workspace"]
@@ -90,7 +91,7 @@ def workspace(  # noqa: PLR0913
             own, frame, points=wrenches, box=wrench_box, ellipsoid=wrench_ellipsoid, acceleration=acceleration
         )
         inner, turns = _poses(own, frame, places, orientations)
-        posed = question(own, condition, limits, loads, capacity_length)
+        posed = requirement(own, condition, limits, loads, capacity_length)
         return WorkspaceSearch(own, posed, precision=precision)(inner, turns)
 
 

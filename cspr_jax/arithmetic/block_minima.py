@@ -25,7 +25,7 @@ class Proved(NamedTuple):
     bound: np.ndarray
 
 
-class Blocks(NamedTuple):
+class MinimumBlocks(NamedTuple):
     """Parts of the intervals.
 
     Fields:
@@ -40,7 +40,7 @@ class Blocks(NamedTuple):
     start: np.ndarray
     width: np.ndarray
 
-    def some(self, which) -> "Blocks":
+    def some(self, which) -> "MinimumBlocks":
         """Some of the blocks.
 
         Args:
@@ -49,9 +49,9 @@ class Blocks(NamedTuple):
         Returns:
             these.
         """
-        return Blocks(*(x[which] for x in self))
+        return MinimumBlocks(*(x[which] for x in self))
 
-    def halved(self) -> "Blocks":
+    def halved(self) -> "MinimumBlocks":
         """Both halves of each block.
 
         Returns:
@@ -59,13 +59,13 @@ class Blocks(NamedTuple):
         """
         half = 0.5 * self.width
         left, right = (self.case, self.piece, self.start, half), (self.case, self.piece, self.start + half, half)
-        return Blocks(*(np.concatenate(pair) for pair in zip(left, right, strict=True)))
+        return MinimumBlocks(*(np.concatenate(pair) for pair in zip(left, right, strict=True)))
 
 
 def smallest(
-    blocks: Blocks,
+    blocks: MinimumBlocks,
     count: int,
-    values: Callable[[Blocks], tuple[np.ndarray, np.ndarray]],
+    values: Callable[[MinimumBlocks], tuple[np.ndarray, np.ndarray]],
     scales: np.ndarray,
     *,
     size: int,
@@ -99,7 +99,7 @@ def smallest(
     return Proved(best, done)
 
 
-def _of(values, blocks: Blocks, size: int) -> tuple[np.ndarray, np.ndarray]:
+def _of(values, blocks: MinimumBlocks, size: int) -> tuple[np.ndarray, np.ndarray]:
     parts = [values(blocks.some(slice(i, i + size))) for i in range(0, len(blocks.case), size)]
     low, attained = (np.concatenate(x) for x in zip(*parts, strict=True))
     return low, attained

@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+# Unit quaternion of no rotation, scalar first.
+IDENTITY = (1.0, 0.0, 0.0, 0.0)
 # A z-up file is turned by half a turn about x: a rotation, so that nothing is mirrored.
 _TURN = {"down": (1.0, 1.0, 1.0), "up": (1.0, -1.0, -1.0)}
 

@@ -28,9 +28,9 @@ def bench(kernels: Path | None = None) -> dict[str, Any]:
     by_hand = None if kernels is None else hand_written.compiled(kernels)
     six, three = six_cables.work(room(six_cables.TRAJECTORIES)), three_cables.work()
     batches = six_cables.batches(six)
-    rough, exact = (six_cables.rate(six.robot, batches, rough=is_rough) for is_rough in (True, False))
+    single, exact = (six_cables.rate(six.robot, batches, single_precision=is_single) for is_single in (True, False))
     rates = {
-        "six_cable": {"float32": rough[0], "float64": exact[0], "numpy": six_cables.numpy_rate(six)},
+        "six_cable": {"float32": single[0], "float64": exact[0], "numpy": six_cables.numpy_rate(six)},
         "three_cable": {dtype: three_cables.rate(three, dtype) for dtype in ("float32", "float64")}
         | {"numpy": three_cables.numpy_rate(three)},
     }
@@ -39,7 +39,7 @@ def bench(kernels: Path | None = None) -> dict[str, Any]:
         "schema": SCHEMA,
         "checks_per_second": rates["six_cable"],
         "three_cable": rates["three_cable"],
-        "taut_share": {"float32": rough[1], "float64": exact[1]},
+        "taut_share": {"float32": single[1], "float64": exact[1]},
         "operations_per_check": six_cables.operations_a_check(six.robot, batches[0]),
         "peak_per_second": timing.peak(),
         "hand_written": written,

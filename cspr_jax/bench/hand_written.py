@@ -62,7 +62,7 @@ def compiled(folder: Path) -> Kernels:
     return Kernels(_compiled(folder / "six_cables.cpp"), _compiled(folder / "three_cables.cpp"))
 
 
-def rates(kernels: Kernels, six: six_cables.Work, three: three_cables.Work) -> dict[str, float]:
+def rates(kernels: Kernels, six: six_cables.SixCableWork, three: three_cables.ThreeCableWork) -> dict[str, float]:
     """Checks a second of both kernels, on all cores; what they find is compared with the package's.
 
     Args:
@@ -114,7 +114,7 @@ def _pointers(*arrays: np.ndarray) -> list[ctypes.c_void_p]:
     return [array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
 
 
-def _three_cables(kernel: Callable, work: three_cables.Work) -> float:
+def _three_cables(kernel: Callable, work: three_cables.ThreeCableWork) -> float:
     tau = (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
     calls, kept = [], []
     for first, segments in ((0, work.segments[1]), (1, work.segments[0])):
@@ -133,7 +133,7 @@ def _three_cables(kernel: Callable, work: three_cables.Work) -> float:
     return three_cables.checks(len(work.ends)) / best(lambda: [call() for call in calls])
 
 
-def _six_cables(kernel: Callable, work: six_cables.Work) -> float:
+def _six_cables(kernel: Callable, work: six_cables.SixCableWork) -> float:
     robot, tau = work.robot, np.linspace(0.0, 1.0, six_cables.SAMPLES)
     corners = sorted(set(robot.joints))
     points = np.asarray(robot.platform_points)[corners]
@@ -152,7 +152,7 @@ def _six_cables(kernel: Callable, work: six_cables.Work) -> float:
         calls.append(partial(kernel, *_pointers(*given, *constants, joint), *numbers, *sizes, *_pointers(out)))
         kept.append((given, out))
         count += batch.real
-        wanted = six_cables.tensions(robot, batch, rough=False) * float(batch.segments.rate[0]) / 6.0
+        wanted = six_cables.tensions(robot, batch, single_precision=False) * float(batch.segments.rate[0]) / 6.0
         _compare("six_cables.cpp", out, calls[-1], wanted)
     return count * six_cables.SAMPLES / best(lambda: [call() for call in calls])
 

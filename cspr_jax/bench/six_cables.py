@@ -14,11 +14,12 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches, in_threads, padded, room
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.bench.timing import best, operations
-from cspr_jax.build import load_robot
+from cspr_jax.build.robots import load_robot
 from cspr_jax.motions import amplitudes
-from cspr_jax.motions.platform_kind import Kind
-from cspr_jax.platforms.platform_segment import PoseSegment, pose_segment
+from cspr_jax.motions.platform_kind import PlatformMotionKind
+from cspr_jax.platforms.platform_segment import PlatformSegment, pose_segment
 from cspr_jax.platforms.sieve import smallest_tensions
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point
@@ -28,10 +29,10 @@ TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
 NUMPY_TRAJECTORIES = 128
 FEWEST_ARCS, MOST_ARCS = 4, 15
 PLACE = (1.5 * 0.86, 0.0, 1.7)
-FROM_REST, QUINTIC = Kind(from_rest=True), amplitudes.named("quintic")
+FROM_REST, QUINTIC = PlatformMotionKind(from_rest=True), amplitudes.named("quintic")
 
 
-class Work(NamedTuple):
+class SixCableWork(NamedTuple):
     """Transitions from rest, all to `PLACE`.
 
     Fields:
@@ -49,7 +50,7 @@ class Work(NamedTuple):
     beta_hat: np.ndarray
 
 
-def work(count: int) -> Work:
+def work(count: int) -> SixCableWork:
     """Random transitions.
 
     Args:
@@ -63,7 +64,7 @@ def work(count: int) -> Work:
     axis /= np.linalg.norm(axis, axis=0)
     angle, arcs = rng.uniform(0.0, 2.0, count), rng.integers(FEWEST_ARCS, MOST_ARCS + 1, count)
     robot = cast(PlatformRobot, load_robot("laval-mssm"))
-    return Work(aligned(robot)[0], axis.T, angle, arcs, rng.uniform(-15.0, 0.0, count))
+    return SixCableWork(aligned(robot)[0], axis.T, angle, arcs, rng.uniform(-15.0, 0.0, count))
 
 
 class Batch(NamedTuple):
@@ -77,10 +78,10 @@ class Batch(NamedTuple):
 
     arcs: int
     real: int
-    segments: PoseSegment
+    segments: PlatformSegment
 
 
-def batches(given: Work) -> list[Batch]:
+def batches(given: SixCableWork) -> list[Batch]:
     """The work by numbers of arcs.
 
     Args:
@@ -103,9 +104,9 @@ def batches(given: Work) -> list[Batch]:
 
 
 @jax.jit
-def _segments(robot: PlatformRobot, odd, items) -> PoseSegment:
+def _segments(robot: PlatformRobot, odd, items) -> PlatformSegment:
     depth = jnp.asarray(PLACE[2])
-    rest = jnp.stack([0.0 * depth, 0.0 * depth, depth]), jnp.array([1.0, 0.0, 0.0, 0.0])
+    rest = jnp.stack([0.0 * depth, 0.0 * depth, depth]), jnp.array(IDENTITY)
 
     def one(quaternion, beta_hat):
         return pose_segment(robot, rest, (jnp.asarray(PLACE), quaternion), depth, (beta_hat, beta_hat), odd=odd)
@@ -113,20 +114,20 @@ def _segments(robot: PlatformRobot, odd, items) -> PoseSegment:
     return jax.vmap(one)(*items)
 
 
-def rate(robot: PlatformRobot, some: list[Batch], *, rough: bool) -> tuple[float, float]:
+def rate(robot: PlatformRobot, some: list[Batch], *, single_precision: bool) -> tuple[float, float]:
     """Checks a second.
 
     Args:
         robot: the robot.
         some: batches.
-        rough: whether in float32.
+        single_precision: whether in float32.
 
     Returns:
         the rate, and the share of the trajectories whose tensions are positive at all samples.
     """
 
     def call(batch):
-        return jax.block_until_ready(tensions(robot, batch, rough=rough))
+        return jax.block_until_ready(tensions(robot, batch, single_precision=single_precision))
 
     lowest = [np.asarray(call(batch)) for batch in some]
     total = sum(batch.real for batch in some)
@@ -134,19 +135,21 @@ def rate(robot: PlatformRobot, some: list[Batch], *, rough: bool) -> tuple[float
     return total * SAMPLES / best(partial(in_threads, call, some)), taut / total
 
 
-def tensions(robot: PlatformRobot, batch: Batch, *, rough: bool) -> Array:
+def tensions(robot: PlatformRobot, batch: Batch, *, single_precision: bool) -> Array:
     """Smallest normalised tension of each trajectory.
 
     Args:
         robot: the robot.
         batch: of segments.
-        rough: whether in float32.
+        single_precision: whether in float32.
 
     Returns:
         (lanes,) of `platforms.sieve.smallest_tensions`.
     """
     tau, arcs = np.linspace(0.0, 1.0, SAMPLES), float(batch.arcs)
-    return smallest_tensions(robot, QUINTIC, arcs, tau, batch.segments, kind=FROM_REST, rough=rough)[0]
+    return smallest_tensions(
+        robot, QUINTIC, arcs, tau, batch.segments, kind=FROM_REST, single_precision=single_precision
+    )[0]
 
 
 def operations_a_check(robot: PlatformRobot, batch: Batch) -> float | None:
@@ -160,12 +163,12 @@ def operations_a_check(robot: PlatformRobot, batch: Batch) -> float | None:
         as XLA counts them; None where it does not.
     """
     lowered = smallest_tensions.lower(
-        robot, QUINTIC, float(batch.arcs), np.zeros(1), batch.segments, kind=FROM_REST, rough=True
+        robot, QUINTIC, float(batch.arcs), np.zeros(1), batch.segments, kind=FROM_REST, single_precision=True
     )
     return operations(lowered, len(batch.segments.rate))
 
 
-def numpy_rate(given: Work) -> float:
+def numpy_rate(given: SixCableWork) -> float:
     """Checks a second of the NumPy version.
 
     Args:
@@ -174,11 +177,11 @@ def numpy_rate(given: Work) -> float:
     Returns:
         the rate.
     """
-    some = Work(given.robot, *(x[:NUMPY_TRAJECTORIES] for x in given[1:]))
+    some = SixCableWork(given.robot, *(x[:NUMPY_TRAJECTORIES] for x in given[1:]))
     return len(some.arcs) * SAMPLES / best(partial(_numpy_checks, some))
 
 
-def _numpy_checks(given: Work) -> np.ndarray:
+def _numpy_checks(given: SixCableWork) -> np.ndarray:
     # Smallest tension per mass and length of each trajectory: (n,); -inf where the determinant changes its sign.
     tau, theta = np.linspace(0.0, 1.0, SAMPLES), math.pi * given.arcs[:, None]
     a, a1 = 10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4

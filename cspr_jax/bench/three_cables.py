@@ -28,7 +28,7 @@ RADIUS = 0.26
 START = (0.7, 0.7, 3.0)
 
 
-class Work(NamedTuple):
+class ThreeCableWork(NamedTuple):
     """Measured work.
 
     Fields:
@@ -42,7 +42,7 @@ class Work(NamedTuple):
     segments: tuple[Segment, Segment]
 
 
-def work() -> Work:
+def work() -> ThreeCableWork:
     """Segments from one point to random ones.
 
     Returns:
@@ -54,10 +54,10 @@ def work() -> Work:
     ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * room(sieve.BATCH), 3))
     starts = np.broadcast_to(START, ends.shape).copy()
     parities, _ = segments_between(problem, starts, ends, np.full(len(ends), Z0))
-    return Work(problem, ends, (parities[0], parities[1]))
+    return ThreeCableWork(problem, ends, (parities[0], parities[1]))
 
 
-def rate(given: Work, dtype: str) -> float:
+def rate(given: ThreeCableWork, dtype: str) -> float:
     """Checks a second of the sieve.
 
     Args:
@@ -88,7 +88,7 @@ def checks(count: int) -> int:
     return count * MAX_ARCS * sieve.SAMPLES
 
 
-def numpy_rate(given: Work) -> float:
+def numpy_rate(given: ThreeCableWork) -> float:
     """Checks a second of the NumPy version.
 
     Args:

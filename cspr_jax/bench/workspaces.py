@@ -9,17 +9,19 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_threads, room
 from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.bench.timing import best
-from cspr_jax.build import centred, load_robot
+from cspr_jax.build.robots import load_robot
 from cspr_jax.robots import clearance_kernels
 from cspr_jax.robots.clearance import scene
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot, platform_robot
 from cspr_jax.robots.point_mass import PointMassRobot, point_mass_robot
-from cspr_jax.robots.tension_lanes import least_norms
+from cspr_jax.robots.tension_distribution_lanes import least_norms
 from cspr_jax.robots.tension_programs import by_program, by_squares
 from cspr_jax.workspaces import geometry
-from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, question
+from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
 # Batches of poses; of twelve cables fewer.
@@ -28,7 +30,7 @@ BATCHES, FEW_BATCHES = 16, 4
 PAIRS_BATCH, TENSIONS, SAMPLE = 65_536, 65_536, 100
 
 
-class Poses(NamedTuple):
+class SamplePoses(NamedTuple):
     """Random poses among the spools, as lanes.
 
     Fields:
@@ -40,17 +42,17 @@ class Poses(NamedTuple):
     turn: tuple[np.ndarray, ...] | None
 
 
-def _poses(robot: PointMassRobot | PlatformRobot, count: int, dtype: str) -> Poses:
+def _poses(robot: PointMassRobot | PlatformRobot, count: int, dtype: str) -> SamplePoses:
     rng, base = np.random.default_rng(0), np.asarray(robot.base_points)
     half = np.maximum(0.4 * np.ptp(base, axis=0), 0.5)
-    turns = np.array([1.0, 0.0, 0.0, 0.0]) + 0.1 * rng.normal(size=(count, 4))
+    turns = np.array(IDENTITY) + 0.1 * rng.normal(size=(count, 4))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
 
     def lanes(array):
         return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
     place = lanes(half * rng.uniform(-1.0, 1.0, (count, 3)))
-    return Poses(place, lanes(turns) if isinstance(robot, PlatformRobot) else None)
+    return SamplePoses(place, lanes(turns) if isinstance(robot, PlatformRobot) else None)
 
 
 def _four_cables() -> PointMassRobot:
@@ -87,7 +89,7 @@ def margin_rate(
     """
     own = centred(robot)[0]
     start = time.perf_counter()
-    search = WorkspaceSearch(own, question(own, condition, robot.limits))
+    search = WorkspaceSearch(own, requirement(own, condition, robot.limits))
     numbers = np.dtype(dtype).type
     kernel, size = search.kernel(numbers, by_null_space=by_null_space), room(search.batch(numbers))
     every = _poses(own, batches * size, dtype)
@@ -121,7 +123,7 @@ def clearance_rate(dtype: str) -> float:
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::4], every)) for i in range(4)]
 
     def one(poses):
-        given = clearance_kernels.Poses(poses.place, poses.turn, None)
+        given = clearance_kernels.PoseLanes(poses.place, poses.turn, None)
         return jax.block_until_ready(clearance_kernels.of_cables(points, given, pairs))
 
     return 4 * size / best(partial(in_threads, one, parts))
@@ -138,7 +140,7 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
     """
     count = TENSIONS
     own = centred(robot)[0]
-    search = WorkspaceSearch(own, question(own, FEASIBLE, robot.limits))
+    search = WorkspaceSearch(own, requirement(own, FEASIBLE, robot.limits))
     poses = _poses(own, count, "float64")
     places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
     matrices = np.asarray(geometry.wrench_matrices(own, places, turns)) / search.unit[:, None]
@@ -175,7 +177,7 @@ def rates() -> dict[str, Any]:
 def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
     # Poses a second of linear programs and of least squares.
     own = centred(robot)[0]
-    search = WorkspaceSearch(own, question(own, FEASIBLE, robot.limits))
+    search = WorkspaceSearch(own, requirement(own, FEASIBLE, robot.limits))
     poses = _poses(own, SAMPLE, "float64")
     places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
     matrices = np.asarray(geometry.wrench_matrices(own, places, turns)) / search.unit[:, None]

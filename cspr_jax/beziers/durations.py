@@ -11,7 +11,7 @@ from cspr_jax.beziers.duration_roots import Ends, critical_durations
 from cspr_jax.beziers.margins import smallest_margins
 from cspr_jax.beziers.motion import Bezier
 from cspr_jax.beziers.verdicts import BATCH, verdicts
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_verdicts import Verdicts
 from cspr_jax.robots.force_balance import adjugate
@@ -117,7 +117,7 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
         s; if there is none, of those tried one that keeps every cable taut and breaks the fewest limits, if there is
         one, else that with the largest margin.
     """
-    if len(intervals) and not given(problem.limits):
+    if len(intervals) and not limits_set(problem.limits):
         return float(intervals[0, 0])
 
     def judged(times: np.ndarray) -> Verdicts:
@@ -137,7 +137,9 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
     times = np.concatenate([np.geomspace(0.1, 100.0, 4 * TRIED) * unit, intervals.ravel()])
     times = times[np.isfinite(times)]
     own = judged(times)
-    return float(times[_nearest(own) if given(problem.limits) else np.argmax(np.nan_to_num(own.margin, nan=-np.inf))])
+    return float(
+        times[_nearest(own) if limits_set(problem.limits) else np.argmax(np.nan_to_num(own.margin, nan=-np.inf))]
+    )
 
 
 def _nearest(own: Verdicts) -> int:

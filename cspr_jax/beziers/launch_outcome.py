@@ -9,7 +9,7 @@ from cspr_jax.beziers.landings import LaunchErrors, Scatter, Throw, scatter
 from cspr_jax.beziers.launch import flown
 from cspr_jax.beziers.launches import Launch
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.motions.waypoints import Stops
+from cspr_jax.motions.waypoints import Waypoints
 
 # Of the distance from the target: a place of release counts as on a parabola that it misses by less.
 ON_PARABOLA = 1e-6
@@ -58,7 +58,7 @@ class Released:
         return own if self.scatter is None else own | {"scatter": self.scatter.to_dict()}
 
 
-def question_of(stops: Stops, points: np.ndarray, depth: float, gravity: float) -> Launch:
+def question_of(stops: Waypoints, points: np.ndarray, depth: float, gravity: float) -> Launch:
     """Question that the [launch] table of a plan asks.
 
     Args:
@@ -92,7 +92,9 @@ def question_of(stops: Stops, points: np.ndarray, depth: float, gravity: float) 
     return Launch(points, at, target, point, velocity, time, table.release, np.asarray(depth))
 
 
-def _flight_time(stops: Stops, point: np.ndarray, target: np.ndarray, velocity: np.ndarray, gravity: float) -> float:
+def _flight_time(
+    stops: Waypoints, point: np.ndarray, target: np.ndarray, velocity: np.ndarray, gravity: float
+) -> float:
     # Of the parabola through the target: the roots of where it is nearest to the point.
     down = 0.5 * gravity * np.array([0.0, 0.0, 1.0])
     way = target - point

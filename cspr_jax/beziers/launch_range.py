@@ -18,10 +18,10 @@ from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.beziers.launch import aimed, through
 from cspr_jax.beziers.margins import depths_of
 from cspr_jax.beziers.motion import Bezier
-from cspr_jax.beziers.release_bounds import Bounds
+from cspr_jax.beziers.release_bounds import ReleaseBounds
 from cspr_jax.beziers.sequences import margins_of
 from cspr_jax.beziers.verdicts import BATCH, verdicts
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.schema.labelled import Columns
@@ -34,7 +34,7 @@ EXACT, SAMPLED, SAMPLES = (1e-6,), (1e-3, 1e-2), 33
 TOGETHER = 512
 
 
-class Question(NamedTuple):
+class LaunchRequirement(NamedTuple):
     """Questions of n landing places, in the kernels' coordinates.
 
     Fields:
@@ -116,7 +116,7 @@ class LaunchRange(Columns):
         return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)
 
 
-def _shot(known: tuple[Problem, Bounds], question: Question, x: Array) -> Shot:
+def _shot(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> Shot:
     problem, bounds = known
     own = bounds.low + (bounds.high - bounds.low) * x
     position, (flight, duration), share = own[:3], jnp.exp(own[3:5]), own[5]
@@ -125,7 +125,7 @@ def _shot(known: tuple[Problem, Bounds], question: Question, x: Array) -> Shot:
     return Shot(position, velocity, flight, share, Bezier(question.start, middle, end, duration, question.z0))
 
 
-def _energy(known: tuple[Problem, Bounds], question: Question, x: Array) -> tuple[Array, Array]:
+def _energy(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> tuple[Array, Array]:
     # Kinetic energy at the release over weight and size of the robot, and the smallest margin.
     robot, shot = known[0].robot, _shot(known, question, x)
     margins = margins_of(known[0], jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], shot.motion), SAMPLES)
@@ -133,12 +133,12 @@ def _energy(known: tuple[Problem, Bounds], question: Question, x: Array) -> tupl
 
 
 @jax.jit
-def _shots(known: tuple[Problem, Bounds], cases: tuple[Question, Array]) -> Shot:
+def _shots(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, Array]) -> Shot:
     return jax.vmap(lambda question, x: _shot(known, question, x))(*cases)
 
 
 def launch_range(
-    problem: Problem, starts: np.ndarray, targets: np.ndarray, bounds: Bounds, population: int = POPULATION
+    problem: Problem, starts: np.ndarray, targets: np.ndarray, bounds: ReleaseBounds, population: int = POPULATION
 ) -> LaunchRange:
     """Launches of least speed, and the largest margins, to landing places.
 
@@ -152,15 +152,15 @@ def launch_range(
     Returns:
         the launches, each the best of a search: those found are proved, that there is no other or no slower one is not.
     """
-    question = Question(starts, targets, depths_of(problem.robot, starts))
-    asked = (np.inf, *(SAMPLED if given(problem.limits) else EXACT))
+    question = LaunchRequirement(starts, targets, depths_of(problem.robot, starts))
+    asked = (np.inf, *(SAMPLED if limits_set(problem.limits) else EXACT))
     places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, asked=asked, population=population)
     parts = [slice(i, i + TOGETHER) for i in range(0, len(starts), TOGETHER)]
     own = [_answers((problem, bounds), jax.tree.map(lambda x, s=some: x[s], (question, places))) for some in parts]
     return LaunchRange(**{name: np.concatenate([vars(part)[name] for part in own]) for name in vars(own[0])})
 
 
-def _answers(known: tuple[Problem, Bounds], cases: tuple[Question, np.ndarray]) -> LaunchRange:
+def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, np.ndarray]) -> LaunchRange:
     # Of every place and margin asked for one candidate, in one row: the margins change fastest.
     count, tracks, _ = cases[1].shape
     question = jax.tree.map(lambda x: np.repeat(x, tracks, axis=0), cases[0])

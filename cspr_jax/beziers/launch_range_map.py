@@ -20,9 +20,9 @@ _OF_LAUNCHES = ("duration", "release_time", "flight_time", "release_x", "release
 class LaunchRangeMap(FromPlacesMap):
     """The launch of least speed to each landing place; see `GridMap`."""
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse bounds that leave no release."""
-        super().__init__(spec, keys, file)
+        super().__init__(robot_file, keys, file)
         own = self._search = keys.launch or LaunchSearch()
         try:
             ranges = (own.release_x, own.release_y, own.release_z)

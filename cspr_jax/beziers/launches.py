@@ -44,7 +44,7 @@ class Launch(NamedTuple):
     z0: Any
 
 
-class Found(NamedTuple):
+class LaunchSequence(NamedTuple):
     """A launch and its sequence.
 
     Fields:
@@ -65,7 +65,7 @@ class Found(NamedTuple):
 
 
 @jax.jit
-def _found(arguments: Any, x: Array) -> Found:
+def _found(arguments: Any, x: Array) -> LaunchSequence:
     # Unknowns: logarithms of the free durations, then the release, then the logarithm of the flight's time.
     problem, launch, durations, free = arguments
     times = durations.at[free].set(jnp.exp(x[: len(free)])) if len(free) else durations
@@ -79,10 +79,10 @@ def _found(arguments: Any, x: Array) -> Found:
         position, velocity = launch.point, aimed(launch.point, launch.target, gravity, time)
     middle, end = through(launch.points[at], position, velocity, share, times[at])
     sequence = Anchored(launch.points.at[at + 1].set(end), at, middle, launch.z0)
-    return Found(sequence, times, share * times[at], time, position, velocity)
+    return LaunchSequence(sequence, times, share * times[at], time, position, velocity)
 
 
-def _margins(problem: Problem, found: Found) -> Array:
+def _margins(problem: Problem, found: LaunchSequence) -> Array:
     share = found.release / found.durations[found.sequence.segment]
     own = margins_of(problem, segments_of(found.sequence, found.durations))
     return jnp.append(own, jnp.minimum(share, 1.0 - share))
@@ -105,7 +105,7 @@ def _landing(arguments, x: Array) -> tuple[Array, Array]:
     return before + found.release + found.time, _margins(arguments[0], found)
 
 
-def launched(problem: Problem, launch: Launch, durations: list[float | None], choose: str | None) -> Found:
+def launched(problem: Problem, launch: Launch, durations: list[float | None], choose: str | None) -> LaunchSequence:
     """The launch, with everything that is left open chosen.
 
     Args:
@@ -129,7 +129,7 @@ def launched(problem: Problem, launch: Launch, durations: list[float | None], ch
     return _searched(problem, launch, durations, _total)
 
 
-def _searched(problem: Problem, launch: Launch, durations: list[float | None], parts) -> Found:
+def _searched(problem: Problem, launch: Launch, durations: list[float | None], parts) -> LaunchSequence:
     known = jnp.asarray([1.0 if time is None else time for time in durations])
     free = np.array([i for i, time in enumerate(durations) if time is None], int)
     arguments: Any = (problem, launch, known, free)

@@ -18,7 +18,7 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg, each
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Stops
+from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.robots.point_mass import AT_P0, spool_radius
 
 # Accelerations that count as none, over gravity.
@@ -37,7 +37,7 @@ class _Chosen(NamedTuple):
 class Beziers(Leg):
     """Any places, joined by Bezier segments; see `Leg`."""
 
-    def __init__(self, stops: Stops) -> None:
+    def __init__(self, stops: Waypoints) -> None:
         """Refuse numbers of arcs, of which a segment has none."""
         super().__init__(stops)
         for i, pose in enumerate(stops.poses[1:], start=1):

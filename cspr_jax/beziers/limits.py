@@ -12,11 +12,11 @@ from typing import Any
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.block_minima import Blocks, Proved, smallest
+from cspr_jax.arithmetic.block_minima import MinimumBlocks, Proved, smallest
 from cspr_jax.arithmetic.interval_jets import Jet, lowest
 from cspr_jax.arithmetic.polynomials import bounds, derivatives, over, product, total
 from cspr_jax.beziers.motion import Bezier, powers
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.force_balance import adjugate
 
@@ -37,12 +37,12 @@ def limit_slacks(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below:
     Returns:
         slacks without a unit, (n, n_limits); of speeds 1 - (rate / limit)^2.
     """
-    rows, tables = given(problem.limits), _tables(problem, motions, kappa, is_below)
+    rows, tables = limits_set(problem.limits), _tables(problem, motions, kappa, is_below)
     slacks = [_SLACKS[row.name](problem, getattr(problem.limits, row.name)) for row in rows]
     count = len(is_below)
-    whole = Blocks(np.arange(count), np.zeros(count, int), np.full(count, -1.0), np.full(count, 2.0))
+    whole = MinimumBlocks(np.arange(count), np.zeros(count, int), np.full(count, -1.0), np.full(count, 2.0))
 
-    def values(blocks: Blocks) -> tuple[np.ndarray, np.ndarray]:
+    def values(blocks: MinimumBlocks) -> tuple[np.ndarray, np.ndarray]:
         own = {name: over(x[blocks.case], *_wide(blocks, x.ndim)) for name, x in tables.items()}
         ends = [{name: x.sum(-1) if end else x[..., 0] for name, x in own.items()} for end in (0, 1)]
         during = {name: Jet(*map(bounds, derivatives(x, 2))) for name, x in own.items()}
@@ -55,7 +55,7 @@ def limit_slacks(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below:
     return Proved(*(np.where(unknown, -np.inf, x) for x in proved))
 
 
-def _wide(blocks: Blocks, dimensions: int) -> tuple[np.ndarray, np.ndarray]:
+def _wide(blocks: MinimumBlocks, dimensions: int) -> tuple[np.ndarray, np.ndarray]:
     shape = (-1, *[1] * (dimensions - 2))
     return blocks.start.reshape(shape), blocks.width.reshape(shape)
 

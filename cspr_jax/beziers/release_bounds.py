@@ -19,7 +19,7 @@ EARLIEST, LATEST = 0.01, 0.99
 Range = Sequence[float] | None
 
 
-class Bounds(NamedTuple):
+class ReleaseBounds(NamedTuple):
     """Bounds of the unknowns: place of the release, m, logarithms of the flight's time and of the duration, s, share.
 
     Fields:
@@ -33,7 +33,7 @@ class Bounds(NamedTuple):
 
 def bounds_of(
     problem: Problem, frame: Frame, releases: Sequence[Range] = (None, None, None), longest: float | None = None
-) -> Bounds:
+) -> ReleaseBounds:
     """Bounds of the unknowns.
 
     Args:
@@ -62,4 +62,4 @@ def bounds_of(
     if longest is not None and not np.log(longest) > short:
         raise InputError("max_duration", longest, f"above {shown(float(np.exp(short)))} s, for a robot of this size")
     last = long if longest is None else min(np.log(longest), long)
-    return Bounds(np.array([*inner[0], short, short, EARLIEST]), np.array([*inner[1], long, last, LATEST]))
+    return ReleaseBounds(np.array([*inner[0], short, short, EARLIEST]), np.array([*inner[1], long, last, LATEST]))

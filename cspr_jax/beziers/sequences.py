@@ -16,7 +16,7 @@ from cspr_jax.beziers.durations import slowest
 from cspr_jax.beziers.margins import smallest_margins
 from cspr_jax.beziers.motion import Bezier
 from cspr_jax.beziers.verdicts import verdicts
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.slacks import slacks
 from cspr_jax.robots.point_mass import spool_radius
@@ -79,7 +79,7 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
     def one(motion):
         own = smallest_margins(problem.robot, motion)
         found = jnp.append(own.taut, own.below)
-        if not given(problem.limits):
+        if not limits_set(problem.limits):
             return found
         tau = jnp.linspace(0.0, 1.0, samples)
         limits = jax.vmap(lambda t: slacks(problem, motion, t)[len(found) :])(tau)

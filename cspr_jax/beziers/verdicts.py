@@ -9,7 +9,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.beziers.limits import limit_slacks
 from cspr_jax.beziers.margins import cubics, smallest_margins
 from cspr_jax.beziers.motion import Bezier
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_verdicts import Verdicts, plain_slack
 from cspr_jax.robots.force_balance import pseudotensions
@@ -54,7 +54,7 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
     bound, room = slack - doubt, np.full(len(slack), np.inf)
     broken = np.bitwise_or.reduce(np.where(slack < -doubt, flags, 0), axis=1)
     is_open = ~(bound > 0.0).all(1)
-    rows = given(problem.limits)
+    rows = limits_set(problem.limits)
     finite = np.isfinite(slack).all(1)
     if rows:
         kappa = in_batches(partial(_pseudotensions, problem.robot), motions, size=size)

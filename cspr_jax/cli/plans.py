@@ -81,7 +81,7 @@ def _planned(options: argparse.Namespace) -> Any:
         from cspr_jax.api import plans
 
         plan = plans.plan(options.plan)
-    hints = robot_hints(plan.spec) + ([] if plan.feasible else plan_hints(plan.keys, plan.spec))
+    hints = robot_hints(plan.robot_file) + ([] if plan.feasible else plan_hints(plan.keys, plan.robot_file))
     for line in [*plan.warnings, *(f"hint: {line}" for line in hints)]:
         warn(line)
     return plan

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
-# Why a robot of the catalogue cannot hang still with every cable taut, as `build.fault_at_rest` finds it, which takes
-# seconds; a test compares them. Robots that are not here can.
+# Why a robot of the catalogue cannot hang still with every cable taut. `build.robots.fault_at_rest` finds it, which
+# takes seconds; a test compares them. Robots that are not here can.
 FAULTS: dict[str, str] = {}
 
 

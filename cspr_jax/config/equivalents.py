@@ -8,39 +8,39 @@ from cspr_jax.errors import InputError
 PLATFORM = "3R3T"
 
 
-def as_moved(spec: RobotFile, patterns: Iterable[Collection[str]]) -> RobotFile:
+def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> RobotFile:
     """The robot as trajectory families, or a kind of map, move it.
 
     Args:
-        spec: the robot of a file.
+        robot_file: the robot of a file.
         patterns: for each of them, patterns of motion of the robots that it moves.
 
     Returns:
         a platform's equivalent, if it says that it only translates, or if some of them move no platforms and it has
         one; else the robot itself.
     """
-    if not spec.is_platform:
-        return spec
-    if not spec.translation_only and all(PLATFORM in some for some in patterns):
-        return spec
+    if not robot_file.is_platform:
+        return robot_file
+    if not robot_file.translation_only and all(PLATFORM in some for some in patterns):
+        return robot_file
     try:
-        return spec.equivalent()
+        return robot_file.equivalent()
     except InputError:  # who refuses the platform adds `no_equivalent`
-        return spec
+        return robot_file
 
 
-def no_equivalent(spec: RobotFile) -> str:
+def no_equivalent(robot_file: RobotFile) -> str:
     """Why a platform is not moved as a point mass, to go on with in a line that refuses it.
 
     Args:
-        spec: the robot.
+        robot_file: the robot.
 
     Returns:
         the reason; empty of other robots.
     """
     try:
-        if spec.is_platform:
-            spec.parallel_pairs()
+        if robot_file.is_platform:
+            robot_file.parallel_pairs()
     except InputError as error:
         return f"; nor do three parallel pairs of cables keep it from turning: {error.fault}"
     return ""

@@ -24,41 +24,44 @@ ROUNDING = 1e-3
 NEAR_P0 = 1e-3
 
 
-def robot_hints(spec: RobotFile) -> list[str]:
+def robot_hints(robot_file: RobotFile) -> list[str]:
     """Likely mistakes in the units of a robot, and what was left out of a file of another program.
 
     Args:
-        spec: the robot.
+        robot_file: the robot.
 
     Returns:
         one line each.
     """
-    lines, spools = list(spec.notes), np.asarray(spec.base_points)
+    lines, spools = list(robot_file.notes), np.asarray(robot_file.base_points)
     span = float(np.linalg.norm(spools[:, None] - spools, axis=2).max())
-    if span > LARGEST_SPAN and spec.mass < LARGEST_MASS:
+    if span > LARGEST_SPAN and robot_file.mass < LARGEST_MASS:
         lines.append(
-            f"robot.base_points: spools {span:g} m apart, for a mass of {spec.mass:g} kg: are these millimetres? "
+            f"robot.base_points: spools {span:g} m apart, for a mass of {robot_file.mass:g} kg: are these millimetres? "
             "Lengths are in m"
         )
-    if spec.platform_points is not None and spec.inertia is not None:
-        arms = np.asarray(spec.platform_points) - np.asarray(spec.centre_of_mass or [0.0, 0.0, 0.0])
-        reach, largest = float(np.linalg.norm(arms, axis=1).max()), float(np.abs(spec.inertia).max())
-        ratio = largest / (spec.mass * reach**2) if reach > 0.0 else 1.0
+    if robot_file.platform_points is not None and robot_file.inertia is not None:
+        arms = np.asarray(robot_file.platform_points) - np.asarray(robot_file.centre_of_mass or [0.0, 0.0, 0.0])
+        reach, largest = float(np.linalg.norm(arms, axis=1).max()), float(np.abs(robot_file.inertia).max())
+        ratio = largest / (robot_file.mass * reach**2) if reach > 0.0 else 1.0
         if not INERTIA_RATIOS[0] < ratio < INERTIA_RATIOS[1]:
             lines.append(
-                f"robot.inertia: {largest:g} kg m^2 for a mass of {spec.mass:g} kg and platform_points {reach:g} m "
-                "from it: do the units fit? Inertia is in kg m^2, lengths are in m"
+                f"robot.inertia: {largest:g} kg m^2 for a mass of {robot_file.mass:g} kg and platform_points "
+                f"{reach:g} m from it: do the units fit? Inertia is in kg m^2, lengths are in m"
             )
-    return lines + _unbalanced(spec)
+    return lines + _unbalanced(robot_file)
 
 
-def _unbalanced(spec: RobotFile) -> list[str]:
+def _unbalanced(robot_file: RobotFile) -> list[str]:
     # A mass centre far from the points is mostly one from another origin, or what another program writes by default.
-    if spec.platform_points is None:
+    if robot_file.platform_points is None:
         return []
-    centre, axes = np.asarray(spec.centre_of_mass or [0.0, 0.0, 0.0]), [0, 2] if spec.is_planar else [0, 1, 2]
-    points = np.asarray(spec.platform_points)
-    if spec.own_pattern == "3R":  # the joint holds it too
+    centre, axes = (
+        np.asarray(robot_file.centre_of_mass or [0.0, 0.0, 0.0]),
+        [0, 2] if robot_file.is_planar else [0, 1, 2],
+    )
+    points = np.asarray(robot_file.platform_points)
+    if robot_file.own_pattern == "3R":  # the joint holds it too
         points = np.vstack([points, np.zeros(3)])
     extent = float(np.ptp(points, axis=0).max())
     away = _distance_to_hull((points - centre)[:, axes] / extent) * extent if extent > 0.0 else 0.0
@@ -85,35 +88,35 @@ def _distance_to_hull(points: np.ndarray) -> float:
     return float(np.linalg.norm(weights @ points) / weights.sum())
 
 
-def plan_hints(keys: PlanFile, spec: RobotFile) -> list[str]:
+def plan_hints(keys: PlanFile, robot_file: RobotFile) -> list[str]:
     """Likely mistakes in a plan that is not feasible.
 
     Args:
         keys: the plan.
-        spec: its robot.
+        robot_file: its robot.
 
     Returns:
         one line each.
     """
     targets = {i: pose.position for i, pose in enumerate(keys.pose) if pose.position is not None and not pose.rest}
     places = np.asarray(list(targets.values()), float).reshape(-1, 3)
-    level = in_plane(np.asarray(spec.base_points), places, planar=spec.is_planar)
+    level = in_plane(np.asarray(robot_file.base_points), places, planar=robot_file.is_planar)
     lines = [
         f"pose[{i}].position = {shown(place)}: in the plane of the spools, where no tension of the cables carries a "
         "weight: must be below it"
         for (i, place), is_level in zip(targets.items(), level, strict=True)
         if is_level
     ]
-    text = forgotten_axis(spec, places[~level].tolist())
+    text = forgotten_axis(robot_file, places[~level].tolist())
     return [*lines, f"pose: {text}"] if text else lines
 
 
-def sweep_hints(keys: SweepFile, spec: RobotFile) -> list[str]:
+def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
     """Likely mistakes in a sweep.
 
     Args:
         keys: the sweep.
-        spec: its robot.
+        robot_file: its robot.
 
     Returns:
         one line each.
@@ -121,10 +124,11 @@ def sweep_hints(keys: SweepFile, spec: RobotFile) -> list[str]:
     lines, start, asked = list[str](), keys.trajectory.start, keys.workspace
     if start is not None and start.position is not None and not start.rest and keys.axes.z0 is not None:
         every = (
-            almost_at_rest("trajectory.from.position", start.position, z0, spec) for z0 in axis_points(keys.axes.z0)
+            almost_at_rest("trajectory.from.position", start.position, z0, robot_file)
+            for z0 in axis_points(keys.axes.z0)
         )
         lines += [line for line in every if line][:1]
-    if asked is not None and "interference-free" in asked.conditions and not spec.cable_diameter:
+    if asked is not None and "interference-free" in asked.conditions and not robot_file.cable_diameter:
         shapes = (asked.obstacle, asked.platform_box, asked.platform_hull)
         if all(shape is None for shape in shapes):
             lines.append(
@@ -160,20 +164,20 @@ def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure
     )
 
 
-def forgotten_axis(spec: RobotFile, targets: Iterable[Sequence[float]]) -> str:
+def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) -> str:
     """Whether the z axis seems to point the other way.
 
     Args:
-        spec: the robot.
+        robot_file: the robot.
         targets: [x, y, z] in the file's axes, m.
 
     Returns:
         what to look at, if every target is above every spool; else nothing.
     """
-    frame = frame_of(spec.base_points, spec.z_axis)
-    depths, spools = (frame.depth([point[2] for point in points]) for points in (targets, spec.base_points))
+    frame = frame_of(robot_file.base_points, robot_file.z_axis)
+    depths, spools = (frame.depth([point[2] for point in points]) for points in (targets, robot_file.base_points))
     is_above = bool(len(depths)) and depths.max() < spools.min()
-    return f"every target is above every spool: {axis_question(spec.z_axis)}" if is_above else ""
+    return f"every target is above every spool: {axis_question(robot_file.z_axis)}" if is_above else ""
 
 
 def axis_question(z_axis: str) -> str:

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.config.limits import Coordinate, Point
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import fault
@@ -93,7 +94,7 @@ class ObstacleTable(Table):
             return shapes.cylinder(self.start, self.end, self.radius, name=name)
         if self.corners is not None:
             return shapes.box_between(*self.corners, name=name)
-        return shapes.box(self.centre, self.size, self.quaternion or (1.0, 0.0, 0.0, 0.0), name=name)
+        return shapes.box(self.centre, self.size, self.quaternion or IDENTITY, name=name)
 
 
 Obstacles = Annotated[list[ObstacleTable], Field(max_length=MOST_OBSTACLES)]

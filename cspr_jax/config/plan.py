@@ -17,7 +17,7 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
 
 
-class Choice(Table):
+class DepthRule(Table):
     """Rule that chooses z0."""
 
     choose: Literal["mean", "conservative", "fastest"] = Field(
@@ -26,8 +26,8 @@ class Choice(Table):
 
 
 Depth = Annotated[
-    Annotated[Positive, Tag("~number")] | Annotated[Choice, Tag("~choice")],
-    Discriminator(lambda value: "~choice" if isinstance(value, dict | Choice) else "~number"),
+    Annotated[Positive, Tag("~number")] | Annotated[DepthRule, Tag("~choice")],
+    Discriminator(lambda value: "~choice" if isinstance(value, dict | DepthRule) else "~number"),
 ]
 
 

@@ -319,9 +319,9 @@ def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, I
         ConfigError: a mistake in it, or what no robot file can say.
     """
     found = read(path, cable_set)
-    spec = checked(RobotFile, found.keys, path)
-    spec._file, spec._notes = path, found.warnings
-    return spec, found
+    robot_file = checked(RobotFile, found.keys, path)
+    robot_file._file, robot_file._notes = path, found.warnings
+    return robot_file, found
 
 
 def read_robot(path: Path) -> RobotFile:
@@ -338,6 +338,6 @@ def read_robot(path: Path) -> RobotFile:
     """
     data = read_toml(path)
     refuse_other_kinds(data, "robot", path)
-    spec = checked(RobotFile, data, path)
-    spec._file = path
-    return spec
+    robot_file = checked(RobotFile, data, path)
+    robot_file._file = path
+    return robot_file

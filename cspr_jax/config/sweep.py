@@ -142,7 +142,7 @@ class Orientations(Table):
     )
 
 
-class Run(Table):
+class RunTable(Table):
     """Settings of the computation, and the quantities to keep."""
 
     dtype: Literal["float64", "float32"] = Field(
@@ -188,4 +188,4 @@ class SweepFile(Table):
         None, description="[workspace] of workspace: conditions, orientation, wrenches"
     )
     limits: LimitTable = Field(default_factory=LimitTable, description="[limits]")
-    run: Run = Field(default_factory=Run, description="[run] dtype, tile, store")
+    run: RunTable = Field(default_factory=RunTable, description="[run] dtype, tile, store")

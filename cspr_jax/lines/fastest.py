@@ -12,7 +12,7 @@ from cspr_jax.lines.any_limits import LONGER
 from cspr_jax.lines.durations import Durations, Rule, by_cells, by_formula, by_search, moving
 from cspr_jax.lines.faces import in_one_plane
 from cspr_jax.lines.verdicts import TOLERANCE, acceleration_slack, limits_at_rest, verdicts
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_verdicts import Verdicts
 from cspr_jax.robots.point_mass import spool_radius
@@ -104,7 +104,7 @@ def _fastest(
         # peak of the acceleration may lie beyond its limit.
         is_short = (np.minimum(found.ratio, 1.0 - found.ratio) < SHORT) & (law == "s-curve")
         is_within = acceleration_slack(starts, ends, found, law=law, max_acceleration=max_acceleration) > 0.0
-        some = np.flatnonzero(may_move & (sharp | bool(given(problem.limits)) | is_short | ~is_within))
+        some = np.flatnonzero(may_move & (sharp | bool(limits_set(problem.limits)) | is_short | ~is_within))
         if len(some) > 0:
             own.replace(some, judged(starts[some], ends[some], found.part(some)))
     # Where a place breaks a limit, no other motion mends it.

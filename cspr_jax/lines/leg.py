@@ -9,7 +9,7 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Stops
+from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.robots.point_mass import AT_P0, spool_radius
 from cspr_jax.schema.verdicts import Verdict
 
@@ -17,7 +17,7 @@ from cspr_jax.schema.verdicts import Verdict
 class TimedLines(Leg):
     """Any places, joined by straight lines in the least time of their law; see `Leg`."""
 
-    def __init__(self, stops: Stops) -> None:
+    def __init__(self, stops: Waypoints) -> None:
         """Refuse what a line knows nothing of."""
         super().__init__(stops)
         for i, pose in enumerate(stops.poses[1:], start=1):
@@ -27,7 +27,7 @@ class TimedLines(Leg):
     def check(self, problem: Problem) -> None:
         """Refuse the rule of the text where spools are not in one plane; see `Leg.check`."""
         if self.stops.keys.rule == "thesis" and not in_one_plane(problem.robot):
-            place, key = self.stops.spec.placed("base_points", self.stops.path)
+            place, key = self.stops.robot_file.placed("base_points", self.stops.path)
             raise ConfigError(place, f'{key}: must lie in one plane with rule = "thesis"')
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:

@@ -11,7 +11,7 @@ import math
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.block_minima import Blocks, Proved, smallest
+from cspr_jax.arithmetic.block_minima import MinimumBlocks, Proved, smallest
 from cspr_jax.arithmetic.interval_jets import Jet, lowest
 from cspr_jax.arithmetic.polynomials import bounds, derivatives, over
 from cspr_jax.lines.slacks import Instants, LineSlacks, slacks, tensions_at, tensions_over
@@ -39,23 +39,23 @@ def smallest_slacks(
     scales = np.array([gravity if name in lines.low else 1.0 for name in lines.names])
     size = max(TOGETHER // max(lines.along[0].size, 1), 1)
 
-    def values(part: Blocks) -> tuple[np.ndarray, np.ndarray]:
+    def values(part: MinimumBlocks) -> tuple[np.ndarray, np.ndarray]:
         return _of_blocks(lines, laws, durations, part)
 
     return smallest(_first(laws), len(durations), values, scales, size=size, enough=enough)
 
 
-def _first(laws: Amplitude) -> Blocks:
+def _first(laws: Amplitude) -> MinimumBlocks:
     # One block a piece, about its origin.
     count, pieces = laws.origins.shape
     ends = np.zeros((count, 1)), np.asarray(laws.knots, float), np.ones((count, 1))
     edges = np.concatenate(ends, axis=1)
     line, piece = (x.ravel() for x in np.meshgrid(np.arange(count), np.arange(pieces), indexing="ij"))
-    return Blocks(line, piece, (edges[:, :-1] - laws.origins).ravel(), np.diff(edges).ravel())
+    return MinimumBlocks(line, piece, (edges[:, :-1] - laws.origins).ravel(), np.diff(edges).ravel())
 
 
 def _of_blocks(
-    lines: LineSlacks, laws: Amplitude, durations: np.ndarray, blocks: Blocks
+    lines: LineSlacks, laws: Amplitude, durations: np.ndarray, blocks: MinimumBlocks
 ) -> tuple[np.ndarray, np.ndarray]:
     # Of each block a lower bound of each group, and the smaller one of its values at both ends, (n, n_groups) each.
     own = jax.tree.map(lambda x: x[blocks.case], lines)

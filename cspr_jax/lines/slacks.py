@@ -15,7 +15,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.interval_jets import Jet
 from cspr_jax.lines.faces import line_faces
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.limits import LIMITS
@@ -116,7 +116,7 @@ def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
         high=high,
         largest={
             row.name: jnp.broadcast_to(jnp.asarray(getattr(problem.limits, row.name)), (robot.n_cables,))
-            for row in given(problem.limits)
+            for row in limits_set(problem.limits)
             if row.quantity in ("speed", "acceleration")
         },
     )

@@ -14,7 +14,7 @@ from cspr_jax.lines.proof import smallest_slacks
 from cspr_jax.lines.slacks import TAUT
 from cspr_jax.motions.acceleration_sets import faces_at
 from cspr_jax.motions.amplitudes import Amplitude
-from cspr_jax.motions.limits import given, scales, slack
+from cspr_jax.motions.limits import limits_set, scales, slack
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_verdicts import Verdicts, plain_slack
 from cspr_jax.robots.limits import Limits
@@ -115,7 +115,7 @@ def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np
     each: dict[str, Any] = {"depth": places[..., 2:], "length": lengths}
     scale: Any = scales(robot.n_cables, robot.mass * robot.gravity, spool_radius(robot))
     room, flags = np.full(len(starts), np.inf), np.zeros(len(starts), int)
-    for row in given(problem.limits):
+    for row in limits_set(problem.limits):
         if not row.of_motion:
             limit: Any = np.asarray(getattr(problem.limits, row.name))
             own = np.asarray(slack(row, limit, each[row.quantity], scale)).min((1, 2))
@@ -135,10 +135,12 @@ def limits_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np
         (n,) flags of `Verdict`.
     """
     _, flags, _ = _at_ends(problem, starts, ends)
-    limits = {row.name: getattr(problem.limits, row.name) for row in given(problem.limits) if row.quantity == "tension"}
+    limits = {
+        row.name: getattr(problem.limits, row.name) for row in limits_set(problem.limits) if row.quantity == "tension"
+    }
     fails = partial(_fails_at_rest, problem, starts, ends)
     alone = {name: fails({name: limit}) for name, limit in limits.items()}
-    for row in given(problem.limits):
+    for row in limits_set(problem.limits):
         flags |= np.where(alone.get(row.name, False), row.flag.value, 0)
     if len(limits) > 1:  # of two that only fail together one may go
         together = fails(limits) & ~np.any(list(alone.values()), axis=0)

@@ -13,11 +13,11 @@ from cspr_jax.schema.tiles import Grid
 class FromPlacesMap(PointMassMap):
     """The map of motions of a point mass from given places; see `GridMap`."""
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse starts that are none."""
-        super().__init__(spec, keys, file)
+        super().__init__(robot_file, keys, file)
         start = keys.trajectory.start
-        if spec.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:
+        if robot_file.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:
             raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")
         if start is not None and start.rest:
             raise ConfigError(

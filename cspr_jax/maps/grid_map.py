@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
-from cspr_jax.build import build_problem
+from cspr_jax.build.problems import build_problem
 from cspr_jax.config.equivalents import no_equivalent
 from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
@@ -29,7 +29,7 @@ class GridMap(abc.ABC):
     """The map of a sweep, ready to compute tiles; its row in `schema.map_kinds` names its class.
 
     Args:
-        spec: the robot.
+        robot_file: the robot.
         keys: the sweep.
         file: named in errors.
         for_bounds: whether the amplitude function may be "ideal", which is no motion.
@@ -45,12 +45,12 @@ class GridMap(abc.ABC):
     any_cables: ClassVar[bool] = False
     proves: ClassVar[bool] = False
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Build what all tiles share."""
         self._keys, self._file = keys, file
-        self._frame, self._z_axis = frame_of(spec.base_points, spec.z_axis), spec.z_axis
+        self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
         some: dict[str, Any] = {"at": "trajectory.", "for_bounds": for_bounds, "any_cables": self.any_cables}
-        self._problem = build_problem(spec, keys.trajectory, keys.limits, file, **some)
+        self._problem = build_problem(robot_file, keys.trajectory, keys.limits, file, **some)
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -136,11 +136,13 @@ class GridMap(abc.ABC):
 class PlatformMap(GridMap):
     """The map of a sweep of a platform; see `GridMap`."""
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a point mass."""
-        if not spec.is_platform:
-            raise ConfigError(file, f'robot "{spec.name}" is {spec.kind}: must be a platform on six cables in this map')
-        super().__init__(spec, keys, file)
+        if not robot_file.is_platform:
+            raise ConfigError(
+                file, f'robot "{robot_file.name}" is {robot_file.kind}: must be a platform on six cables in this map'
+            )
+        super().__init__(robot_file, keys, file)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
@@ -158,12 +160,14 @@ class PlatformMap(GridMap):
 class PointMassMap(GridMap):
     """The map of a sweep of a point mass; see `GridMap`."""
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object, *, for_bounds: bool = False) -> None:
         """Refuse a platform."""
-        if spec.is_platform:
-            why = no_equivalent(spec)
-            raise ConfigError(file, f'robot "{spec.name}" is a rigid platform: must be a point mass in this map{why}')
-        super().__init__(spec, keys, file, for_bounds=for_bounds)
+        if robot_file.is_platform:
+            why = no_equivalent(robot_file)
+            raise ConfigError(
+                file, f'robot "{robot_file.name}" is a rigid platform: must be a point mass in this map{why}'
+            )
+        super().__init__(robot_file, keys, file, for_bounds=for_bounds)
 
     def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates.

@@ -68,7 +68,7 @@ def verdict(robot: PointMassRobot, faces: Faces, position: Array, acceleration: 
     return sum((jnp.where(is_so, flag.value, 0) for is_so, flag in flags), jnp.zeros((), int))
 
 
-class Reach(NamedTuple):
+class AccelerationReach(NamedTuple):
     """Feasible accelerations at one place, and how large they are; () each.
 
     Fields:
@@ -92,7 +92,7 @@ class Reach(NamedTuple):
     downward_acceleration: Array
 
 
-def reach(robot: PointMassRobot, limits: Limits, position: Array) -> Reach:
+def reach(robot: PointMassRobot, limits: Limits, position: Array) -> AccelerationReach:
     """Feasible accelerations at one place.
 
     Args:
@@ -113,7 +113,7 @@ def reach(robot: PointMassRobot, limits: Limits, position: Array) -> Reach:
         return jnp.where(margin > 0.0, jnp.maximum(jnp.min(distance), 0.0), 0.0)
 
     across = jnp.linalg.norm(faces.normals[:, :2], axis=1)
-    return Reach(
+    return AccelerationReach(
         verdict=verdict(robot, faces, position, still),
         acceleration_margin=margin,
         static_margin=cone.margin(still),
@@ -176,7 +176,7 @@ def along(robot: PointMassRobot, limits: Limits, position: Array, direction: Arr
 
 
 @jax.jit
-def reaches(robot: PointMassRobot, limits: Limits, positions: Array) -> Reach:
+def reaches(robot: PointMassRobot, limits: Limits, positions: Array) -> AccelerationReach:
     """Feasible accelerations at many places.
 
     Args:

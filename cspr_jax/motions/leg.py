@@ -8,7 +8,7 @@ import numpy as np
 from cspr_jax.motions.answers import Answers, joined
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Stops
+from cspr_jax.motions.waypoints import Waypoints
 
 
 class Leg(abc.ABC):
@@ -21,7 +21,7 @@ class Leg(abc.ABC):
         ConfigError: poses, or keys of the plan, that the family cannot use.
     """
 
-    def __init__(self, stops: Stops) -> None:
+    def __init__(self, stops: Waypoints) -> None:
         """Keep the poses; a family refuses what it cannot join."""
         self.stops = stops
 

@@ -13,7 +13,7 @@ from cspr_jax.robots.state import State
 from cspr_jax.schema.limits import LIMITS, Limit
 
 
-def given(limits: Limits) -> tuple[Limit, ...]:
+def limits_set(limits: Limits) -> tuple[Limit, ...]:
     """Rows of the limits that are given, in the order of their slacks.
 
     Args:

@@ -12,7 +12,7 @@ from jax import Array
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.minima import narrowed_places
-from cspr_jax.motions.limits import given, scales, slack, values
+from cspr_jax.motions.limits import limits_set, scales, slack, values
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import wrench_balance
@@ -111,7 +111,7 @@ def _criteria(robot: AnyRobot, limits: Limits) -> list[_Criterion]:
     if _pairs(robot):
         thick = 0.0 if robot.cable_diameter is None else float(robot.cable_diameter)
         criteria.append(_Criterion(Verdict.CABLE_CABLE, _pairs(robot), np.full(len(_pairs(robot)), thick), "m"))
-    for row in given(limits):
+    for row in limits_set(limits):
         limit = np.atleast_1d(np.asarray(getattr(limits, row.name)))
         criteria.append(_Criterion(row.flag, each if row.per_cable else ((),), limit, row.unit))
     return criteria
@@ -143,7 +143,7 @@ def _values(
             reached.append(apart)
             slacks.append((apart - thick) / z0)
         now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
-        for row in given(limits):
+        for row in limits_set(limits):
             value = jnp.atleast_1d(getattr(now, row.quantity))
             reached.append(value)
             slacks.append(slack(row, jnp.asarray(getattr(limits, row.name)), value, scale))

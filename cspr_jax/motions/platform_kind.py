@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 
-class Kind(NamedTuple):
+class PlatformMotionKind(NamedTuple):
     """Kind of motions; known when a function is compiled.
 
     Fields:
@@ -17,4 +17,4 @@ class Kind(NamedTuple):
     from_rest: bool = False
 
 
-USUAL = Kind()
+USUAL = PlatformMotionKind()

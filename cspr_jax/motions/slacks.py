@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.motions.limits import given, scales, slack, values
+from cspr_jax.motions.limits import limits_set, scales, slack, values
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import force_balance, wrench_balance
@@ -37,7 +37,7 @@ def slacks(problem: Problem, motion: Motion, tau: Array) -> Array:
     robot, state, z0 = problem.robot, motion.state(tau), motion.z0
     balance = _of_platform if isinstance(robot, PlatformRobot) else _of_point_mass
     terms = [*balance(robot, state, z0), jnp.atleast_1d(plane_normal(robot) @ state.position / z0)]
-    rows = given(problem.limits)
+    rows = limits_set(problem.limits)
     if rows:
         now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
         for row in rows:
@@ -59,7 +59,7 @@ def flags(problem: Problem) -> tuple[Verdict, ...]:
     if isinstance(robot, PlatformRobot):
         verdicts.append(Verdict.SINGULAR)
     verdicts.append(Verdict.ABOVE_SPOOLS)
-    for row in given(problem.limits):
+    for row in limits_set(problem.limits):
         verdicts += [row.flag] * (robot.n_cables if row.per_cable else 1)
     return tuple(verdicts)
 

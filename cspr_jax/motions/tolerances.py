@@ -12,7 +12,7 @@ import numpy as np
 
 from cspr_jax.motions.blocks import Blocks
 from cspr_jax.motions.enclosures import Enclosure, Influence, influence
-from cspr_jax.motions.uncertainty import Requirements, Worst, fails, holds, worst
+from cspr_jax.motions.uncertainty import Requirements, WorstDisplacements, fails, holds, worst
 from cspr_jax.schema.limits import LARGEST_MULTIPLE
 
 # Multiples that are tried first, one after the other; then they are divided, down to the first one or less.
@@ -46,11 +46,11 @@ class _Open:
     blocks: Blocks
     known: Enclosure
     found: Influence
-    worst: Worst
+    worst: WorstDisplacements
     asked: Requirements
 
     def some(self, which: np.ndarray) -> "_Open":
-        worst = Worst(*(x[:, which] for x in self.worst))
+        worst = WorstDisplacements(*(x[:, which] for x in self.worst))
         asked = dataclasses.replace(self.asked, slack=self.asked.slack[which])
         return _Open(self.blocks.some(which), self.known.some(which), self.found.some(which), worst, asked)
 
@@ -82,7 +82,7 @@ def tolerated(
     """
     if not len(arcs):
         return Tolerated(np.zeros(0), np.zeros(0))
-    now, search = _looked_at(blocks, asked, enclose), _Search(arcs, whole=whole)
+    now, search = _looked_at(blocks, asked, enclose), _MultipleSearch(arcs, whole=whole)
     search.refuted = (
         _refuted_first(now, len(arcs)) if whole else _refuted_below(now, search.refuted, np.ones(len(arcs)))
     )
@@ -97,7 +97,7 @@ def tolerated(
     return Tolerated(search.proved, search.refuted)
 
 
-class _Search:
+class _MultipleSearch:
     # What is known of n motions: multiples that are refuted, wanted and, where it is settled, proved.
 
     def __init__(self, arcs: np.ndarray, *, whole: bool) -> None:

@@ -272,7 +272,7 @@ def _unit(asked: Requirements) -> np.ndarray:
     return TOUCHED * asked.mass * asked.slack
 
 
-class Worst(NamedTuple):
+class WorstDisplacements(NamedTuple):
     """Robots that are worst to first order in the middles of k blocks, per displacement.
 
     Fields:
@@ -286,7 +286,7 @@ class Worst(NamedTuple):
 
 
 @UNKNOWN
-def worst(known: Enclosure, found: Influence, asked: Requirements) -> Worst:
+def worst(known: Enclosure, found: Influence, asked: Requirements) -> WorstDisplacements:
     """Robots that are worst to first order.
 
     Args:
@@ -311,11 +311,13 @@ def worst(known: Enclosure, found: Influence, asked: Requirements) -> Worst:
         cable = np.argmin(np.nan_to_num(room / change, nan=np.inf), axis=1)
         spools.append(sign * unit_vectors(found.across[every, cable] * np.sign(found.mu)[..., None]))
         centre.append(-sign * unit_vectors(found.centre[every, cable]))
-    return Worst(np.stack(spools), np.stack(centre))
+    return WorstDisplacements(np.stack(spools), np.stack(centre))
 
 
 @UNKNOWN
-def fails(known: Enclosure, found: Influence, worst: Worst, asked: Requirements, multiple: np.ndarray) -> np.ndarray:
+def fails(
+    known: Enclosure, found: Influence, worst: WorstDisplacements, asked: Requirements, multiple: np.ndarray
+) -> np.ndarray:
     """Blocks in whose middles one of the worst robots within a multiple of the uncertainty breaks something.
 
     Args:

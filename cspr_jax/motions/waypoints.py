@@ -1,4 +1,4 @@
-"""Stops: consecutive poses of a plan that one family joins, as points of the kernels."""
+"""Way-points: consecutive poses of a plan that one family joins, as points of the kernels."""
 
 import dataclasses
 from pathlib import Path
@@ -13,11 +13,11 @@ from cspr_jax.schema.families import FAMILIES
 
 
 @dataclasses.dataclass(frozen=True)
-class Stops:
+class Waypoints:
     """Consecutive poses of a plan.
 
     Fields:
-        spec: the robot.
+        robot_file: the robot.
         keys: the plan.
         path: of the plan, named in errors.
         frame: of the robot.
@@ -26,7 +26,7 @@ class Stops:
         last: number of the last of them.
     """
 
-    spec: RobotFile
+    robot_file: RobotFile
     keys: PlanFile
     path: Path
     frame: Frame

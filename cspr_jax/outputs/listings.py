@@ -32,15 +32,15 @@ def robots(names: Iterable[str | Path] = ()) -> list[dict[str, Any]]:
 
     listed = []
     for name in list(names) or catalogue_names():
-        spec = resolve_robot(str(name), "robots", Path())
-        is_known = spec.file is not None and spec.file.parent == catalogue.CATALOGUE
+        robot_file = resolve_robot(str(name), "robots", Path())
+        is_known = robot_file.file is not None and robot_file.file.parent == catalogue.CATALOGUE
         if is_known:
-            fault = FAULTS.get(spec.name)
+            fault = FAULTS.get(robot_file.name)
         else:
-            from cspr_jax.build import fault_at_rest  # imports jax
+            from cspr_jax.build.robots import fault_at_rest  # imports jax
 
-            fault = fault_at_rest(spec)
-        listed.append(spec.model_dump(exclude_none=True) | {"fault": fault})
+            fault = fault_at_rest(robot_file)
+        listed.append(robot_file.model_dump(exclude_none=True) | {"fault": fault})
     return listed
 
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from cspr_jax import __version__
 from cspr_jax.errors import printable
 from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended
-from cspr_jax.plans.planning import Plan
+from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
 
@@ -139,7 +139,7 @@ def control_file_of(path: Path) -> Path:
     return path.with_name(f"{path.stem}_control.csv")
 
 
-def write_mjcf(plan: Plan, path: Path, step: float = STEP) -> None:
+def write_mjcf(plan: PlannedMotions, path: Path, step: float = STEP) -> None:
     """Write a model of a plan's robot, and beside it the control file that plays the plan.
 
     Args:

@@ -19,7 +19,7 @@ from cspr_jax.lines.motion import TimedLine
 from cspr_jax.motions.acceleration_sets import along
 from cspr_jax.motions.motion import Motion, outward
 from cspr_jax.plans.causes import cause_columns
-from cspr_jax.plans.planning import Plan
+from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
@@ -79,7 +79,7 @@ def _states(robot, limits: Limits, motion: Motion, tau, *, rule: str, with_coupl
     return jax.vmap(one)(tau)
 
 
-def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
+def rows(plan: PlannedMotions, *, rate: float | None = None) -> dict[str, np.ndarray]:
     """States along a plan.
 
     Args:
@@ -118,7 +118,7 @@ def rows(plan: Plan, *, rate: float | None = None) -> dict[str, np.ndarray]:
     return rows_at(plan, taus)
 
 
-def rows_at(plan: Plan, taus: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
+def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
     """States at given instants of the segments of a plan.
 
     Args:
@@ -135,7 +135,7 @@ def rows_at(plan: Plan, taus: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
     needs_limits = is_redundant or any(isinstance(motion, TimedLine) for motion in motions)
     limits = plan.problem.limits if needs_limits else NO_LIMITS
     with_couples = is_redundant and is_rectangle(plan.problem.robot.base_points)
-    pairs, parts = plan.spec.pairs, []
+    pairs, parts = plan.robot_file.pairs, []
     longest = max(len(tau) for tau in taus)
     for i, tau in enumerate(taus):
         # Segments of one length are compiled once.
@@ -154,7 +154,7 @@ def rows_at(plan: Plan, taus: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
     return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
 
-def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
+def write_rows(plan: PlannedMotions, path: Path, *, rate: float | None = None) -> None:
     """Write the motion of a plan to a .csv or .h5 file; that of one that is not feasible says so.
 
     Args:
@@ -176,7 +176,7 @@ def write_rows(plan: Plan, path: Path, *, rate: float | None = None) -> None:
         _write_hdf5(plan, path, columns)
 
 
-def _feasible_rows(plan: Plan, t: np.ndarray) -> np.ndarray:
+def _feasible_rows(plan: PlannedMotions, t: np.ndarray) -> np.ndarray:
     # Of each row, whether its segment is feasible; a row at a boundary belongs to both.
     ends = np.cumsum(plan.answers.duration)
     before, after = (np.searchsorted(ends, t, side).clip(max=len(ends) - 1) for side in ("left", "right"))
@@ -195,7 +195,7 @@ def _csv(columns: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
     return text.getvalue()
 
 
-def _write_hdf5(plan: Plan, path: Path, columns: dict[str, np.ndarray]) -> None:
+def _write_hdf5(plan: PlannedMotions, path: Path, columns: dict[str, np.ndarray]) -> None:
     of_segments = segments(plan)
     numbers = list(range(1, columns["tension"].shape[1] + 1))
     with new_hdf5(path, attributes(plan)) as file:
@@ -243,7 +243,7 @@ def _write_flight(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
                 file[name].dims[i].attach_scale(file[scale])
 
 
-def flight(plan: Plan) -> dict[str, np.ndarray]:
+def flight(plan: PlannedMotions) -> dict[str, np.ndarray]:
     """Flight of the object that a plan releases, and the landings of a sample of throws.
 
     Args:
@@ -265,7 +265,7 @@ def flight(plan: Plan) -> dict[str, np.ndarray]:
     return columns
 
 
-def attributes(plan: Plan) -> dict[str, Any]:
+def attributes(plan: PlannedMotions) -> dict[str, Any]:
     """Attributes of a motion file, from its plan.
 
     Args:
@@ -274,25 +274,25 @@ def attributes(plan: Plan) -> dict[str, Any]:
     Returns:
         attributes of the whole file.
     """
-    spec = plan.spec
+    robot_file = plan.robot_file
     return {
         "Conventions": "CF-1.11",
-        "title": f"Motion of robot {spec.name}" + ("" if plan.feasible else ", not proved feasible"),
+        "title": f"Motion of robot {robot_file.name}" + ("" if plan.feasible else ", not proved feasible"),
         "schema": SCHEMA,
         "software": f"cspr_jax {__version__}",
         "feasible": int(plan.feasible),
         "family": plan.keys.family,
         "plan": plan.text,
-        "robot": spec.name,
-        "robot_settings": canonical_json(spec.settings),
-        "base_points": np.asarray(spec.base_points),
-        "mass": spec.mass,
-        "z_axis": spec.z_axis,
+        "robot": robot_file.name,
+        "robot_settings": canonical_json(robot_file.settings),
+        "base_points": np.asarray(robot_file.base_points),
+        "mass": robot_file.mass,
+        "z_axis": robot_file.z_axis,
         **({"z0": float(plan.z0)} if np.isfinite(plan.z0) else {}),
     }
 
 
-def segments(plan: Plan) -> dict[str, np.ndarray]:
+def segments(plan: PlannedMotions) -> dict[str, np.ndarray]:
     """Quantities of each segment in a motion file.
 
     Args:

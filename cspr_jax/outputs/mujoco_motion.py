@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.motion_files import LARGEST_ROWS, rows_at
-from cspr_jax.plans.planning import Plan
+from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.patterns import PATTERNS
 
 STEP = 0.0005  # s, the longest that MuJoCo takes unless it is told another one
@@ -119,7 +119,7 @@ def upward(z_axis: str) -> Frame:
     return Frame(np.array(_SIGNS[z_axis]), np.zeros(3), np.zeros(3))
 
 
-def suspended(plan: Plan) -> Suspended:
+def suspended(plan: PlannedMotions) -> Suspended:
     """The robot of a plan for MuJoCo.
 
     Args:
@@ -129,10 +129,10 @@ def suspended(plan: Plan) -> Suspended:
         the robot; of a platform that only translates the platform, which its joints keep from turning as its winches
         do, on all six cables.
     """
-    robot, written, world = plan.problem.robot, plan.spec.as_written, upward(plan.spec.z_axis)
+    robot, written, world = plan.problem.robot, plan.robot_file.as_written, upward(plan.robot_file.z_axis)
     row, inertia = PATTERNS[robot.pattern], None
     points = np.zeros((len(written.base_points), 3))
-    if plan.spec.pairs is not None:
+    if plan.robot_file.pairs is not None:
         points = world.turned(np.asarray(written.platform_points) - np.asarray(written.centre_of_mass or [0.0] * 3))
         inertia = world.turned_tensor(np.asarray(written.inertia))
     elif row.is_body:
@@ -141,8 +141,8 @@ def suspended(plan: Plan) -> Suspended:
     limits = [getattr(keys, "tension_max", None) for keys in (plan.keys, written)]
     limit = next((given for given in limits if given is not None), np.inf)
     return Suspended(
-        name=plan.spec.name,
-        z_axis=plan.spec.z_axis,
+        name=plan.robot_file.name,
+        z_axis=plan.robot_file.z_axis,
         axes=() if row.is_body else row.forces,
         mass=float(robot.mass),
         inertia=inertia,
@@ -154,7 +154,7 @@ def suspended(plan: Plan) -> Suspended:
     )
 
 
-def played(plan: Plan, step: float = STEP) -> Played:
+def played(plan: PlannedMotions, step: float = STEP) -> Played:
     """Motion and tensions of a plan, as MuJoCo asks for them.
 
     Args:
@@ -175,10 +175,10 @@ def played(plan: Plan, step: float = STEP) -> Played:
         raise ConfigError("--step", f"{step:g} s: must give at most {LARGEST_ROWS} rows, two a step")
     taus, times = _instants(plan, step)
     columns, segment = rows_at(plan, taus), np.repeat(np.arange(1, len(taus) + 1), [len(tau) for tau in taus])
-    columns |= {"t": times, "tension": columns["tension" if plan.spec.pairs is None else "tension_each"]}
+    columns |= {"t": times, "tension": columns["tension" if plan.robot_file.pairs is None else "tension_each"]}
     if not all(np.isfinite(columns[name]).all() for name in ("tension", "position", "acceleration")):
         raise ConfigError("plan", "cannot be played: its motion or its tensions are not finite; see its verdicts")
-    return in_world(columns, segment, plan.spec.z_axis)
+    return in_world(columns, segment, plan.robot_file.z_axis)
 
 
 def in_world(columns: Mapping[str, np.ndarray], segment: np.ndarray, z_axis: str) -> Played:
@@ -204,7 +204,7 @@ def in_world(columns: Mapping[str, np.ndarray], segment: np.ndarray, z_axis: str
     return Played(time=columns["t"], segment=segment, tension=columns["tension"], **moved)
 
 
-def _instants(plan: Plan, step: float) -> tuple[list[np.ndarray], np.ndarray]:
+def _instants(plan: PlannedMotions, step: float) -> tuple[list[np.ndarray], np.ndarray]:
     # Normalised times of each segment, and all times: rows on either side of a jump have the same.
     taus, times, start = [], [], 0.0
     for motion, length in zip(plan.motions, plan.answers.duration.tolist(), strict=True):

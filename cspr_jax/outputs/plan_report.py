@@ -6,7 +6,7 @@ from typing import Any
 
 from cspr_jax.beziers.launch_outcome import released
 from cspr_jax.outputs.table_layout import two_digits
-from cspr_jax.plans.planning import Plan
+from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.verdicts import Verdict
 
@@ -15,7 +15,7 @@ SCHEMA = 1
 DIGITS = 12
 
 
-def plan_object(plan: Plan) -> dict[str, Any]:
+def plan_object(plan: PlannedMotions) -> dict[str, Any]:
     """The object that `cspr plan --json` prints.
 
     Args:
@@ -27,11 +27,11 @@ def plan_object(plan: Plan) -> dict[str, Any]:
     segments = [_segment_object(plan, i) for i in range(len(plan.answers.arcs))]
     fields = {
         "schema": SCHEMA,
-        "robot": plan.spec.name,
+        "robot": plan.robot_file.name,
         "family": plan.keys.family,
         "amplitude": plan.problem.amplitude.name if plan.keys.takes_amplitude else None,
         "z0": plan.z0,
-        "z_axis": plan.spec.z_axis,
+        "z_axis": plan.robot_file.z_axis,
         "gravity": float(plan.problem.robot.gravity),
         "segments": segments,
         "total_duration": float(plan.answers.duration.sum()),
@@ -76,7 +76,7 @@ _OF_SOME = (
 )
 
 
-def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
+def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
     answers, asked = plan.answers, plan.demands
     arcs = int(answers.arcs[i])
     fields = {
@@ -109,10 +109,10 @@ def _segment_object(plan: Plan, i: int) -> dict[str, Any]:
     return fields | dict.fromkeys(_OF_SOME) | plan.details(i)
 
 
-def _tension_margin(plan: Plan, i: int) -> float | None:
+def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
     # Of platforms on redundant cables, N: the margin is over the weight a cable.
     robot = plan.problem.robot
-    if not plan.spec.is_platform or robot.n_cables == robot.dof:
+    if not plan.robot_file.is_platform or robot.n_cables == robot.dof:
         return None
     return float(plan.answers.margin[i] * robot.mass * robot.gravity / robot.n_cables)
 
@@ -125,7 +125,7 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def plan_table(plan: Plan):
+def plan_table(plan: PlannedMotions):
     """The plan as a table for a terminal.
 
     Args:
@@ -138,7 +138,7 @@ def plan_table(plan: Plan):
 
     words = [", ".join(plan.keys.families), plan.problem.amplitude.name if plan.keys.takes_amplitude else ""]
     words += [f"z0 = {plan.z0:.{DIGITS}g} m"] if math.isfinite(plan.z0) else []
-    title = f"{plan.spec.name}: {', '.join(filter(None, words))}"
+    title = f"{plan.robot_file.name}: {', '.join(filter(None, words))}"
     whole = plan_object(plan)
     caption, segments = _caption(plan) + _launch(whole.get("launch")), whole["segments"]
     table = Table(title=cell(title, style="table.title"), title_justify="left", caption_justify="left")
@@ -154,7 +154,7 @@ def plan_table(plan: Plan):
 Column = Callable[[dict[str, Any]], str]
 
 
-def _places(plan: Plan) -> dict[str, Column]:
+def _places(plan: PlannedMotions) -> dict[str, Column]:
     def position(segment: dict[str, Any]) -> str:
         pose = plan.keys.pose[segment["to"]]
         # Where a launch ends follows from it: nobody gives that place.
@@ -225,11 +225,11 @@ def _two_digits(name: str) -> Column:
     return lambda segment: "-" if segment[name] is None else two_digits(segment[name])
 
 
-def _caption(plan: Plan) -> str:
+def _caption(plan: PlannedMotions) -> str:
     time = float(plan.answers.duration.sum())
-    total = f"total {f'{time:.2f} s' if math.isfinite(time) else 'time unknown'}; z {plan.spec.z_axis}"
+    total = f"total {f'{time:.2f} s' if math.isfinite(time) else 'time unknown'}; z {plan.robot_file.z_axis}"
     numbered = not plan.feasible and (plan.answers.tried_arcs > 0).any()
-    pairs = plan.spec.pairs
+    pairs = plan.robot_file.pairs
     if pairs is not None:
         named = ", ".join("-".join(map(str, pair)) for pair in (pairs.cables + 1).tolist())
         total += f"; tensions of the pairs of cables {named}"
@@ -237,7 +237,7 @@ def _caption(plan: Plan) -> str:
     return f"{total}{note}{_causes(plan)}"
 
 
-def _causes(plan: Plan) -> str:
+def _causes(plan: PlannedMotions) -> str:
     # A line for each segment that is not feasible, after its number in the table.
     lines = [(i + 1, [cause.text for cause in own]) for i, own in enumerate(plan.causes) if own]
     return "".join(f"\nto {to}: {'; '.join(words)}" for to, words in lines)

@@ -13,12 +13,12 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.mjcf import model_xml
 from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended, upward
 from cspr_jax.outputs.table_layout import two_digits
-from cspr_jax.plans.planning import Plan
+from cspr_jax.plans.planning import PlannedMotions
 
 _LENT = threading.Lock()
 
 
-class Way(NamedTuple):
+class PlayedPath(NamedTuple):
     """Where MuJoCo goes.
 
     Fields:
@@ -31,7 +31,7 @@ class Way(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Replay:
+class PlayedPlan:
     """A plan beside what MuJoCo makes of it, at the ends of its steps; in the axes of the robot file.
 
     Fields:
@@ -57,8 +57,8 @@ class Replay:
     time: np.ndarray
     segment: np.ndarray
     position: np.ndarray
-    played: Way
-    through: Way
+    played: PlayedPath
+    through: PlayedPath
     tension: np.ndarray
     tension_deviation: np.ndarray
 
@@ -132,7 +132,7 @@ def need_mujoco() -> Any:
     return mujoco
 
 
-def replay(plan: Plan, step: float = STEP) -> Replay:
+def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
     """Play a plan in MuJoCo.
 
     Args:
@@ -148,12 +148,12 @@ def replay(plan: Plan, step: float = STEP) -> Replay:
     """
     mujoco = need_mujoco()
     body, moved = suspended(plan), played(plan, step)
-    rows, world = ends_of_steps(moved), upward(plan.spec.z_axis)
+    rows, world = ends_of_steps(moved), upward(plan.robot_file.z_axis)
     ways = [way_of(body, moved, step, by_segment=by_segment) for by_segment in (True, False)]
     own, through = (way._replace(position=world.turned(way.position)) for way in ways)
-    return Replay(
-        robot=plan.spec.name,
-        z_axis=plan.spec.z_axis,
+    return PlayedPlan(
+        robot=plan.robot_file.name,
+        z_axis=plan.robot_file.z_axis,
         mujoco=mujoco.__version__,
         steps=len(rows) - len(moved.runs()),
         time=moved.time[rows],
@@ -178,7 +178,7 @@ def ends_of_steps(moved: Played) -> np.ndarray:
     return np.concatenate([np.asarray(run[::2]) for run in moved.runs()])
 
 
-def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> Way:
+def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> PlayedPath:
     """Where the tensions of a motion take MuJoCo's robot, by its own integrator.
 
     Args:
@@ -229,7 +229,7 @@ def _callback_lent(mujoco: Any) -> Iterator[None]:
             mujoco.set_mjcb_control(before)
 
 
-def _way(moved: Played, found: np.ndarray, axes: Sequence[int]) -> Way:
+def _way(moved: Played, found: np.ndarray, axes: Sequence[int]) -> PlayedPath:
     rows = ends_of_steps(moved)
     position, turned = moved.position[rows], np.zeros(len(rows))
     if moved.rotation is None:
@@ -237,7 +237,7 @@ def _way(moved: Played, found: np.ndarray, axes: Sequence[int]) -> Way:
     else:
         position[:] = found[:, :3]
         turned = (moved.rotation[rows].inv() * Rotation.from_quat(np.roll(found[:, 3:], -1, axis=1))).magnitude()
-    return Way(position, turned)
+    return PlayedPath(position, turned)
 
 
 def tension_deviation(body: Suspended, moved: Played) -> np.ndarray:

@@ -5,14 +5,14 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.build import build_amplitude
+from cspr_jax.build.problems import build_amplitude
 from cspr_jax.config.hints import almost_at_rest, plan_hints
-from cspr_jax.config.plan import Choice
+from cspr_jax.config.plan import DepthRule
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Stops
-from cspr_jax.plans.sequence import Sequence
+from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, rest_point, spool_radius
 from cspr_jax.robots.robot import Robot
 from cspr_jax.runtime.stages import within
@@ -27,7 +27,7 @@ EPSILONS = np.linspace(0.02, 0.5, 49)
 DEPTHS = 200
 
 
-def chosen_depth(problem: Any, sequence: Sequence) -> float:
+def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
     """The plan's z0, given or chosen.
 
     Args:
@@ -55,7 +55,7 @@ def chosen_depth(problem: Any, sequence: Sequence) -> float:
             raise ConfigError(path, f"pose[{i}].position = {shown(pose.position)}: must be absent where z0 is chosen")
     if not len(targets):
         raise ConfigError(path, "z0 = { choose = ... }: must be a number where every pose is at rest")
-    if not isinstance(keys.z0, Choice):
+    if not isinstance(keys.z0, DepthRule):
         return _depth_of_inclination(problem, stops)
     if keys.z0.choose == "mean":
         z0 = depths.mean_depth(problem.robot, targets)
@@ -65,13 +65,13 @@ def chosen_depth(problem: Any, sequence: Sequence) -> float:
         with within("fastest z0"):
             z0 = _fastest_depth(problem, sequence)
     if not 0.0 < z0 <= LARGEST_LENGTH:
-        hint = "".join(f" ({line})" for line in plan_hints(keys, stops.spec))
+        hint = "".join(f" ({line})" for line in plan_hints(keys, stops.robot_file))
         why = f"since no z0 in ]0, 1e6] m follows from the poses{hint}"
         raise ConfigError(path, f'z0.choose = "{keys.z0.choose}": must be a number here, {why}')
     return z0
 
 
-def _needs_depth(stops: Stops) -> bool:
+def _needs_depth(stops: Waypoints) -> bool:
     # Rests elsewhere than in P0 need none.
     keys = stops.keys
     anywhere = all(FAMILIES[name].rests_anywhere for name in keys.families)
@@ -80,7 +80,7 @@ def _needs_depth(stops: Stops) -> bool:
     )
 
 
-def _check_depth_keys(stops: Stops) -> None:
+def _check_depth_keys(stops: Waypoints) -> None:
     keys, path = stops.keys, stops.path
     if keys.z0 is None and keys.inclination is None:
         other = ", or inclination" if set(keys.families) == {"transition"} else ""
@@ -91,7 +91,7 @@ def _check_depth_keys(stops: Stops) -> None:
         raise ConfigError(path, "z0, inclination: must be one of them")
 
 
-def _check_rest(robot: Robot, stops: Stops, z0: float) -> None:
+def _check_rest(robot: Robot, stops: Waypoints, z0: float) -> None:
     at_rest, near = rest_point(np.asarray(z0)), AT_P0 * float(spool_radius(robot))
     for i, pose in enumerate(stops.poses):
         if not pose.rest or pose.position is None or _rests_anywhere(stops, i):
@@ -103,7 +103,7 @@ def _check_rest(robot: Robot, stops: Stops, z0: float) -> None:
             )
 
 
-def nearly_resting(stops: Stops, z0: float) -> list[str]:
+def nearly_resting(stops: Waypoints, z0: float) -> list[str]:
     """Poses that are P0 but for their last digits.
 
     Args:
@@ -114,19 +114,19 @@ def nearly_resting(stops: Stops, z0: float) -> list[str]:
         hints, one line each.
     """
     lines = [
-        almost_at_rest(f"{stops.name(i)}.position", pose.position, z0, stops.spec)
+        almost_at_rest(f"{stops.name(i)}.position", pose.position, z0, stops.robot_file)
         for i, pose in enumerate(stops.poses)
         if not pose.rest and pose.position is not None and not _rests_anywhere(stops, i)
     ]
     return [f"hint: {line}" for line in lines if line]
 
 
-def _rests_anywhere(stops: Stops, i: int) -> bool:
+def _rests_anywhere(stops: Waypoints, i: int) -> bool:
     segments = range(max(i - 1, 0), min(i + 1, len(stops)))
     return all(FAMILIES[stops.keys.family_of(segment)].rests_anywhere for segment in segments)
 
 
-def _depth_of_inclination(problem: Problem, stops: Stops) -> float:
+def _depth_of_inclination(problem: Problem, stops: Waypoints) -> float:
     targets, path, inclination = stops.targets, stops.path, stops.keys.inclination
     if inclination == "best":
         if (targets != targets[0]).any():
@@ -142,13 +142,13 @@ def _depth_of_inclination(problem: Problem, stops: Stops) -> float:
             path, f"inclination = {v:g}: must be replaced by z0, since the targets lie at different depths"
         )
     if not levels[0] > 0.0:
-        hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.spec))
+        hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.robot_file))
         why = f"since the targets are not below the spool plane{hint}"
         raise ConfigError(path, f"inclination: must be replaced by z0, {why}")
     return levels[0]
 
 
-def _fastest_depth(problem: Problem, sequence: Sequence) -> float:
+def _fastest_depth(problem: Problem, sequence: PlanLegs) -> float:
     # The duration grows with the root of z0 between changes of the arcs: a coarse look, then a fine one at the best.
     least = max(depths.least_depth(problem.robot, sequence.stops.targets), 1e-3)
     safe = depths.conservative_depth(problem.robot, sequence.stops.targets)
@@ -165,7 +165,7 @@ def _fastest_depth(problem: Problem, sequence: Sequence) -> float:
     return chosen
 
 
-def best_amplitude(problem: Any, sequence: Sequence, z0: float) -> tuple[Amplitude, float]:
+def best_amplitude(problem: Any, sequence: PlanLegs, z0: float) -> tuple[Amplitude, float]:
     """The amplitude function whose epsilon gives the shortest plan; among equals, the largest margin.
 
     Args:

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.build import build_problem
+from cspr_jax.build.problems import build_problem
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
@@ -24,7 +24,7 @@ from cspr_jax.motions.motion import Motion, Placed
 from cspr_jax.motions.problem import Problem
 from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
-from cspr_jax.plans.sequence import Sequence
+from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
@@ -53,11 +53,11 @@ class JoinedLeg:
 
 
 @dataclasses.dataclass(frozen=True)
-class Plan:
+class PlannedMotions:
     """A planned sequence.
 
     Fields:
-        spec: the robot as its file has it; or its equivalent, `config.equivalents`.
+        robot_file: the robot as its file has it; or its equivalent, `config.equivalents`.
         keys: the plan file.
         problem: robot, limits, amplitude function; centred.
         z0: m.
@@ -70,7 +70,7 @@ class Plan:
         text: of the plan file; empty for a plan that has none.
     """
 
-    spec: RobotFile
+    robot_file: RobotFile
     keys: PlanFile
     problem: Problem
     z0: float
@@ -121,7 +121,7 @@ class Plan:
         return np.concatenate([leg.answers.feasible for leg in self.legs])
 
 
-def plan(path: Path) -> Plan:
+def plan(path: Path) -> PlannedMotions:
     """Plan the sequence of a plan file.
 
     Args:
@@ -137,7 +137,7 @@ def plan(path: Path) -> Plan:
     return dataclasses.replace(plan_of(read_plan(text, path), path), text=text)
 
 
-def plan_of(keys: PlanFile, path: Path) -> Plan:
+def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     """Plan the sequence of a plan file's content.
 
     Args:
@@ -151,10 +151,10 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
         ConfigError: a mistake in it.
     """
     legs_of = [FAMILIES[name].legs for name in keys.families]
-    spec = as_moved(resolve_robot(keys.robot, path, path.parent), legs_of)
-    sequence = Sequence(spec, keys, path)
-    any_cables = all(spec.own_pattern in FAMILIES[name].any_cables for name in keys.families)
-    problem = build_problem(spec, keys, keys, path, epsilon=FIRST_EPSILON, any_cables=any_cables)
+    robot_file = as_moved(resolve_robot(keys.robot, path, path.parent), legs_of)
+    sequence = PlanLegs(robot_file, keys, path)
+    any_cables = all(robot_file.own_pattern in FAMILIES[name].any_cables for name in keys.families)
+    problem = build_problem(robot_file, keys, keys, path, epsilon=FIRST_EPSILON, any_cables=any_cables)
     _check_rule(problem, keys, path)
     for leg in sequence.legs:
         leg.check(problem)
@@ -177,7 +177,7 @@ def plan_of(keys: PlanFile, path: Path) -> Plan:
     lines += nearly_resting(sequence.stops, z0)
     lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), asked)
     every = tuple(itertools.chain.from_iterable(why))
-    return Plan(spec, keys, problem, z0, frame, points, legs, asked, every, tuple(dict.fromkeys(lines)))
+    return PlannedMotions(robot_file, keys, problem, z0, frame, points, legs, asked, every, tuple(dict.fromkeys(lines)))
 
 
 def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:
@@ -228,7 +228,7 @@ def _ends(before: Motion, after: Motion):
     return before.state(jnp.asarray(1.0))[:3], after.state(jnp.asarray(0.0))[:3]
 
 
-def _refuse_jumps(problem: Problem, sequence: Sequence, legs: tuple[JoinedLeg, ...]) -> None:
+def _refuse_jumps(problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...]) -> None:
     # Where another family goes on, positions, velocities and accelerations must meet.
     size, gravity = float(spool_radius(problem.robot)), float(problem.robot.gravity)
     scales = {"position": size, "velocity": np.sqrt(size * gravity), "acceleration": gravity}

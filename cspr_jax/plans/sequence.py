@@ -12,17 +12,17 @@ from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motions.leg import Leg
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Stops
+from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.schema.families import FAMILIES, moving
 
 POINT_MASS = "3T"
 
 
-class Sequence:
+class PlanLegs:
     """Poses of a plan.
 
     Args:
-        spec: the robot.
+        robot_file: the robot.
         keys: the plan.
         path: named in errors.
 
@@ -34,19 +34,19 @@ class Sequence:
         ConfigError: poses that their families cannot join.
     """
 
-    def __init__(self, spec: RobotFile, keys: PlanFile, path: Path) -> None:
+    def __init__(self, robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
         """Refuse poses that are none, and families that do not move the robot."""
-        _check_families(spec, keys, path)
+        _check_families(robot_file, keys, path)
         _check_lines(keys, path)
-        _check_poses(spec, keys, path)
-        frame, last = frame_of(spec.base_points, spec.z_axis), len(keys.pose) - 1
-        self.stops = Stops(spec, keys, path, frame, keys.family, 0, last)
+        _check_poses(robot_file, keys, path)
+        frame, last = frame_of(robot_file.base_points, robot_file.z_axis), len(keys.pose) - 1
+        self.stops = Waypoints(robot_file, keys, path, frame, keys.family, 0, last)
         changes = [i for i in range(1, last) if keys.family_of(i) != keys.family_of(i - 1)]
         self.legs: list[Leg] = []
         for first, after in zip([0, *changes], [*changes, last], strict=True):
             family = keys.family_of(first)
-            leg = FAMILIES[family].leg(spec.own_pattern)
-            self.legs.append(leg(Stops(spec, keys, path, frame, family, first, after)))
+            leg = FAMILIES[family].leg(robot_file.own_pattern)
+            self.legs.append(leg(Waypoints(robot_file, keys, path, frame, family, first, after)))
 
     def table(self, problem: Problem, depths: np.ndarray) -> dict[str, np.ndarray]:
         """Feasibility, durations and margins for several depths of P0.
@@ -65,18 +65,20 @@ class Sequence:
         }
 
 
-def _check_families(spec: RobotFile, keys: PlanFile, path: Path) -> None:
+def _check_families(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
     for i in range(len(keys.pose) - 1):
         family, own = keys.family_of(i), keys.pose[i + 1].family
-        if spec.own_pattern in FAMILIES[family].legs:
+        if robot_file.own_pattern in FAMILIES[family].legs:
             continue
         key = "family" if own is None else f"pose[{i + 1}].family"
-        names = " or ".join(f'"{name}"' for name in moving(spec.own_pattern))
+        names = " or ".join(f'"{name}"' for name in moving(robot_file.own_pattern))
         if not names:
             known = "it moves robots of the patterns " + ", ".join(FAMILIES[family].legs)
-            raise ConfigError(path, f'{key} = "{family}": no family moves {spec.kind} ("{spec.name}") yet: {known}')
-        why = no_equivalent(spec) if POINT_MASS in FAMILIES[family].legs else ""
-        raise ConfigError(path, f'{key} = "{family}": must be {names} for {spec.kind} ("{spec.name}"){why}')
+            raise ConfigError(
+                path, f'{key} = "{family}": no family moves {robot_file.kind} ("{robot_file.name}") yet: {known}'
+            )
+        why = no_equivalent(robot_file) if POINT_MASS in FAMILIES[family].legs else ""
+        raise ConfigError(path, f'{key} = "{family}": must be {names} for {robot_file.kind} ("{robot_file.name}"){why}')
 
 
 def _check_lines(keys: PlanFile, path: Path) -> None:
@@ -92,27 +94,27 @@ def _check_lines(keys: PlanFile, path: Path) -> None:
             raise ConfigError(path, f"{key}: must be absent unless family = {either(families)}")
 
 
-def _check_poses(spec: RobotFile, keys: PlanFile, path: Path) -> None:
-    _check_plane(spec, keys, path)
-    if keys.beat is not None and not spec.is_platform:
-        raise ConfigError(path, f'beat = "{keys.beat}": must be absent for {spec.kind}')
+def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
+    _check_plane(robot_file, keys, path)
+    if keys.beat is not None and not robot_file.is_platform:
+        raise ConfigError(path, f'beat = "{keys.beat}": must be absent for {robot_file.kind}')
     for i, pose in enumerate(keys.pose):
         if pose.duration is not None and (i == 0 or keys.family_of(i - 1) != "bezier"):
             raise ConfigError(path, f'pose[{i}].duration: must be absent unless family = "bezier" leads there')
         follows = keys.launch is not None and i == keys.launch.segment + 1
         if pose.position is None and not pose.rest and not follows:
             raise ConfigError(path, f"pose[{i}].position is missing: [x, y, z] in m, or rest = true")
-        for key in () if spec.is_platform else ("tilt_torsion", "quaternion", "beta_hat"):
+        for key in () if robot_file.is_platform else ("tilt_torsion", "quaternion", "beta_hat"):
             if getattr(pose, key) is not None:
-                raise ConfigError(path, f"pose[{i}].{key}: must be absent for {spec.kind}")
-        if spec.is_planar and pose.position is not None and pose.position[1] != 0.0:
+                raise ConfigError(path, f"pose[{i}].{key}: must be absent for {robot_file.kind}")
+        if robot_file.is_planar and pose.position is not None and pose.position[1] != 0.0:
             raise ConfigError(path, f"pose[{i}].position = {shown(pose.position)}: must have y = 0: a planar robot")
 
 
-def _check_plane(spec: RobotFile, keys: PlanFile, path: Path) -> None:
+def _check_plane(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
     given = {"first_control_point": keys.first_control_point}
     if keys.launch is not None:
         given |= {f"launch.{name}": getattr(keys.launch, name) for name in ("point", "target", "velocity")}
     for key, value in given.items():
-        if spec.is_planar and value is not None and value[1] != 0.0:
+        if robot_file.is_planar and value is not None and value[1] != 0.0:
             raise ConfigError(path, f"{key} = {shown(value)}: must have y = 0: a planar robot")

@@ -12,7 +12,7 @@ Files, each importing only from those above it:
 
     oscillating_slerp       rotation that swings, section 3.7
     platform_segment        segment between two poses, (3.42) to (3.66)
-    platform_lanes          the same, one lane a segment
+    platform_segment_lanes  the same, one lane a segment
     from_rest_lanes         the same from rest, with the fewest operations
     end_acceleration        angular acceleration at the end of a segment, section 3.8
     beta_hat                values of beta-hat to try

@@ -11,7 +11,7 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.fewest_limits import Refused, rank
 from cspr_jax.platforms.arcs import (
     Candidates,
-    Found,
+    FewestArcs,
     best_candidates,
     refused_by_limits,
     segments_with,
@@ -19,16 +19,16 @@ from cspr_jax.platforms.arcs import (
     unavoidable,
 )
 from cspr_jax.platforms.end_acceleration import AT_REST
-from cspr_jax.platforms.motion_checker import MotionChecker, PoseChecks
+from cspr_jax.platforms.motion_checker import MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import rows
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 NEVER = np.iinfo(int).max
 
 
 @dataclasses.dataclass(frozen=True)
-class PoseAnswers(Answers):
+class PlatformMotionAnswers(Answers):
     """One answer a segment between poses.
 
     Fields:
@@ -58,21 +58,21 @@ class PoseAnswers(Answers):
             "beta_hat": [float(value) for value in self.beta_hat[i]],
         }
 
-    def rows(self, which: np.ndarray) -> "PoseAnswers":
+    def rows(self, which: np.ndarray) -> "PlatformMotionAnswers":
         """Answers chosen by indices, or by a mask (n,)."""
-        return PoseAnswers(**{name: values[which] for name, values in vars(self).items()})
+        return PlatformMotionAnswers(**{name: values[which] for name, values in vars(self).items()})
 
 
 def settled(
     checker: MotionChecker,
     candidates: Candidates,
-    smallest: Found,
+    smallest: FewestArcs,
     *,
     refused: Refused,
     max_arcs: int,
     fixed: np.ndarray | None = None,
     margins: bool = True,
-) -> tuple[PoseAnswers, PoseSegment]:
+) -> tuple[PlatformMotionAnswers, PlatformSegment]:
     """Answers of motions, whether a number of arcs was found or not.
 
     Args:
@@ -109,7 +109,7 @@ def settled(
     none = np.where(doubtful, Verdict.UNDECIDED.value, reasons | Verdict.NO_ARCS.value)
     less = np.where(doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
     nothing = np.full(len(tried), np.nan)
-    answers = PoseAnswers(
+    answers = PlatformMotionAnswers(
         arcs=smallest.arcs,
         tried_arcs=tried,
         verdict=np.where(smallest.arcs > 0, less, none).astype(FLAGS),
@@ -131,9 +131,9 @@ def settled(
 def _reasons(
     checker: MotionChecker,
     candidates: Candidates,
-    smallest: Found,
+    smallest: FewestArcs,
     refused: Refused,
-    checks: PoseChecks,
+    checks: PlatformChecks,
     *,
     margins: bool,
     max_arcs: int,
@@ -181,7 +181,7 @@ def reached(
     max_arcs: int,
     same: bool = False,
     margins: bool = True,
-) -> PoseAnswers:
+) -> PlatformMotionAnswers:
     """Smallest numbers of arcs of motions, each with several values of beta-hat at its end.
 
     Args:
@@ -204,7 +204,7 @@ def reached(
     arcs[cell[best]], beta_hats[cell[best]] = of_trials.arcs[best], trial.beta_hats[1][best]
     checks.put(cell[best], of_trials.checks.rows(best))
     np.minimum.at(undecided, cell, np.where(of_trials.undecided > 0, of_trials.undecided, NEVER))
-    smallest = Found(arcs, np.where(undecided < NEVER, undecided, 0), checks)
+    smallest = FewestArcs(arcs, np.where(undecided < NEVER, undecided, 0), checks)
     # Where there is none, the value at which the fewest limits refuse the motion, if there is one.
     open_ones = np.flatnonzero(((arcs == 0) & (undecided == NEVER))[cell])
     of_limits = refused_by_limits(checker, trial.rows(open_ones), max_arcs=max_arcs)

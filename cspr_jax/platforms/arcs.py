@@ -10,9 +10,9 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.fewest_limits import FewestLimits, Refused
-from cspr_jax.platforms.motion_checker import MotionChecker, PoseChecks
+from cspr_jax.platforms.motion_checker import MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import rows
-from cspr_jax.platforms.platform_segment import PoseSegment, pose_segment
+from cspr_jax.platforms.platform_segment import PlatformSegment, pose_segment
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
@@ -58,7 +58,7 @@ class Candidates(NamedTuple):
         return Candidates(start, end, self.z0[which], np.arange(len(which)), beta_hats)
 
 
-class Found(NamedTuple):
+class FewestArcs(NamedTuple):
     """Smallest numbers of arcs.
 
     Fields:
@@ -69,11 +69,11 @@ class Found(NamedTuple):
 
     arcs: np.ndarray
     undecided: np.ndarray
-    checks: PoseChecks
+    checks: PlatformChecks
 
 
 @jax.jit
-def _motions(robot: PlatformRobot, odd, motions) -> PoseSegment:
+def _motions(robot: PlatformRobot, odd, motions) -> PlatformSegment:
     def one(start, end, z0):
         return pose_segment(robot, start, end, z0, (jnp.zeros_like(z0), jnp.zeros_like(z0)), odd=odd)
 
@@ -89,7 +89,7 @@ class _Segments:
             in_batches(partial(_motions, robot, np.asarray(odd)), candidates[:3], size=BATCH) for odd in (False, True)
         ]
 
-    def __call__(self, arcs: int, which: np.ndarray) -> PoseSegment:
+    def __call__(self, arcs: int, which: np.ndarray) -> PlatformSegment:
         # (k,) indices of candidates.
         motion, (first, last) = self._candidates.motion[which], self._candidates.beta_hats
         segments = rows(self._of_motions[arcs % 2], motion)
@@ -106,7 +106,7 @@ def smallest_arcs(
     fixed: np.ndarray | None = None,
     beyond: int = -1,
     margins: bool = True,
-) -> Found:
+) -> FewestArcs:
     """The smallest number of arcs that passes all tests.
 
     A few instants refute most motions before they are checked in full.
@@ -126,7 +126,7 @@ def smallest_arcs(
     motion, count = candidates.motion, len(candidates.motion)
     smallest, undecided, checks = np.zeros(count, int), np.zeros(count, int), checker.nothing(count)
     if not count:
-        return Found(smallest, undecided, checks)
+        return FewestArcs(smallest, undecided, checks)
     last = np.full(len(candidates.z0), max_arcs)
     only = np.zeros(len(last), int) if fixed is None else fixed
     segments = _Segments(checker.problem.robot, candidates)
@@ -150,7 +150,7 @@ def smallest_arcs(
             smallest[passed] = arcs
             undecided[unsure] = np.where(undecided[unsure] > 0, undecided[unsure], arcs)
             last[motion[passed]] = np.minimum(last[motion[passed]], arcs + beyond)
-    return Found(smallest, undecided, checks)
+    return FewestArcs(smallest, undecided, checks)
 
 
 def _instants(arcs: int, before: np.ndarray) -> np.ndarray:
@@ -170,7 +170,7 @@ def _sieved(
     # Those that some instants do not refute.
     if not len(alive):
         return alive
-    return alive[~checker.prefilter.refuted(segments(arcs, alive), arcs, tau, limits=limits)]
+    return alive[~checker.sieve.refuted(segments(arcs, alive), arcs, tau, limits=limits)]
 
 
 def refused_by_limits(
@@ -204,7 +204,7 @@ def refused_by_limits(
     return fewest.refused()
 
 
-def _but_for_limits(checker: MotionChecker, segments: PoseSegment, arcs: int) -> tuple[np.ndarray, np.ndarray]:
+def _but_for_limits(checker: MotionChecker, segments: PlatformSegment, arcs: int) -> tuple[np.ndarray, np.ndarray]:
     # Which motions are proved but for the limits that they break, (n,), and these limits, (n, n_criteria).
     each, is_limit = np.full(len(segments.rate), arcs), checker.is_limit
     first = checker.check(segments, each, whole=False, margins=False, ignored=is_limit)
@@ -276,12 +276,12 @@ def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs:
     for arcs in range(1, max_arcs + 1):
         stage(f"best of what fails, arcs {arcs} of {max_arcs}")
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
-        lowest = checker.prefilter.lowest(segments(arcs, every), arcs, tau)
+        lowest = checker.sieve.lowest(segments(arcs, every), arcs, tau)
         best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)
     return best
 
 
-def segments_with(robot: PlatformRobot, candidates: Candidates, arcs: np.ndarray) -> PoseSegment:
+def segments_with(robot: PlatformRobot, candidates: Candidates, arcs: np.ndarray) -> PlatformSegment:
     """The segments for given numbers of arcs.
 
     Args:

@@ -3,11 +3,12 @@
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_parts
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
 from cspr_jax.motions.answers import joined
-from cspr_jax.platforms.answers import PoseAnswers, reached, trials
+from cspr_jax.platforms.answers import PlatformMotionAnswers, reached, trials
 from cspr_jax.platforms.arcs import CANDIDATES, Candidates, smallest_arcs
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.point_mass import rest_point
@@ -23,7 +24,7 @@ LARGE, PART, MIXED = 4 * CANDIDATES, CANDIDATES // 4, 16
 
 
 def attainable(
-    checker: PoseChecker,
+    checker: PlatformChecker,
     places: np.ndarray,
     angles: np.ndarray,
     z0: np.ndarray,
@@ -32,7 +33,7 @@ def attainable(
     values: int = VALUES,
     symmetry: Symmetries = NONE,
     margins: bool = True,
-) -> PoseAnswers:
+) -> PlatformMotionAnswers:
     """Smallest numbers of arcs from rest to orientations of places.
 
     Args:
@@ -59,7 +60,7 @@ def attainable(
 
 
 def attained(
-    checker: PoseChecker,
+    checker: PlatformChecker,
     places: np.ndarray,
     angles: np.ndarray,
     z0: np.ndarray,
@@ -123,19 +124,19 @@ def turns(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array([0]), every[every % FEWER == 0], every[every % FEWER != 0]
 
 
-def _once(checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
+def _once(checker: PlatformChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
     # Orientations that stand for others too, and where each of all is among them.
     some, own = np.unique(alike(symmetry, np.c_[places, z0], angles), return_inverse=True)
     return some, own.ravel()
 
 
 def _motions(
-    checker: PoseChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
+    checker: PlatformChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
 ) -> tuple[Candidates, np.ndarray]:
     # Transitions from rest, and (n, values) of beta-hat at their ends.
     robot, count = checker.problem.robot, len(angles)
     ends = (places, from_tilt_torsion(angles + cylindrical_frames(places)))
     beta_hats, can_end = end_options(robot, *ends, z0, values)
-    start = (rest_point(z0), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
+    start = (rest_point(z0), np.tile(IDENTITY, (count, 1)))
     rest = np.full(count, AT_REST)
     return Candidates(start, ends, z0, np.arange(count), (rest, rest)), np.where(can_end[:, None], beta_hats, np.nan)

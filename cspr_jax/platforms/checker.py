@@ -14,19 +14,19 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches, in_threads
-from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
 from cspr_jax.platforms.enclosures import Robustness
 from cspr_jax.platforms.end_acceleration import endpoint
 from cspr_jax.platforms.kernels import slacks_at
 from cspr_jax.platforms.margins import Samples, narrowed
-from cspr_jax.platforms.motion_checker import BESIDE_KNOT, FEW, MANY, MotionChecker, PoseChecks
+from cspr_jax.platforms.motion_checker import BESIDE_KNOT, FEW, MANY, MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import Motions
 from cspr_jax.platforms.place_proof import PlaceCertifier, PlaceProof
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.proof import Certifier, TensionProof
-from cspr_jax.platforms.sieve import FIRST, Prefilter
+from cspr_jax.platforms.sieve import FIRST, TensionSieve
 from cspr_jax.platforms.slack_lanes import order
 from cspr_jax.platforms.slacks import flags
 from cspr_jax.platforms.tension_blocks import of_motion
@@ -46,7 +46,7 @@ NEAR = 0.5
 _end = jax.jit(endpoint)
 
 
-class PoseChecker(MotionChecker):
+class PlatformChecker(MotionChecker):
     """Checker of motions of one robot on six cables.
 
     Args:
@@ -55,20 +55,20 @@ class PoseChecker(MotionChecker):
         batch: how many are computed at a time.
 
     Fields:
-        prefilter: the first look, which comes before checks.
+        sieve: the first look, which comes before checks.
         done: how many instants of motions were looked at so far, in the first look and in checks, and how many motions
             were checked.
     """
 
-    def __init__(self, problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> None:
+    def __init__(self, problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> None:
         """Find what can meet."""
         super().__init__(problem, kind, batch=batch)
-        self._lock, self.done = threading.Lock(), {"prefilter": 0, "motions": 0, "checks": 0}
+        self._lock, self.done = threading.Lock(), {"sieve": 0, "motions": 0, "checks": 0}
         self._compiling, self._compiled = threading.Lock(), set[bool]()
         self.flags = flags(problem.limits)
         knots = np.asarray(problem.amplitude.knots)
-        count, count_checks = partial(self._count, "prefilter"), partial(self._count, "checks")
-        self.prefilter = Prefilter(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
+        count, count_checks = partial(self._count, "sieve"), partial(self._count, "checks")
+        self.sieve = TensionSieve(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
         self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._places = PlaceCertifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._robustness = None
@@ -93,7 +93,7 @@ class PoseChecker(MotionChecker):
         """Criteria that are broken for certain; see `MotionChecker.breaks`."""
         return slack + self._allowed < -TOLERANCE
 
-    def sampled(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         """Smallest slacks at some instants; see `MotionChecker.sampled`."""
         motions, size = Motions(segments, np.full(len(segments.rate), arcs)), max(SAMPLES // len(tau), 1)
         kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
@@ -107,13 +107,13 @@ class PoseChecker(MotionChecker):
 
     def check(
         self,
-        segments: PoseSegment,
+        segments: PlatformSegment,
         arcs: np.ndarray,
         *,
         whole: bool = True,
         margins: bool = True,
         ignored: np.ndarray | None = None,
-    ) -> PoseChecks:
+    ) -> PlatformChecks:
         """Check motions in full; see `MotionChecker.check`."""
         checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         self._count("motions", len(arcs))
@@ -123,7 +123,7 @@ class PoseChecker(MotionChecker):
             checks.put(piece, self._checked(motions.rows(piece), whole=whole, margins=margins, ignored=ignored))
         return checks
 
-    def _checked(self, motions: Motions, *, whole: bool, margins: bool, ignored: np.ndarray | None) -> PoseChecks:
+    def _checked(self, motions: Motions, *, whole: bool, margins: bool, ignored: np.ndarray | None) -> PlatformChecks:
         checks = self.nothing(len(motions.arcs))
         self._compile(motions, margins=margins)
         moving, still = self._narrowed_criteria()
@@ -162,13 +162,13 @@ class PoseChecker(MotionChecker):
                 in_threads(lambda proofs: proofs.prove(*one, margins=margins), [self._tensions, self._places])
                 self._compiled.add(margins)
 
-    def tolerated(self, segments: PoseSegment, arcs: np.ndarray) -> Tolerated:
+    def tolerated(self, segments: PlatformSegment, arcs: np.ndarray) -> Tolerated:
         """Multiples of the uncertainty that motions stand; see `MotionChecker.tolerated`."""
         if self._robustness is None:
             return super().tolerated(segments, arcs)
         return self._robustness.tolerated(segments, arcs)
 
-    def _weigh(self, checks: PoseChecks, some: np.ndarray, motions: Motions, verdict: np.ndarray) -> None:
+    def _weigh(self, checks: PlatformChecks, some: np.ndarray, motions: Motions, verdict: np.ndarray) -> None:
         # Judges motions that are feasible as they are planned by all robots within the uncertainty.
         which = np.flatnonzero(verdict == Verdict.FEASIBLE)
         if self._robustness is None or not len(which):

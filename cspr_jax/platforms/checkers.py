@@ -1,13 +1,13 @@
 """The checker of a platform's motions: by its number of cables."""
 
-from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.motion_checker import FEW, MotionChecker
 from cspr_jax.platforms.redundant_checker import RedundantChecker
 
 
-def pose_checker(problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> MotionChecker:
+def pose_checker(problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> MotionChecker:
     """Checker of motions of a platform.
 
     Args:
@@ -19,4 +19,4 @@ def pose_checker(problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> M
         on six cables that of their only tensions, on more that of the margin of all tensions.
     """
     is_determined = problem.robot.n_cables == problem.robot.dof
-    return (PoseChecker if is_determined else RedundantChecker)(problem, kind, batch=batch)
+    return (PlatformChecker if is_determined else RedundantChecker)(problem, kind, batch=batch)

@@ -15,17 +15,17 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.lanes import stored
 from cspr_jax.motions.blocks import Blocks, parts_of_arcs
 from cspr_jax.motions.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves, unit_vectors
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated, tolerated
 from cspr_jax.motions.uncertainty import requirements_of
 from cspr_jax.platforms.motions import rows
-from cspr_jax.platforms.platform_lanes import State, squared_duration, state
 from cspr_jax.platforms.platform_reach import Reach, instant_beside, middle_of, reach
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
+from cspr_jax.platforms.platform_segment_lanes import StateLanes, squared_duration, state
 from cspr_jax.platforms.proof import Certifier
-from cspr_jax.robots.contact_lanes import residual
 from cspr_jax.robots.interference import between, contacts, nearest
+from cspr_jax.robots.interference_lanes import residual
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES
@@ -42,14 +42,14 @@ RADIUS = 0.4
 class _Moving(NamedTuple):
     # State in the middles of n blocks, fixed axes and normalised time, and bounds: on the blocks, and on discs about
     # all of their instants.
-    here: State
+    here: StateLanes
     squared: Array
     near: Reach
     wide: Reach
 
 
 @partial(jax.jit, static_argnames="kind")
-def _moving(problem: Problem, one: Array, items, *, kind: Kind) -> _Moving:
+def _moving(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) -> _Moving:
     segments, arcs, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
     here = state(segments, arcs, instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), kind)
@@ -99,7 +99,7 @@ class _Within(NamedTuple):
     whirl: np.ndarray
 
 
-def _middle(robot: PlatformRobot, here: State, squared: np.ndarray) -> _Middle:
+def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Middle:
     position, velocity, acceleration, omega, spin = (
         np.stack(x, axis=1) for x in (here.position, here.velocity, here.acceleration, here.omega, here.spin)
     )
@@ -229,7 +229,9 @@ class Robustness:
         count_instants: is told how many were looked at.
     """
 
-    def __init__(self, problem: Problem, kind: Kind, *, batch: int, count_instants: Callable[[int], None]) -> None:
+    def __init__(
+        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
+    ) -> None:
         """Find what can meet."""
         self._problem, self._kind, self._batch = problem, kind, batch
         near = contacts(problem.robot)
@@ -238,7 +240,7 @@ class Robustness:
         self._certifier = Certifier(problem, kind, batch=batch, count_instants=count_instants)
         self._knots = np.asarray(problem.amplitude.knots)
 
-    def tolerated(self, segments: PoseSegment, arcs: np.ndarray, *, whole: bool = True) -> Tolerated:
+    def tolerated(self, segments: PlatformSegment, arcs: np.ndarray, *, whole: bool = True) -> Tolerated:
         """Multiples that motions stand.
 
         Args:
@@ -253,7 +255,7 @@ class Robustness:
         asked = requirements_of(self._problem, np.asarray(segments.rate) / CABLES)
         return tolerated(blocks, arcs, asked, partial(self.enclosure, segments, arcs), whole=whole)
 
-    def enclosure(self, segments: PoseSegment, arcs: np.ndarray, blocks: Blocks) -> Enclosure:
+    def enclosure(self, segments: PlatformSegment, arcs: np.ndarray, blocks: Blocks) -> Enclosure:
         """What is known of blocks of motions.
 
         Args:

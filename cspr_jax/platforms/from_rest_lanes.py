@@ -14,8 +14,8 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
-from cspr_jax.motions.platform_kind import Kind
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.motions.platform_kind import PlatformMotionKind
+from cspr_jax.platforms.platform_segment import PlatformSegment
 
 
 class Swings(NamedTuple):
@@ -58,7 +58,7 @@ class Swing(NamedTuple):
     spin: Array
 
 
-def swings(segments: PoseSegment) -> Swings:
+def swings(segments: PlatformSegment) -> Swings:
     """Swings of segments from rest.
 
     Args:
@@ -79,7 +79,7 @@ def swings(segments: PoseSegment) -> Swings:
     )
 
 
-def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: Kind) -> Array:
+def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: PlatformMotionKind) -> Array:
     """Table that segments from rest of one number of arcs share.
 
     Args:

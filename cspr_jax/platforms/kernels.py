@@ -7,16 +7,16 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import dot, smallest
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.platform_lanes import instant, state
+from cspr_jax.platforms.platform_segment_lanes import instant, state
 from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
-from cspr_jax.robots import contact_lanes
+from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.wrench_lanes import cables
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind"))
-def slacks_at(problem: Problem, items, *, pairs: tuple, kind: Kind) -> tuple[Array, ...]:
+def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind) -> tuple[Array, ...]:
     """Slacks and distances between cables at instants.
 
     Args:
@@ -34,7 +34,7 @@ def slacks_at(problem: Problem, items, *, pairs: tuple, kind: Kind) -> tuple[Arr
     here = state(segments, arcs, now, kind)
     wires = cables(problem.robot, here.position, here.turn)
     every = [*moving_slacks(problem, segments, arcs, now, kind), *still_slacks(problem, segments, here, wires)]
-    squares = [dot(gap, gap) for gap in contact_lanes.gaps(problem.robot.base_points, pairs, wires)]
+    squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, wires)]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
     # Not stacked: XLA would compute all of them for each.
     return *(every[k] for k in order(problem.limits)), nearest

@@ -11,7 +11,8 @@ from jax import Array
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.build import given_quaternion, orientations
+from cspr_jax.arithmetic.frames import IDENTITY
+from cspr_jax.build.orientations import given_quaternion, orientations
 from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.plan import Pose
 from cspr_jax.errors import ConfigError, InputError
@@ -19,16 +20,16 @@ from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.fewest_limits import Refused
 from cspr_jax.motions.leg import Leg, each
 from cspr_jax.motions.motion import Motion
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Stops
-from cspr_jax.platforms.answers import PoseAnswers, settled
-from cspr_jax.platforms.arcs import Candidates, Found, refused_by_limits, smallest_arcs
+from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.platforms.answers import PlatformMotionAnswers, settled
+from cspr_jax.platforms.arcs import Candidates, FewestArcs, refused_by_limits, smallest_arcs
 from cspr_jax.platforms.beta_hat import BEYOND, cheapest_path, options
 from cspr_jax.platforms.checkers import pose_checker
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import FEW, MANY, TOUCH, MotionChecker
-from cspr_jax.platforms.platform_segment import PlatformMotion, PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformMotion, PlatformSegment
 from cspr_jax.robots.interference import contacts, gaps
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
@@ -50,7 +51,7 @@ class _Poses(Leg):
 
     variable: ClassVar[bool]
 
-    def __init__(self, stops: Stops) -> None:
+    def __init__(self, stops: Waypoints) -> None:
         """Refuse keys of other families and orientations that are none."""
         keys, path = stops.keys, stops.path
         if keys.inclination is not None:
@@ -60,7 +61,7 @@ class _Poses(Leg):
                 if pose.beta_hat is not None:
                     raise ConfigError(path, f'{stops.name(i)}.beta_hat: must be absent with beat = "{keys.beat}"')
         super().__init__(stops)
-        self._kind = Kind(self.variable, keys.beat == "beta_1")
+        self._kind = PlatformMotionKind(self.variable, keys.beat == "beta_1")
         self._given = np.array([_orientation(stops.name(i), pose, path) for i, pose in enumerate(stops.poses)])
 
     def _quaternions(self, points: np.ndarray) -> np.ndarray:
@@ -74,24 +75,24 @@ class _Poses(Leg):
         """Refuse poses at which no motion can begin or end; see `Leg.check`."""
         stops = self.stops
         points = stops.points(1.0)
-        hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.spec))
+        hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.robot_file))
         for i, (position, quaternion) in enumerate(zip(points, self._quaternions(points), strict=True)):
             # On more cables poses are judged by the margin of their tensions alone.
             if not stops.poses[i].rest and _is_determined(problem):
                 _check_pose(problem.robot, stops.name(i), position, quaternion, stops.path, hint)
 
-    def join(self, problem: Problem, z0: float) -> tuple[PoseAnswers, list[Motion]]:
+    def join(self, problem: Problem, z0: float) -> tuple[PlatformMotionAnswers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
         try:
             if _is_determined(problem):
                 reference_pose(problem.robot, z0)
         except InputError as error:
-            raise ConfigError(self.stops.path, self.stops.spec.typed(error)) from error
+            raise ConfigError(self.stops.path, self.stops.robot_file.typed(error)) from error
         answers, segments = self._found(problem, np.array([z0]))
         pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
         return answers, [PlatformMotion(own, problem.amplitude, leaf(arcs), self._kind) for own, arcs in pairs]
 
-    def answers(self, problem: Problem, depths: np.ndarray) -> PoseAnswers:
+    def answers(self, problem: Problem, depths: np.ndarray) -> PlatformMotionAnswers:
         """Answers for several depths; see `Leg.answers`."""
         return self._found(problem, depths)[0]
 
@@ -99,7 +100,7 @@ class _Poses(Leg):
         """Tensions that jump; see `Leg.warnings`."""
         return [_JUMPS.format(problem.amplitude.name)] if self.variable and _jumps(problem.amplitude) else []
 
-    def _found(self, problem: Problem, depths: np.ndarray) -> tuple[PoseAnswers, PoseSegment]:
+    def _found(self, problem: Problem, depths: np.ndarray) -> tuple[PlatformMotionAnswers, PlatformSegment]:
         # The values of beta-hat that give the fewest arcs in sum.
         count, z0 = len(self), np.repeat(depths, len(self))
         points = self.stops.points(depths)
@@ -119,11 +120,11 @@ class _Poses(Leg):
         of_trials = smallest_arcs(checker, trial, max_arcs=largest, fixed=fixed, beyond=BEYOND)
         refused = self._refused(checker, trial, of_trials, fixed)
         path = _best_paths(of_trials.arcs, refused.arcs, pairs)
-        best = Found(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.rows(path))
+        best = FewestArcs(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.rows(path))
         why = Refused(refused.arcs[path], refused.broken[path])
         return settled(checker, trial.rows(path), best, refused=why, max_arcs=largest, fixed=fixed)
 
-    def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: Found, fixed: np.ndarray) -> Refused:
+    def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: FewestArcs, fixed: np.ndarray) -> Refused:
         # Of candidates of segments of which none is feasible, or nearly so.
         is_open = np.ones(len(trial.z0), bool)
         is_open[trial.motion[(of_trials.arcs > 0) | (of_trials.undecided > 0)]] = False
@@ -216,7 +217,7 @@ def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarra
 
 def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
     # Of a pose in the file's axes; that of tilt and torsion follows from the place.
-    reference = np.array([1.0, 0.0, 0.0, 0.0])
+    reference = np.array(IDENTITY)
     if pose.tilt_torsion is not None and pose.quaternion is not None:
         raise ConfigError(path, f"{name}.quaternion: cannot be combined with tilt_torsion")
     if pose.rest:

@@ -14,8 +14,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import dot
-from cspr_jax.platforms.platform_lanes import State
-from cspr_jax.robots.wrench_lanes import CABLES, Cables, cable_rates
+from cspr_jax.platforms.platform_segment_lanes import StateLanes
+from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cable_rates
 
 # A length is analytic where its ray changes by less than this part of it: sqrt(2) - 1.
 STRAIGHT = 0.414
@@ -33,8 +33,8 @@ class Here(NamedTuple):
         z0: m.
     """
 
-    state: State
-    wires: Cables
+    state: StateLanes
+    wires: CableLanes
     kappa: Sequence[Array]
     squared: Array
     z0: Array
@@ -78,7 +78,7 @@ class Enclosed(NamedTuple):
     share: Pair
 
 
-class Quantity(NamedTuple):
+class LimitOnBlocks(NamedTuple):
     """A quantity of the motion that limits bound.
 
     Fields:
@@ -197,7 +197,7 @@ def _acceleration_slacks(found: Enclosed, _: Array, __: bool) -> Pair:
 
 # By the name that rows of `schema.limits` call them.
 QUANTITIES = {
-    "tension": Quantity(CABLES, _tensions, _tension_sizes, _tension_slacks),
-    "speed": Quantity(CABLES, _speeds, _speed_sizes, _speed_slacks),
-    "acceleration": Quantity(2 * CABLES, _accelerations, _acceleration_sizes, _acceleration_slacks),
+    "tension": LimitOnBlocks(CABLES, _tensions, _tension_sizes, _tension_slacks),
+    "speed": LimitOnBlocks(CABLES, _speeds, _speed_sizes, _speed_slacks),
+    "acceleration": LimitOnBlocks(2 * CABLES, _accelerations, _acceleration_sizes, _acceleration_slacks),
 }

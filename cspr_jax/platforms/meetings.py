@@ -16,7 +16,7 @@ import numpy as np
 ROUNDING = 1e-13
 
 
-class Cables(NamedTuple):
+class CablesOfStep(NamedTuple):
     """Cables at instants of n blocks, equal steps apart.
 
     Fields:
@@ -49,7 +49,7 @@ class _Around(NamedTuple):
         return _size(self.mean) * other.off + _size(other.mean) * self.off + self.off * other.off
 
 
-def cables_meet(base: np.ndarray, pairs: np.ndarray, found: Cables) -> np.ndarray:
+def cables_meet(base: np.ndarray, pairs: np.ndarray, found: CablesOfStep) -> np.ndarray:
     """Steps in which two cables meet for certain.
 
     Args:
@@ -80,7 +80,7 @@ def cables_meet(base: np.ndarray, pairs: np.ndarray, found: Cables) -> np.ndarra
     return meets
 
 
-def cables_hit(sides: np.ndarray, normal: np.ndarray, found: Cables) -> np.ndarray:
+def cables_hit(sides: np.ndarray, normal: np.ndarray, found: CablesOfStep) -> np.ndarray:
     """Steps in which a cable lies on the platform for certain.
 
     Args:

@@ -8,10 +8,10 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
-from cspr_jax.platforms.platform_segment import PoseSegment, duration
+from cspr_jax.platforms.platform_segment import PlatformSegment, duration
 from cspr_jax.schema.verdicts import Verdict
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
@@ -23,7 +23,7 @@ BASIC = 3  # criteria that are no limits
 
 
 @dataclasses.dataclass(frozen=True)
-class PoseChecks:
+class PlatformChecks:
     """Verdicts, slacks and gaps of n motions.
 
     Fields:
@@ -47,7 +47,7 @@ class PoseChecks:
     tolerated: np.ndarray
     not_tolerated: np.ndarray
 
-    def put(self, which: np.ndarray, others: "PoseChecks") -> None:
+    def put(self, which: np.ndarray, others: "PlatformChecks") -> None:
         """Write others into it.
 
         Args:
@@ -57,7 +57,7 @@ class PoseChecks:
         for mine, theirs in zip(vars(self).values(), vars(others).values(), strict=True):
             mine[which] = theirs
 
-    def rows(self, which: np.ndarray) -> "PoseChecks":
+    def rows(self, which: np.ndarray) -> "PlatformChecks":
         """Checks of some of the motions.
 
         Args:
@@ -66,13 +66,13 @@ class PoseChecks:
         Returns:
             those of m motions.
         """
-        return PoseChecks(**{name: values[which] for name, values in vars(self).items()})
+        return PlatformChecks(**{name: values[which] for name, values in vars(self).items()})
 
 
-class FirstLook(Protocol):
+class Sieve(Protocol):
     """First look at motions: a few instants that refute most of what is infeasible."""
 
-    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         """Smallest slack of the tensions over some instants.
 
         Args:
@@ -85,7 +85,7 @@ class FirstLook(Protocol):
         """
         ...
 
-    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
+    def refuted(self, segments: PlatformSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
         """Motions that some instants refute.
 
         Args:
@@ -116,17 +116,17 @@ class MotionChecker(abc.ABC):
     Fields:
         flags: of each criterion, the verdict where it is broken: of the tensions, of singular poses, of poses above the
             spools, then of the other limits. Where one does not apply, its slack is NaN or infinite.
-        prefilter: the first look, which comes before checks.
+        sieve: the first look, which comes before checks.
     """
 
     flags: tuple[Verdict, ...]
-    prefilter: FirstLook
+    sieve: Sieve
 
-    def __init__(self, problem: Problem, kind: Kind, *, batch: int) -> None:
+    def __init__(self, problem: Problem, kind: PlatformMotionKind, *, batch: int) -> None:
         """Keep what is asked about."""
         self.problem, self.kind, self.batch = problem, kind, batch
 
-    def durations(self, segments: PoseSegment, arcs: np.ndarray) -> np.ndarray:
+    def durations(self, segments: PlatformSegment, arcs: np.ndarray) -> np.ndarray:
         """Durations of segments.
 
         Args:
@@ -138,7 +138,7 @@ class MotionChecker(abc.ABC):
         """
         return in_batches(_durations, (segments, arcs.astype(float)), size=self.batch)
 
-    def nothing(self, count: int) -> PoseChecks:
+    def nothing(self, count: int) -> PlatformChecks:
         """Checks to be filled.
 
         Args:
@@ -148,9 +148,9 @@ class MotionChecker(abc.ABC):
             verdicts 0, the rest NaN.
         """
         numbers = [np.full(count, np.nan) for _ in range(5)]
-        return PoseChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
+        return PlatformChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
 
-    def tolerated(self, segments: PoseSegment, arcs: np.ndarray) -> Tolerated:
+    def tolerated(self, segments: PlatformSegment, arcs: np.ndarray) -> Tolerated:
         """Multiples of the uncertainty that motions stand, as closely as they can be found.
 
         Args:
@@ -179,7 +179,7 @@ class MotionChecker(abc.ABC):
         """
 
     @abc.abstractmethod
-    def sampled(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         """Smallest slacks at some instants.
 
         Args:
@@ -194,13 +194,13 @@ class MotionChecker(abc.ABC):
     @abc.abstractmethod
     def check(
         self,
-        segments: PoseSegment,
+        segments: PlatformSegment,
         arcs: np.ndarray,
         *,
         whole: bool = True,
         margins: bool = True,
         ignored: np.ndarray | None = None,
-    ) -> PoseChecks:
+    ) -> PlatformChecks:
         """Check motions in full.
 
         Args:

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
 
 
-def rows(segments: PoseSegment, which: np.ndarray) -> PoseSegment:
+def rows(segments: PlatformSegment, which: np.ndarray) -> PlatformSegment:
     """Segments chosen from many.
 
     Args:
@@ -32,14 +32,14 @@ class Motions(NamedTuple):
         arcs: (n,) how many each has.
     """
 
-    segments: PoseSegment
+    segments: PlatformSegment
     arcs: np.ndarray
 
     def rows(self, which: np.ndarray) -> "Motions":
         """Motions chosen by indices, or by a mask (n,)."""
         return Motions(rows(self.segments, which), self.arcs[which])
 
-    def items(self, which: np.ndarray) -> tuple[PoseSegment, np.ndarray]:
+    def items(self, which: np.ndarray) -> tuple[PlatformSegment, np.ndarray]:
         """Chosen motions as kernels take them.
 
         Args:

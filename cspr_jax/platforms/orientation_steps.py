@@ -9,8 +9,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.arithmetic.lanes import rotation, stored
-from cspr_jax.robots import contact_lanes, wrench_lanes
+from cspr_jax.robots import interference_lanes, wrench_lanes
 from cspr_jax.robots.interference import Contacts, cables_cross, contacts, platform_hit
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
@@ -47,8 +48,11 @@ def _sampled(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) 
     turn = stored(rotation([quaternions[:, i] for i in range(4)]), one)
     wires = cables(robot, [places[:, i] for i in range(3)], turn)
     wires = wires._replace(rays=stored(wires.rays, one))
-    apart, directions = contact_lanes.gaps(robot.base_points, pairs, wires), contact_lanes.cable_directions(wires, turn)
-    return wrench_lanes.normalised_determinant(robot, wires), *contact_lanes.as_arrays(apart, directions)
+    apart, directions = (
+        interference_lanes.gaps(robot.base_points, pairs, wires),
+        interference_lanes.cable_directions(wires, turn),
+    )
+    return wrench_lanes.normalised_determinant(robot, wires), *interference_lanes.as_arrays(apart, directions)
 
 
 def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
@@ -88,7 +92,7 @@ class OrientationSteps:
         self._reference = reference_share(robot, self._place)
         self._size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
         self._side = np.zeros(robot.n_cables)  # of each cable; not yet known, and nothing lies in the platform there
-        self._side = np.sign(self.at(np.array([[1.0, 0.0, 0.0, 0.0]])).cable_directions[0] @ self._contacts.normal)
+        self._side = np.sign(self.at(np.array([IDENTITY])).cable_directions[0] @ self._contacts.normal)
 
     def at(self, quaternions: np.ndarray) -> OrientationSamples:
         """Determinants and vectors of cables of orientations.

@@ -16,18 +16,18 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.arithmetic.lanes import Vector, dot, largest, smallest, stored, turned_back
-from cspr_jax.motions.limits import given, scales
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.limits import limits_set, scales
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.least_nodes import least_nodes
-from cspr_jax.platforms.platform_lanes import State, state
 from cspr_jax.platforms.platform_reach import instant_beside, middle_of, reach
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
+from cspr_jax.platforms.platform_segment_lanes import StateLanes, state
 from cspr_jax.platforms.work_list import allowance
-from cspr_jax.robots import contact_lanes
+from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
-from cspr_jax.robots.wrench_lanes import CABLES, Cables, cables
+from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cables
 from cspr_jax.schema.limits import Limit
 
 # Steps of a block, and the instants between them.
@@ -76,12 +76,12 @@ def of_pose(problem: Problem) -> list[Limit]:
     Returns:
         their rows.
     """
-    return [row for row in given(problem.limits) if not row.of_motion]
+    return [row for row in limits_set(problem.limits) if not row.of_motion]
 
 
 @partial(jax.jit, static_argnames=("pairs", "kind", "margins"))
 def place_blocks(
-    problem: Problem, platform, one: Array, items, *, pairs: tuple, kind: Kind, margins: bool
+    problem: Problem, platform, one: Array, items, *, pairs: tuple, kind: PlatformMotionKind, margins: bool
 ) -> PlaceBounds:
     """Bounds on blocks.
 
@@ -120,11 +120,11 @@ def place_blocks(
         now = at(place)
         lines = cables(problem.robot, now.position, now.turn)
         apart = _apart(problem.robot, pairs, gaps, lines, bends)
-        away = zip(left, contact_lanes.cable_directions(lines, now.turn), strict=True)
+        away = zip(left, interference_lanes.cable_directions(lines, now.turn), strict=True)
         clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
         values = _slacks(problem, segments, now, lines)
         if margins and pairs:
-            found = [dot(x, x) for x in contact_lanes.gaps(problem.robot.base_points, pairs, lines)]
+            found = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, lines)]
             values.append(jnp.sqrt(smallest(found)))
         # Two numbers a loop.
         return lax.complex(clear, values[0]), *values[1:]
@@ -157,12 +157,12 @@ def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array
     seen = turned_back(turn, [-x for x in rays])
     sides, normal = platform
     first, last = ([sides[:, which, k, None] for k in range(3)] for which in range(2))
-    left = _units(contact_lanes.residual((first, last), [normal[k] for k in range(3)], seen))
+    left = _units(interference_lanes.residual((first, last), [normal[k] for k in range(3)], seen))
     if not pairs:
         return [], left
     i, j = (np.array([pair[k] for pair in pairs]) for k in range(2))
     apart = [x[j] - x[i] for x in base]
-    return _units(contact_lanes.gap(apart, [x[i] for x in rays], [x[j] for x in rays])), left
+    return _units(interference_lanes.gap(apart, [x[i] for x in rays], [x[j] for x in rays])), left
 
 
 def _units(vectors: Vector) -> list[Vector]:
@@ -172,7 +172,7 @@ def _units(vectors: Vector) -> list[Vector]:
     return [tuple(x[k] for x in columns) for k in range(columns[0].shape[0])]
 
 
-def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: Cables, bends: _Bends) -> Array:
+def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: CableLanes, bends: _Bends) -> Array:
     # The least over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed between instants.
     if not pairs:
         return jnp.full_like(bends.centre, jnp.inf)
@@ -191,7 +191,7 @@ def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: Cables
     return smallest(values)
 
 
-def _slacks(problem: Problem, segments: PoseSegment, here: State, wires: Cables) -> list[Array]:
+def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, wires: CableLanes) -> list[Array]:
     # Of the depth below the spools, and of limits on the pose.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     normal = plane_normal(robot)
@@ -206,7 +206,7 @@ def _slacks(problem: Problem, segments: PoseSegment, here: State, wires: Cables)
     return values
 
 
-def _steps(problem: Problem, segments: PoseSegment, bends: _Bends) -> list[Array]:
+def _steps(problem: Problem, segments: PlatformSegment, bends: _Bends) -> list[Array]:
     # What these may fall below their values at two instants; a length is convex along the chord of its ray.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     steps = [jnp.sqrt(jnp.sum(plane_normal(robot) ** 2)) * bends.centre / z0]

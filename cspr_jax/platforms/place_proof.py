@@ -14,16 +14,16 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.blocks import Blocks, growing, parts_of_arcs
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.meetings import Cables, cables_hit, cables_meet
+from cspr_jax.platforms.meetings import CablesOfStep, cables_hit, cables_meet
 from cspr_jax.platforms.motions import rows
 from cspr_jax.platforms.place_blocks import PLACES, PlaceBounds, of_pose, place_blocks
-from cspr_jax.platforms.platform_lanes import state
 from cspr_jax.platforms.platform_reach import instant_beside, middle_of
-from cspr_jax.platforms.platform_segment import PoseSegment
-from cspr_jax.platforms.work_list import Looked, WorkList
-from cspr_jax.robots import contact_lanes
+from cspr_jax.platforms.platform_segment import PlatformSegment
+from cspr_jax.platforms.platform_segment_lanes import state
+from cspr_jax.platforms.work_list import BlockBounds, WorkList
+from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.interference import contacts
 from cspr_jax.robots.wrench_lanes import cables
 
@@ -62,11 +62,11 @@ class PlaceProof:
     bound: np.ndarray
     instant: np.ndarray
     row: np.ndarray
-    first: Looked
+    first: BlockBounds
 
 
 @partial(jax.jit, static_argnames="kind")
-def wires_beside(problem: Problem, items, *, kind: Kind) -> tuple[Array, Array]:
+def wires_beside(problem: Problem, items, *, kind: PlatformMotionKind) -> tuple[Array, Array]:
     """Cables at one instant beside the middle of each of many blocks.
 
     Args:
@@ -81,7 +81,7 @@ def wires_beside(problem: Problem, items, *, kind: Kind) -> tuple[Array, Array]:
     now = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
     here = state(segments, arcs, now, kind)
     wires = cables(problem.robot, here.position, here.turn)
-    return contact_lanes.as_arrays(wires.rays, contact_lanes.cable_directions(wires, here.turn))
+    return interference_lanes.as_arrays(wires.rays, interference_lanes.cable_directions(wires, here.turn))
 
 
 class PlaceCertifier:
@@ -97,7 +97,9 @@ class PlaceCertifier:
         pairs: of cables that can meet.
     """
 
-    def __init__(self, problem: Problem, kind: Kind, *, batch: int, count_instants: Callable[[int], None]) -> None:
+    def __init__(
+        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
+    ) -> None:
         """Find what can meet."""
         self._problem, self._kind, self._batch, self._count = problem, kind, batch, count_instants
         near, points = contacts(problem.robot), np.asarray(problem.robot.platform_points)
@@ -108,7 +110,7 @@ class PlaceCertifier:
         self._parts = PARTS, growing(problem.amplitude, *(FROM_REST if kind.from_rest else BETWEEN))
 
     def prove(
-        self, segments: PoseSegment, arcs: np.ndarray, *, margins: bool = False, ignored: np.ndarray | None = None
+        self, segments: PlatformSegment, arcs: np.ndarray, *, margins: bool = False, ignored: np.ndarray | None = None
     ) -> PlaceProof:
         """Prove motions clear, or that something meets or is broken.
 
@@ -124,7 +126,7 @@ class PlaceCertifier:
         blocks, work = parts_of_arcs(arcs, self._knots, self._parts[not margins]), WorkList(arcs, self._limits, ignored)
         met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
 
-        def look(some: Blocks, level: int) -> Looked:
+        def look(some: Blocks, level: int) -> BlockBounds:
             found = self._bounds(some, segments, arcs, margins=margins)
             is_clear = np.asarray(found.clear) > touch
             doubtful = np.flatnonzero(~is_clear)
@@ -141,14 +143,14 @@ class PlaceCertifier:
                     work.refute(own.row[which], between[step[which], which])
             nodes, bound = np.asarray(found.nodes), np.asarray(found.slacks)
             tau = some.instants(PLACES[:, None] if margins else np.asarray(found.place)[None])
-            return Looked(nodes, bound, tau, lambda _: is_clear)
+            return BlockBounds(nodes, bound, tau, lambda _: is_clear)
 
         first = work.work_off(blocks, look)
         is_proved = ~work.is_refuted & ~work.is_stuck
         known = work.attained, work.bound, work.instant
         return PlaceProof(is_proved, work.is_refuted, met, hit, *known, blocks.row, first)
 
-    def _bounds(self, blocks: Blocks, segments: PoseSegment, arcs: np.ndarray, *, margins: bool) -> PlaceBounds:
+    def _bounds(self, blocks: Blocks, segments: PlatformSegment, arcs: np.ndarray, *, margins: bool) -> PlaceBounds:
         self._count(len(blocks.row) * len(PLACES))
         kernel = partial(
             place_blocks,
@@ -162,7 +164,7 @@ class PlaceCertifier:
         items = (rows(segments, blocks.row), arcs[blocks.row].astype(float), blocks.start, blocks.stop)
         return in_batches(kernel, items, size=self._batch, axis=-1)
 
-    def _cables(self, blocks: Blocks, bends: np.ndarray, motions) -> Cables:
+    def _cables(self, blocks: Blocks, bends: np.ndarray, motions) -> CablesOfStep:
         # At the instants of blocks.
         segments, arcs = motions
         own = np.tile(np.arange(len(blocks.row)), len(PLACES))
@@ -171,4 +173,4 @@ class PlaceCertifier:
         found = in_batches(partial(wires_beside, self._problem, kind=self._kind), items, size=self._batch)
         rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in found)
         centre, arm, platform = bends
-        return Cables(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)
+        return CablesOfStep(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from cspr_jax.build import motion_kind
+from cspr_jax.build.problems import motion_kind
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Orientations, SweepFile
 from cspr_jax.maps.grid_map import PlatformMap
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.platforms.accessible import Accessible, accessible_sets
-from cspr_jax.platforms.answers import PoseAnswers
+from cspr_jax.platforms.answers import PlatformMotionAnswers
 from cspr_jax.platforms.attainable import VALUES, attainable
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.robots.symmetries import NONE, folded, symmetries
 from cspr_jax.schema.quantities import REFUSALS
@@ -23,12 +23,12 @@ DIGITS = 12
 class OrientationWorkspaceMap(PlatformMap):
     """The accessible orientations of each place; see `GridMap`."""
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Find the robot's symmetries."""
-        super().__init__(spec, keys, file)
+        super().__init__(robot_file, keys, file)
         self._orientations = keys.orientations or Orientations()
         # Limits may differ from cable to cable.
-        self._alike = NONE if given(self._problem.limits) else symmetries(self._problem.robot)
+        self._alike = NONE if limits_set(self._problem.limits) else symmetries(self._problem.robot)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`. Places that symmetries join are computed once."""
@@ -64,13 +64,15 @@ class OrientationWorkspaceMap(PlatformMap):
 class AttainabilityMap(OrientationWorkspaceMap):
     """The accessible orientations of each place, and those of them that are attained; see `GridMap`."""
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Build the checker of motions from rest."""
-        super().__init__(spec, keys, file)
+        super().__init__(robot_file, keys, file)
         kind = motion_kind(keys.trajectory, from_rest=True)
-        self._checker = PoseChecker(self._problem, kind, batch=MANY)
+        self._checker = PlatformChecker(self._problem, kind, batch=MANY)
 
-    def _attainable(self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, *, margins: bool) -> PoseAnswers:
+    def _attainable(
+        self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, *, margins: bool
+    ) -> PlatformMotionAnswers:
         # Of (n, 3) angles at (n, 3) places, both in the kernels' axes.
         values, most = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
         asked = self._checker, places, angles, z0

@@ -19,9 +19,9 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import polynomial, sincospi
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
-from cspr_jax.motions.platform_kind import Kind
-from cspr_jax.platforms.platform_lanes import Instant
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.motions.platform_kind import PlatformMotionKind
+from cspr_jax.platforms.platform_segment import PlatformSegment
+from cspr_jax.platforms.platform_segment_lanes import InstantLanes
 
 # 1 - s up to which arccos(s) / sqrt(1 - s^2) is bounded: it is singular at 2. Less than the least counts as that.
 FARTHEST, NEAREST = 1.9, 0.1
@@ -73,7 +73,7 @@ def middle_of(amplitude: Amplitude, tau: Array) -> Middle:
     return Middle(tau, [value / math.factorial(j) for j, value in enumerate(values)])
 
 
-def instant_beside(middle: Middle, sense: Array, arcs: Array, off: Array) -> Instant:
+def instant_beside(middle: Middle, sense: Array, arcs: Array, off: Array) -> InstantLanes:
     """Instant beside the middle of a block, by the polynomial piece of the middle.
 
     Args:
@@ -87,10 +87,12 @@ def instant_beside(middle: Middle, sense: Array, arcs: Array, off: Array) -> Ins
     """
     tau, terms = middle.tau + off, middle.terms
     a, a1, a2, a3 = (polynomial([math.perm(i, j) * terms[i] for i in range(j, len(terms))], off) for j in range(4))
-    return Instant(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
+    return InstantLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
 
 
-def reach(segment: PoseSegment, arcs: Array, middle: Middle, axes: tuple[Array, Array], kind: Kind) -> Reach:
+def reach(
+    segment: PlatformSegment, arcs: Array, middle: Middle, axes: tuple[Array, Array], kind: PlatformMotionKind
+) -> Reach:
     """Bounds of motions around the middles of blocks.
 
     Args:
@@ -167,8 +169,10 @@ def _trigonometric(middle: tuple[Array, Array], along: Array, growth: Array) -> 
     )
 
 
-def _swing(segment: PoseSegment, arcs: Array, middle: Middle, axes, sizes, first, kind: Kind) -> tuple[Array, Array]:
-    # Of |p'| and |p''|: the terms of `platform_lanes`, and the growth of the frame that turns with the ellipse.
+def _swing(
+    segment: PlatformSegment, arcs: Array, middle: Middle, axes, sizes, first, kind: PlatformMotionKind
+) -> tuple[Array, Array]:
+    # Of |p'| and |p''|: the terms of `platform_segment_lanes`, and the growth of the frame that turns with the ellipse.
     omega = math.pi * arcs
     sine, cosine, _ = first
     if kind.from_rest:
@@ -198,7 +202,7 @@ def _hypotenuse(a: Array, b: Array) -> Array:
     return jnp.sqrt(a * a + b * b)
 
 
-def _beat(segment: PoseSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
+def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
     # Of (3.93), by terms.
     how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
@@ -213,7 +217,7 @@ def _beat(segment: PoseSegment, arcs: Array, middle: Middle, axes, first, third)
     return _Beats(value * 0.125, rate * 0.125, bend * 0.125, aside * 0.125)
 
 
-def _half_vector(segment: PoseSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:
+def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:
     # Of |u|, |u'|, |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
     how = segment.turn
     rate, bend = angle * sizes[1], angle * sizes[2]

@@ -21,7 +21,7 @@ from jax import Array
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
-from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.swing_plane import swing_plane
 from cspr_jax.platforms.oscillating_slerp import Turn, beat, orientation, rates, turn
 from cspr_jax.robots.platform import PlatformRobot
@@ -32,7 +32,7 @@ from cspr_jax.robots.wrench_balance import normalised_determinant
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
-class PoseSegment:
+class PlatformSegment:
     """Parameters of one segment between two poses, for one parity of the number of arcs.
 
     Fields:
@@ -67,7 +67,7 @@ def pose_segment(
     beta_hats: tuple[Array, Array],
     *,
     odd: Array,
-) -> PoseSegment:
+) -> PlatformSegment:
     """The segment from one pose to another.
 
     Args:
@@ -89,10 +89,10 @@ def pose_segment(
     is_determined = robot.n_cables == robot.dof
     one = jnp.eye(3, dtype=hub.dtype)
     regular = normalised_determinant(robot, hub, one) if is_determined else one[0, 0]
-    return PoseSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, how, regular)
+    return PlatformSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, how, regular)
 
 
-def duration(segment: PoseSegment, arcs: Array) -> Array:
+def duration(segment: PlatformSegment, arcs: Array) -> Array:
     """Duration T of a segment, (3.77).
 
     Args:
@@ -105,14 +105,16 @@ def duration(segment: PoseSegment, arcs: Array) -> Array:
     return math.pi * arcs * jnp.sqrt(_share(segment, arcs) / segment.rate)
 
 
-def _share(segment: PoseSegment, arcs: Array) -> Array:
+def _share(segment: PlatformSegment, arcs: Array) -> Array:
     # theta_h^2 (n_h - 1) over (pi p)^2; 1 - ratio is what vanishes for p = 1 and psi -> 0.
     ratio = segment.precession / arcs
     return (1.0 - ratio) * (1.0 + ratio)
 
 
 @partial(jax.jit, static_argnames="kind")
-def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: Kind = USUAL) -> State:
+def motion(
+    segment: PlatformSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: PlatformMotionKind = USUAL
+) -> State:
     """The state of the platform at one instant.
 
     Args:
@@ -140,7 +142,9 @@ def motion(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, 
     )
 
 
-def quaternion_at(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: Kind = USUAL) -> Array:
+def quaternion_at(
+    segment: PlatformSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: PlatformMotionKind = USUAL
+) -> Array:
     """The orientation at one instant.
 
     Args:
@@ -157,7 +161,7 @@ def quaternion_at(segment: PoseSegment, amplitude: Amplitude, arcs: Array, tau: 
 
 
 def _quaternions(
-    segment: PoseSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: Kind
+    segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: PlatformMotionKind
 ) -> tuple[Array, Array, Array]:
     share = _share(segment, arcs)
     beta_hats = (-1.0 / share, -1.0 / share) if kind.plain else (segment.turn.start_beta_hat, segment.turn.end_beta_hat)
@@ -166,7 +170,7 @@ def _quaternions(
 
 
 def _swing(
-    segment: PoseSegment, values: tuple[Array, ...], arcs: Array, tau: Array, *, variable: bool
+    segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, *, variable: bool
 ) -> tuple[Array, Array, Array]:
     # c, c' and c'' in the plane, derivatives in tau.
     span = segment.end_radius - segment.start_radius
@@ -207,10 +211,10 @@ class PlatformMotion:
         kind: of the motion; known when a function is compiled.
     """
 
-    segment: PoseSegment
+    segment: PlatformSegment
     amplitude: Amplitude
     arcs: Array
-    kind: Kind = dataclasses.field(default=USUAL, metadata={"static": True})
+    kind: PlatformMotionKind = dataclasses.field(default=USUAL, metadata={"static": True})
 
     @property
     def z0(self) -> Array:

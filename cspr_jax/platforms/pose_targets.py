@@ -5,11 +5,12 @@ from typing import Literal
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_parts
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.motions.answers import joined
-from cspr_jax.platforms.answers import PoseAnswers, reached
+from cspr_jax.platforms.answers import PlatformMotionAnswers, reached
 from cspr_jax.platforms.arcs import CANDIDATES, Candidates
 from cspr_jax.platforms.beta_hat import OPTIONS
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.point_mass import rest_point
@@ -17,7 +18,6 @@ from cspr_jax.schema.families import WITHOUT_BETA_HAT
 
 # Time functions of the rotation with a beta-hat of its own at each end; None is the default.
 _OWN = (None, "beta_ff")
-REFERENCE = (1.0, 0.0, 0.0, 0.0)
 Poses = tuple[np.ndarray, np.ndarray]
 
 
@@ -30,10 +30,10 @@ def rest_poses(z0: np.ndarray) -> Poses:
     Returns:
         positions (n, 3), m, and quaternions (n, 4).
     """
-    return rest_point(z0), np.tile(REFERENCE, (len(z0), 1))
+    return rest_point(z0), np.tile(IDENTITY, (len(z0), 1))
 
 
-def start_beta_hat(checker: PoseChecker, starts: Poses, z0: np.ndarray) -> np.ndarray:
+def start_beta_hat(checker: PlatformChecker, starts: Poses, z0: np.ndarray) -> np.ndarray:
     """Beta-hat at starts beyond P0: the preferred one of (3.91), else that at rest.
 
     Args:
@@ -51,13 +51,13 @@ def start_beta_hat(checker: PoseChecker, starts: Poses, z0: np.ndarray) -> np.nd
 
 
 def pose_arcs(
-    checker: PoseChecker,
+    checker: PlatformChecker,
     motions: Candidates,
     *,
     beta_hat: float | Literal["preferred"] | None = None,
     beat: str | None = None,
     max_arcs: int = 30,
-) -> PoseAnswers:
+) -> PlatformMotionAnswers:
     """Smallest number of arcs of each motion.
 
     Args:
@@ -71,7 +71,7 @@ def pose_arcs(
         the answers.
     """
 
-    def part(which: slice) -> PoseAnswers:
+    def part(which: slice) -> PlatformMotionAnswers:
         some = motions.motions(np.arange(len(motions.z0))[which])
         values, can_end = end_options(
             checker.problem.robot, *some.end, some.z0, 1 if beta_hat == "preferred" else OPTIONS

@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from cspr_jax.build import given_quaternion, motion_kind, orientations
+from cspr_jax.build.orientations import given_quaternion, orientations
+from cspr_jax.build.problems import motion_kind
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.platforms.arcs import Candidates
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.platforms.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
@@ -22,15 +23,15 @@ class PosesMap(PlatformMap):
 
     proves = True
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a start that is no pose."""
-        super().__init__(spec, keys, file)
+        super().__init__(robot_file, keys, file)
         start = keys.trajectory.start
         self._quaternion = given_quaternion(
             None if start is None else start.quaternion, "trajectory.from.quaternion", file
         )
         from_rest = start is None or start.rest
-        self._checker = PoseChecker(self._problem, motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
+        self._checker = PlatformChecker(self._problem, motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

@@ -20,19 +20,19 @@ import numpy as np
 from cspr_jax.arithmetic import chebyshev
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.blocks import Blocks, growing, parts_of_arcs
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.motions import rows
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.tension_blocks import (
     BASIC,
-    BlockBounds,
+    TensionBounds,
     TensionRange,
     of_motion,
     tension_blocks,
     tension_ranges,
 )
-from cspr_jax.platforms.work_list import TOLERANCE, Looked, WorkList
+from cspr_jax.platforms.work_list import TOLERANCE, BlockBounds, WorkList
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.wrench_lanes import CABLES
 from cspr_jax.schema.limits import LIMITS
@@ -48,7 +48,7 @@ MATTERS = 0.1  # part of all that is allowed for
 
 @dataclasses.dataclass(frozen=True)
 class TensionProof:
-    """Proofs about n motions; criteria are those of `tension_blocks.BlockBounds`.
+    """Proofs about n motions; criteria are those of `tension_blocks.TensionBounds`.
 
     Fields:
         is_proved: (n,) every criterion is met at every instant.
@@ -66,7 +66,7 @@ class TensionProof:
     bound: np.ndarray
     instant: np.ndarray
     row: np.ndarray
-    first: Looked
+    first: BlockBounds
 
 
 class _Order(NamedTuple):
@@ -86,7 +86,9 @@ class Certifier:
         count_instants: is told how many were looked at.
     """
 
-    def __init__(self, problem: Problem, kind: Kind, *, batch: int, count_instants: Callable[[int], None]) -> None:
+    def __init__(
+        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
+    ) -> None:
         """Order the cables."""
         self._kind, self._batch, self._count = kind, batch, count_instants
         self._knots, self._orders = np.asarray(problem.amplitude.knots), _orders(problem)
@@ -96,7 +98,7 @@ class Certifier:
 
     def prove(
         self,
-        segments: PoseSegment,
+        segments: PlatformSegment,
         arcs: np.ndarray,
         *,
         near: float = 0.0,
@@ -118,18 +120,18 @@ class Certifier:
         blocks = parts_of_arcs(arcs, self._knots, self._parts[not margins])
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
 
-        def look(some: Blocks, _: int) -> Looked:
+        def look(some: Blocks, _: int) -> BlockBounds:
             found = self._looked_at(some, motions, margins=margins)
             tau = some.instants(chebyshev.nodes()[:, None] if margins else np.asarray(found.place)[None])
             nodes, bound = np.asarray(found.nodes), np.asarray(found.bound)
-            return Looked(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[some.row, 0], 0.0))
+            return BlockBounds(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[some.row, 0], 0.0))
 
         work = WorkList(arcs, self._limits, ignored)
         first = work.work_off(blocks, look)
         is_proved = ~work.is_refuted & ~work.is_stuck
         return TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.instant, blocks.row, first)
 
-    def _looked_at(self, blocks: Blocks, motions, *, margins: bool) -> BlockBounds:
+    def _looked_at(self, blocks: Blocks, motions, *, margins: bool) -> TensionBounds:
         found = self.bounds(0, blocks, motions, margins=margins, least=not margins)
         for k in range(1, len(self._orders)):
             # What is not proved because the first three cables lie nearly in one plane.
@@ -146,7 +148,7 @@ class Certifier:
             found.allowed[open_ones] = np.minimum(found.allowed[open_ones], better.allowed)
         return found
 
-    def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool, least: bool = False) -> BlockBounds:
+    def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool, least: bool = False) -> TensionBounds:
         """Bounds on blocks.
 
         Args:
@@ -171,7 +173,7 @@ class Certifier:
         own = rows(segments, blocks.row), arcs[blocks.row].astype(float), sign * standing[blocks.row]
         return problem, (*own, blocks.start, blocks.stop)
 
-    def ranges(self, blocks: Blocks, segments: PoseSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def ranges(self, blocks: Blocks, segments: PlatformSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Ranges of the tensions on blocks.
 
         Args:
@@ -199,7 +201,7 @@ class Certifier:
         return low, high
 
 
-def _rounding_matters(found: BlockBounds | TensionRange) -> np.ndarray:
+def _rounding_matters(found: TensionBounds | TensionRange) -> np.ndarray:
     # Elsewhere no other order of the cables gives better bounds: only shorter blocks do.
     rounding, allowed = np.asarray(found.rounding), np.asarray(found.allowed)
     return (rounding > 0.25 * TOLERANCE) & (rounding >= MATTERS * allowed)
@@ -238,7 +240,7 @@ def _reordered(problem: Problem, order: list[int]) -> Problem:
     return problem._replace(robot=changed, limits=Limits(**own))
 
 
-def determinant_at_rest(problem: Problem, segments: PoseSegment) -> np.ndarray:
+def determinant_at_rest(problem: Problem, segments: PlatformSegment) -> np.ndarray:
     """Determinant of the Jacobian J (3.5) in the rest point, with the sign that `wrench_lanes.balance` gives it.
 
     Args:

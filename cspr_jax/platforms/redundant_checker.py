@@ -13,19 +13,19 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed_places
-from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.beta_hat import LARGEST
 from cspr_jax.platforms.crossings import CableVectors, passed_over
 from cspr_jax.platforms.end_acceleration import AT_REST
-from cspr_jax.platforms.motion_checker import BASIC, BESIDE_KNOT, FEW, TOLERANCE, TOUCH, MotionChecker, PoseChecks
+from cspr_jax.platforms.motion_checker import BASIC, BESIDE_KNOT, FEW, TOLERANCE, TOUCH, MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import Motions, rows
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.redundant_kernels import cable_vectors, end_wrenches, instants, other_limits
 from cspr_jax.robots.platform import pairs_apart
 from cspr_jax.schema.verdicts import Verdict, conjunction
 from cspr_jax.workspaces import exact
-from cspr_jax.workspaces.questions import FEASIBLE, question
+from cspr_jax.workspaces.questions import FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
 # So many samples are held at a time, instants of the first look computed at a time.
@@ -37,8 +37,8 @@ HALVINGS, FLAT = 60, 1e-12
 NONE = (LARGEST, -LARGEST)
 
 
-class MarginLook:
-    """First look at motions by the margins of their tensions, and other limits; see `FirstLook`.
+class MarginSieve:
+    """First look at motions by the margins of their tensions, and other limits; see `Sieve`.
 
     Args:
         checker: of the motions.
@@ -48,12 +48,12 @@ class MarginLook:
         """Of a checker."""
         self._checker = checker
 
-    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        """Smallest margin over some instants; see `FirstLook.lowest`."""
+    def lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest margin over some instants; see `Sieve.lowest`."""
         return self._least(segments, arcs, tau)[:, 0]
 
-    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
-        """Motions that some instants refute; see `FirstLook.refuted`."""
+    def refuted(self, segments: PlatformSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
+        """Motions that some instants refute; see `Sieve.refuted`."""
         is_refuted = np.zeros(len(segments.rate), bool)
         for start in range(0, len(tau), CHUNK):
             alive = np.flatnonzero(~is_refuted)
@@ -63,7 +63,7 @@ class MarginLook:
             is_refuted[alive] = ~(least[:, : None if limits else 1] > -TOLERANCE).all(1)
         return is_refuted
 
-    def _least(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def _least(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         # (n, n_slacks) the margin first; not the distances between cables.
         motions = Motions(segments, np.full(len(segments.rate), arcs))
         found = self._checker.values(motions, np.tile(tau, (len(motions.arcs), 1)))[:, :, :-1].min(1)
@@ -73,14 +73,14 @@ class MarginLook:
 class RedundantChecker(MotionChecker):
     """Checker of motions of one robot on more cables than six; see `MotionChecker`."""
 
-    def __init__(self, problem: Problem, kind: Kind = USUAL, *, batch: int = FEW) -> None:
+    def __init__(self, problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> None:
         """Find what can meet."""
         super().__init__(problem, kind, batch=batch)
         robot, limits = problem.robot, problem.limits
         self._rows = other_limits(limits)
         basic = (Verdict.WRENCH_INFEASIBLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS)
-        self.flags, self.prefilter = (*basic, *(row.flag for row in self._rows)), MarginLook(self)
-        self._asked = question(robot, FEASIBLE, limits)
+        self.flags, self.sieve = (*basic, *(row.flag for row in self._rows)), MarginSieve(self)
+        self._asked = requirement(robot, FEASIBLE, limits)
         self._workspace = WorkspaceSearch(robot, self._asked)
         self._weight = float(robot.mass * robot.gravity) / robot.n_cables
         self._pairs = np.array(pairs_apart(robot), int).reshape(-1, 2)
@@ -142,20 +142,20 @@ class RedundantChecker(MotionChecker):
         """Criteria that are broken for certain; see `MotionChecker.breaks`."""
         return slack <= -TOLERANCE
 
-    def sampled(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         """Smallest slacks at some instants; see `MotionChecker.sampled`."""
         motions = Motions(segments, np.full(len(segments.rate), arcs))
         return _in_order(self.values(motions, np.tile(tau, (len(motions.arcs), 1))).min(1))
 
     def check(
         self,
-        segments: PoseSegment,
+        segments: PlatformSegment,
         arcs: np.ndarray,
         *,
         whole: bool = True,
         margins: bool = True,
         ignored: np.ndarray | None = None,
-    ) -> PoseChecks:
+    ) -> PlatformChecks:
         """Check motions in full, by samples: nothing is proved; see `MotionChecker.check`."""
         checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         for count in np.unique(arcs).tolist():
@@ -167,7 +167,7 @@ class RedundantChecker(MotionChecker):
                 checks.put(some, self._checked(motions.rows(some), count, whole, ignored))
         return checks
 
-    def _checked(self, motions: Motions, count: int, whole: bool, ignored: np.ndarray | None) -> PoseChecks:
+    def _checked(self, motions: Motions, count: int, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:
         tau = np.linspace(0.0, 1.0, SAMPLES * count + 1)
         samples = self.values(motions, np.tile(tau, (len(motions.arcs), 1)))
         counted = np.ones(len(self.flags), bool) if ignored is None else ~ignored
@@ -202,7 +202,7 @@ class RedundantChecker(MotionChecker):
             return np.zeros(many, bool)
         return passed_over(vectors, None, row, (ends[0], ends[1]), many)[0]
 
-    def _judged(self, least: np.ndarray, met: np.ndarray, duration: np.ndarray, counted: np.ndarray) -> PoseChecks:
+    def _judged(self, least: np.ndarray, met: np.ndarray, duration: np.ndarray, counted: np.ndarray) -> PlatformChecks:
         margin, nearest, others = least[:, 0], least[:, -1], least[:, 1:-1]
         free = nearest - self._diameter
         verdict = Verdict.CABLE_CABLE.value * (met | (free <= -self._touch))
@@ -216,7 +216,7 @@ class RedundantChecker(MotionChecker):
         verdict |= np.where(close.any(1), Verdict.UNDECIDED.value, 0)
         verdict = conjunction(verdict)
         is_finite = ~np.isnan(least).any(1) & (duration > 0.0)
-        return PoseChecks(
+        return PlatformChecks(
             np.where(is_finite, verdict, Verdict.NOT_FINITE.value),
             np.where(is_finite[:, None], _in_order(least), np.nan),
             np.where(is_finite, nearest, np.nan),

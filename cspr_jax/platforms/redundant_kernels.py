@@ -7,11 +7,11 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.motions.limits import Values, given, scales, slack
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.limits import Values, limits_set, scales, slack
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.end_acceleration import end_state
-from cspr_jax.platforms.platform_segment import PlatformMotion, PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformMotion, PlatformSegment
 from cspr_jax.robots.cables import cable_motion
 from cspr_jax.robots.interference import cable_directions, gaps
 from cspr_jax.robots.limits import Limits
@@ -19,7 +19,7 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.schema.limits import Limit
 
 
-class Instants(NamedTuple):
+class PoseInstants(NamedTuple):
     """What motions ask for at n instants.
 
     Fields:
@@ -44,11 +44,13 @@ def other_limits(limits: Limits) -> list[Limit]:
     Returns:
         the rows.
     """
-    return [row for row in given(limits) if row.quantity != "tension"]
+    return [row for row in limits_set(limits) if row.quantity != "tension"]
 
 
 @partial(jax.jit, static_argnames="kind")
-def instants(problem: Problem, pairs: Array, items: tuple[PoseSegment, Array, Array], *, kind: Kind) -> Instants:
+def instants(
+    problem: Problem, pairs: Array, items: tuple[PlatformSegment, Array, Array], *, kind: PlatformMotionKind
+) -> PoseInstants:
     """What motions ask for, each at an instant.
 
     Args:
@@ -74,14 +76,14 @@ def instants(problem: Problem, pairs: Array, items: tuple[PoseSegment, Array, Ar
         apart = jnp.linalg.norm(gaps(robot, pairs, state.position, state.rotation), axis=1)
         nearest = jnp.min(apart, initial=jnp.inf)
         slacks = jnp.stack([*(jnp.min(x) for x in each), nearest])
-        return Instants(state.position, state.quaternion, robot.inertial_wrench(state), slacks)
+        return PoseInstants(state.position, state.quaternion, robot.inertial_wrench(state), slacks)
 
     return jax.vmap(one)(*items)
 
 
 @partial(jax.jit, static_argnames="kind")
 def cable_vectors(
-    problem: Problem, pairs: Array, items: tuple[PoseSegment, Array, Array], *, kind: Kind
+    problem: Problem, pairs: Array, items: tuple[PlatformSegment, Array, Array], *, kind: PlatformMotionKind
 ) -> tuple[Array, Array]:
     """The vectors between cables, and the directions of cables, of motions, each at an instant.
 

@@ -17,11 +17,11 @@ from jax import Array
 from cspr_jax.arithmetic.batches import in_batches, room, row_by_row
 from cspr_jax.arithmetic.lanes import cross, dot
 from cspr_jax.motions.amplitudes import Amplitude
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.from_rest_lanes import rest_table, swing, swings
 from cspr_jax.platforms.motions import rows
-from cspr_jax.platforms.platform_lanes import instant
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
+from cspr_jax.platforms.platform_segment_lanes import instant
 from cspr_jax.platforms.slack_lanes import certain_tension, lowest_tension
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import balance, cables
@@ -30,16 +30,16 @@ from cspr_jax.robots.wrench_lanes import balance, cables
 CHUNK, FIRST, FEWER = 8, 2, 8
 
 
-@partial(jax.jit, static_argnames=("kind", "rough"))
+@partial(jax.jit, static_argnames=("kind", "single_precision"))
 def smallest_tensions(
     robot: PlatformRobot,
     amplitude: Amplitude,
     arcs: Array,
     tau: Array,
-    segments: PoseSegment,
+    segments: PlatformSegment,
     *,
-    kind: Kind,
-    rough: bool = False,
+    kind: PlatformMotionKind,
+    single_precision: bool = False,
 ) -> tuple[Array, Array]:
     """Smallest normalised tension of many segments over some instants.
 
@@ -50,14 +50,14 @@ def smallest_tensions(
         tau: (m,) instants.
         segments: leaves (n, ...), of the parity of `arcs`.
         kind: of the motions.
-        rough: whether in float32.
+        single_precision: whether in float32.
 
     Returns:
         (n,) of `slack_lanes.certain_tension`; and which instant it belongs to, (n,) from 0 on.
     """
-    if rough:
+    if single_precision:
         robot, segments = _of_one_size(robot, segments)
-    kept = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if rough else x.dtype))
+    kept = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if single_precision else x.dtype))
     robot, segments, number = kept((robot, segments, jnp.asarray(arcs)))
     if kind.from_rest:
         at, table = _from_rest(robot, segments), kept(rest_table(amplitude, arcs, tau, kind))
@@ -73,7 +73,7 @@ def smallest_tensions(
     return lowest, jnp.where(values == lowest[None], jnp.arange(len(tau))[:, None], len(tau)).min(0)
 
 
-def _of_one_size(robot: PlatformRobot, segments: PoseSegment) -> tuple[PlatformRobot, PoseSegment]:
+def _of_one_size(robot: PlatformRobot, segments: PlatformSegment) -> tuple[PlatformRobot, PlatformSegment]:
     # With the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
     # eighteenth, which float32 has no room for. Tensions over their value at rest do not depend on the unit.
     unit = jnp.sqrt(jnp.mean(robot.base_points**2))
@@ -93,7 +93,7 @@ def _of_one_size(robot: PlatformRobot, segments: PoseSegment) -> tuple[PlatformR
     )
 
 
-def _from_rest(robot: PlatformRobot, segments: PoseSegment):
+def _from_rest(robot: PlatformRobot, segments: PlatformSegment):
     which, inertia = swings(segments), robot.inertia / robot.mass
     # I e has the same direction in platform axes as about the fixed ones before the turn, which leaves the axis alone.
     own = tuple(dot([inertia[i, j] for j in range(3)], which.axis) for i in range(3))
@@ -112,18 +112,24 @@ def _from_rest(robot: PlatformRobot, segments: PoseSegment):
 
 @partial(jax.jit, static_argnames="kind")
 def _rough_and_certain(
-    robot: PlatformRobot, amplitude: Amplitude, arcs: Array, tau: Array, segments: PoseSegment, *, kind: Kind
+    robot: PlatformRobot,
+    amplitude: Amplitude,
+    arcs: Array,
+    tau: Array,
+    segments: PlatformSegment,
+    *,
+    kind: PlatformMotionKind,
 ) -> tuple[Array, Array]:
     # As `smallest_tensions`, in float32; and in float64 at the instant of that, (n,) each.
-    lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, rough=True)
+    lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, single_precision=True)
     when = jnp.minimum(when, len(tau) - 1)  # there is none where all are NaN
     if kind.from_rest:
         return lowest, _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
     return lowest, lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau[when]), kind)
 
 
-class Prefilter(NamedTuple):
-    """Prefilter of motions of one robot, by their tensions at a few instants.
+class TensionSieve(NamedTuple):
+    """Sieve of motions of one robot, by their tensions at a few instants.
 
     Fields:
         robot: the robot.
@@ -136,12 +142,12 @@ class Prefilter(NamedTuple):
 
     robot: PlatformRobot
     amplitude: Amplitude
-    kind: Kind
+    kind: PlatformMotionKind
     least: float
     size: int
     count_instants: Callable[[int], None]
 
-    def lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         """Smallest tension over some instants.
 
         Args:
@@ -157,7 +163,7 @@ class Prefilter(NamedTuple):
             lowest = np.minimum(lowest, self._lowest(segments, arcs, chunk))
         return np.where(np.isnan(lowest), -np.inf, lowest)
 
-    def refuted(self, segments: PoseSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
+    def refuted(self, segments: PlatformSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
         """Motions that some instants refute.
 
         Args:
@@ -185,7 +191,7 @@ class Prefilter(NamedTuple):
             is_refuted[alive] = (lowest < 0.0) & ~(certain > self.least)
         return is_refuted
 
-    def _lowest(self, segments: PoseSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+    def _lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         # Of few motions, in float64.
         self.count_instants(len(segments.rate) * len(tau))
         kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)

@@ -4,18 +4,18 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import dot, smallest
-from cspr_jax.motions.limits import given, scales, slack
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.limits import limits_set, scales, slack
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.platform_lanes import Instant, State, squared_duration, state
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
+from cspr_jax.platforms.platform_segment_lanes import InstantLanes, StateLanes, squared_duration, state
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import (
     CABLES,
     Balance,
-    Cables,
+    CableLanes,
     balance,
     cable_rates,
     cables,
@@ -29,7 +29,7 @@ from cspr_jax.schema.limits import Limit
 FLAT = 1e-3
 
 
-def _balanced(robot: PlatformRobot, now: State, wires: Cables, squared: Array) -> Balance:
+def _balanced(robot: PlatformRobot, now: StateLanes, wires: CableLanes, squared: Array) -> Balance:
     def slowed(vector):
         return tuple(x / squared for x in vector)
 
@@ -38,7 +38,7 @@ def _balanced(robot: PlatformRobot, now: State, wires: Cables, squared: Array) -
     return balance(wires, force, slowed(moment))
 
 
-def _is_flat(wires: Cables, balance: Balance) -> Array:
+def _is_flat(wires: CableLanes, balance: Balance) -> Array:
     # Where three of the cables are nearly in one plane.
     a, b, c = (dot(wires.rays[k], wires.rays[k]) for k in range(0, CABLES, 2))
     return balance.volume * balance.volume < FLAT**2 * a * b * c
@@ -50,7 +50,7 @@ def _smallest_tension(rate: Array, balance: Balance) -> Array:
     return smallest([x * share for x in balance.numerators])
 
 
-def certain_tension(rate: Array, regular: Array, wires: Cables, balance: Balance) -> Array:
+def certain_tension(rate: Array, regular: Array, wires: CableLanes, balance: Balance) -> Array:
     """The smallest tension, where the fast balance gives one.
 
     Args:
@@ -67,7 +67,9 @@ def certain_tension(rate: Array, regular: Array, wires: Cables, balance: Balance
     return jnp.where(_is_flat(wires, balance), jnp.inf, lowest)
 
 
-def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> Array:
+def lowest_tension(
+    robot: PlatformRobot, segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
+) -> Array:
     """The smallest tension at one instant of many segments.
 
     Args:
@@ -86,7 +88,9 @@ def lowest_tension(robot: PlatformRobot, segment: PoseSegment, arcs: Array, now:
     return certain_tension(segment.rate, segment.regular, wires, balance)
 
 
-def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> list[Array]:
+def moving_slacks(
+    problem: Problem, segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
+) -> list[Array]:
     """Smallest slacks of the criteria that depend on the motion, at one instant of many segments.
 
     Args:
@@ -122,7 +126,7 @@ def moving_slacks(problem: Problem, segment: PoseSegment, arcs: Array, now: Inst
     return values
 
 
-def still_slacks(problem: Problem, segment: PoseSegment, here: State, wires: Cables) -> list[Array]:
+def still_slacks(problem: Problem, segment: PlatformSegment, here: StateLanes, wires: CableLanes) -> list[Array]:
     """Smallest slacks of the criteria that depend on the pose alone, at one instant of many segments.
 
     Args:
@@ -144,7 +148,7 @@ def still_slacks(problem: Problem, segment: PoseSegment, here: State, wires: Cab
 
 
 def _given(limits: Limits, *, of_motion: bool) -> list[Limit]:
-    return [row for row in given(limits) if row.of_motion == of_motion]
+    return [row for row in limits_set(limits) if row.of_motion == of_motion]
 
 
 def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
@@ -165,4 +169,4 @@ def order(limits: Limits) -> list[int]:
     """
     moving, still = _given(limits, of_motion=True), _given(limits, of_motion=False)
     every = ["taut", *moving, "regular", "below", *still]
-    return [every.index(which) for which in ("taut", "regular", "below", *given(limits))]
+    return [every.index(which) for which in ("taut", "regular", "below", *limits_set(limits))]

@@ -13,7 +13,7 @@ With n the number of cables, f the tensions, m the mass:
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.motions.limits import given, scales, slack, values
+from cspr_jax.motions.limits import limits_set, scales, slack, values
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.limits import Limits
@@ -31,7 +31,7 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
     Returns:
         n_criteria flags.
     """
-    return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(row.flag for row in given(limits)))
+    return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(row.flag for row in limits_set(limits)))
 
 
 def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Array:
@@ -53,7 +53,7 @@ def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Ar
         wrench_balance.normalised_determinant(robot, state.position, state.rotation) / regular,
         plane_normal(robot) @ state.position / z0,
     ]
-    rows = given(limits)
+    rows = limits_set(limits)
     if not rows:
         return jnp.stack(basic)
     now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)

@@ -21,14 +21,14 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic import chebyshev, packed
 from cspr_jax.arithmetic.lanes import dot, stored
-from cspr_jax.motions.limits import given, scales
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.limits import limits_set, scales
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.least_nodes import least_nodes
 from cspr_jax.platforms.limit_blocks import QUANTITIES, STRAIGHT, Enclosed, Here, Pair, Sizes, at_most, ratio
-from cspr_jax.platforms.platform_lanes import State, squared_duration, state
 from cspr_jax.platforms.platform_reach import Reach, instant_beside, middle_of, reach
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
+from cspr_jax.platforms.platform_segment_lanes import StateLanes, squared_duration, state
 from cspr_jax.platforms.work_list import allowance
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES, balance, cables, inertial_wrench
@@ -42,7 +42,7 @@ REGULAR = CABLES  # the place of D among the values
 BASIC = 2  # criteria that are no limits
 
 
-class BlockBounds(NamedTuple):
+class TensionBounds(NamedTuple):
     """Slacks on n blocks: of taut cables, of the determinant (D), of the limits on the motion that are given.
 
     Fields:
@@ -65,7 +65,7 @@ class BlockBounds(NamedTuple):
 
 class _Block(NamedTuple):
     # Of n blocks.
-    segments: PoseSegment
+    segments: PlatformSegment
     squared: Array  # T^2, s^2
     regular: Array  # det J(P0), m^9
     z0: Array
@@ -80,13 +80,13 @@ def of_motion(problem: Problem) -> list[Limit]:
     Returns:
         their rows.
     """
-    return [row for row in given(problem.limits) if row.of_motion]
+    return [row for row in limits_set(problem.limits) if row.of_motion]
 
 
 @partial(jax.jit, static_argnames=("kind", "margins", "least"))
 def tension_blocks(
-    problem: Problem, one: Array, items, *, kind: Kind, margins: bool, least: bool = False
-) -> BlockBounds:
+    problem: Problem, one: Array, items, *, kind: PlatformMotionKind, margins: bool, least: bool = False
+) -> TensionBounds:
     """Bounds of slacks on blocks.
 
     Args:
@@ -101,7 +101,7 @@ def tension_blocks(
     Returns:
         the bounds.
     """
-    found = _taken(problem, one, items, kind=kind, margins=margins, rough=least)
+    found = _taken(problem, one, items, kind=kind, margins=margins, single_precision=least)
     # What margins alone need comes last, and is not bounded.
     nodes, bound = _bounds(problem, found)
     if margins:
@@ -110,7 +110,7 @@ def tension_blocks(
         every, place = least_nodes(nodes, allowance(np.arange(len(nodes)) >= BASIC), chebyshev.nodes())
     else:
         every, place = jnp.stack(nodes, axis=1), jnp.zeros_like(bound[0])
-    return BlockBounds(every, place, jnp.stack(bound), *_allowances(found))
+    return TensionBounds(every, place, jnp.stack(bound), *_allowances(found))
 
 
 class TensionRange(NamedTuple):
@@ -119,7 +119,7 @@ class TensionRange(NamedTuple):
     Fields:
         low: (n_cables, n) proved lower bounds.
         high: (n_cables, n) proved upper bounds; infinite where the determinant may vanish.
-        rounding: (n,) as in `BlockBounds`.
+        rounding: (n,) as in `TensionBounds`.
         allowed: (n,) likewise.
     """
 
@@ -130,7 +130,7 @@ class TensionRange(NamedTuple):
 
 
 @partial(jax.jit, static_argnames="kind")
-def tension_ranges(problem: Problem, one: Array, items, *, kind: Kind) -> TensionRange:
+def tension_ranges(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) -> TensionRange:
     """Ranges of the tensions of each cable on blocks.
 
     Args:
@@ -169,7 +169,9 @@ class _Taken(NamedTuple):
     rounding: Array
 
 
-def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool, rough: bool = False) -> _Taken:
+def _taken(
+    problem: Problem, one: Array, items, *, kind: PlatformMotionKind, margins: bool, single_precision: bool = False
+) -> _Taken:
     segments, arcs, regular, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
     block = _Block(segments, squared_duration(segments, arcs), regular, problem.robot.gravity / segments.rate)
@@ -181,7 +183,7 @@ def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool, ro
     def values_at(node):
         return [x for pair in _values(problem, block, at(node), margins=margins) for x in pair]
 
-    together, apart = (packed.packed, packed.unpacked) if rough else (packed.paired, packed.parts)
+    together, apart = (packed.packed, packed.unpacked) if single_precision else (packed.paired, packed.parts)
     values = jnp.stack(apart(lax.map(lambda node: together(values_at(node)), chebyshev.nodes())), axis=1)
     lengths = stored(_lengths(problem.robot, at(0.0)), one)
     radii = np.array(chebyshev.RADII)
@@ -203,12 +205,12 @@ def _taken(problem: Problem, one: Array, items, *, kind: Kind, margins: bool, ro
     largest = jnp.where(jnp.isnan(largest), jnp.inf, largest)  # of three cables in one plane
     rounding = sizes[:, -1] * amplified[None] + COEFFICIENTS * largest
     rests = jnp.min(sizes[:, :-1], axis=1) + rounding
-    if rough:
+    if single_precision:
         rests = rests + chebyshev.LEBESGUE * packed.ROUNDING * largest
     return _Taken(block, values, rests, rounding)
 
 
-def _values(problem: Problem, block: _Block, here: State, *, margins: bool) -> list[Pair]:
+def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool) -> list[Pair]:
     # At one node, two at a time, which XLA then computes in one loop: kappa and D, what rounding is multiplied with,
     # what the limits need, and what makes of D the normalised determinant.
     robot = problem.robot
@@ -251,7 +253,7 @@ def _quantities(problem: Problem) -> dict[str, list[Limit]]:
     return rows
 
 
-def _lengths(robot: PlatformRobot, here: State) -> tuple[list[Array], list[Array]]:
+def _lengths(robot: PlatformRobot, here: StateLanes) -> tuple[list[Array], list[Array]]:
     # Of the cables, and from the spools to the mass centre.
     wires = cables(robot, here.position, here.turn)
     offs = [tuple(here.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]

@@ -16,7 +16,7 @@ HALVINGS, OPEN = 21, 64
 AT_ONCE = (1, 2, 3)
 
 
-class Looked(NamedTuple):
+class BlockBounds(NamedTuple):
     """What was found of k blocks.
 
     Fields:
@@ -58,7 +58,7 @@ class WorkList:
         self.bound, self.instant = np.full((len(arcs), len(limits)), np.inf), np.full(len(arcs), np.nan)
         self.attained, self._worst = np.zeros((len(arcs), 0)), np.full(len(arcs), -TOLERANCE)
 
-    def work_off(self, blocks: Blocks, look: Callable[[Blocks, int], Looked]) -> Looked:
+    def work_off(self, blocks: Blocks, look: Callable[[Blocks, int], BlockBounds]) -> BlockBounds:
         """Look at blocks, and at halves of what stays open.
 
         Args:
@@ -96,7 +96,7 @@ class WorkList:
         is_new = np.isnan(self.instant[row])
         self.instant[row[is_new]] = tau[is_new]
 
-    def _told(self, blocks: Blocks, found: Looked, *, last: bool) -> np.ndarray:
+    def _told(self, blocks: Blocks, found: BlockBounds, *, last: bool) -> np.ndarray:
         # Takes in what was found of blocks; which of them are to be halved.
         least, low = found.nodes.min(0).T, found.bound.T
         _lower(self.attained, blocks.row, least)
@@ -113,7 +113,7 @@ class WorkList:
         _lower(self.bound, blocks.row[is_done], low[is_done])
         return ~is_done & ~(self.is_refuted | self.is_stuck)[blocks.row]
 
-    def _note_instants(self, blocks: Blocks, found: Looked) -> None:
+    def _note_instants(self, blocks: Blocks, found: BlockBounds) -> None:
         worst = (found.nodes[:, : len(self._allowed)] + self._allowed[None, :, None]).min(1)
         place = worst.argmin(0)
         value, tau = worst[place, np.arange(len(place))], found.tau[place, np.arange(len(place))]

@@ -9,14 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.build import kernel_robot
+from cspr_jax.build.robots import kernel_robot
 from cspr_jax.config.plan import read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.lines.faces import Sides, line_faces, sides
 from cspr_jax.lines.motion import s_curve
 from cspr_jax.lines.s_model import least_s_curve
-from cspr_jax.plans.sequence import Sequence
+from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.point_mass import PointMassRobot
 
@@ -30,7 +30,7 @@ EXACT, ROUNDED = "exact boundaries", "boundaries of five decimals"
 EXACT_TIMES, ROUNDED_TIMES = "exact T and p", "T and p of three decimals"
 
 
-class Line(NamedTuple):
+class PublishedLine(NamedTuple):
     """A boundary of the path acceleration: start + slope * s.
 
     Fields:
@@ -45,10 +45,10 @@ class Line(NamedTuple):
 def _case() -> tuple[Sides, float]:
     # Bounds of the path acceleration of the test case, and the largest one.
     keys = read_plan(read_text(CASE), CASE)
-    spec = resolve_robot(keys.robot, CASE, CASE.parent)
-    start, end = Sequence(spec, keys, CASE).stops.points(float("nan"))
+    robot_file = resolve_robot(keys.robot, CASE, CASE.parent)
+    start, end = PlanLegs(robot_file, keys, CASE).stops.points(float("nan"))
     largest = float(keys.max_acceleration or np.inf) / float(np.linalg.norm(end - start))
-    robot = kernel_robot(spec, keys, CASE, any_cables=True)
+    robot = kernel_robot(robot_file, keys, CASE, any_cables=True)
     return jax.tree.map(np.asarray, _bounds(robot, start, end, jnp.asarray(largest))), largest
 
 
@@ -61,15 +61,15 @@ _least = jax.jit(least_s_curve)
 _laws = jax.jit(jax.vmap(s_curve))
 
 
-def _active() -> tuple[Line, Line, float]:
+def _active() -> tuple[PublishedLine, PublishedLine, float]:
     # (24) and (25): the boundaries that hold the least time back, and the largest path acceleration.
     bounds, largest = _case()
     least = _least(bounds)
     up, down = int(least.up), int(least.down)
     # Braking is seen from the end.
     slope = float(bounds.down_slope[down])
-    lower = Line(-float(bounds.down[down]) - slope, slope)
-    return Line(float(bounds.up[up]), float(bounds.up_slope[up])), lower, largest
+    lower = PublishedLine(-float(bounds.down[down]) - slope, slope)
+    return PublishedLine(float(bounds.up[up]), float(bounds.up_slope[up])), lower, largest
 
 
 def table_4_1() -> dict[Key, float | None]:
@@ -121,7 +121,7 @@ def table_4_3() -> dict[Key, float | None]:
     upper, lower, largest = _active()
     cells: dict[Key, float | None] = {}
     for reading, decimals in ((EXACT, None), (ROUNDED, DECIMALS)):
-        high, low = (line if decimals is None else Line(*np.round(line, decimals)) for line in (upper, lower))
+        high, low = (line if decimals is None else PublishedLine(*np.round(line, decimals)) for line in (upper, lower))
         over, under = _passed(high, low, largest)
         for name, values in (("Max_a", over), ("Max_b", under)):
             for i, time in enumerate(TIMES):
@@ -133,7 +133,7 @@ def table_4_3() -> dict[Key, float | None]:
     return cells
 
 
-def _passed(upper: Line, lower: Line, largest: float) -> tuple[np.ndarray, np.ndarray]:
+def _passed(upper: PublishedLine, lower: PublishedLine, largest: float) -> tuple[np.ndarray, np.ndarray]:
     # Of each duration and p: by how much s'' is above its boundary at most, and from p on below the other.
     time, p = (grid.ravel() for grid in np.meshgrid(TIMES, PERIODS, indexing="ij"))
     laws = jax.tree.map(np.asarray, _laws(jnp.asarray(p / time)))
@@ -142,12 +142,12 @@ def _passed(upper: Line, lower: Line, largest: float) -> tuple[np.ndarray, np.nd
     s = np.moveaxis(laws.coefficients, -1, 0)  # (4, n, n_pieces) about the origin of each piece
     bend = np.stack([2.0 * s[2], 6.0 * s[3], 0.0 * s[0], 0.0 * s[0]]) / time[:, None] ** 2
 
-    def beyond(line: Line) -> np.ndarray:
+    def beyond(line: PublishedLine) -> np.ndarray:
         constant = np.zeros((4, 1, 1))
         constant[0] = line.start
         return bend - line.slope * s - constant
 
-    level, shape = (Line(largest, 0.0), Line(-largest, 0.0)), (len(TIMES), len(PERIODS))
+    level, shape = (PublishedLine(largest, 0.0), PublishedLine(-largest, 0.0)), (len(TIMES), len(PERIODS))
     over = np.maximum(_largest(beyond(upper), spans), _largest(beyond(level[0]), spans)).max(1)
     under = np.maximum(_largest(-beyond(lower), spans), _largest(-beyond(level[1]), spans))[:, 2:].max(1)
     return over.reshape(shape), under.reshape(shape)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.build import kernel_robot
+from cspr_jax.build.robots import kernel_robot
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.robot import read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys

@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.build import kernel_robot
+from cspr_jax.build.robots import kernel_robot
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms import attainable
 from cspr_jax.platforms.accessible import DEFINITIONS, Accessible, accessible_sets
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.limits import Limits
@@ -43,7 +43,7 @@ DEPTH = 1.7
 
 
 @dataclasses.dataclass(frozen=True)
-class Choice:
+class TableSettings:
     """Settings of a table of orientations.
 
     Fields:
@@ -61,7 +61,7 @@ class Choice:
     values: int = attainable.VALUES
 
 
-USUAL = Choice()
+USUAL = TableSettings()
 
 
 def variant(definition: str, amplitude: str) -> str:
@@ -79,7 +79,7 @@ def variant(definition: str, amplitude: str) -> str:
 
 
 @functools.lru_cache(maxsize=len(AMPLITUDES))
-def checker_of(amplitude: str) -> PoseChecker:
+def checker_of(amplitude: str) -> PlatformChecker:
     """Checker of the tables' motions.
 
     Args:
@@ -91,14 +91,14 @@ def checker_of(amplitude: str) -> PoseChecker:
     here = Path(__file__)
     robot = kernel_robot(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
     problem = Problem(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
-    return PoseChecker(problem, Kind(from_rest=True), batch=MANY)
+    return PlatformChecker(problem, PlatformMotionKind(from_rest=True), batch=MANY)
 
 
 def attained(
-    checker: PoseChecker,
+    checker: PlatformChecker,
     sets: list[tuple[np.ndarray, np.ndarray]],
     *,
-    choice: Choice = USUAL,
+    choice: TableSettings = USUAL,
     tried: np.ndarray | None = None,
 ) -> list[np.ndarray]:
     """Orientations that horizontal transitions attain; the centroid of the spools is the origin.
@@ -139,7 +139,7 @@ def accessible_there(amplitude: str, definition: str, asked: list[tuple[np.ndarr
 
 
 def attained_there(
-    amplitude: str, choice: Choice, tried: np.ndarray | None, sets: list[tuple[np.ndarray, np.ndarray]]
+    amplitude: str, choice: TableSettings, tried: np.ndarray | None, sets: list[tuple[np.ndarray, np.ndarray]]
 ) -> list[np.ndarray]:
     """Orientations that horizontal transitions attain, in whichever process.
 
@@ -170,7 +170,7 @@ def sizes(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
     return [len(angles) for _, angles in sets]
 
 
-def table_3_3(choice: Choice, workers: int = 1) -> dict[Key, float | None]:
+def table_3_3(choice: TableSettings, workers: int = 1) -> dict[Key, float | None]:
     """Counts and proportions at four places; errors are differences from twice the step.
 
     Args:

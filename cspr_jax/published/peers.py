@@ -10,14 +10,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cspr_jax.build import centred, load_robot
+from cspr_jax.build.robots import load_robot
 from cspr_jax.published.chapter_1 import Key
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.tension_programs import CLOSE, by_program, by_squares
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.workspaces import geometry
 from cspr_jax.workspaces.geometry import mass_centres
-from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, STATIC, Question, question
+from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, STATIC, Requirement, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
 # Poses of which linear programs and least squares are asked as well, evenly over the grid.
@@ -25,7 +26,7 @@ SAMPLE = 60
 MICRO = 1e6
 
 
-class Grid(NamedTuple):
+class PoseGrid(NamedTuple):
     """Poses of a study.
 
     Fields:
@@ -52,7 +53,7 @@ def _turns(angles: np.ndarray) -> np.ndarray:
     return Rotation.from_euler("XYZ", angles).as_quat(scalar_first=True)
 
 
-def grids() -> list[Grid]:
+def grids() -> list[PoseGrid]:
     """The studies.
 
     Returns:
@@ -61,17 +62,17 @@ def grids() -> list[Grid]:
     level = _product(np.linspace(-4.0, 4.0, 81), np.linspace(-3.0, 3.0, 61), np.array([2.0, 3.0, 4.0]))
     turned = np.repeat(_turns(np.deg2rad([[30.0, -30.0, 5.0]])), len(level), axis=0)
     found = [
-        Grid(f"{name}, closure", robot, CLOSURE, level, turned)
+        PoseGrid(f"{name}, closure", robot, CLOSURE, level, turned)
         for name, robot in (("IPAnema 2", "ipanema-2"), ("IPAnema 2, set IROS 2016", "ipanema-2-iros"))
     ]
     ends, steps = np.array([2.0, 1.5, 1.0, 0.5, 0.5, 0.1]), (11, 11, 11, 5, 5, 3)
     poses = _product(*[np.linspace(-end, end, count) for end, count in zip(ends, steps, strict=True)])
     poses[:, 2] += 1.0
     for condition in (FEASIBLE, STATIC, CLOSURE):
-        found.append(Grid(f"IPAnema 1, {condition}", "ipanema-1", condition, poses[:, :3], _turns(poses[:, 3:])))
+        found.append(PoseGrid(f"IPAnema 1, {condition}", "ipanema-1", condition, poses[:, :3], _turns(poses[:, 3:])))
     cube = _product(np.linspace(-6.0, 6.0, 10), np.linspace(-4.0, 4.0, 10), np.linspace(0.0, 4.0, 10))
     still = np.repeat(_turns(np.zeros((1, 3))), len(cube), axis=0)
-    found += [Grid(f"CoGiRo, {condition}", "cogiro", condition, cube, still) for condition in (FEASIBLE, STATIC)]
+    found += [PoseGrid(f"CoGiRo, {condition}", "cogiro", condition, cube, still) for condition in (FEASIBLE, STATIC)]
     return found
 
 
@@ -91,10 +92,10 @@ def peers() -> dict[Key, float | None]:
     return cells
 
 
-def _row(grid: Grid) -> dict[str, float]:
+def _row(grid: PoseGrid) -> dict[str, float]:
     robot = load_robot(grid.robot)
     own, frame = centred(robot)
-    asked = question(own, grid.condition, robot.limits if grid.condition == FEASIBLE else Limits())
+    asked = requirement(own, grid.condition, robot.limits if grid.condition == FEASIBLE else Limits())
     turns = frame.turned_quaternions(grid.quaternions)
     places = mass_centres(own, np.asarray(frame.inward(grid.positions)), turns)
     start = time.perf_counter()
@@ -121,6 +122,6 @@ def _row(grid: Grid) -> dict[str, float]:
     return found
 
 
-def _size(asked: Question) -> float:
+def _size(asked: Requirement) -> float:
     finite = asked.high[np.isfinite(asked.high)]
     return 1.0 if asked.condition == CLOSURE else float(max([*asked.low, *finite, asked.wrenches.size]))

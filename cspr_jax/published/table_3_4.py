@@ -13,7 +13,7 @@ from cspr_jax.published.chapter_3 import (
     DIVISIONS,
     EVERY,
     RADIUS,
-    Choice,
+    TableSettings,
     accessible_there,
     attained_there,
     checker_of,
@@ -68,7 +68,7 @@ def smallest_proportions(
     return smallest.tolist()
 
 
-def table_3_4(choice: Choice, workers: int = 1) -> dict[Key, float | None]:
+def table_3_4(choice: TableSettings, workers: int = 1) -> dict[Key, float | None]:
     """Smallest proportions in an annulus, at five heights.
 
     Args:

@@ -10,7 +10,7 @@ from cspr_jax.outputs.table_layout import Cell, grid
 from cspr_jax.plans.planning import plan
 from cspr_jax.published import boralugoda, chapter_1, chapter_3, peers, table_3_2, table_3_4
 from cspr_jax.published.chapter_1 import Key
-from cspr_jax.published.chapter_3 import Choice
+from cspr_jax.published.chapter_3 import TableSettings
 from cspr_jax.runtime.stages import within
 
 SCHEMA = 1
@@ -19,13 +19,13 @@ LARGEST_ARCS, LARGEST_VALUES = 1000, 100
 
 
 @dataclasses.dataclass(frozen=True)
-class Source:
+class TableSource:
     """A table that can be recomputed.
 
     Fields:
         title: of the table, with its source.
         published: known cells as printed, by row, column and variant.
-        compute: () -> computed cells, by row, column and variant; of a `Choice`, where there is one.
+        compute: () -> computed cells, by row, column and variant; of a `TableSettings`, where there is one.
         with_choice: whether there is one, of definitions, amplitude functions and step; `compute` takes a number of
             processes, too, then.
         by_processes: whether several compute it where nobody says how many.
@@ -64,22 +64,22 @@ _PUBLISHED_2_1 = {
 # In tables p is the number of arcs; what the S-model calls p, a time, is named.
 ACCELERATION = {"p": "acceleration (s)"}
 TABLES = {
-    "1.1": Source(
+    "1.1": TableSource(
         "Dion-Gauvin thesis, Table 1.1: oscillations needed at a distance of four radii, horizontal, A1",
         chapter_1.PUBLISHED["1.1"],
         chapter_1.table_1_1,
     ),
-    "1.2": Source(
+    "1.2": TableSource(
         "Dion-Gauvin thesis, Table 1.2: oscillations needed at various inclinations, sigma R = 1, xi = 1",
         chapter_1.PUBLISHED["1.2"],
         chapter_1.table_1_2,
     ),
-    "1.3": Source(
+    "1.3": TableSource(
         "Dion-Gauvin thesis, Table 1.3: oscillations needed with various amplitude functions, horizontal",
         chapter_1.PUBLISHED["1.3"],
         chapter_1.table_1_3,
     ),
-    "2.1": Source(
+    "2.1": TableSource(
         "Dion-Gauvin thesis, Table 2.1: feasibility at infinity, smallest number of arcs, duration (s)",
         {
             (row, column, ""): value
@@ -88,43 +88,43 @@ TABLES = {
         },
         _table_2_1,
     ),
-    "3.2": Source(
+    "3.2": TableSource(
         "Dion-Gauvin thesis, Table 3.2: smallest number of arcs and duration (s) with the printed beta-hat",
         table_3_2.PUBLISHED,
         table_3_2.table_3_2,
     ),
-    "3.3": Source(
+    "3.3": TableSource(
         "Dion-Gauvin thesis, Table 3.3: accessible and attainable orientations at four places, z0 = z = 1.7 m",
         chapter_3.PUBLISHED,
         chapter_3.table_3_3,
         with_choice=True,
         transposed=True,
     ),
-    "3.4": Source(
+    "3.4": TableSource(
         "Dion-Gauvin thesis, Table 3.4: smallest proportion (%) of attainable orientations from 1.5b to 3b, z0 = z",
         table_3_4.PUBLISHED,
         table_3_4.table_3_4,
         with_choice=True,
         by_processes=True,
     ),
-    "4.1": Source(
+    "4.1": TableSource(
         "Boralugoda thesis, Table 4.1: solutions of (28) and (29), s",
         boralugoda.PUBLISHED["4.1"],
         boralugoda.table_4_1,
         heads=ACCELERATION,
     ),
-    "4.2": Source(
+    "4.2": TableSource(
         "Boralugoda thesis, Table 4.2: path acceleration, slope (1/s^3) and intercept (1/s^2) of each range",
         boralugoda.PUBLISHED["4.2"],
         boralugoda.table_4_2,
     ),
-    "4.3": Source(
+    "4.3": TableSource(
         "Boralugoda thesis, Table 4.3: how far the S-model passes its boundaries, 1/s^2, and the first node without",
         boralugoda.PUBLISHED["4.3"],
         boralugoda.table_4_3,
         heads=ACCELERATION,
     ),
-    "peers": Source(
+    "peers": TableSource(
         "Workspaces in papers on other tools: poses, and microseconds a pose here (compiling included), by linear "
         "programs and by least squares; for all poses of the first row CASPR prints 89 to 455 s (IROS 2016, Table I)",
         {},
@@ -133,7 +133,7 @@ TABLES = {
 }
 
 
-def table_cells(name: str, choice: Choice | None = None, workers: int = 1) -> list[Cell]:
+def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1) -> list[Cell]:
     """Compute a table.
 
     Args:
@@ -146,7 +146,7 @@ def table_cells(name: str, choice: Choice | None = None, workers: int = 1) -> li
     """
     source = TABLES[name]
     with within(f"table {name}"):
-        computed = source.compute(choice or Choice(), workers) if source.with_choice else source.compute()
+        computed = source.compute(choice or TableSettings(), workers) if source.with_choice else source.compute()
     return [
         Cell(row, column, value, source.published.get((row, column, variant), ""), variant)
         for (row, column, variant), value in computed.items()
@@ -191,7 +191,7 @@ def table_for_people(name: str, cells: list[Cell]) -> Any:
     return grid(TABLES[name].title, cells, transposed=TABLES[name].transposed, heads=TABLES[name].heads)
 
 
-def chosen(name: str, given: dict[str, Any]) -> Choice | None:
+def chosen(name: str, given: dict[str, Any]) -> TableSettings | None:
     """Settings of a table, from the options of the command line.
 
     Args:
@@ -209,7 +209,7 @@ def chosen(name: str, given: dict[str, Any]) -> Choice | None:
             if value is not None:
                 raise ConfigError(option, f"must be absent with table {name}")
         return None
-    usual = Choice()
+    usual = TableSettings()
 
     def every(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
         value, known = given[option], tuple(names)
@@ -217,7 +217,7 @@ def chosen(name: str, given: dict[str, Any]) -> Choice | None:
             raise ConfigError(option, f"{shown(value)}: must be one of {', '.join(known)}, all")
         return otherwise if value is None else known if value == "all" else (value,)
 
-    return Choice(
+    return TableSettings(
         every("--definition", chapter_3.DEFINITIONS, usual.definitions),
         every("--amplitude", chapter_3.AMPLITUDES, usual.amplitudes),
         2 if given["--fine"] else 1,

@@ -200,13 +200,13 @@ class _Given(NamedTuple):
         turn, spools = (None if x is None else x[which] for x in self[1:])
         return _Given(self.place[which], turn, spools)
 
-    def lanes(self, origin: np.ndarray, dtype: np.dtype) -> kernels.Poses:
+    def lanes(self, origin: np.ndarray, dtype: np.dtype) -> kernels.PoseLanes:
         def columns(array):
             return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
         turn = None if self.turn is None else columns(self.turn)
         ends = None if self.spools is None else [columns(x) for x in np.swapaxes(self.spools - origin, 0, 1)]
-        return kernels.Poses(columns(self.place - origin), turn, ends)
+        return kernels.PoseLanes(columns(self.place - origin), turn, ends)
 
 
 def _checked(scene: Scene, positions, quaternions, ends) -> _Given:

@@ -29,7 +29,7 @@ __all__ = [
     "Brick",
     "Points",
     "Polyhedron",
-    "Poses",
+    "PoseLanes",
     "Rod",
     "of_body",
     "of_cables",
@@ -52,7 +52,7 @@ class Points(NamedTuple):
     diameters: Array
 
 
-class Poses(NamedTuple):
+class PoseLanes(NamedTuple):
     """Poses as lanes.
 
     Fields:
@@ -118,11 +118,11 @@ def _less(a: Vector, b: Vector) -> Vector:
     return tuple(x - y for x, y in zip(a, b, strict=True))
 
 
-def _rotation(poses: Poses) -> Matrix | None:
+def _rotation(poses: PoseLanes) -> Matrix | None:
     return None if poses.quaternion is None else lanes.rotation(poses.quaternion)
 
 
-def _cables(points: Points, poses: Poses) -> tuple[Sequence[Vector], Sequence[Vector]]:
+def _cables(points: Points, poses: PoseLanes) -> tuple[Sequence[Vector], Sequence[Vector]]:
     # Where cables leave their spools, and from there to the platform.
     turn, count = _rotation(poses), points.base.shape[0]
     arms = [_three(points.platform[k]) for k in range(count)]
@@ -132,7 +132,7 @@ def _cables(points: Points, poses: Poses) -> tuple[Sequence[Vector], Sequence[Ve
     return ends, [tuple(poses.position[i] + arms[k][i] - ends[k][i] for i in range(3)) for k in range(count)]
 
 
-def of_cables(points: Points, poses: Poses, pairs: np.ndarray) -> Array:
+def of_cables(points: Points, poses: PoseLanes, pairs: np.ndarray) -> Array:
     """The nearest two cables.
 
     Args:
@@ -147,7 +147,7 @@ def of_cables(points: Points, poses: Poses, pairs: np.ndarray) -> Array:
 
 
 @jax.jit
-def _lines(points: Points, poses: Poses) -> tuple[list[Array] | None, list[Array]]:
+def _lines(points: Points, poses: PoseLanes) -> tuple[list[Array] | None, list[Array]]:
     # Components of where cables leave their spools, if that moves, and from there to the platform, (n_cables, n) each:
     # a loop over what its own call has stored would be slow.
     if poses.ends is not None:
@@ -185,7 +185,7 @@ def _nearest_pair(points: Points, starts: list[Array] | None, rays: list[Array],
 
 
 @jax.jit
-def of_obstacle(points: Points, poses: Poses, solid: Solid) -> Array:
+def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Array:
     """The cable that is the nearest to an obstacle.
 
     Args:
@@ -216,7 +216,7 @@ def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]
 
 
 @jax.jit
-def of_platform(points: Points, poses: Poses, own: Own, leave: Array) -> Array:
+def of_platform(points: Points, poses: PoseLanes, own: Own, leave: Array) -> Array:
     """The cable that is the nearest to its own platform.
 
     Args:
@@ -248,7 +248,7 @@ def _from_own(own: Own, start: Vector, ray: Vector) -> Array:
 
 
 @jax.jit
-def of_body(poses: Poses, own: Own, solid: Ball | Rod) -> Array:
+def of_body(poses: PoseLanes, own: Own, solid: Ball | Rod) -> Array:
     """The platform and a sphere or a cylinder.
 
     Args:
@@ -267,7 +267,7 @@ def of_body(poses: Poses, own: Own, solid: Ball | Rod) -> Array:
 
 
 @jax.jit
-def of_boxes(poses: Poses, own: Brick, solid: Brick) -> Array:
+def of_boxes(poses: PoseLanes, own: Brick, solid: Brick) -> Array:
     """The platform, a box, and another box: the largest gap between their shadows on a line.
 
     Args:
@@ -287,7 +287,7 @@ def of_boxes(poses: Poses, own: Brick, solid: Brick) -> Array:
 
 
 @jax.jit
-def of_hull_box(poses: Poses, own: Polyhedron, solid: Brick) -> Array:
+def of_hull_box(poses: PoseLanes, own: Polyhedron, solid: Brick) -> Array:
     """The platform, a convex polyhedron, and a box: the largest gap between their shadows on a line.
 
     Args:

@@ -1,7 +1,7 @@
 """Point-mass robots: geometry, mass, gravity, limits, wrenches.
 
 A robot that is loaded or made has the axes of its file. Kernels take it from the centroid of its spools and with z
-down, as `build.centred` gives it.
+down, as `robots.kernel_axes.centred` gives it.
 """
 
 import dataclasses

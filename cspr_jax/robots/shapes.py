@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.errors import InputError
 
 # Beyond it squares of lengths lose their meaning; as in `robots.point_mass`, with jax.
@@ -127,7 +127,7 @@ def cylinder(start, end, radius: float, *, name: str = "cylinder") -> Cylinder:
     return Cylinder(_point("start", start), _point("end", end), _radius(radius), name)
 
 
-def box(centre, size, quaternion=(1.0, 0.0, 0.0, 0.0), *, name: str = "box") -> Box:
+def box(centre, size, quaternion=IDENTITY, *, name: str = "box") -> Box:
     """A box, its numbers checked.
 
     Args:

@@ -260,7 +260,7 @@ def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(pairs)[:, 0], np.array(pairs)[:, 1]
 
 
-class _Search(NamedTuple):
+class _ActiveSet(NamedTuple):
     # For the limits that the shortest x reaches. At each step x = pulls @ kernel.T is the shortest for some limits.
     point: Array  # (r,)
     pulls: Array  # (n,) of the sign of `sides`, and of that of the limit sought
@@ -285,11 +285,11 @@ def _limits_reached(every: AllTensions, low: Array, high: Array) -> Array:
     none, no = jnp.zeros(count), jnp.asarray(False)
     # What is not finite is never within limits.
     is_lost = ~(jnp.isfinite(every.least).all() & jnp.isfinite(every.kernel).all())
-    start = _Search(jnp.zeros(freedom), none, none, jnp.asarray(0), no, is_lost, jnp.asarray(0))
+    start = _ActiveSet(jnp.zeros(freedom), none, none, jnp.asarray(0), no, is_lost, jnp.asarray(0))
     return lax.while_loop(is_open, lambda search: _step(every, low, high, search), start).sides
 
 
-def _step(every: AllTensions, low: Array, high: Array, search: _Search) -> _Search:
+def _step(every: AllTensions, low: Array, high: Array, search: _ActiveSet) -> _ActiveSet:
     """Towards the limit that is sought, until it is reached or one that is held is in the way, and let go."""
     excess = beyond(every.tensions(search.point), low, high)
     sought = jnp.where(search.is_seeking, search.sought, jnp.argmax(jnp.abs(excess)))
@@ -309,7 +309,7 @@ def _step(every: AllTensions, low: Array, high: Array, search: _Search) -> _Sear
     let_go = (jnp.arange(excess.size) == first) & ~is_reached
     pulls = search.pulls + length * (jnp.where(is_sought, side, 0.0) - loss)
     sides = jnp.where(is_sought & is_reached & ~is_stuck, side, search.sides)
-    return _Search(
+    return _ActiveSet(
         point=search.point + jnp.where(is_blocked, 0.0, length) * way,
         pulls=jnp.where(let_go, 0.0, pulls),
         sides=jnp.where(let_go, 0.0, sides),

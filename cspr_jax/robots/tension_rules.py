@@ -29,7 +29,7 @@ from cspr_jax.robots.tension_distribution import (
     least_norm,
     projected,
 )
-from cspr_jax.robots.tension_lanes import FREE, least_norms
+from cspr_jax.robots.tension_distribution_lanes import FREE, least_norms
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 
 BATCH = 4096

@@ -17,7 +17,7 @@ from cspr_jax.robots.platform import PlatformRobot
 CABLES = 6  # what the adjugates and Laplace's expansion here are written for
 
 
-class Cables(NamedTuple):
+class CableLanes(NamedTuple):
     """Positions of the cables, one entry a cable.
 
     Fields:
@@ -45,7 +45,7 @@ class Balance(NamedTuple):
     volume: Array
 
 
-def cables(robot: PlatformRobot, position: Vector, turn: Matrix) -> Cables:
+def cables(robot: PlatformRobot, position: Vector, turn: Matrix) -> CableLanes:
     """The cables, (3.1).
 
     Args:
@@ -59,7 +59,7 @@ def cables(robot: PlatformRobot, position: Vector, turn: Matrix) -> Cables:
     each = {k: turned(turn, [robot.platform_points[k, j] for j in range(3)]) for k in set(robot.joints)}
     arms = [each[k] for k in robot.joints]
     rays = [tuple(position[i] + arm[i] - robot.base_points[k, i] for i in range(3)) for k, arm in enumerate(arms)]
-    return Cables(arms, rays)
+    return CableLanes(arms, rays)
 
 
 def inertial_wrench(
@@ -88,7 +88,7 @@ def inertial_wrench(
     return force, tuple(a + b for a, b in zip(x, y, strict=True))
 
 
-def balance(wires: Cables, force: Vector, moment: Vector) -> Balance:
+def balance(wires: CableLanes, force: Vector, moment: Vector) -> Balance:
     """The tensions that give a wrench, (3.11).
 
     Args:
@@ -122,7 +122,7 @@ def balance(wires: Cables, force: Vector, moment: Vector) -> Balance:
     return Balance(numerators, d * determinant, -determinant, d)
 
 
-def determinant(wires: Cables) -> Array:
+def determinant(wires: CableLanes) -> Array:
     """Determinant of J, (3.5), in three pairs of cables: the volumes of their forces times those of their moments.
 
     Args:
@@ -143,7 +143,7 @@ def determinant(wires: Cables) -> Array:
     return total
 
 
-def normalised_determinant(robot: PlatformRobot, wires: Cables) -> Array:
+def normalised_determinant(robot: PlatformRobot, wires: CableLanes) -> Array:
     """Determinant of J with unit cables and the platform's size as unit; see `wrench_balance.normalised_determinant`.
 
     Args:
@@ -159,7 +159,7 @@ def normalised_determinant(robot: PlatformRobot, wires: Cables) -> Array:
 
 
 def cable_rates(
-    wires: Cables, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector
+    wires: CableLanes, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector
 ) -> list[list[Array]]:
     """Lengths of the cables and their first two derivatives, (3.2) and (3.3).
 

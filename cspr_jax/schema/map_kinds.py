@@ -38,7 +38,7 @@ class MapKind:
         only_with: quantities, and the keys without which they are no numbers: stored only where one of these is given.
             A condition of a workspace is a key, too: "workspace.conditions.static".
         own: rows of quantities that say of this kind more than those of the table; names, units and types are the same.
-        planned: whether a cell is the motion of a plan of two poses, which `plans.of_cells` writes.
+        planned: whether a cell is the motion of a plan of two poses, which `plans.cell_plan` writes.
         pictured: those of which a picture shows the first that there is, where nobody says which.
         motionless: those that belong to a place or an instant, not to a motion.
         families: trajectory families that it takes; none: its cells are places, and it knows no motion.

@@ -18,7 +18,7 @@ from cspr_jax.schema.tiles import Grid
 from cspr_jax.store import guard
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.documents import Settings, document, plain_json
-from cspr_jax.store.guard import Found
+from cspr_jax.store.guard import ReadableDataset
 from cspr_jax.store.netcdf import (
     UNREADABLE,
     make_datasets,
@@ -122,7 +122,7 @@ def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[]
     return digests
 
 
-def content_of(path: Path, begun: Callable[[Iterable[Found]], None] = lambda _: None) -> Content:
+def content_of(path: Path, begun: Callable[[Iterable[ReadableDataset]], None] = lambda _: None) -> Content:
     """All of a result, read and compared with its checksums, but for its seal.
 
     Args:
@@ -164,7 +164,7 @@ def _text(file: h5py.File, name: str) -> str:
     return text
 
 
-def _found(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, Found]:
+def _found(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, ReadableDataset]:
     # All datasets that the settings name, and no others; each looked at before anything is read.
     names = [*axes, *store]
     if len({*names}) < len(names) or not {*axes} <= AXES.keys() or not {*store} <= QUANTITIES.keys():
@@ -180,7 +180,7 @@ def _found(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, Foun
     return datasets
 
 
-def _check_shapes(datasets: dict[str, Found], grid: Grid, store: list[str]) -> None:
+def _check_shapes(datasets: dict[str, ReadableDataset], grid: Grid, store: list[str]) -> None:
     if any(datasets[name].shape != grid.shape for name in store) or len(grid.tile) != len(grid.shape):
         raise DamagedError("its datasets do not fit its axes")
     largest = 8.0 * float(np.prod([float(n) for n in grid.tile]))

@@ -41,7 +41,7 @@ _TYPES = {
 }
 
 
-class Found(NamedTuple):
+class ReadableDataset(NamedTuple):
     """A dataset that may be read.
 
     Fields:
@@ -72,7 +72,7 @@ class Found(NamedTuple):
         return array
 
 
-def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, Found]:
+def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, ReadableDataset]:
     """Those of some datasets that a file holds; nothing else of it is looked at.
 
     Args:
@@ -88,7 +88,7 @@ def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, Found]:
     return {name: _dataset(file, name) for name in names if file.id.links.exists(name.encode())}
 
 
-def refuse_dense(wanted: Iterable[Found], size: int, *, densest: int = DENSEST) -> None:
+def refuse_dense(wanted: Iterable[ReadableDataset], size: int, *, densest: int = DENSEST) -> None:
     """Refuse datasets that hold much more than their file can, or much less than it has.
 
     Args:
@@ -188,7 +188,7 @@ def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None,
     return array
 
 
-def _dataset(file: h5py.File, name: str) -> Found:
+def _dataset(file: h5py.File, name: str) -> ReadableDataset:
     key = name.encode()
     if file.id.links.get_info(key).type != h5l.TYPE_HARD:
         raise DamagedError(f"{name} is a link: must be a dataset of this file")
@@ -214,7 +214,7 @@ def _dataset(file: h5py.File, name: str) -> Found:
         chunks = math.prod(-(-n // m) for n, m in zip(shape, chunk, strict=True))
         if math.prod(chunk) * item > LARGEST_CHUNK or chunks > LARGEST_CHUNKS:
             raise DamagedError(f"{name} has {chunks} chunks of {list(chunk)}: more or larger ones than cspr makes")
-    return Found(data, shape, dtype, math.prod(shape) * item, chunks, int(data.get_storage_size()))
+    return ReadableDataset(data, shape, dtype, math.prod(shape) * item, chunks, int(data.get_storage_size()))
 
 
 def _dtype(kind: h5t.TypeID) -> str | None:

@@ -124,7 +124,7 @@ def _content(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
         _tell(out, {"motion": True})
         return
 
-    def go_on(datasets: Iterable[guard.Found]) -> None:
+    def go_on(datasets: Iterable[guard.ReadableDataset]) -> None:
         _tell(out, {})  # what takes long begins
         _grant_for(datasets)
 
@@ -172,7 +172,7 @@ def _send(out: BinaryIO, values: np.ndarray) -> None:
         out.write(values.reshape(-1).data.cast("B"))
 
 
-def _grant_for(datasets: Iterable[guard.Found]) -> None:
+def _grant_for(datasets: Iterable[guard.ReadableDataset]) -> None:
     every = list(datasets)
     seconds = sum(one.size * _PER_BYTE + one.chunks * _PER_CHUNK for one in every)
     _grant(_LOOK + seconds, 2 * max((one.size for one in every), default=0))

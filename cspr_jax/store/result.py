@@ -31,7 +31,7 @@ _MOST_PARTS = 10_000
 _BLOCK = 1 << 20
 
 
-class Choice(NamedTuple):
+class BestPoints(NamedTuple):
     """An axis of which every cell has its best point.
 
     Fields:
@@ -63,7 +63,7 @@ class Result:
     labels: dict[str, str]
     attributes: dict[str, Any]
     settings: dict[str, Any]
-    choices: dict[str, Choice] = dataclasses.field(default_factory=dict)
+    choices: dict[str, BestPoints] = dataclasses.field(default_factory=dict)
 
     @property
     def is_map(self) -> bool:
@@ -102,12 +102,12 @@ class Result:
         data, places = best_of(self.data, axis, points, place, MAP_KINDS[self.attributes["map"]].pictured)
         others = {name: points for name, points in self.axes.items() if name != axis}
         earlier = {
-            name: Choice(
+            name: BestPoints(
                 choice.points, np.take_along_axis(choice.places, np.expand_dims(places, place), place).squeeze(place)
             )
             for name, choice in self.choices.items()
         }
-        choices = earlier | {axis: Choice(points, places)}
+        choices = earlier | {axis: BestPoints(points, places)}
         units, labels = _described(self.settings.get("map"), [*others, *choices, *data])
         return dataclasses.replace(self, axes=others, data=data, units=units, labels=labels, choices=choices)
 

@@ -16,7 +16,7 @@ from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantity import EARLIER
 from cspr_jax.store import guard
 from cspr_jax.store.documents import Header, document, plain_json
-from cspr_jax.store.guard import Found
+from cspr_jax.store.guard import ReadableDataset
 from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, new_dataset, reason
 from cspr_jax.store.seal import DamagedError, sealed
 
@@ -109,7 +109,7 @@ def decode(
     layout: Layout,
     index: int,
     shape: tuple[int, ...],
-    begun: Callable[[Iterable[Found]], None] = lambda _: None,
+    begun: Callable[[Iterable[ReadableDataset]], None] = lambda _: None,
 ) -> Shard:
     """A shard, checked in every respect but its seal.
 

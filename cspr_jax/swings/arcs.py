@@ -148,7 +148,9 @@ def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
         raise InputError("max_arcs", max_arcs, "an integer >= 1")
     if np.abs(np.asarray(robot.base_points).mean(0)).max() > AT_P0 * float(spool_radius(robot)):
         raise InputError(
-            "base_points", np.asarray(robot.base_points).tolist(), "from their centroid; see `build.centred`"
+            "base_points",
+            np.asarray(robot.base_points).tolist(),
+            "from their centroid; see `kernel_axes.centred`",
         )
     fits = (np.asarray(z0) > 0.0) & (np.asarray(z0) <= LARGEST_LENGTH)
     if not fits.all():

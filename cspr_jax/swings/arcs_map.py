@@ -17,11 +17,11 @@ class MinimumArcsMap(PointMassMap):
 
     proves = True
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a planar robot; build what all tiles share."""
-        if spec.is_planar:
-            raise ConfigError(file, f'robot "{spec.name}" is planar: must have three cables in this map')
-        super().__init__(spec, keys, file)
+        if robot_file.is_planar:
+            raise ConfigError(file, f'robot "{robot_file.name}" is planar: must have three cables in this map')
+        super().__init__(robot_file, keys, file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.motions.amplitudes import Amplitude
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.verdicts import Verdict
@@ -26,7 +26,7 @@ def flags(limits: Limits) -> tuple[Verdict, ...]:
     Returns:
         n_criteria flags.
     """
-    return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in given(limits)))
+    return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in limits_set(limits)))
 
 
 def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
@@ -39,7 +39,7 @@ def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
     Returns:
         n_criteria numbers.
     """
-    return (robot.n_cables, 1, *(count(row, robot.n_cables) for row in given(limits)))
+    return (robot.n_cables, 1, *(count(row, robot.n_cables) for row in limits_set(limits)))
 
 
 @jax.jit

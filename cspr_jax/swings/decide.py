@@ -15,7 +15,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.answers import Answers
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
 from cspr_jax.schema.verdicts import FLAGS, Verdict
@@ -163,9 +163,9 @@ def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, k
         if not len(rows):
             return _Search(smallest, doubtful, bound, is_planned)
         arcs = np.argmax(alive[rows], axis=1) + 1
-        given = arcs == known.arcs[rows]
-        smallest[rows[given]], bound[rows[given]] = arcs[given], known.bound[rows[given]]
-        rows, arcs = rows[~given], arcs[~given]
+        is_known = arcs == known.arcs[rows]
+        smallest[rows[is_known]], bound[rows[is_known]] = arcs[is_known], known.bound[rows[is_known]]
+        rows, arcs = rows[~is_known], arcs[~is_known]
         if not len(rows):
             continue
         proof = prove(problem, pick(parities, rows, arcs), arcs)
@@ -200,7 +200,7 @@ def _shown(
     fixed, by_cables = search.smallest.copy(), np.zeros(len(every), bool)
     # Without limits, or near to zero, the largest margin says enough.
     is_refused = (fixed == 0) & ~search.doubtful & ~search.is_planned
-    refused = np.flatnonzero(is_refused & bool(given(problem.limits)))
+    refused = np.flatnonzero(is_refused & bool(limits_set(problem.limits)))
     why = refusals(problem, rows_of(parities, refused), basic[refused])
     fixed[refused], by_cables[refused] = why.arcs, why.arcs == 0
     upper = np.where(by_cables[:, None], basic, every)

@@ -8,7 +8,7 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg, each
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Stops
+from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.swings.arcs import arcs_and_segments
 from cspr_jax.swings.hypocycloid import Hypocycloid, Segment
 
@@ -16,7 +16,7 @@ from cspr_jax.swings.hypocycloid import Hypocycloid, Segment
 class Hypocycloids(Leg):
     """Any points, joined by standard hypocycloids; see `Leg`."""
 
-    def __init__(self, stops: Stops) -> None:
+    def __init__(self, stops: Waypoints) -> None:
         """Refuse what belongs to transitions."""
         if stops.keys.inclination is not None:
             raise ConfigError(stops.path, 'inclination: must be absent unless family = "transition"')

@@ -22,7 +22,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.bounds import Bounds
 from cspr_jax.arithmetic.elementary import sincospi
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
 from cspr_jax.schema.limits import Limit
@@ -131,9 +131,9 @@ def limit_slacks(
         now: the state at `tau`.
 
     Returns:
-        a list of () for each limit of `given`, as long as `count` says.
+        a list of () for each limit of `limits_set`, as long as `count` says.
     """
-    if not given(limits):
+    if not limits_set(limits):
         return ()
     position, slope, curvature = _path(segment, arcs, tau, now)
     rays = position[None] - robot.base_points
@@ -143,7 +143,7 @@ def limit_slacks(
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
     lift = jnp.stack(now.kappa) * length / (len(now.kappa) * z0)
     here = _Now(z0, time, weight, now.eta, lift, position[2], length, rate, rate_slope)
-    slacks = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in given(limits))
+    slacks = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in limits_set(limits))
     return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in slacks)
 
 
@@ -174,9 +174,9 @@ def limit_curvatures(
         kappa: bounds of the variable part of the pseudotensions over it, leaves (n_cables,).
 
     Returns:
-        one () for each limit of `given`, the largest over the cables.
+        one () for each limit of `limits_set`, the largest over the cables.
     """
-    if not given(limits):
+    if not limits_set(limits):
         return ()
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
     pace, pull = pace_bounds(segment, arcs, over)
@@ -185,7 +185,7 @@ def limit_curvatures(
     depth = row_bounds(segment, arcs, over, segment.plane[2])
     square = 2.0 * (pace.slope**2 + length.value * pace.curvature)
     here = _Over(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
-    return tuple(jnp.max(CLOSED[row.name].curvature(here, getattr(limits, row.name))) for row in given(limits))
+    return tuple(jnp.max(CLOSED[row.name].curvature(here, getattr(limits, row.name))) for row in limits_set(limits))
 
 
 def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]:

@@ -16,7 +16,7 @@ from jax import lax
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.answers import Answers
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.runtime.stages import stage
 from cspr_jax.swings import envelope_oscillations as counts
@@ -205,7 +205,7 @@ def minimum_oscillations(
     allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
     parities = {0: segments, 1: segments}
     if steady is None:
-        is_plain = not given(problem.limits) and problem.limits.uncertainty is None
+        is_plain = not limits_set(problem.limits) and problem.limits.uncertainty is None
         known = _known(problem, segments, (weights, v), allowed) if is_plain else None
         how: dict[str, Any] = {"known": known, "measure": transition_margins}
     else:

@@ -22,9 +22,9 @@ class MinimumOscillationsMap(PointMassMap):
 
     proves = True
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Build what all tiles share; bounds may be asked for."""
-        super().__init__(spec, keys, file, for_bounds=True)
+        super().__init__(robot_file, keys, file, for_bounds=True)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

@@ -23,7 +23,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.amplitudes import Amplitude
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.swings.criteria import curvatures, slacks
@@ -103,7 +103,7 @@ def _first_look(problem: Problem, edges: Array, counts: Array, arguments) -> tup
         sampled, proved = block_bounds(problem, segments, arcs, start, stop)
         return jnp.minimum(state[0], sampled), jnp.minimum(state[1], proved)
 
-    nothing = jnp.full((2 + len(given(problem.limits)), *arcs.shape), jnp.inf, arcs.dtype)
+    nothing = jnp.full((2 + len(limits_set(problem.limits)), *arcs.shape), jnp.inf, arcs.dtype)
     sampled, proved = over_blocks(edges, counts, arcs, (nothing, nothing), step)
     near = jax.vmap(partial(tolerance, problem.amplitude))(segments, arcs)
     return sampled.T, proved.T, near

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 
 from cspr_jax.motions.fewest_limits import FewestLimits, Refused
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.swings.criteria import flags
 from cspr_jax.swings.hypocycloid import Segment
@@ -26,7 +26,7 @@ def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray) 
     Returns:
         the refusals.
     """
-    is_limit = np.arange(BASIC + len(given(problem.limits))) >= BASIC
+    is_limit = np.arange(BASIC + len(limits_set(problem.limits))) >= BASIC
     fewest, alive = FewestLimits(len(upper), flags(problem.limits)), upper >= -SMALLEST_MARGIN
     while True:
         rows = np.flatnonzero(~fewest.is_best & alive.any(1))

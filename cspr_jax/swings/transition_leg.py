@@ -10,7 +10,7 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg, each
 from cspr_jax.motions.motion import Backwards, Motion
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Stops
+from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.swings.hypocycloid import Hypocycloid, Segment
 from cspr_jax.swings.oscillations import minimum_oscillations, transitions_to
 from cspr_jax.swings.transition import steady
@@ -19,7 +19,7 @@ from cspr_jax.swings.transition import steady
 class Transitions(Leg):
     """Rest and targets, joined by transitions and by swings of one size; see `Leg`."""
 
-    def __init__(self, stops: Stops) -> None:
+    def __init__(self, stops: Waypoints) -> None:
         """Refuse pairs of poses that a transition cannot join."""
         super().__init__(stops)
         pairs = list(zip(stops.poses[:-1], stops.poses[1:], strict=True))
@@ -69,7 +69,7 @@ def _with_swings(segments: Segment, is_steady: np.ndarray) -> Segment:
     return jax.tree.map(choose, steady(segments), segments)
 
 
-def _check_pair(stops: Stops, i: int, start: Pose, end: Pose) -> None:
+def _check_pair(stops: Waypoints, i: int, start: Pose, end: Pose) -> None:
     name, path = stops.name(i + 1), stops.path
     if start.rest and end.rest:
         raise ConfigError(path, f"{name}.rest = true: must follow a target, not another rest")

@@ -9,7 +9,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
-from cspr_jax.motions.limits import given
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.swings import transition
 from cspr_jax.swings.blocks import blocks
@@ -47,7 +47,7 @@ def transition_margins(problem: Problem, segments: Segment, arcs: np.ndarray) ->
     Returns:
         (n, n_criteria); NaN where the motion is not finite.
     """
-    if given(problem.limits):
+    if limits_set(problem.limits):
         return margins(problem, segments, arcs)
     table = blocks(problem.amplitude, int(np.max(arcs)))
     smallest = smallest_values(Functions(_extreme_pseudotensions, (1, 1)), problem, segments, arcs, table).min(1)

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.motions.acceleration_sets import Reach, faces_at, reaches, verdict
+from cspr_jax.motions.acceleration_sets import AccelerationReach, faces_at, reaches, verdict
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.wrench_sets import Faces
@@ -20,7 +20,7 @@ def _size(robot: PointMassRobot, power: int) -> int:
     return max(min(BATCH, _ROOM // robot.n_cables**power), 1)
 
 
-def reach_of(robot: PointMassRobot, limits: Limits, positions: np.ndarray) -> Reach:
+def reach_of(robot: PointMassRobot, limits: Limits, positions: np.ndarray) -> AccelerationReach:
     """Feasible accelerations at many places, and how large they are.
 
     Args:

@@ -19,11 +19,11 @@ class FeasibleAccelerationMap(PointMassMap):
 
     any_cables = True
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse more cables than there is room for the corners of their faces."""
-        super().__init__(spec, keys, file)
+        super().__init__(robot_file, keys, file)
         if self._problem.robot.n_cables > MOST_CABLES:
-            place, key = spec.placed("base_points", file)
+            place, key = robot_file.placed("base_points", file)
             raise ConfigError(place, f"{key}: must be at most {MOST_CABLES} in this map")
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

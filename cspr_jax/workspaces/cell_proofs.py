@@ -12,7 +12,7 @@ from cspr_jax.robots.wrench_sets import spanning
 from cspr_jax.workspaces.cells import Cells, cells_about
 from cspr_jax.workspaces.inside_cells import least_margins
 from cspr_jax.workspaces.outside_cells import are_beyond, are_one_sided
-from cspr_jax.workspaces.questions import CLOSURE, Question
+from cspr_jax.workspaces.questions import CLOSURE, Requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.worst_cocircuits import worst_cocircuits
 
@@ -26,7 +26,7 @@ KEPT = 0.98
 class CellProofs:
     """Proofs of cells at one orientation, without halving."""
 
-    def __init__(self, robot: AnyRobot, asked: Question, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
+    def __init__(self, robot: AnyRobot, asked: Requirement, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
         """Of a robot without pulleys, and the search of the same question."""
         self._asked, self._is_closure = asked, asked.condition == CLOSURE
         self._unbounded = tuple(np.isinf(asked.high).tolist())

@@ -29,7 +29,7 @@ NOTHING = 1e-12
 Column = Sequence[Array]
 
 
-class Choices(NamedTuple):
+class CableSubsets(NamedTuple):
     """Choices of dof - 1 cables whose columns have a normal that is not normal to all others.
 
     Fields:
@@ -42,7 +42,7 @@ class Choices(NamedTuple):
     counts: np.ndarray | None
 
 
-def choices_of(matrices: np.ndarray) -> Choices:
+def choices_of(matrices: np.ndarray) -> CableSubsets:
     """Choices of dof - 1 cables that are one at some pose: four cables at one point are none, wherever they are.
 
     Args:
@@ -68,7 +68,7 @@ def choices_of(matrices: np.ndarray) -> Choices:
         np.maximum(sizes, np.abs(np.einsum("sk,ksj->sj", normals, rest)), out=sizes)
     is_one = (sizes > NOTHING).any(1)
     counts = (sizes > NOTHING)[is_one]
-    return Choices(table[is_one], None if counts.all() else counts.astype(float))
+    return CableSubsets(table[is_one], None if counts.all() else counts.astype(float))
 
 
 def _check_finite(matrices: np.ndarray) -> None:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cspr_jax.workspaces.cocircuits import Choices
+from cspr_jax.workspaces.cocircuits import CableSubsets
 from cspr_jax.workspaces.required import RequiredWrenches
 
 # Of unit columns: smaller singular values, of the largest and at all, are zero.
@@ -122,7 +122,7 @@ def is_outside(wrenches: np.ndarray, basis: np.ndarray) -> bool:
     return bool((outside > OUTSIDE * np.linalg.norm(wrenches, axis=1)).any())
 
 
-def closure_margin(matrix: np.ndarray, choices: Choices) -> float:
+def closure_margin(matrix: np.ndarray, choices: CableSubsets) -> float:
     """Margin of wrench closure; see `workspaces.margins.closure_margin`.
 
     Args:
@@ -144,7 +144,7 @@ def closure_margin(matrix: np.ndarray, choices: Choices) -> float:
     return float(np.where(has_more, np.maximum(rarer, 0.0), rarer).min())
 
 
-def _always_zero(found: np.ndarray, choices: Choices) -> np.ndarray:
+def _always_zero(found: np.ndarray, choices: CableSubsets) -> np.ndarray:
     # How many components more than those of a hyperplane's columns are zero at every pose of the robot.
     if choices.counts is None:
         return np.zeros(len(found), int)

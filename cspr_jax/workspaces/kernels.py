@@ -15,14 +15,14 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.lanes import largest
 from cspr_jax.workspaces import margins
-from cspr_jax.workspaces.cocircuits import CABLES, MOST_OTHERS, Choices, Column, block, normal, product, relation
-from cspr_jax.workspaces.margins import BLOCK_ROUNDING, ROUNDING, Pull, Wrenches, length, one_norm
+from cspr_jax.workspaces.cocircuits import CABLES, MOST_OTHERS, CableSubsets, Column, block, normal, product, relation
+from cspr_jax.workspaces.margins import BLOCK_ROUNDING, ROUNDING, CocircuitLimits, Wrenches, length, one_norm
 
 # Up to so many cocircuits there is no loop.
 UNROLLED = 10
 
 
-class Range(NamedTuple):
+class TensionLimits(NamedTuple):
     """Limits of the tensions.
 
     Fields:
@@ -41,8 +41,8 @@ def by_normals(
     every: Sequence[Array],
     loss: Array,
     wrenches: Wrenches,
-    asked: Range,
-    choices: Choices,
+    asked: TensionLimits,
+    choices: CableSubsets,
     *,
     measure: str,
     is_bounded: bool,
@@ -84,11 +84,11 @@ def by_normals(
     return _least(pull, choices.table, limits, like, asked, measure=measure, is_bounded=is_bounded)
 
 
-def _pull(entries: Sequence[Array], low, high, counts, size: Array, noise: Array, error: Array) -> Pull:
+def _pull(entries: Sequence[Array], low, high, counts, size: Array, noise: Array, error: Array) -> CocircuitLimits:
     noises = [noise] * len(entries)
     if counts is not None:  # what is a zero of the robot has no rounding either
         entries, noises = ([x * counts[i] for i, x in enumerate(values)] for values in (entries, noises))
-    return Pull(entries, list(low), list(high), size, noises, error)
+    return CocircuitLimits(entries, list(low), list(high), size, noises, error)
 
 
 def _size(wrenches: Wrenches) -> Array:
@@ -102,7 +102,9 @@ def _row(array: Array, k: Array) -> Array:
     return lax.dynamic_index_in_dim(array, k, 0, keepdims=False)
 
 
-def _least(pull, table: np.ndarray, limits, like: Array, asked: Range, *, measure: str, is_bounded: bool) -> Array:
+def _least(
+    pull, table: np.ndarray, limits, like: Array, asked: TensionLimits, *, measure: str, is_bounded: bool
+) -> Array:
     # The least of all cocircuits.
     judged = margins.bounded_margin if is_bounded else margins.free_margin
 
@@ -188,7 +190,9 @@ def _joined(found: tuple[list[list[Array]], Array], wrench: Column, loss: Array)
 
 
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
-def by_null_space(space: NullSpace, asked: Range, choices: Choices, *, measure: str, is_bounded: bool) -> Array:
+def by_null_space(
+    space: NullSpace, asked: TensionLimits, choices: CableSubsets, *, measure: str, is_bounded: bool
+) -> Array:
     """Margins of poses by the relations among rows of the null space.
 
     Args:

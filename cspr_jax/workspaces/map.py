@@ -7,20 +7,23 @@ import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.arithmetic.rotations import from_tilt_torsion, products
-from cspr_jax.build import build_limits, build_robot, centred, given_quaternion
+from cspr_jax.build.limits import build_limits
+from cspr_jax.build.orientations import given_quaternion
+from cspr_jax.build.robots import build_robot
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, turn_grid
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.axes import TILT_TORSION
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.workspaces.clearances import surroundings
-from cspr_jax.workspaces.questions import FEASIBLE, check_cables, question, required_wrenches
+from cspr_jax.workspaces.questions import FEASIBLE, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.rest_poses import MARGINS, OrientationSet, RestPoses, over_orientations
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.speeds import CableSpeeds, cable_speeds
@@ -37,19 +40,19 @@ DIVISIONS = 12
 class WorkspaceMap(GridMap):
     """The workspace of a robot: of poses, or of places with sets of orientations; see `GridMap`."""
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse what the robot cannot be asked."""
         self._keys, self._file = keys, file
-        self._frame, self._z_axis = frame_of(spec.base_points, spec.z_axis), spec.z_axis
+        self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
         self._asked = keys.workspace or WorkspaceTable()
         self._refuse_unused()
-        self._limits = build_limits(spec, keys.limits, file)
-        self._robot = centred(build_robot(spec, keys.trajectory, file))[0]
+        self._limits = build_limits(robot_file, keys.limits, file)
+        self._robot = centred(build_robot(robot_file, keys.trajectory, file))[0]
         self._row = PATTERNS[self._robot.pattern]
         if not self._row.is_body:
             for name in ("orientation", "orientations"):
                 if getattr(self._asked, name) is not None:
-                    raise ConfigError(file, f"workspace.{name}: must be absent: {spec.kind} has none")
+                    raise ConfigError(file, f"workspace.{name}: must be absent: {robot_file.kind} has none")
         self._turn = self._given_turns([self._asked.orientation], "workspace.orientation")
         self._samples, self._volume = self._orientation_set()
         try:
@@ -63,7 +66,7 @@ class WorkspaceMap(GridMap):
             capacity = None if length is None else self._search(FEASIBLE, length)
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
-        around, speeds = self._surroundings(spec), self._speeds(spec)
+        around, speeds = self._surroundings(robot_file), self._speeds(robot_file)
         self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity)
 
     def _refuse_unused(self) -> None:
@@ -78,23 +81,23 @@ class WorkspaceMap(GridMap):
                 allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
                 raise ConfigError(self._file, f"limits.{limit.name}: {allowed}")
 
-    def _surroundings(self, spec: RobotFile) -> Scene | None:
+    def _surroundings(self, robot_file: RobotFile) -> Scene | None:
         asked, row = self._asked, self._row
         if INTERFERENCE not in asked.conditions:
             return None
         for name in ("platform_box", "platform_hull"):
             if getattr(asked, name) is not None and not row.is_body:
-                raise ConfigError(self._file, f"workspace.{name}: must be absent: {spec.kind} has no shape")
+                raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} has no shape")
         # Shapes are from where the arms of the kernels are: the mass centre, or a joint.
-        centre = None if row.is_jointed else spec.centre_of_mass
+        centre = None if row.is_jointed else robot_file.centre_of_mass
         try:
-            body = asked.body(centre or (0.0, 0.0, 0.0), spec.platform_points or ())
+            body = asked.body(centre or (0.0, 0.0, 0.0), robot_file.platform_points or ())
         except InputError as error:
             allowed = "must be points: those where the cables are attached lie in a plane"
             raise ConfigError(self._file, f"workspace.platform_hull = true: {allowed}") from error
         return surroundings(self._robot, self._frame, [table.shape() for table in asked.obstacle or ()], body)
 
-    def _speeds(self, spec: RobotFile) -> CableSpeeds | None:
+    def _speeds(self, robot_file: RobotFile) -> CableSpeeds | None:
         asked, most = self._asked, self._limits.cable_speed_max
         given = [name for name in ("speed", "angular_speed") if getattr(asked, name) is not None]
         if not given:
@@ -105,7 +108,7 @@ class WorkspaceMap(GridMap):
         for name, has in (("speed", not self._row.is_jointed), ("angular_speed", self._row.is_body)):
             if name in given and not has:
                 why = "turns about its joint alone" if self._row.is_jointed else "does not turn"
-                raise ConfigError(self._file, f"workspace.{name}: must be absent: {spec.kind} {why}")
+                raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} {why}")
         if most is None:
             raise ConfigError(self._file, f"workspace.{given[0]}: must be absent without limits.cable_speed_max")
         values = {"speed": asked.speed or 0.0, "angular_speed": asked.angular_speed or 0.0}
@@ -145,7 +148,7 @@ class WorkspaceMap(GridMap):
             asked = self._asked
             given = {"points": asked.wrenches, "box": asked.wrench_box, "ellipsoid": asked.wrench_ellipsoid}
             loads = required_wrenches(self._robot, self._frame, **given, acceleration=asked.acceleration)
-        return WorkspaceSearch(self._robot, question(self._robot, name, self._limits, loads, capacity_length))
+        return WorkspaceSearch(self._robot, requirement(self._robot, name, self._limits, loads, capacity_length))
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

@@ -32,7 +32,7 @@ class Wrenches(NamedTuple):
     ellipsoids: Sequence[Array] = ()
 
 
-class Pull(NamedTuple):
+class CocircuitLimits(NamedTuple):
     """A cocircuit, with what the limits of its cables are.
 
     Fields:
@@ -102,7 +102,7 @@ def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
     return most, least
 
 
-def bounded_margin(pull: Pull, most: Array, least: Array) -> Bounds:
+def bounded_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
     """Bounds of the margin of one cocircuit whose cables all have a largest tension.
 
     Args:
@@ -121,7 +121,7 @@ def bounded_margin(pull: Pull, most: Array, least: Array) -> Bounds:
     return _between(pull, slack, slack)
 
 
-def _between(pull: Pull, sure: Array, possible: Array) -> Bounds:
+def _between(pull: CocircuitLimits, sure: Array, possible: Array) -> Bounds:
     # Over a size that has an error as well.
     inverse = 1.0 / pull.size
     lower, upper, loss = sure * inverse, possible * inverse, sum(pull.noises[1:], pull.noises[0])
@@ -129,7 +129,7 @@ def _between(pull: Pull, sure: Array, possible: Array) -> Bounds:
     return lower - (pull.error + less) * inverse, upper + (pull.error + more) * inverse
 
 
-def free_margin(pull: Pull, most: Array, least: Array) -> Bounds:
+def free_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
     """Bounds of the margin of one cocircuit; any of its cables may have no largest tension.
 
     A component that rounding may have made of a zero frees the upper bound, and does not free the lower one.
@@ -154,7 +154,7 @@ def free_margin(pull: Pull, most: Array, least: Array) -> Bounds:
     return _between(pull, jnp.minimum(*lower), jnp.minimum(*upper))
 
 
-def closure_margin(pull: Pull) -> Bounds:
+def closure_margin(pull: CocircuitLimits) -> Bounds:
     """Bounds of the margin of wrench closure of one cocircuit.
 
     Args:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.errors import InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
@@ -20,11 +20,10 @@ STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
 CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
 # Of dof - 1 cables each: seconds of a pose, and as many megabytes.
 MOST_CHOICES = 100_000
-UNTURNED = np.array([[1.0, 0.0, 0.0, 0.0]])
 
 
 @dataclasses.dataclass(frozen=True)
-class Question:
+class Requirement:
     """What is asked of each pose.
 
     Fields:
@@ -58,13 +57,13 @@ def check_cables(robot: AnyRobot) -> None:
         raise InputError("robot", None, f"must have {allowed}", fault=f"{robot.n_cables} cables")
 
 
-def question(
+def requirement(
     robot: AnyRobot,
     condition: str,
     limits: Limits,
     wrenches: RequiredWrenches | None = None,
     capacity_length: float | None = None,
-) -> Question:
+) -> Requirement:
     """A question of a condition.
 
     Args:
@@ -72,7 +71,7 @@ def question(
         condition: one of `CONDITIONS`.
         limits: of the tensions; of account for "wrench-feasible" alone, as is what follows.
         wrenches: of `required_wrenches`; None: what holds the weight still.
-        capacity_length: as in `Question`.
+        capacity_length: as in `Requirement`.
 
     Returns:
         the question.
@@ -80,14 +79,14 @@ def question(
     if condition != FEASIBLE:
         limits, wrenches, capacity_length = Limits(), None, None
     low, high = tension_range(robot, limits)
-    return Question(condition, np.asarray(low), np.asarray(high), wrenches or _weight(robot), capacity_length)
+    return Requirement(condition, np.asarray(low), np.asarray(high), wrenches or _weight(robot), capacity_length)
 
 
 def _weight(robot: AnyRobot) -> RequiredWrenches:
     # Of a body on a joint it turns with the body.
     if PATTERNS[robot.pattern].is_jointed:
         return RequiredWrenches(None)
-    return RequiredWrenches(np.asarray(geometry.weights(robot, np.zeros((1, 3)), UNTURNED)))
+    return RequiredWrenches(np.asarray(geometry.weights(robot, np.zeros((1, 3)), np.array([IDENTITY]))))
 
 
 def required_wrenches(

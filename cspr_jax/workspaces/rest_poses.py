@@ -32,7 +32,7 @@ CLOSE = 1e-9
 # Poses that are answered at a time, where each place has many orientations.
 AT_ONCE = 1 << 19
 
-Answers = dict[str, np.ndarray]
+PoseColumns = dict[str, np.ndarray]
 OrientationSet = Literal["inclusion", "total"]
 
 
@@ -56,7 +56,7 @@ class RestPoses:
     speeds: CableSpeeds | None = None
     capacity: WorkspaceSearch | None = None
 
-    def __call__(self, origins: np.ndarray, quaternions: np.ndarray) -> Answers:
+    def __call__(self, origins: np.ndarray, quaternions: np.ndarray) -> PoseColumns:
         """Whether poses meet all conditions.
 
         Args:
@@ -67,7 +67,7 @@ class RestPoses:
             (n,) verdict, each of `MARGINS`, NaN where nobody asks, and `NEAREST`.
         """
         places, count = mass_centres(self.robot, origins, quaternions), len(origins)
-        found: Answers = {name: np.full(count, np.nan) for name in MARGINS}
+        found: PoseColumns = {name: np.full(count, np.nan) for name in MARGINS}
         verdict = np.zeros(count, FLAGS)
         for condition, asked in self.searches.items():
             answers = asked(places, quaternions)
@@ -141,12 +141,12 @@ class RestPoses:
 
 
 def over_orientations(
-    ask: Callable[[np.ndarray, np.ndarray], Answers],
+    ask: Callable[[np.ndarray, np.ndarray], PoseColumns],
     origins: np.ndarray,
     orientations: np.ndarray,
     volume: np.ndarray,
     kind: OrientationSet,
-) -> Answers:
+) -> PoseColumns:
     """Whether places belong to the workspace of a set of orientations.
 
     Args:
@@ -160,7 +160,7 @@ def over_orientations(
         (n,) verdict: where it is not 0, the flags of the most orientations that stand in the way; margins of the best
         orientation, or of the worst, and what is nearest there; orientation_fraction, the part of the set inside.
     """
-    parts, count = list[Answers](), len(orientations)
+    parts, count = list[PoseColumns](), len(orientations)
     step = max(1, AT_ONCE // count)
     for start in range(0, len(origins), step):
         some = origins[start : start + step]
@@ -169,7 +169,7 @@ def over_orientations(
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _of_places(every: Answers, volume: np.ndarray, kind: OrientationSet) -> Answers:
+def _of_places(every: PoseColumns, volume: np.ndarray, kind: OrientationSet) -> PoseColumns:
     # (n_places, n_orientations) each.
     verdict = every["verdict"]
     inside = verdict == 0

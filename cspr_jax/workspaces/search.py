@@ -14,6 +14,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts
 from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.errors import InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
@@ -22,7 +23,7 @@ from cspr_jax.schema.labelled import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces import cocircuits, exact, geometry, kernels
 from cspr_jax.workspaces.margins import Wrenches
-from cspr_jax.workspaces.questions import CLOSURE, UNTURNED, Question
+from cspr_jax.workspaces.questions import CLOSURE, Requirement
 from cspr_jax.workspaces.required import RequiredWrenches
 
 # Of the largest limit of the tensions, or of the wrench: a margin nearer to zero is that of the boundary.
@@ -97,7 +98,7 @@ class WorkspaceSearch:
         unit: (dof,) by what the components of wrenches are divided: moments by a length of the robot, m.
     """
 
-    def __init__(self, robot: AnyRobot, asked: Question, *, precision: str = "float64") -> None:
+    def __init__(self, robot: AnyRobot, asked: Requirement, *, precision: str = "float64") -> None:
         """Of a robot, centred, z down.
 
         With precision "float32" that decides the poses of which it can, and float64 the others; margins of the former
@@ -138,7 +139,7 @@ class WorkspaceSearch:
         """
         if len(positions) == 0:
             return WorkspaceAnswers(np.zeros(0, FLAGS), np.zeros(0), np.zeros(0, bool))
-        turns = np.repeat(UNTURNED, len(positions), 0) if quaternions is None else quaternions
+        turns = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
         loads = self._weights(positions, turns) if wrenches is None else wrenches / self.unit
         poses = Poses(positions, turns, loads)
         parts = in_parts(lambda part: self._part(poses.some(part)), len(positions), PART)
@@ -161,7 +162,7 @@ class WorkspaceSearch:
         regular = np.zeros((0, self._robot.dof, self._robot.n_cables))
         for widening in range(WIDENINGS):
             places = middle + 2.0**widening * half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
-            turns = UNTURNED + 0.2 * rng.normal(size=(TRIALS, 4))
+            turns = np.array(IDENTITY) + 0.2 * rng.normal(size=(TRIALS, 4))
             if row.is_planar:
                 turns[:, [1, 3]] = 0.0
             matrices = self._matrices(places, turns / np.linalg.norm(turns, axis=1, keepdims=True))
@@ -244,7 +245,7 @@ class WorkspaceSearch:
         options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.asked.high).all())}
         robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
         limits = leaf(self.asked.low[ordered]), leaf(self.asked.high[ordered]), leaf(self._normals_unit)
-        asked, length, fixed = cast((kernels.Range(*limits), leaf(self._length), self._fixed))
+        asked, length, fixed = cast((kernels.TensionLimits(*limits), leaf(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
 
@@ -275,13 +276,13 @@ class WorkspaceSearch:
         return stage
 
     @property
-    def _relations(self) -> cocircuits.Choices:
+    def _relations(self) -> cocircuits.CableSubsets:
         # Cables of each cocircuit alone, in the order of the block.
         table, counts = self._choices
         places = np.argsort(self._order)[table[:, self._robot.dof - 1 :]].astype(np.int32)
         sorting = np.argsort(places, axis=1)
         ordered = None if counts is None else np.take_along_axis(counts, sorting, 1)
-        return cocircuits.Choices(np.take_along_axis(places, sorting, 1), ordered)
+        return cocircuits.CableSubsets(np.take_along_axis(places, sorting, 1), ordered)
 
     def required(self, position: np.ndarray, quaternion: np.ndarray) -> RequiredWrenches:
         """What the cables must supply at a pose.

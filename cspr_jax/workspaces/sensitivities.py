@@ -7,6 +7,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.arithmetic.rotations import matrix
 from cspr_jax.errors import InputError
 from cspr_jax.robots.parallel_pairs import ParallelPairs, parallel_pairs
@@ -74,7 +75,7 @@ class SensitivitySearch:
             first, second = points[pairs.cables[:, 0]], points[pairs.cables[:, 1]]
             geometry = (leaf(pairs.exit_points), leaf(second - first), leaf(np.sqrt((points**2).sum(1).mean())))
             return in_batches(partial(_of_pairs, geometry), positions, size=BATCH)
-        turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(positions), 1)) if quaternions is None else quaternions
+        turns = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
         return in_batches(partial(_of_platform, robot), (positions, turns), size=BATCH)
 
 

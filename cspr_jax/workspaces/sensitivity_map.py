@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cspr_jax.build import kernel_robot
+from cspr_jax.build.robots import kernel_robot
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
@@ -18,12 +18,12 @@ class SensitivityMap(GridMap):
 
     any_cables = True
 
-    def __init__(self, spec: RobotFile, keys: SweepFile, file: object) -> None:
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse more cables than degrees of freedom, whose lengths are not independent."""
-        super().__init__(spec, keys, file)
-        robot = kernel_robot(spec, keys.trajectory, file, any_cables=True)
+        super().__init__(robot_file, keys, file)
+        robot = kernel_robot(robot_file, keys.trajectory, file, any_cables=True)
         if robot.n_cables != robot.dof:
-            place, key = spec.placed("base_points", file)
+            place, key = robot_file.placed("base_points", file)
             raise ConfigError(place, f"{key}: {robot.n_cables} points: must be {robot.dof} in this map")
         self._search = SensitivitySearch(robot)
 

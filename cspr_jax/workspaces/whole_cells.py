@@ -5,10 +5,11 @@ import itertools
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.workspaces.cell_proofs import CellProofs
-from cspr_jax.workspaces.questions import Question
+from cspr_jax.workspaces.questions import Requirement
 from cspr_jax.workspaces.search import WorkspaceAnswers, WorkspaceSearch
 
 # How often a cell that is not decided is halved along each axis: the first time decides most of what can be decided.
@@ -24,7 +25,7 @@ class WorkspaceCells:
     rounding included. Of a robot with pulleys nothing is proved.
     """
 
-    def __init__(self, robot: AnyRobot, asked: Question) -> None:
+    def __init__(self, robot: AnyRobot, asked: Requirement) -> None:
         """Of a robot, centred, z down."""
         self._robot, self._asked, self._search = robot, asked, WorkspaceSearch(robot, asked)
 
@@ -53,7 +54,7 @@ class WorkspaceCells:
         proved = np.zeros(len(positions), bool)
         chosen = np.flatnonzero(side)
         if len(chosen) and self._robot.pulleys is None:
-            turn = np.array([1.0, 0.0, 0.0, 0.0]) if quaternion is None else np.asarray(quaternion)
+            turn = np.array(IDENTITY) if quaternion is None else np.asarray(quaternion)
             sizes = np.broadcast_to(np.asarray(half, float), positions.shape)[chosen]
             with double_precision():
                 proofs = CellProofs(self._robot, self._asked, self._search, turn)

@@ -17,7 +17,7 @@ ZERO = 1e-9
 SHORT = 1e-9
 
 
-class Worst(NamedTuple):
+class WorstCocircuits(NamedTuple):
     """Cocircuits, one a pose.
 
     Fields:
@@ -44,7 +44,7 @@ def worst_cocircuits(
     *,
     condition: str,
     unbounded: Sequence[bool],
-) -> Worst:
+) -> WorstCocircuits:
     """Cocircuits that leave the least, times the volume of the columns that they are normal to.
 
     By this length those of columns that are nearly dependent, whose normals turn fast from place to place, come last;
@@ -88,6 +88,6 @@ def worst_cocircuits(
             load = jnp.argmax(products[worst])
             value = reach - products[:, load]
         weight = jnp.where(is_void, 0.0, jnp.maximum(-value, 0.0))
-        return Worst(normals[worst], worst % len(chosen), load, weight @ normals)
+        return WorstCocircuits(normals[worst], worst % len(chosen), load, weight @ normals)
 
     return jax.vmap(one)(matrices)

@@ -21,7 +21,7 @@ from cspr_jax import cli
 from cspr_jax.api import plans
 from cspr_jax.config.catalogue import catalogue_names
 from cspr_jax.errors import ConfigError, CsprError, InputError, RefusedError, StoreError
-from cspr_jax.platforms.answers import PoseAnswers
+from cspr_jax.platforms.answers import PlatformMotionAnswers
 from cspr_jax.published.tables import table_object
 from cspr_jax.schema.quantities import AXES, QUANTITIES
 
@@ -328,8 +328,8 @@ def test_answers_for_xarray(prototype):
 
 def test_answers_between_poses_for_xarray():
     """beta-hat has a value at either end."""
-    fields = {name: np.arange(6.0) for name in inspect.signature(PoseAnswers).parameters}
-    answers = PoseAnswers(**fields | {"beta_hat": np.arange(12.0).reshape(6, 2)})
+    fields = {name: np.arange(6.0) for name in inspect.signature(PlatformMotionAnswers).parameters}
+    answers = PlatformMotionAnswers(**fields | {"beta_hat": np.arange(12.0).reshape(6, 2)})
     found = answers.to_xarray({"tilt": [0.0, 0.1, 0.2], "torsion": [0.0, 0.5]})
     assert found.beta_hat.dims == ("tilt", "torsion", "end") and found.end.values.tolist() == ["start", "target"]
     assert found.beta_hat.sel(tilt=0.2, torsion=0.0, end="target") == 9.0

@@ -33,9 +33,9 @@ from cspr_jax.errors import shown
     ],
 )
 def test_hints_about_a_rounded_p0(z_axis, z0, place, told):
-    spec = spec_of(z_axis=z_axis, base_points=[[x + 5.0, y, 3.0] for x, y, _ in SPOOLS])
-    centre = np.mean(spec.base_points, axis=0)
-    text = hints.almost_at_rest("pose[1].position", (centre + place).tolist(), z0, spec)
+    robot_file = spec_of(z_axis=z_axis, base_points=[[x + 5.0, y, 3.0] for x, y, _ in SPOOLS])
+    centre = np.mean(robot_file.base_points, axis=0)
+    text = hints.almost_at_rest("pose[1].position", (centre + place).tolist(), z0, robot_file)
     if not told:
         assert text == ""
         return
@@ -57,10 +57,10 @@ def test_hints_about_a_rounded_p0(z_axis, z0, place, told):
     ],
 )
 def test_hints_about_cables_without_a_thickness(robot, asked, told):
-    spec = spec_of(**BODY, base_points=RING).model_copy(update=robot)
+    robot_file = spec_of(**BODY, base_points=RING).model_copy(update=robot)
     table = WorkspaceTable.model_construct(**{"obstacle": None, "platform_box": None, "platform_hull": None} | asked)
     keys = SweepFile.model_construct(workspace=table, trajectory=SweepTrajectory(), axes=None)
-    lines = hints.sweep_hints(keys, spec)
+    lines = hints.sweep_hints(keys, robot_file)
     assert len(lines) == told and all("cable_diameter" in line and "excludes nothing" in line for line in lines)
 
 
@@ -88,8 +88,8 @@ def test_hints_about_a_start_of_a_sweep():
 def test_hints_about_a_pose_among_the_spools(spools, planar, place, told):
     """It says that the pose is in their plane, and asks about the z axis only where every target is above them."""
     keys = {"schema": 1, "robot": "r", "z0": 1.0, "pose": [{"rest": True}, {"position": place}]}
-    spec = spec_of(base_points=spools, **({"planar": True} if planar else {}))
-    lines = hints.plan_hints(PlanFile.model_validate(keys), spec)
+    robot_file = spec_of(base_points=spools, **({"planar": True} if planar else {}))
+    lines = hints.plan_hints(PlanFile.model_validate(keys), robot_file)
     wanted = f"pose[1].position = {shown(place)}: in the plane of the spools"
     assert [line.startswith(wanted) for line in lines if "z_axis" not in line] == [True] * told
     assert any("z_axis" in line for line in lines) == (place[2] < np.min(spools, axis=0)[2])

@@ -129,13 +129,16 @@ def test_level_planar_spools_are_taken():
 
 def test_numbers_are_shown_as_typed():
     """A file with z up is turned for the kernels; its errors are not."""
-    spec = checked(RobotFile, robot(z_axis="up", base_points=[[0.0, 1.0, 3.0], [1.0, 2.0, 3.0], [2.0, 3.0, 3.0]]), "in")
-    turned = [[x, -y, -z] for x, y, z in spec.base_points]
-    line = spec.typed(InputError("base_points", turned, "three spools that are not on one line"))
+    robot_file = checked(
+        RobotFile, robot(z_axis="up", base_points=[[0.0, 1.0, 3.0], [1.0, 2.0, 3.0], [2.0, 3.0, 3.0]]), "in"
+    )
+    turned = [[x, -y, -z] for x, y, z in robot_file.base_points]
+    line = robot_file.typed(InputError("base_points", turned, "three spools that are not on one line"))
     assert line.startswith("robot.base_points = [[0.0, 1.0, 3.0], ") and line.endswith("not on one line")
-    assert spec.typed(InputError("gravity", -1.0, "> 0")) == "robot.gravity = -1.0: must be > 0"
+    assert robot_file.typed(InputError("gravity", -1.0, "> 0")) == "robot.gravity = -1.0: must be > 0"
     assert (
-        spec.typed(InputError("base_points", 0, "must be so", fault="is so")) == "robot.base_points: is so: must be so"
+        robot_file.typed(InputError("base_points", 0, "must be so", fault="is so"))
+        == "robot.base_points: is so: must be so"
     )
 
 
@@ -409,8 +412,8 @@ def test_hints_about_the_mass_centre(keys, distance):
     ],
 )
 def test_hints_about_the_z_axis(z_axis, spools, targets, other):
-    spec = spec_of(z_axis=z_axis, base_points=[[x, y, spools] for x, y, _ in SPOOLS])
-    text = hints.forgotten_axis(spec, [[0.0, 0.0, z] for z in targets])
+    robot_file = spec_of(z_axis=z_axis, base_points=[[x, y, spools] for x, y, _ in SPOOLS])
+    text = hints.forgotten_axis(robot_file, [[0.0, 0.0, z] for z in targets])
     assert text == "" if other is None else (f"z points {z_axis}" in text and f'z_axis = "{other}"' in text)
 
 

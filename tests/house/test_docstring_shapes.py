@@ -21,11 +21,11 @@ import pytest
 import cspr_jax
 from cspr_jax.arithmetic.bounds import Bounds
 from cspr_jax.motions.amplitudes import Amplitude, named
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms import oscillating_slerp, platform_segment
 from cspr_jax.platforms.oscillating_slerp import Turn
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot, pairs_apart
@@ -126,7 +126,19 @@ def is_kernel(function) -> bool:
     return computes and np.ndarray not in found and given <= KNOWN
 
 
-KNOWN = {PointMassRobot, PlatformRobot, Robot, Amplitude, Segment, PoseSegment, Turn, Kind, State, Bounds, Limits}
+KNOWN = {
+    PointMassRobot,
+    PlatformRobot,
+    Robot,
+    Amplitude,
+    Segment,
+    PlatformSegment,
+    Turn,
+    PlatformMotionKind,
+    State,
+    Bounds,
+    Limits,
+}
 KNOWN |= {Problem, Faces, slacks.Instant, slacks.Stretch, jax.Array, int, bool, tuple}
 FUNCTIONS = {name: function for name, function in functions() if is_kernel(function)}
 
@@ -156,9 +168,9 @@ def examples(request):
         PlatformRobot: platform,
         Amplitude: amplitude,
         Segment: of_point,
-        PoseSegment: of_poses,
+        PlatformSegment: of_poses,
         Turn: of_poses.turn,
-        Kind: Kind(),
+        PlatformMotionKind: PlatformMotionKind(),
         "pairs": pairs_apart(platform),
         State: State(*[array(3)] * 3, array(3, 3), *[array(3)] * 2, array(4)),
         Bounds: Bounds(*[array(request.param)] * 3),
@@ -188,7 +200,7 @@ def argument(kind, text: str, parameter: inspect.Parameter, examples: dict, size
             return array(*sizes.shape(shape))
         more = sizes.shape("(n)" if "n" in shape else "(...)")
         return jax.tree.map(
-            lambda leaf: array(*more, *np.shape(leaf)), examples[kind if kind in examples else PoseSegment]
+            lambda leaf: array(*more, *np.shape(leaf)), examples[kind if kind in examples else PlatformSegment]
         )
 
     if parameter.name == "pairs":
@@ -210,7 +222,9 @@ def argument(kind, text: str, parameter: inspect.Parameter, examples: dict, size
 
 def is_static(value) -> bool:
     """Whether a function is compiled for it."""
-    return isinstance(value, (int, bool, float, Kind)) or (isinstance(value, tuple) and isinstance(value[0], tuple))
+    return isinstance(value, (int, bool, float, PlatformMotionKind)) or (
+        isinstance(value, tuple) and isinstance(value[0], tuple)
+    )
 
 
 def check_fields(value, sizes: Sizes, where: str) -> None:

@@ -9,7 +9,6 @@ import pytest
 from oracles import lines as oracle
 
 import cspr_jax
-from cspr_jax.build import prepared
 from cspr_jax.lines.faces import Sides, in_one_plane, line_faces, sides
 from cspr_jax.lines.motion import fixed_law, s_curve
 from cspr_jax.lines.proof import smallest_slacks
@@ -18,6 +17,7 @@ from cspr_jax.lines.slacks import line_slacks
 from cspr_jax.lines.timed_lines import motions_of, timed_lines
 from cspr_jax.motions.amplitudes import derivatives, named
 from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.schema.verdicts import Verdict
 

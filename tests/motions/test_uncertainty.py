@@ -11,15 +11,15 @@ from support.random_motions import ROBOTS, motions_of, problem_of, quintic
 
 from cspr_jax.motions.blocks import parts_of_arcs
 from cspr_jax.motions.enclosures import influence
-from cspr_jax.motions.platform_kind import Kind
+from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.uncertainty import closer_changes, deviations, requirements_of, worst
 from cspr_jax.motions.uncertainty import tensions as tensions_of
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.enclosures import Robustness
 from cspr_jax.platforms.motions import rows as some_of
 from cspr_jax.robots.limits import Limits, Uncertainty
 
-BETWEEN = Kind()
+BETWEEN = PlatformMotionKind()
 SPOOLS, CENTRE = 0.004, 0.006
 BALLS = Uncertainty(np.asarray(SPOOLS), np.asarray(CENTRE), np.asarray(1.0))
 
@@ -30,7 +30,7 @@ def feasible_motions(name, kind, count, limits, seed=0):
     drawn = motions_of(rng, robot, kind, count)
     segments, arcs = stacked([own[3] for own in drawn]), np.array([own[1] for own in drawn])
     without = dataclasses.replace(limits, uncertainty=None)
-    checks = PoseChecker(problem_of(robot, without), kind, batch=64).check(segments, arcs, margins=False)
+    checks = PlatformChecker(problem_of(robot, without), kind, batch=64).check(segments, arcs, margins=False)
     which = np.flatnonzero(checks.verdict == 0)
     return [drawn[i] for i in which], some_of(segments, which), arcs[which]
 

@@ -11,7 +11,7 @@ from matplotlib.colors import to_hex
 from support.reading import read_here
 
 import cspr_jax
-from cspr_jax.build import limits_over
+from cspr_jax.build.limits import limits_over
 from cspr_jax.lines.durations import names_of
 from cspr_jax.lines.map import LeastTimeMap
 from cspr_jax.outputs.plots.colours import NONE_COLOUR

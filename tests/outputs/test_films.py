@@ -52,12 +52,12 @@ def test_cables_are_where_the_plan_has_them(plan):
     columns = plan.rows(200.0)
     rows = np.array([0, len(columns["t"]) // 3, len(columns["t"]) - 1])
     with in_style(Style()):
-        picture = films._Picture("film", columns, plan.spec, plan.keys, rows)
+        picture = films._Picture("film", columns, plan.robot_file, plan.keys, rows)
         for number, row in enumerate(rows):
             picture.show(number)
             for k, cable in enumerate(picture.cables):
                 start, end = np.transpose(cable.get_data_3d())
-                assert start == pytest.approx(plan.spec.base_points[k])
+                assert start == pytest.approx(plan.robot_file.base_points[k])
                 assert end == pytest.approx(columns["position"][row])
                 assert np.linalg.norm(end - start) == pytest.approx(columns["length"][row, k])
 
@@ -75,7 +75,7 @@ def test_long_films_have_fewer_pictures(plan, monkeypatch):
     monkeypatch.setattr(films, "MOST", 7)
     columns = plan.rows(200.0)
     with in_style(Style()):
-        data = films.film(".gif", "film", columns, plan.spec, plan.keys, speed=2.0)
+        data = films.film(".gif", "film", columns, plan.robot_file, plan.keys, speed=2.0)
     with Image.open(io.BytesIO(data)) as picture:
         assert picture.info["duration"] in (200, 500, 1000)
 

@@ -126,15 +126,15 @@ def test_motions_of_cells_are_theirs(result, page):
 
 def test_a_platform_s_points_turn_with_it():
     rng, count = np.random.default_rng(3), 9
-    spec = resolve_robot("laval-mssm", Path("plan"), Path())
+    robot_file = resolve_robot("laval-mssm", Path("plan"), Path())
     quaternion = Rotation.random(count, rng=rng).as_quat(scalar_first=True)
     position = rng.uniform(-1.0, 1.0, (count, 3))
     columns = {"t": np.arange(count) / 8.0, "position": position, "quaternion": quaternion}
     columns["tension"] = rng.uniform(size=(count, 6))
     keys = plan_keys({"schema": 1, "robot": "laval-mssm", "pose": [{"rest": True}, {"rest": True}]}, "plan")
-    found = motion_content("motion", columns, {}, spec, keys)
+    found = motion_content("motion", columns, {}, robot_file, keys)
     attached = unpacked(found["attached"]).reshape(count, 6, 3)
-    own = np.array(spec.platform_points)
+    own = np.array(robot_file.platform_points)
     for row in range(count):
         turned = position[row] + Rotation.from_quat(quaternion[row], scalar_first=True).apply(own)
         np.testing.assert_allclose(attached[row], turned, atol=1e-6)
@@ -425,9 +425,9 @@ def test_a_workspace_in_a_browser(folder):
 
 def test_a_page_says_robot_limits_and_duration(folder):
     keys = plan_keys(PLAN | {"tension_max": 9.0, "cable_speed_max": 40.0, "floor": 3.0}, "plan")
-    spec = resolve_robot("prototype", "", Path())
+    robot_file = resolve_robot("prototype", "", Path())
     rows = {name: np.zeros((3, width)) for name, width in {"position": 3, "length": 3, "rate": 3, "tension": 3}.items()}
-    motion = motion_content("motion", {"t": np.array([0.0, 1.0, 2.5])} | rows, {}, spec, keys)
+    motion = motion_content("motion", {"t": np.array([0.0, 1.0, 2.5])} | rows, {}, robot_file, keys)
     said = dict(motion["facts"])
     assert said["robot"].startswith("prototype, point mass of 0.198 kg on 3 cables")
     assert said["limits"] == ("tension at least 0.1 and at most 9 N, floor at z = 3 m, cable speed at most 40 m/s")

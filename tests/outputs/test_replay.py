@@ -75,18 +75,20 @@ def test_plans_in_mujoco(name, tmp_path):
     plan, found = checked(ROOT / name, step=0.002)
     plan.save_mjcf(tmp_path / "model.xml", step=0.002)
     model, data, table = open_loop(tmp_path / "model.xml")
-    rows, up = plan.rows(), np.array([1.0, 1.0, 1.0] if plan.spec.z_axis == "up" else [1.0, -1.0, -1.0])
-    axes = [0, 2] if plan.spec.is_planar else [0, 1, 2]
+    rows, up = plan.rows(), np.array([1.0, 1.0, 1.0] if plan.robot_file.z_axis == "up" else [1.0, -1.0, -1.0])
+    axes = [0, 2] if plan.robot_file.is_planar else [0, 1, 2]
     np.testing.assert_allclose(data.qpos, (up * plan.points[-1])[axes], atol=1e-9)
     assert data.time == pytest.approx(found.time[-1], abs=1e-12)
-    np.testing.assert_allclose(data.site("spool_1").xpos, up * plan.spec.base_points[0])
+    np.testing.assert_allclose(data.site("spool_1").xpos, up * plan.robot_file.base_points[0])
     np.testing.assert_array_equal(table[[0, -1], 1:], found.tension[[0, -1]])
     # The keyframe moves on as planned.
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
     np.testing.assert_allclose(data.qacc, (up * rows["acceleration"][0])[axes], atol=1e-9)
     np.testing.assert_allclose(data.ten_length, rows["length"][0], atol=1e-12)
-    assert model.body("effector").mass[0] == plan.spec.mass and model.opt.gravity[2] == -plan.problem.robot.gravity
+    assert (
+        model.body("effector").mass[0] == plan.robot_file.mass and model.opt.gravity[2] == -plan.problem.robot.gravity
+    )
     assert (model.tendon_width > 0).all() and model.nbody == 2 and mujoco.get_mjcb_control() is None
 
 
@@ -209,6 +211,6 @@ def test_every_example_in_mujoco(path, tmp_path):
     if path.stem == UNSTABLE:
         return
     _, data, _ = open_loop(plan.save_mjcf(tmp_path / "model.xml", step=0.001))
-    up = np.array([1.0, 1.0, 1.0] if plan.spec.z_axis == "up" else [1.0, -1.0, -1.0])
-    axes = [0, 2] if plan.spec.is_planar else [0, 1, 2]
+    up = np.array([1.0, 1.0, 1.0] if plan.robot_file.z_axis == "up" else [1.0, -1.0, -1.0])
+    axes = [0, 2] if plan.robot_file.is_planar else [0, 1, 2]
     np.testing.assert_allclose(data.qpos[: len(axes)], (up * found.position[-1])[axes], atol=OPEN_LOOP)

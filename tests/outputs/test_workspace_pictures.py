@@ -11,7 +11,7 @@ from support.reading import read_here
 import cspr_jax
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.plots import solid
-from cspr_jax.outputs.plots.boundary import Sides, boundary, outlines
+from cspr_jax.outputs.plots.boundary import BoundarySides, boundary, outlines
 from cspr_jax.outputs.plots.labels import COLOURS
 from cspr_jax.schema.quantities import EVERY
 from cspr_jax.schema.verdicts import Verdict
@@ -50,7 +50,7 @@ def grid(points: list[np.ndarray]) -> np.ndarray:
     return np.stack(np.meshgrid(*points, indexing="ij"), axis=-1)
 
 
-def random_sides(rng, shape, kind: str) -> Sides:
+def random_sides(rng, shape, kind: str) -> BoundarySides:
     """Points inside and outside at random, or a ball with a bite, with two margins in different units."""
     points = [np.sort(rng.uniform(0.0, 1.0, n)) * (1.0 + k) for k, n in enumerate(shape)]
     if kind == "noise":
@@ -59,7 +59,7 @@ def random_sides(rng, shape, kind: str) -> Sides:
         places = grid(points) / (1.0 + np.arange(len(shape)))
         every = np.stack([0.4 - np.linalg.norm(places - 0.5, axis=-1), places[..., 0] + places[..., 1] - 0.6])
     every = every * np.array([1.0, 1000.0]).reshape(-1, *[1] * len(shape))
-    return Sides(points, np.where((every > 0.0).all(0), 0, OUTSIDE), list(every))
+    return BoundarySides(points, np.where((every > 0.0).all(0), 0, OUTSIDE), list(every))
 
 
 def winding(corners: np.ndarray, pieces: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -109,19 +109,19 @@ def test_the_surface_lies_where_margins_are_zero():
     points = [np.linspace(0.0, 1.0, n) for n in (5, 6, 8)]
     places = grid(points)
     margin = 0.93 - places.sum(-1)
-    found = boundary(Sides(points, np.where(margin > 0.0, 0, OUTSIDE), [margin]))
+    found = boundary(BoundarySides(points, np.where(margin > 0.0, 0, OUTSIDE), [margin]))
     assert volume(found.corners, found.pieces) == pytest.approx(0.93**3 / 6.0, rel=1e-12)
     wall = found.corners[np.unique(found.pieces[~found.is_end])]
     np.testing.assert_allclose(wall.sum(1), 0.93, atol=1e-12)
     pair = [0.61 - places[..., 0], 1e3 * (0.35 - places[..., 1])]
-    found = boundary(Sides(points, np.where(np.min(pair, axis=0) > 0.0, 0, OUTSIDE), pair))
+    found = boundary(BoundarySides(points, np.where(np.min(pair, axis=0) > 0.0, 0, OUTSIDE), pair))
     beside = np.stack([0.61 - found.corners[:, 0], 0.35 - found.corners[:, 1]])
     assert (beside > -1e-12).all()
     np.testing.assert_allclose(beside[:, np.unique(found.pieces[~found.is_end])].min(0), 0.0, atol=1e-12)
     half = np.where(places[..., 2] > 0.5, FLOOR, 0)
     unknown, endless, beyond = np.full(half.shape, np.nan), np.where(half, -1.0, np.inf), np.where(half, -0.1, 0.9)
     for margins in ([], [unknown], [endless], [beyond]):
-        found = boundary(Sides(points, half, margins))
+        found = boundary(BoundarySides(points, half, margins))
         assert volume(found.corners, found.pieces) == pytest.approx(0.5, rel=1e-9)
 
 
@@ -133,10 +133,10 @@ def test_the_surface_encloses_the_volume():
     data = {"verdict": np.where(margin > 0.0, 0, OUTSIDE), "wrench_margin": margin}
     told = cspr_jax.workspace_volume(result(dict(zip("xyz", points, strict=True)), data))
     exact = 4.0 / 3.0 * np.pi * 0.8**3
-    found = boundary(Sides(points, data["verdict"], [margin]))
+    found = boundary(BoundarySides(points, data["verdict"], [margin]))
     assert volume(found.corners, found.pieces) == pytest.approx(exact, rel=0.02)
     assert abs(volume(found.corners, found.pieces) - told.volume) < told.error < 0.5 * exact
-    plain = boundary(Sides(points, data["verdict"], []))
+    plain = boundary(BoundarySides(points, data["verdict"], []))
     assert abs(volume(plain.corners, plain.pieces) - told.volume) < 0.2 * told.error
 
 
@@ -167,7 +167,7 @@ def test_outlines_part_the_points_as_their_verdicts_do(kind):
                     assert {0, OUTSIDE} <= set(beside(sides, corner)) or at_the_end(sides, corner)
 
 
-def beside(sides: Sides, corner: np.ndarray) -> list[int]:
+def beside(sides: BoundarySides, corner: np.ndarray) -> list[int]:
     """Verdicts of the two points between which a corner lies, on an edge of the grid."""
     index = [np.searchsorted(points, x) for points, x in zip(sides.points, corner, strict=True)]
     ranges = [
@@ -177,7 +177,7 @@ def beside(sides: Sides, corner: np.ndarray) -> list[int]:
     return [int(sides.verdict[place]) for place in itertools.product(*ranges)]
 
 
-def at_the_end(sides: Sides, corner: np.ndarray) -> bool:
+def at_the_end(sides: BoundarySides, corner: np.ndarray) -> bool:
     return any(x in (points[0], points[-1]) for points, x in zip(sides.points, corner, strict=True))
 
 
@@ -222,7 +222,9 @@ def test_a_solid_is_its_surface_with_the_robot_in_it(drawn, z_axis):
     figure = cspr_jax.plot(given, solid=True, at={"tilt": 0.2})
     (panel,) = figure.axes
     behind, before, platform = (parts for parts, _ in drawn["triangles"])
-    sides = Sides([np.sort(AXES[a]) for a in "xyz"], *(parts_of(given, name) for name in ("verdict", "wrench_margin")))
+    sides = BoundarySides(
+        [np.sort(AXES[a]) for a in "xyz"], *(parts_of(given, name) for name in ("verdict", "wrench_margin"))
+    )
     wanted = boundary(sides._replace(margins=[sides.margins]))
     every = np.concatenate([behind, before])
     assert volume(every.reshape(-1, 3), np.arange(3 * len(every)).reshape(-1, 3)) == pytest.approx(
@@ -296,7 +298,7 @@ def test_workspaces_are_compared_by_their_outlines():
     for panel, k in zip(every, range(5), strict=True):
         for one, colour in zip(SHAPES.values(), COLOURS, strict=False):
             lines = [line.get_xydata() for line in panel.lines if to_hex(line.get_color()) == colour.lower()]
-            sides = Sides(
+            sides = BoundarySides(
                 [AXES["x"], AXES["y"][::-1]], *(one.data[n][:, ::-1, k] for n in ("verdict", "wrench_margin"))
             )
             wanted = outlines(sides._replace(margins=[]))  # half-way, as volumes count: scales of margins differ

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cspr_jax import compute, plan
-from cspr_jax.plans.of_cells import cell_plan
+from cspr_jax.plans.cell_plan import cell_plan
 
 POSES = {
     "map": "poses",

@@ -32,7 +32,7 @@ from cspr_jax.motions.amplitudes import named
 from cspr_jax.platforms import place_proof
 from cspr_jax.platforms.arcs import Candidates, smallest_arcs
 from cspr_jax.platforms.beta_hat import LARGEST, cheapest_path, options
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.platform_segment import motion
 from cspr_jax.platforms.slacks import pose_slacks
 from cspr_jax.published import table_3_2
@@ -170,14 +170,14 @@ def test_what_stays_undecided_is_said(checker, monkeypatch):
     plain = smallest_arcs(checker, one, max_arcs=8)
     p = int(plain.arcs[0])
     assert p > 0 and not plain.undecided.any()
-    whole = PoseChecker.check
+    whole = PlatformChecker.check
 
     def unsure(self, segments, arcs, **keys):
         found = whole(self, segments, arcs, **keys)
         at_first = np.where(arcs == p, Verdict.UNDECIDED.value, found.verdict)
         return dataclasses.replace(found, verdict=at_first)
 
-    monkeypatch.setattr(PoseChecker, "check", unsure)
+    monkeypatch.setattr(PlatformChecker, "check", unsure)
     found = smallest_arcs(checker, one, max_arcs=p)
     assert found.arcs[0] == 0 and found.undecided[0] == p
     more = smallest_arcs(checker, one, max_arcs=p + 4)

@@ -8,7 +8,7 @@ import pytest
 from support.commands import cspr
 from support.platforms import FROM_REST, LOOSE, MSSM, checker_of, ours, place
 
-from cspr_jax.outputs.plots.reasons import reasons
+from cspr_jax.outputs.plots.verdict_colours import reasons
 from cspr_jax.platforms.accessible import accessible
 from cspr_jax.platforms.attainable import attainable
 from cspr_jax.published import chapter_3
@@ -52,7 +52,7 @@ def check_tables(monkeypatch):
 @pytest.mark.thorough
 def test_the_smallest_proportion_is_that_of_all(monkeypatch):
     """Though not all values of beta-hat are tried at every place."""
-    choice = chapter_3.Choice(max_arcs=8)
+    choice = chapter_3.TableSettings(max_arcs=8)
     checker, asked = chapter_3.checker_of("effective-c3"), []
     for radius, azimuth, tilt in ((1.5, 0.2, 0.6), (2.5, 0.0, 1.0), (2.5, 0.5, 1.0), (3.0, 0.1, 0.7), (1.5, 0.1, 0.0)):
         place = np.array([radius * np.cos(azimuth), radius * np.sin(azimuth), 1.7]) * [0.86, 0.86, 1.0]

@@ -13,11 +13,11 @@ from support.random_motions import BATCH, ROBOTS, drawn, motions_of, problem_of,
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.platforms import meetings
-from cspr_jax.platforms.meetings import Cables
+from cspr_jax.platforms.meetings import CablesOfStep
 from cspr_jax.platforms.place_blocks import STEPS, place_blocks
 from cspr_jax.platforms.place_proof import PARTS, PlaceCertifier
-from cspr_jax.robots.contact_lanes import residual
 from cspr_jax.robots.interference import contacts, platform_hit
+from cspr_jax.robots.interference_lanes import residual
 
 # Spools far from level: the plane through them rises by 80 degrees.
 STEEP = turned(dataclasses.replace(MSSM, base=MSSM.base @ Rotation.from_euler("x", 80, degrees=True).as_matrix().T))
@@ -165,7 +165,7 @@ def test_proofs_agree_with_many_samples(kind, name):
 def cables_from(first, last, bent, steps=2):
     """Two cables of one block whose rays go straight from the first ones to the last ones, in equal steps."""
     rays = np.linspace(first, last, steps + 1)[:, None]
-    return Cables(rays, rays, np.full((1, 2), bent), np.full(1, bent))
+    return CablesOfStep(rays, rays, np.full((1, 2), bent), np.full(1, bent))
 
 
 def test_cables_that_meet():
@@ -241,7 +241,7 @@ def test_sectors_are_those_of_the_convex_hull():
             steps = direction + np.array([[0.01], [-0.01]]) * near.normal
             every = np.tile(near.normal, (2, 1, 6, 1))
             every[:, 0, k] = steps
-            cables = Cables(np.zeros((2, 1, 6, 3)), every, np.zeros((1, 6)), np.zeros(1))
+            cables = CablesOfStep(np.zeros((2, 1, 6, 3)), every, np.zeros((1, 6)), np.zeros(1))
             hits = bool(meetings.cables_hit(near.sides, near.normal, cables)[0] == 0)
             crossed = bool(platform_hit(near.sides, near.normal, every[0, 0], every[1, 0])[k])
             # What moves by 0.02 in between proves nothing beside the edges.

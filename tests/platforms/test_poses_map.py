@@ -27,16 +27,16 @@ from support.platforms import (
     states,
 )
 
-from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.plans import choices, planning
 from cspr_jax.platforms.kernels import slacks_at
 from cspr_jax.platforms.place_proof import wires_beside
-from cspr_jax.platforms.platform_lanes import instant, state
 from cspr_jax.platforms.platform_segment import motion
+from cspr_jax.platforms.platform_segment_lanes import instant, state
 from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.platforms.slacks import pose_slacks
-from cspr_jax.robots import contact_lanes, interference
+from cspr_jax.robots import interference, interference_lanes
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.platform import rays as rays_of
 from cspr_jax.robots.state import State
@@ -178,8 +178,8 @@ def as_lanes(problem, batch, p, t, *, pairs):
     here = state(batch, p, now, USUAL)
     wires = cables(problem.robot, here.position, here.turn)
     slacks = moving_slacks(problem, batch, p, now, USUAL) + still_slacks(problem, batch, here, wires)
-    gaps = contact_lanes.gaps(problem.robot.base_points, pairs, wires)
-    return jnp.stack(slacks), *contact_lanes.as_arrays(gaps, contact_lanes.cable_directions(wires, here.turn))
+    gaps = interference_lanes.gaps(problem.robot.base_points, pairs, wires)
+    return jnp.stack(slacks), *interference_lanes.as_arrays(gaps, interference_lanes.cable_directions(wires, here.turn))
 
 
 @jax.jit
@@ -230,7 +230,7 @@ def test_time_functions_of_the_rotation():
     segment = made(robot, start, end, Z0, (0.0, 0.0), p)
     still = states(segment, EFFECTIVE, p, tau)
     np.testing.assert_allclose(still.angular_acceleration[[0, 2]], 0.0, atol=1e-9)
-    plain = states(segment, EFFECTIVE, p, tau, kind=Kind(variable=False, plain=True))
+    plain = states(segment, EFFECTIVE, p, tau, kind=PlatformMotionKind(variable=False, plain=True))
     angle = 2.0 * np.arccos(np.clip(abs(end[1][0]), 0.0, 1.0))
     wanted = np.cos(np.abs(angle * oracle.effective_c3(0.1)(tau)[0] * np.cos(np.pi * p * tau)))
     np.testing.assert_allclose((np.trace(plain.rotation, axis1=1, axis2=2) - 1.0) / 2.0, wanted, atol=1e-9)

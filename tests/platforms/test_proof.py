@@ -13,7 +13,7 @@ from oracles import platform as oracle
 from support.platforms import FROM_REST, general, ours
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.build import kernel_robot
+from cspr_jax.build.robots import kernel_robot
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.motions.amplitudes import named
@@ -21,7 +21,7 @@ from cspr_jax.motions.platform_kind import USUAL
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms import proof, redundant_kernels
 from cspr_jax.platforms.arcs import Candidates, segments_with
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.crossings import passed_over
 from cspr_jax.platforms.kernels import slacks_at
 from cspr_jax.platforms.motions import Motions
@@ -114,7 +114,7 @@ def against_samples(name, kind, count, seed=1):
     robot = robot_of(name)
     problem = Problem(robot, Limits(), named("quintic"))
     motions, samples = drawn(robot, kind, count, seed), Samples(problem, kind)
-    checks = PoseChecker(problem, kind, batch=1024).check(*motions, margins=False)
+    checks = PlatformChecker(problem, kind, batch=1024).check(*motions, margins=False)
     is_proved, is_unsure = checks.verdict == 0, checks.verdict == Verdict.UNDECIDED.value
     wrong = 0
     tau = np.linspace(0.0, 1.0, INSTANTS)
@@ -153,7 +153,7 @@ def test_no_motion_is_refuted_where_its_tensions_are_rounding():
     robot = robot_of("laval-mssm")
     problem = Problem(robot, Limits(), named("quintic"))
     motions = drawn(robot, FROM_REST, 400, 9).rows(np.array([107]))
-    checks = PoseChecker(problem, FROM_REST, batch=64).check(*motions, margins=False)
+    checks = PlatformChecker(problem, FROM_REST, batch=64).check(*motions, margins=False)
     assert checks.verdict[0] == Verdict.SLACK_CABLE.value
     assert Samples(problem, FROM_REST).slack(motions, np.array([0]), checks.instant)[0] < -0.01
 
@@ -164,7 +164,7 @@ def test_flags_are_the_same_with_margins_beside_a_singularity():
     robot = robot_of("laval-mssm")
     problem = Problem(robot, Limits(), named("quintic"))
     motions = drawn(robot, FROM_REST, 400, 9).rows(np.array([6, 170, 249, 251, 356, 363]))
-    checker = PoseChecker(problem, FROM_REST, batch=64)
+    checker = PlatformChecker(problem, FROM_REST, batch=64)
     with_margins, without = (checker.check(*motions, margins=x).verdict for x in (True, False))
     np.testing.assert_array_equal(with_margins, without)
     assert (without & Verdict.SINGULAR.value).all()

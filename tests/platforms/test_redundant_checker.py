@@ -12,7 +12,8 @@ from support.commands import cspr, plan
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.build import limits_over, load_robot, prepared
+from cspr_jax.build.limits import limits_over
+from cspr_jax.build.robots import load_robot
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.amplitudes import named
@@ -20,6 +21,7 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.outputs import example_files, motion_files
 from cspr_jax.platforms.beta_hat import LARGEST
 from cspr_jax.platforms.redundant_checker import RedundantChecker
+from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 from cspr_jax.schema.verdicts import Verdict

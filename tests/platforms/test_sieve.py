@@ -14,7 +14,7 @@ from cspr_jax.motions.platform_kind import USUAL
 from cspr_jax.platforms import sieve
 from cspr_jax.platforms.arcs import Candidates, _Segments, smallest_arcs
 from cspr_jax.platforms.slack_lanes import certain_tension
-from cspr_jax.robots.wrench_lanes import Cables, balance
+from cspr_jax.robots.wrench_lanes import CableLanes, balance
 
 BENDS, ARCS = 5, 8
 
@@ -61,7 +61,7 @@ def check_search(motions, amplitude):
     np.testing.assert_array_equal(arcs, wanted)
     assert passes[found.arcs[some], some].all()
     assert 0 < (wanted > 0).sum() < motions
-    work, brute = (sum(c.done[name] for name in ("prefilter", "checks")) for c in (checker, full))
+    work, brute = (sum(c.done[name] for name in ("sieve", "checks")) for c in (checker, full))
     assert checker.done["motions"] < 0.2 * motions * BENDS * ARCS and work < 0.25 * brute
 
 
@@ -71,21 +71,21 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     checker, rng = checker_of(kind=kind, batch=64), np.random.default_rng(4)
     segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 60))(6, np.arange(300))
     tau = np.linspace(1.0, 0.0, 37)
-    lowest = checker.prefilter.lowest(segments, 6, tau)
+    lowest = checker.sieve.lowest(segments, 6, tau)
     wanted = lowest <= -1e-7
     assert 30 < wanted.sum() < 270
-    np.testing.assert_array_equal(checker.prefilter.refuted(segments, 6, tau), wanted)
+    np.testing.assert_array_equal(checker.sieve.refuted(segments, 6, tau), wanted)
     few = jax.tree.map(lambda x: x[:16], segments)
-    np.testing.assert_array_equal(checker.prefilter.refuted(few, 6, tau), wanted[:16])
+    np.testing.assert_array_equal(checker.sieve.refuted(few, 6, tau), wanted[:16])
     whole = sieve._rough_and_certain
     for wrong in (lambda x: x - 0.3, lambda x: np.inf * x, lambda x: np.nan * x):
 
         def spoiled(*given, wrong=wrong, **options):
-            rough, certain = whole(*given, **options)
-            return wrong(rough), certain
+            single_precision, certain = whole(*given, **options)
+            return wrong(single_precision), certain
 
         monkeypatch.setattr(sieve, "_rough_and_certain", spoiled)
-        refuted = checker.prefilter.refuted(segments, 6, tau)
+        refuted = checker.sieve.refuted(segments, 6, tau)
         assert not (refuted & ~wanted).any()
 
 
@@ -106,7 +106,7 @@ def test_segments_of_candidates():
 def test_more_instants_refute_more():
     checker, rng = checker_of(kind=FROM_REST, batch=64), np.random.default_rng(5)
     segments = _Segments(checker.problem.robot, candidates(MSSM, rng, 40))(5, np.arange(200))
-    found = [checker.prefilter.refuted(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
+    found = [checker.sieve.refuted(segments, 5, np.linspace(1.0, 0.0, count)) for count in (3, 17, 129)]
     assert all(not (a & ~b).any() for a, b in pairwise(found))
 
 
@@ -120,17 +120,17 @@ def test_the_size_of_the_robot_changes_nothing(scale):
         start, end = ((place * unit, turn) for place, turn in (given.start, given.end))
         given = given._replace(start=start, end=end, z0=given.z0 * unit)
         segments = _Segments(checker.problem.robot, given)(5, np.arange(300))
-        sizes.append(checker.prefilter.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
-        rough, _ = sieve.smallest_tensions(
+        sizes.append(checker.sieve.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
+        single_precision, _ = sieve.smallest_tensions(
             checker.problem.robot,
             EFFECTIVE,
             5.0,
             np.linspace(0.1, 1.0, 8),
             segments,
             kind=FROM_REST,
-            rough=True,
+            single_precision=True,
         )
-        assert not np.isnan(rough).any() and (np.asarray(rough) < 0.0).sum() > 20
+        assert not np.isnan(single_precision).any() and (np.asarray(single_precision) < 0.0).sum() > 20
     np.testing.assert_array_equal(*sizes)
 
 
@@ -146,7 +146,7 @@ def test_a_tension_is_right_or_unknown():
     columns = -np.concatenate([rays, np.cross(arms, rays)], axis=2).transpose(1, 2, 0)
     is_good = np.linalg.cond(columns) < 100.0
     true = 6.0 * np.linalg.solve(columns, np.concatenate([force, moment], axis=1)[:, :, None])[:, :, 0].min(1)
-    wires = Cables(*([tuple(x.T) for x in vectors] for vectors in (arms, rays)))
+    wires = CableLanes(*([tuple(x.T) for x in vectors] for vectors in (arms, rays)))
     found = balance(wires, tuple(force.T), tuple(moment.T))
     mine = np.asarray(certain_tension(np.ones(n), np.sign(found.signed), wires, found))
     is_known = np.isfinite(mine) & is_good

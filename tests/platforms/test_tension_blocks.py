@@ -15,12 +15,12 @@ from support.random_motions import BATCH, QUINTIC, ROBOTS, drawn, jets, motions_
 
 from cspr_jax.arithmetic import chebyshev, packed
 from cspr_jax.motions.blocks import Blocks
-from cspr_jax.motions.platform_kind import USUAL, Kind
-from cspr_jax.platforms import platform_lanes, platform_reach, proof, tension_blocks
+from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
+from cspr_jax.platforms import platform_reach, platform_segment_lanes, proof, tension_blocks
 from cspr_jax.platforms.proof import Certifier, determinant_at_rest
 from cspr_jax.schema.limits import LIMITS
 
-STANDARD = Kind(variable=False, plain=True)
+STANDARD = PlatformMotionKind(variable=False, plain=True)
 G = 9.81
 
 
@@ -372,9 +372,9 @@ def _rests(problem, items, *, kind):
     segments, arcs, regular, start, stop = items
     middle, half = platform_reach.middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
     z0 = problem.robot.gravity / segments.rate
-    block = tension_blocks._Block(segments, platform_lanes.squared_duration(segments, arcs), regular, z0)
+    block = tension_blocks._Block(segments, platform_segment_lanes.squared_duration(segments, arcs), regular, z0)
     now = platform_reach.instant_beside(middle, segments.sense, arcs, 0.0 * half)
-    lengths = tension_blocks._lengths(problem.robot, platform_lanes.state(segments, arcs, now, kind))
+    lengths = tension_blocks._lengths(problem.robot, platform_segment_lanes.state(segments, arcs, now, kind))
     radii, every = np.array(chebyshev.RADII), []
     for (along, aside), factor in zip(chebyshev.semi_axes(radii), chebyshev.remainders(radii), strict=True):
         bounds = platform_reach.reach(segments, arcs, middle, (along * half, aside * half), kind)

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cspr_jax.build import build_problem
+from cspr_jax.build.problems import build_problem
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError, CsprError, InputError
 from cspr_jax.plans.choices import chosen_depth
-from cspr_jax.plans.sequence import Sequence
+from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.tile import TileMap
@@ -127,9 +127,9 @@ def ready(path):
     if "map" in read_toml(path):
         return TileMap(read_sweep(path))
     keys = checked(PlanFile, read_toml(path), path)
-    spec = resolve_robot(keys.robot, path, path.parent)
-    sequence, problem = Sequence(spec, keys, path), build_problem(spec, keys, keys, path, epsilon=0.2)
-    if not spec.is_platform:
+    robot_file = resolve_robot(keys.robot, path, path.parent)
+    sequence, problem = PlanLegs(robot_file, keys, path), build_problem(robot_file, keys, keys, path, epsilon=0.2)
+    if not robot_file.is_platform:
         return sequence.stops.points(chosen_depth(problem, sequence))
     for leg in sequence.legs:
         leg.check(problem)

@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from support.commands import cspr
 from support.reading import read_here
 
-from cspr_jax.build import build_amplitude, build_limits, build_robot
+from cspr_jax.build.limits import build_limits
+from cspr_jax.build.problems import build_amplitude
+from cspr_jax.build.robots import build_robot
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import resolve_robot
@@ -260,10 +262,10 @@ def read_anything(kind, path):
     if kind == "sweep":
         return read_sweep(path)
     keys = checked(PlanFile, read_toml(path), path)
-    spec = resolve_robot(keys.robot, path, path.parent)
+    robot_file = resolve_robot(keys.robot, path, path.parent)
     return (
-        build_robot(spec, keys, path),
-        build_limits(spec, keys, path),
+        build_robot(robot_file, keys, path),
+        build_limits(robot_file, keys, path),
         build_amplitude(keys, path, epsilon=0.2),
     )
 

@@ -314,7 +314,7 @@ def test_boxes_that_meet():
     found = clearance.clearances(last, place, upright)
     of_body = [clearance._terms(last, np.zeros(3), np.dtype(float))]
     *_, (kind, _, term) = of_body[0]
-    poses = clearance.kernels.Poses(tuple(place.T), None, None)
+    poses = clearance.kernels.PoseLanes(tuple(place.T), None, None)
     assert kind == "platform-obstacle"
     np.testing.assert_allclose(np.asarray(term(poses)).real, [0.3, 0.0, -0.2, 0.1], atol=1e-12)
     assert (found.clearance <= np.array([0.3, 0.0, -0.2, 0.1]) + 1e-12).all()

@@ -14,7 +14,7 @@ from support.commands import cspr, plan, planned
 from support.pairs import LAUNCH_BASE, LAUNCH_PLATFORM, made, random_pairs
 
 import cspr_jax
-from cspr_jax.build import build_limits
+from cspr_jax.build.limits import build_limits
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.equivalents import as_moved, no_equivalent
 from cspr_jax.config.limits import LimitTable
@@ -289,14 +289,14 @@ def test_limits_of_six_cables_bound_the_pairs():
     keys = {"name": "r", "base_points": robot["base"], "platform_points": robot["platform"], "mass": 1.7}
     keys |= {"inertia": 0.1 * np.eye(3), "centre_of_mass": robot["centre"], "tension_max": high, "tension_min": 0.2}
     plain = {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in keys.items()}
-    spec = RobotFile(**plain, translation_only=True).equivalent()
-    of_file = build_limits(spec, LimitTable(cable_length_max=long.tolist(), floor=4.0), "plan")
+    robot_file = RobotFile(**plain, translation_only=True).equivalent()
+    of_file = build_limits(robot_file, LimitTable(cable_length_max=long.tolist(), floor=4.0), "plan")
     np.testing.assert_allclose(of_file.tension_max, found.tension_max, rtol=1e-12)
     np.testing.assert_allclose(of_file.cable_length_max, found.cable_length_max, rtol=1e-12)
     np.testing.assert_allclose(of_file.tension_min, 0.2 / pairs.shares.min(1), rtol=1e-12)
     np.testing.assert_allclose(of_file.floor, 4.0 - robot["exits"].mean(0)[2], rtol=1e-12)
     with pytest.raises(ConfigError, match=r"tension_max = \[1.0, 2.0, 3.0\]: must be .* or 6: one a cable"):
-        build_limits(spec, LimitTable(tension_max=[1.0, 2.0, 3.0]), "plan")
+        build_limits(robot_file, LimitTable(tension_max=[1.0, 2.0, 3.0]), "plan")
     high[pairs.cables[1, 0]] = 1.01 * low[pairs.cables[1, 0]]
     low[pairs.cables[1, 1]] = 40.0
     with pytest.raises(InputError, match="of the pair of cables"):

@@ -13,11 +13,13 @@ from scipy.optimize import brentq
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.build import centred, fault_at_rest, limits_over
+from cspr_jax.build.limits import limits_over
+from cspr_jax.build.robots import fault_at_rest
 from cspr_jax.cli import main
 from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import InputError
 from cspr_jax.robots import pulleys
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot, across_line, platform_robot
@@ -256,11 +258,12 @@ def test_what_only_rigid_platforms_have_is_refused_in_one_line(tmp_path, capsys)
 def test_infinite_tensions_are_kept(tmp_path):
     path = tmp_path / "r.toml"
     path.write_text(f'name = "r"\nmass = 1.0\nbase_points = {BOX[:4].tolist()}\ntension_max = [inf, 5.0, 6.0, inf]\n')
-    robot, spec = cspr_jax.load_robot(path), read_robot(path)
+    robot, robot_file = cspr_jax.load_robot(path), read_robot(path)
     assert np.asarray(robot.limits.tension_max).tolist() == [np.inf, 5.0, 6.0, np.inf]
-    settings = json.loads(json.dumps(spec.settings, allow_nan=False))
+    settings = json.loads(json.dumps(robot_file.settings, allow_nan=False))
     assert (
-        settings["tension_max"] == ["inf", 5.0, 6.0, "inf"] and type(spec)(**settings).tension_max == spec.tension_max
+        settings["tension_max"] == ["inf", 5.0, 6.0, "inf"]
+        and type(robot_file)(**settings).tension_max == robot_file.tension_max
     )
     limits = limits_over(robot, Limits(tension_min=1.0), any_tensions=True)
     assert np.asarray(limits.tension_max)[0] == np.inf

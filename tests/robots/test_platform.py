@@ -25,13 +25,13 @@ from support.platforms import (
 )
 
 from cspr_jax.arithmetic import rotations
-from cspr_jax.build import kernel_robot
+from cspr_jax.build.robots import kernel_robot
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.robot import read_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
 from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.platforms import platform_segment as segments
 from cspr_jax.platforms.end_acceleration import endpoint
 from cspr_jax.platforms.sieve import CHUNK, smallest_tensions
@@ -44,7 +44,7 @@ AMPLITUDES = {
     "quintic": (named("quintic"), oracle.quintic),
     "effective-c3": (EFFECTIVE, oracle.effective_c3(0.1)),
 }
-STANDARD = Kind(variable=False)
+STANDARD = PlatformMotionKind(variable=False)
 # As of `endpoint`, whose eager operations would be compiled one by one.
 end_of = jax.jit(endpoint)
 
@@ -228,8 +228,8 @@ def test_tilt_and_torsion(azimuth, tilt, torsion):
 def test_the_catalogue_hangs_still(name):
     """Every six-cable robot of the catalogue is in equilibrium in its reference orientation, with equal tensions."""
     path = CATALOGUE / f"{name}.toml"
-    spec = read_robot(path)
-    robot = kernel_robot(spec, TrajectoryKeys(), path)
+    robot_file = read_robot(path)
+    robot = kernel_robot(robot_file, TrajectoryKeys(), path)
     span = np.linalg.norm(robot.base_points, axis=1).max()
     for depth in (1.0, 3.0):
         found = reference_pose(robot, depth * span)
@@ -237,7 +237,7 @@ def test_the_catalogue_hangs_still(name):
         np.testing.assert_allclose(found.rotation, np.eye(3), atol=2e-3)
         assert np.sign(found.determinant) == (1.0 if name == "nist-robocrane" else -1.0)
     assert len(pairs_apart(robot)) == (9 if name in ("laval-mssm", "nist-robocrane") else 12)
-    assert "placeholder" in spec.source
+    assert "placeholder" in robot_file.source
 
 
 def test_the_reference_orientation_is_found():
@@ -302,8 +302,8 @@ def test_joints():
 
 
 # Standard hypocycloids whose orientations beat with beta_1: what no usual motion has.
-OTHERS = Kind(variable=False, plain=True)
-KINDS = [USUAL, STANDARD, Kind(plain=True), FROM_REST]
+OTHERS = PlatformMotionKind(variable=False, plain=True)
+KINDS = [USUAL, STANDARD, PlatformMotionKind(plain=True), FROM_REST]
 
 
 @pytest.mark.parametrize(
@@ -337,7 +337,7 @@ def test_the_fast_kernel(robot, name, kind):
         ]
         batch = stacked([*some, *some[:1] * (64 - len(some))])  # the batch that `conftest` sets: compiled once for all
         found, when = _smallest(package, amplitude, p, tau, batch, kind=kind)
-        rough, _ = _smallest(package, amplitude, p, tau, batch, kind=kind, rough=True)
+        rough, _ = _smallest(package, amplitude, p, tau, batch, kind=kind, single_precision=True)
         assert rough.dtype == np.float32
         alone, _ = _smallest(package, amplitude, p, np.resize(tau[np.unique(when)], len(tau)), batch, kind=kind)
         assert (alone == found).all()

@@ -11,7 +11,7 @@ from oracles import platform as oracle
 
 import cspr_jax
 from cspr_jax.arithmetic import minima, rotations
-from cspr_jax.build import centred, fault_at_rest
+from cspr_jax.build.robots import fault_at_rest
 from cspr_jax.cli import main
 from cspr_jax.config.catalogue import CATALOGUE, FAULTS, catalogue_names
 from cspr_jax.config.limits import LimitKeys, LimitTable
@@ -20,6 +20,7 @@ from cspr_jax.config.robot import RobotFile, read_robot
 from cspr_jax.errors import InputError
 from cspr_jax.motions.limits import Values, scales, slack, values
 from cspr_jax.robots import force_balance, wrench_balance
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits, Uncertainty
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.point_mass import planar_robot, plane_normal, point_mass_robot

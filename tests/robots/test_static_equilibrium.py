@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 from support import cable_robots
 from support.workspaces import made
 
-from cspr_jax.build import centred
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.static_equilibrium import DEPTHS, slack_at_rest
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog, minimize
 
 from cspr_jax.errors import InputError
-from cspr_jax.robots.tension_lanes import least_norms
+from cspr_jax.robots.tension_distribution_lanes import least_norms
 from cspr_jax.robots.tension_rules import RULES, distributions
 
 SHAPES = [(2, 4), pytest.param(3, 5, marks=pytest.mark.thorough), (6, 8)]

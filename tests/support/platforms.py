@@ -14,10 +14,10 @@ from oracles import platform as oracle
 
 from cspr_jax.api.motions import sampled_margin
 from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.platform_kind import USUAL, Kind
+from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms import platform_segment as segments
-from cspr_jax.platforms.checker import PoseChecker
+from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
@@ -27,7 +27,7 @@ from cspr_jax.schema.limits import LIMITS
 MSSM = oracle.mssm()
 Z0 = 1.4
 B = 0.86  # m, radius of the spools of the MSSM in the tables of orientations
-FROM_REST = Kind(from_rest=True)
+FROM_REST = PlatformMotionKind(from_rest=True)
 EFFECTIVE = named("effective-c3", 0.1)
 INSTANTS = 64
 # Every limit, so far off that none is broken: which limits there are is known when a function is compiled.
@@ -77,7 +77,7 @@ def limits_of(**numbers):
 
 def checker_of(robot=MSSM, kind=USUAL, *, limits=None, amplitude=EFFECTIVE, batch=512):
     """A checker of motions of an oracle's robot."""
-    return PoseChecker(Problem(ours(robot), limits or Limits(), amplitude), kind, batch=batch)
+    return PlatformChecker(Problem(ours(robot), limits or Limits(), amplitude), kind, batch=batch)
 
 
 @jax.jit

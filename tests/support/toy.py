@@ -36,7 +36,7 @@ TILES = 6
 class ToyMap(GridMap):
     """Distance of each target from the origin."""
 
-    def __init__(self, spec, keys, file):
+    def __init__(self, robot_file, keys, file):
         self._folder = Path(file).parent
 
     def refuse_hopeless(self, grid):

@@ -8,11 +8,11 @@ from support import cable_robots
 from support.workspaces import ROUND, made
 
 import cspr_jax
-from cspr_jax.build import centred
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.workspaces.questions import question, required_wrenches
+from cspr_jax.workspaces.questions import required_wrenches, requirement
 from cspr_jax.workspaces.search import Poses, WorkspaceSearch
 
 G = cable_robots.GRAVITY
@@ -54,7 +54,7 @@ def test_spools_in_a_plane_hide_no_cocircuits():
     found = []
     for shift in (0.0, 1e-3):
         own = centred(wall(shift))[0]
-        found.append(WorkspaceSearch(own, question(own, "static", Limits()))._choices)
+        found.append(WorkspaceSearch(own, requirement(own, "static", Limits()))._choices)
     np.testing.assert_array_equal(found[0].table, found[1].table)
     assert found[0].counts is None and found[1].counts is None
 
@@ -119,7 +119,7 @@ def test_poses_beside_a_spool():
     spools = np.array([[-2.0, -1.0, 3.0], [2.0, -1.0, 3.0], [2.0, 1.0, 3.0], [-2.0, 1.0, 3.0]])
     robot = cspr_jax.point_mass(spools, mass=2.0, z_axis="up")
     own, frame = centred(robot)
-    search = WorkspaceSearch(own, question(own, "static", Limits()), precision="float32")
+    search = WorkspaceSearch(own, requirement(own, "static", Limits()), precision="float32")
     (look, _), *_ = search._stages()
     rng = np.random.default_rng(5)
     for distance in (1e-2, 1e-4, 1e-5):

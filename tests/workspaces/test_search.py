@@ -11,16 +11,16 @@ from support.workspaces import ROUND, made
 
 import cspr_jax
 from cspr_jax.arithmetic.frames import frame_of
-from cspr_jax.build import centred
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.reasons import REASONS
+from cspr_jax.outputs.plots.verdict_colours import REASONS
 from cspr_jax.robots.cables import with_cables
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.pulleys import exits
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 from cspr_jax.workspaces.clearances import at_rest, surroundings
-from cspr_jax.workspaces.questions import question
+from cspr_jax.workspaces.questions import requirement
 from cspr_jax.workspaces.search import Poses, WorkspaceSearch
 
 G = cable_robots.GRAVITY
@@ -315,7 +315,7 @@ def test_every_margin_lies_between_its_bounds(pattern, n, precision):
     if pattern == "3R3T":
         quaternions = frame.turned_quaternions(Rotation.from_matrix(turns).as_quat(scalar_first=True))
     limits = Limits(tension_min=drawn.low, tension_max=drawn.high)
-    search = WorkspaceSearch(own, question(own, "wrench-feasible", limits), precision=precision)
+    search = WorkspaceSearch(own, requirement(own, "wrench-feasible", limits), precision=precision)
     every = Poses(inner, quaternions, None)
     exact = search._exactly(every)[0]
     stages = list(search._stages())

@@ -11,14 +11,14 @@ from support.workspaces import made
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.build import centred
 from cspr_jax.robots.cables import with_cables
+from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.workspaces import geometry
 from cspr_jax.workspaces.cell_proofs import CellProofs
 from cspr_jax.workspaces.geometry import mass_centres
-from cspr_jax.workspaces.questions import CONDITIONS, question
+from cspr_jax.workspaces.questions import CONDITIONS, requirement
 from cspr_jax.workspaces.required import RequiredWrenches
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.whole_cells import WorkspaceCells
@@ -34,7 +34,9 @@ class Asked:
         self.drawn, self.turn, self.robot = drawn, turn, made(drawn)
         self.own, self.frame = centred(self.robot)
         limits = Limits(tension_min=drawn.low, tension_max=drawn.high)
-        self.question = question(self.own, condition, limits, None if wrenches is None else RequiredWrenches(wrenches))
+        self.question = requirement(
+            self.own, condition, limits, None if wrenches is None else RequiredWrenches(wrenches)
+        )
         self.quaternion = NONE
         if drawn.pattern not in cable_robots.POINT_MASSES:
             given = Rotation.from_matrix(turn).as_quat(scalar_first=True)
@@ -142,7 +144,7 @@ def given(robot, condition, limits=None, wrenches=None):
     """Search, cells and frame of a robot of the package."""
     own, frame = centred(robot)
     required = None if wrenches is None else RequiredWrenches(wrenches)
-    asked = question(own, condition, robot.limits if limits is None else limits, required)
+    asked = requirement(own, condition, robot.limits if limits is None else limits, required)
     with double_precision():
         return WorkspaceSearch(own, asked), WorkspaceCells(own, asked), own, frame
 

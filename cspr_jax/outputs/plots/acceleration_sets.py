@@ -6,10 +6,11 @@ import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision, leaf
 from cspr_jax.arithmetic.frames import frame_of
-from cspr_jax.build import build_limits, gravity_of, kernel_robot
+from cspr_jax.build.limits import build_limits
+from cspr_jax.build.robots import gravity_of, kernel_robot
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.labels import value
+from cspr_jax.outputs.plots.motion_source import kept
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
@@ -86,16 +87,19 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         InputError: a platform, a file without its robot, no such instant, or cables that do not span the space there.
         ConfigError: a mistake in the plan that the file keeps.
     """
-    spec, keys = kept(result, file, "acceleration")
-    if spec.is_platform:
-        fault = f'"acceleration" of {spec.kind}'
+    robot_file, keys = kept(result, file, "acceleration")
+    if robot_file.is_platform:
+        fault = f'"acceleration" of {robot_file.kind}'
         raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", fault=fault)
     place, words = None, ""
     for axis, wanted in at.items():
         place, words = nearest(result, axis, wanted)  # it refuses all but t
     with double_precision():
-        robot, frame = kernel_robot(spec, keys, file, any_cables=True), frame_of(spec.base_points, spec.z_axis)
-        low, high = (leaf(tensions) for tensions in tension_range(robot, build_limits(spec, keys, file)))
+        robot, frame = (
+            kernel_robot(robot_file, keys, file, any_cables=True),
+            frame_of(robot_file.base_points, robot_file.z_axis),
+        )
+        low, high = (leaf(tensions) for tensions in tension_range(robot, build_limits(robot_file, keys, file)))
         limits = Limits(tension_min=low, tension_max=high)
         positions, motion = frame.inward(result.data["position"]), frame.turned(result.data["acceleration"])
         if place is None:
@@ -115,13 +119,13 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         margin=float(margin[0]),
         normals=np.asarray(faces.normals)[0] * upward,
         offsets=np.asarray(faces.offsets)[0],
-        names=_names(spec.dof, len(rays), np.asarray(faces.of_largest)[0]),
+        names=_names(robot_file.dof, len(rays), np.asarray(faces.of_largest)[0]),
         cables=rays / np.linalg.norm(rays, axis=1, keepdims=True) * upward,
-        reach=np.asarray(high - low) / spec.mass,
+        reach=np.asarray(high - low) / robot_file.mass,
         apex=np.asarray(faces.apex)[0] * upward,
-        falling=np.array([0.0, 0.0, -gravity_of(spec, keys)]),
+        falling=np.array([0.0, 0.0, -gravity_of(robot_file, keys)]),
         motion=motion * upward,
-        is_planar=spec.is_planar,
+        is_planar=robot_file.is_planar,
     )
 
 

@@ -43,7 +43,7 @@ _NUMBER: dict[str, Any] = {
 }
 
 
-class View(NamedTuple):
+class AccelerationView(NamedTuple):
     """A panel.
 
     Fields:
@@ -94,21 +94,23 @@ def acceleration_figure(result: Result, file: str, at: dict[str, float]) -> Figu
     return figure
 
 
-def _views(found: AccelerationSet) -> list[View]:
+def _views(found: AccelerationSet) -> list[AccelerationView]:
     upward = "upward acceleration (m/s²)"
     if found.is_planar:
         labels = ("level acceleration, along x (m/s²)", upward)
-        return [View("", Plane(found.actual, X, UP), labels, holds_rest=True, across_face=True)]
+        return [AccelerationView("", Plane(found.actual, X, UP), labels, holds_rest=True, across_face=True)]
     across = _level(-found.normals[found.nearest], 1.0)
     along = _level(found.actual, -found.falling[2])
 
-    def vertical(title: str, way: np.ndarray, **others: bool) -> View:
+    def vertical(title: str, way: np.ndarray, **others: bool) -> AccelerationView:
         label = f"level acceleration, azimuth {np.degrees(np.arctan2(way[1], way[0])):.3g}° (m/s²)"
-        return View(f"vertical, {title}", Plane(found.actual, way, UP), (label, upward), **others)
+        return AccelerationView(f"vertical, {title}", Plane(found.actual, way, UP), (label, upward), **others)
 
     labels = ("acceleration along x (m/s²)", "acceleration along y (m/s²)")
     height = f"{found.actual[2] if abs(found.actual[2]) > LEVEL * abs(found.falling[2]) else 0.0:.3g}"
-    level = View(f"level, upward acceleration {height} m/s²", Plane(found.actual, X, Y), labels, is_level=True)
+    level = AccelerationView(
+        f"level, upward acceleration {height} m/s²", Plane(found.actual, X, Y), labels, is_level=True
+    )
     # An acceleration without a level part lies in every vertical section, and so does any in one of a level face.
     if along is None or across is None or abs(along @ across) > 1.0 - LEVEL:
         way = next((way for way in (across, along) if way is not None), X)
@@ -126,7 +128,7 @@ def _level(vector: np.ndarray, size: float) -> np.ndarray | None:
     return np.array([*vector[:2], 0.0]) / part if part > LEVEL * size else None
 
 
-def _draw(panel: Axes, found: AccelerationSet, view: View, shape: float) -> dict[str, Artist]:
+def _draw(panel: Axes, found: AccelerationSet, view: AccelerationView, shape: float) -> dict[str, Artist]:
     seen = view.plane.seen
     window, polygon = _cut_out(found, view, shape)
     panel.fill(*polygon.corners.T, **_INSIDE)
@@ -158,7 +160,7 @@ def _draw(panel: Axes, found: AccelerationSet, view: View, shape: float) -> dict
     return legend
 
 
-def _cut_out(found: AccelerationSet, view: View, shape: float) -> tuple[Window, Polygon]:
+def _cut_out(found: AccelerationSet, view: AccelerationView, shape: float) -> tuple[Window, Polygon]:
     # What is there to see, and as many corners of the section as lie near to it.
     seen = view.plane.seen
     points = [seen(np.stack([found.actual, found.foot]))]
@@ -174,12 +176,12 @@ def _cut_out(found: AccelerationSet, view: View, shape: float) -> tuple[Window, 
     return window, section(view.plane, found.normals, found.offsets, window)
 
 
-def _shows_motion(view: View) -> bool:
+def _shows_motion(view: AccelerationView) -> bool:
     # Across a face only where all of it is in the plane.
     return view.is_level or view.holds_rest
 
 
-def _directions(panel: Axes, found: AccelerationSet, view: View, window: Window) -> Artist:
+def _directions(panel: Axes, found: AccelerationSet, view: AccelerationView, window: Window) -> Artist:
     # Of the cables of a planar robot.
     size = 0.28 * (window.high - window.low).min()
     start = view.plane.seen(found.apex)
@@ -189,7 +191,7 @@ def _directions(panel: Axes, found: AccelerationSet, view: View, window: Window)
     return Line2D([], [], **_CABLE)
 
 
-def _corners(panel: Axes, found: AccelerationSet, view: View) -> Artist:
+def _corners(panel: Axes, found: AccelerationSet, view: AccelerationView) -> Artist:
     # Where the cables' directions meet a level section, the others at their smallest tensions.
     lengths = (found.actual[2] - found.apex[2]) / found.cables[:, 2]
     corners = view.plane.seen(found.apex + lengths[:, None] * found.cables)

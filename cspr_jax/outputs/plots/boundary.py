@@ -27,7 +27,7 @@ CUTS: dict[tuple[int, int], list[list[tuple[int, int]]]] = {
 }
 
 
-class Sides(NamedTuple):
+class BoundarySides(NamedTuple):
     """Points of a grid, and on which side of the boundary each lies.
 
     Fields:
@@ -57,7 +57,7 @@ class Boundary(NamedTuple):
     is_end: np.ndarray
 
 
-def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Sides:
+def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> BoundarySides:
     """Points of a map of a workspace, and their sides.
 
     Args:
@@ -79,10 +79,10 @@ def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Sides:
     points = [result.axes[axis][order] for axis, order in zip(axes, orders, strict=True)]
     margins = [part(name).astype(float) for name in MARGINS if name in result.data]
     unmeasured = sum(flag.value for name, flag in LATER.items() if name not in result.data)
-    return Sides(points, part("verdict"), margins, unmeasured)
+    return BoundarySides(points, part("verdict"), margins, unmeasured)
 
 
-def boundary(sides: Sides) -> Boundary:
+def boundary(sides: BoundarySides) -> Boundary:
     """The boundary of what is inside, by marching simplices: six tetrahedra a cell, or two triangles.
 
     It crosses every edge of the grid, and every diagonal of these simplices, between a point inside and one outside,
@@ -140,7 +140,7 @@ def _cut(is_in: np.ndarray, simplices: np.ndarray, hand: int) -> np.ndarray:
     return np.concatenate(found)
 
 
-def _crossings(sides: Sides, pairs: np.ndarray) -> np.ndarray:
+def _crossings(sides: BoundarySides, pairs: np.ndarray) -> np.ndarray:
     # (n, d) of (n, 2) points, the first inside; -1 for one beyond the end of the grid, at the first.
     inner, outer = pairs[:, 0], np.where(pairs[:, 1] < 0, pairs[:, 0], pairs[:, 1])
     part = np.where(sides.verdict.reshape(-1)[outer] & sides.unmeasured, 0.5, np.inf)
@@ -154,7 +154,7 @@ def _crossings(sides: Sides, pairs: np.ndarray) -> np.ndarray:
     return grid[inner] + part[:, None] * (grid[outer] - grid[inner])
 
 
-def step_of(sides: Sides) -> np.ndarray:
+def step_of(sides: BoundarySides) -> np.ndarray:
     """The part of a plane in which the boundary may lie: between neighbours on different sides.
 
     Args:
@@ -170,7 +170,7 @@ def step_of(sides: Sides) -> np.ndarray:
     return grid[corners[inside.any(1) & ~inside.all(1)]]
 
 
-def outlines(sides: Sides) -> list[tuple[np.ndarray, bool]]:
+def outlines(sides: BoundarySides) -> list[tuple[np.ndarray, bool]]:
     """The boundary in a plane, as long lines.
 
     Args:

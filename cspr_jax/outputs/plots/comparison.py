@@ -12,14 +12,14 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Path2D
 
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.boundary import Sides, outlines, sides_of, step_of
+from cspr_jax.outputs.plots.boundary import BoundarySides, outlines, sides_of, step_of
 from cspr_jax.outputs.plots.conditions import conditions
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import COLOURS, PANELS, STYLES, axis_label, chosen, robot_name, values
 from cspr_jax.outputs.plots.layout import columns_of, panels
 from cspr_jax.outputs.plots.marks import mark
 from cspr_jax.outputs.plots.obstacles import draw_obstacles
-from cspr_jax.outputs.plots.posed import robot_of
+from cspr_jax.outputs.plots.robot_at import robot_of
 from cspr_jax.outputs.plots.selection import SAME
 from cspr_jax.store.result import Result
 
@@ -167,7 +167,7 @@ def _size(box: np.ndarray, count: int, lines: int) -> tuple[float, float]:
     return columns * (float(width) + 0.15) + 0.9, -(-count // columns) * (float(height) + 0.35) + 1.2 + 0.21 * lines
 
 
-def _outline(panel: Axes, sides: Sides, number: int) -> dict[str, Artist]:
+def _outline(panel: Axes, sides: BoundarySides, number: int) -> dict[str, Artist]:
     # Along the end of the grid it is thin: nobody has asked what lies beyond.
     # Margins of different conditions have different scales, so that zeros between their values would not compare: the
     # line runs half-way between points on different sides, as volumes count them, in a band as wide as that step.
@@ -179,7 +179,7 @@ def _outline(panel: Axes, sides: Sides, number: int) -> dict[str, Artist]:
     return {"end of the grid": Line2D([], [], color="black", **_END)} if ends else {}
 
 
-def _band(panel: Axes, sides: Sides, number: int) -> None:
+def _band(panel: Axes, sides: BoundarySides, number: int) -> None:
     # All triangles of the grid with corners on both sides: where the boundary may lie.
     triangles = step_of(sides)
     path = Path2D(

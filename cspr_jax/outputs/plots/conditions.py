@@ -4,8 +4,8 @@ import numpy as np
 
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.workspace import WorkspaceTable
-from cspr_jax.outputs.plots.notes import table
-from cspr_jax.outputs.plots.posed import asked, robot_of
+from cspr_jax.outputs.plots.fixed_axes import table
+from cspr_jax.outputs.plots.robot_at import asked, robot_of
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
 

@@ -10,11 +10,11 @@ from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
 from cspr_jax.outputs.plots.conditions import excluded, is_workspace, said, shown_first
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
+from cspr_jax.outputs.plots.fixed_axes import first_of, notes
 from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, values
-from cspr_jax.outputs.plots.lines import Line, line_figure, lines_of, names_of, overlaid
+from cspr_jax.outputs.plots.lines import PlottedLine, line_figure, lines_of, names_of, overlaid
 from cspr_jax.outputs.plots.motion_comparison import motion_comparison_figure
 from cspr_jax.outputs.plots.motion_pictures import motion_picture
-from cspr_jax.outputs.plots.notes import first_of, notes
 from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.sections import POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
@@ -23,7 +23,7 @@ from cspr_jax.schema.axes import TILT_TORSION
 from cspr_jax.store.result import Result
 
 
-class View(NamedTuple):
+class MapView(NamedTuple):
     """A part of a map.
 
     Fields:
@@ -148,7 +148,7 @@ def _fixed(result: Result, at: dict[str, float], across: list[str]) -> tuple[dic
 def _overlay(
     paths: list[Path], results: list[Result], quantity: str | None, at: dict[str, float], lines: str | None
 ) -> Figure:
-    columns: list[tuple[Result, str, Line]] = []
+    columns: list[tuple[Result, str, PlottedLine]] = []
     constant: list[list[str]] = []
     if lines is not None:
         raise InputError("--lines", lines, "absent where several results are drawn")
@@ -163,7 +163,9 @@ def _overlay(
         view = _view(result, quantity, at)
         if len(view.across) != 1:
             raise InputError("results", f"{path} over {view.across}", "maps over one axis; --at fixes the others")
-        columns.append((result, view.across[0], Line(result.axes[view.across[0]], view.data, excluded=view.excluded)))
+        columns.append(
+            (result, view.across[0], PlottedLine(result.axes[view.across[0]], view.data, excluded=view.excluded))
+        )
         constant.append(_constant(result, view))
     stems = [path.stem for path in paths]
     names = names_of(results, stems if len(set(stems)) == len(stems) else [str(path) for path in paths])
@@ -182,7 +184,7 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
         return _lines_figure(result, view, lines)
     if len(view.across) == 1:
         axis = view.across[0]
-        only = {"": [Line(result.axes[axis], view.data, excluded=view.excluded)]}
+        only = {"": [PlottedLine(result.axes[axis], view.data, excluded=view.excluded)]}
         return line_figure(result, view.name, only, axis, heading(result, view.name), _constant(result, view))
     order = in_order(result, view.across)
     view = _panelled(result, view, order)
@@ -194,7 +196,7 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     return section_figure(result, section, data, told)
 
 
-def _constant(result: Result, view: View, name: str | None = None) -> list[str]:
+def _constant(result: Result, view: MapView, name: str | None = None) -> list[str]:
     fixed = notes(result, view.name if name is None else name, view.fixed, [*view.across, *view.place])
     return [*said(result), *fixed]
 
@@ -206,7 +208,7 @@ def _told(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
     return np.any(telling, axis=0)
 
 
-def _lines_figure(result: Result, view: View, by: str) -> Figure:
+def _lines_figure(result: Result, view: MapView, by: str) -> Figure:
     if by not in view.across or len(view.across) < 2:
         raise InputError("--lines", by, "one of two or more axes that vary: " + ", ".join(view.across))
     along = next(axis for axis in view.across if axis != by)
@@ -223,7 +225,7 @@ def _lines_figure(result: Result, view: View, by: str) -> Figure:
     return line_figure(result, view.name, groups, along, heading(result, view.name), _constant(result, view))
 
 
-def _panelled(result: Result, view: View, order: list[str]) -> View:
+def _panelled(result: Result, view: MapView, order: list[str]) -> MapView:
     # At most three axes, in this order; the others at their first point.
     data, hatched = (x.transpose([view.across.index(axis) for axis in order]) for x in (view.data, view.excluded))
     fixed, place = list(view.fixed), dict(view.place)
@@ -231,10 +233,10 @@ def _panelled(result: Result, view: View, order: list[str]) -> View:
         data, hatched = data[:, :, :, 0], hatched[:, :, :, 0]
         place[extra] = float(result.axes[extra][0])
         fixed.append(first_of(result, extra))
-    return View(view.name, data, hatched, order[:3], fixed, place)
+    return MapView(view.name, data, hatched, order[:3], fixed, place)
 
 
-def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
+def _view(result: Result, quantity: str | None, at: dict[str, float]) -> MapView:
     name = quantity or shown_first(result)
     if name not in result.data:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
@@ -248,4 +250,4 @@ def _view(result: Result, quantity: str | None, at: dict[str, float]) -> View:
         raise InputError("axes", counts, "one with more than one point")
     part = tuple(slice(None) if axis in across else place.get(axis, 0) for axis in result.axes)
     places = {axis: float(result.axes[axis][i]) for axis, i in place.items()}
-    return View(name, result.data[name][part], excluded(result, name)[part], across, fixed, places)
+    return MapView(name, result.data[name][part], excluded(result, name)[part], across, fixed, places)

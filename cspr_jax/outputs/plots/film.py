@@ -21,7 +21,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.fitting import fit, legend_above
 from cspr_jax.outputs.plots.labels import cable_names, line_look
 from cspr_jax.outputs.plots.motion import draw_limits
-from cspr_jax.outputs.plots.moving import Moving, limits_of, moving
+from cspr_jax.outputs.plots.robot_along import Moving, limits_of, moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, fill_places, set_space
 from cspr_jax.outputs.plots.trajectory import name_spools
 from cspr_jax.runtime.stages import stage
@@ -41,7 +41,7 @@ def film(
     ending: str,
     title: str,
     columns: Mapping[str, np.ndarray],
-    spec: RobotFile,
+    robot_file: RobotFile,
     keys: PlanFile,
     speed: float = 1.0,
 ) -> bytes:
@@ -51,7 +51,7 @@ def film(
         ending: of its file, one of `ENDINGS`.
         title: of the motion.
         columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, in the axes of the robot file.
-        spec: the robot whose cables have these tensions.
+        robot_file: the robot whose cables have these tensions.
         keys: the plan, for the limits.
         speed: times real time, positive.
 
@@ -75,7 +75,7 @@ def film(
     rows = np.clip(np.searchsorted(time, wanted - 1e-9), 0, len(time) - 1)
     writer = _writer(ending, rate)
     stage("film")
-    picture = _Picture(title, columns, spec, keys, rows)
+    picture = _Picture(title, columns, robot_file, keys, rows)
     with tempfile.TemporaryDirectory() as folder, matplotlib.rc_context(rc=_settings(ending)):
         path = Path(folder) / f"film{ending}"
         with writer.saving(picture.figure, str(path), DPI):
@@ -123,10 +123,10 @@ class _Picture:
     # A figure whose artists are moved from row to row.
 
     def __init__(
-        self, title: str, columns: Mapping[str, np.ndarray], spec: RobotFile, keys: PlanFile, rows: np.ndarray
+        self, title: str, columns: Mapping[str, np.ndarray], robot_file: RobotFile, keys: PlanFile, rows: np.ndarray
     ) -> None:
         every = np.arange(len(columns["t"]))
-        self.robot, self._path = moving(columns, spec, rows), moving(columns, spec, every).position
+        self.robot, self._path = moving(columns, robot_file, rows), moving(columns, robot_file, every).position
         self._rows, self._time = rows, np.asarray(columns["t"], float)
         self.tension = np.asarray(columns["tension"], float)
         self._names = cable_names(columns)
@@ -138,8 +138,8 @@ class _Picture:
         FigureCanvasAgg(self.figure)
         grid = self.figure.add_gridspec(1, 2, width_ratios=[1.0, 1.05])
         self._space: Any = self.figure.add_subplot(grid[0], projection="3d", computed_zorder=False)
-        self._draw_space(is_down=spec.z_axis == "down")
-        self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(spec, keys))
+        self._draw_space(is_down=robot_file.z_axis == "down")
+        self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(robot_file, keys))
         self.figure.suptitle(title)
         # Once: places of axes do not change. A figure with any layout is drawn twice for each picture.
         self.show(0)

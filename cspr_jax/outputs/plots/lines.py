@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.conditions import EXCLUDED
 from cspr_jax.outputs.plots.fitting import shortened
+from cspr_jax.outputs.plots.fixed_axes import table
 from cspr_jax.outputs.plots.labels import (
     COLOURS,
     STYLES,
@@ -23,8 +24,7 @@ from cspr_jax.outputs.plots.labels import (
     values,
 )
 from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbers, panels
-from cspr_jax.outputs.plots.notes import table
-from cspr_jax.outputs.plots.worded import worded
+from cspr_jax.outputs.plots.word_ticks import worded
 from cspr_jax.store.result import Result
 
 LINES = len(COLOURS)
@@ -33,7 +33,7 @@ CROSSES: dict[str, Any] = {"marker": "x", "linestyle": "", "color": "black", "ma
 
 
 @dataclasses.dataclass(frozen=True)
-class Line:
+class PlottedLine:
     """One line of a picture.
 
     Fields:
@@ -50,7 +50,7 @@ class Line:
 
 
 def line_figure(
-    result: Result, name: str, groups: dict[str, list[Line]], across: str, title: str, fixed: list[str]
+    result: Result, name: str, groups: dict[str, list[PlottedLine]], across: str, title: str, fixed: list[str]
 ) -> Figure:
     """Lines over one axis, in one panel or several.
 
@@ -92,14 +92,14 @@ def line_figure(
     return figure
 
 
-def _as_drawn(result: Result, name: str, across: str, line: Line) -> Line:
+def _as_drawn(result: Result, name: str, across: str, line: PlottedLine) -> PlottedLine:
     # The points of an axis may come in any order.
     order = np.argsort(line.points, kind="stable")
     points, data = as_drawn(result, across, line.points[order]), as_drawn(result, name, line.values[order])
-    return Line(points, data, line.name, None if line.excluded is None else line.excluded[order])
+    return PlottedLine(points, data, line.name, None if line.excluded is None else line.excluded[order])
 
 
-def _draw(panel: Axes, lines: list[Line]) -> None:
+def _draw(panel: Axes, lines: list[PlottedLine]) -> None:
     for i, line in enumerate(lines):
         whole = line.values.dtype.kind in "iu"
         panel.plot(
@@ -118,7 +118,7 @@ def _draw(panel: Axes, lines: list[Line]) -> None:
     panel.grid(alpha=0.3)
 
 
-def _in_words(result: Result, name: str, groups: list[list[Line]]) -> tuple[list[list[Line]], list[str]]:
+def _in_words(result: Result, name: str, groups: list[list[PlottedLine]]) -> tuple[list[list[PlottedLine]], list[str]]:
     # What stands for words becomes numbers from 0 on, one above the other, with their words.
     every = [line.values for lines in groups for line in lines]
     found = worded(result, name, np.concatenate(every))
@@ -129,7 +129,7 @@ def _in_words(result: Result, name: str, groups: list[list[Line]]) -> tuple[list
     return [[dataclasses.replace(line, values=next(parts)) for line in lines] for lines in groups], words
 
 
-def _ticks(panel: Axes, result: Result, across: str, groups: list[list[Line]], words: list[str]) -> None:
+def _ticks(panel: Axes, result: Result, across: str, groups: list[list[PlottedLine]], words: list[str]) -> None:
     every = np.concatenate([line.values for lines in groups for line in lines])
     if words:
         panel.set_yticks(range(len(words)), labels=words)
@@ -141,7 +141,7 @@ def _ticks(panel: Axes, result: Result, across: str, groups: list[list[Line]], w
         in_whole_numbers(panel.xaxis)
 
 
-def lines_of(result: Result, data: np.ndarray, excluded: np.ndarray, across: str, by: str) -> list[Line]:
+def lines_of(result: Result, data: np.ndarray, excluded: np.ndarray, across: str, by: str) -> list[PlottedLine]:
     """The lines of one panel, one for each point of an axis, at most six.
 
     Args:
@@ -157,7 +157,9 @@ def lines_of(result: Result, data: np.ndarray, excluded: np.ndarray, across: str
     points = result.axes[by]
     shown = chosen(len(points), LINES)
     names = values(result, by, points[shown])
-    return [Line(result.axes[across], data[:, i], name, excluded[:, i]) for i, name in zip(shown, names, strict=True)]
+    return [
+        PlottedLine(result.axes[across], data[:, i], name, excluded[:, i]) for i, name in zip(shown, names, strict=True)
+    ]
 
 
 def names_of(results: list[Result], stems: list[str]) -> list[str]:
@@ -188,7 +190,7 @@ def _amplitude(result: Result) -> str:
     return shortened(given) if isinstance(given, str) else ""
 
 
-def overlaid(names: list[str], results: list[tuple[Result, str, Line]]) -> tuple[str, list[Line]]:
+def overlaid(names: list[str], results: list[tuple[Result, str, PlottedLine]]) -> tuple[str, list[PlottedLine]]:
     """One line a result, over the same axis.
 
     Args:

@@ -11,8 +11,8 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.transforms import Bbox
 
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.outputs.plots.fixed_axes import start, starts_at_rest, table
 from cspr_jax.outputs.plots.labels import as_drawn
-from cspr_jax.outputs.plots.notes import start, starts_at_rest, table
 from cspr_jax.store.result import Result
 
 # Axes of one and the same space: of the targets, or of the start points.

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
-from cspr_jax.outputs.plots.kept import keeps_plan, kept
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
-from cspr_jax.outputs.plots.moving import limits_of
+from cspr_jax.outputs.plots.motion_source import keeps_plan, kept
+from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.schema.motion_quantities import PARTS
 from cspr_jax.store.result import Result
 
@@ -118,13 +118,13 @@ def draw_limits(
 
 def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
     tension = result.data["tension"]
-    spec, keys = kept(result, "plan", "tension")
-    draw_limits(drawn["tension"], limits_of(spec, keys), tension, "N")
+    robot_file, keys = kept(result, "plan", "tension")
+    draw_limits(drawn["tension"], limits_of(robot_file, keys), tension, "N")
     legend_above(drawn["tension"], len(tension.T) + 2)
     if "tension_residual" in result.data:
         # The rule by which redundant cables share the load.
         drawn["tension"].set_ylabel(f"tension (N)\n{keys.tension_rule}")
-    for _, level in limits_of(spec, keys, "depth"):
+    for _, level in limits_of(robot_file, keys, "depth"):
         drawn["xz"].axhline(level, **LIMIT)
 
 

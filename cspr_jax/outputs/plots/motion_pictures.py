@@ -6,9 +6,9 @@ from typing import NamedTuple
 from matplotlib.figure import Figure
 
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.landings import landing_figure
 from cspr_jax.outputs.plots.motion import motion_figure
+from cspr_jax.outputs.plots.motion_source import kept
 from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION, SUMMARY, TENSIONS, TRAJECTORY
 from cspr_jax.outputs.plots.path_accelerations import path_figure
 from cspr_jax.outputs.plots.summary import summary_figure

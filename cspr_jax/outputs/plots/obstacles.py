@@ -5,7 +5,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch, Polygon
 
-from cspr_jax.outputs.plots.posed import asked, hull_of
+from cspr_jax.outputs.plots.robot_at import asked, hull_of
 from cspr_jax.robots.shapes import Box, Cylinder, Obstacle
 from cspr_jax.store.result import Result
 

@@ -11,17 +11,17 @@ from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.kept import kept
 from cspr_jax.outputs.plots.labels import COLOURS, PANELS, chosen, robot_name
 from cspr_jax.outputs.plots.layout import columns_of, panels
 from cspr_jax.outputs.plots.motion import doubt
+from cspr_jax.outputs.plots.motion_source import kept
 from cspr_jax.store.result import Result
 
 # Bounds beyond so many times the largest acceleration of the motion leave the picture.
 BEYOND = 2.5
 
 
-class Way(NamedTuple):
+class PathSamples(NamedTuple):
     """A line of a plan.
 
     Fields:
@@ -53,8 +53,8 @@ def path_figure(result: Result, file: str) -> Figure:
         InputError: the file keeps no plan, or its rows do not fit it.
         ConfigError: a mistake in the plan that it keeps.
     """
-    spec, keys = kept(result, file, "path_acceleration")
-    ways = _ways(result, spec, keys)
+    robot_file, keys = kept(result, file, "path_acceleration")
+    ways = _ways(result, robot_file, keys)
     shown = [ways[k] for k in chosen(len(ways), PANELS)]
     columns = columns_of(len(shown))
     rows = -(-len(shown) // columns)
@@ -76,8 +76,8 @@ def path_figure(result: Result, file: str) -> Figure:
     return figure
 
 
-def _ways(result: Result, spec: RobotFile, keys: PlanFile) -> list[Way]:
-    time, ends = result.axes["t"], _poses(result, spec, keys)
+def _ways(result: Result, robot_file: RobotFile, keys: PlanFile) -> list[PathSamples]:
+    time, ends = result.axes["t"], _poses(result, robot_file, keys)
     starts, stops = (result.data.get(f"segment_{name}", np.empty(0)) for name in ("start", "end"))
     if len(ends) != len(starts) + 1:
         raise InputError("--quantity", "path_acceleration", "must be of a plan", fault="the plan has other segments")
@@ -89,15 +89,15 @@ def _ways(result: Result, spec: RobotFile, keys: PlanFile) -> list[Way]:
         if not length > 0.0 or first[k] == first[k + 1]:
             continue
         s = (result.data["position"][rows] - ends[k]) @ line / length**2
-        ways.append(Way(k + 1, length, float(stop - start), s, result.data["path_acceleration"][rows] / length))
+        ways.append(PathSamples(k + 1, length, float(stop - start), s, result.data["path_acceleration"][rows] / length))
     if not ways:
         raise InputError("--quantity", "path_acceleration", "must be of a longer one", fault="a motion without rows")
     return ways
 
 
-def _poses(result: Result, spec: RobotFile, keys: PlanFile) -> np.ndarray:
+def _poses(result: Result, robot_file: RobotFile, keys: PlanFile) -> np.ndarray:
     # (n, 3) as in the file; a rest pose without a position is P0.
-    frame, depth = frame_of(spec.base_points, spec.z_axis), result.attributes.get("z0", np.nan)
+    frame, depth = frame_of(robot_file.base_points, robot_file.z_axis), result.attributes.get("z0", np.nan)
     rest = frame.outward(np.array([0.0, 0.0, depth]))
     return np.array([rest if pose.position is None else pose.position for pose in keys.pose])
 
@@ -108,7 +108,7 @@ def _first_row(time: np.ndarray, start: float) -> int:
     return int(rows[0] + (rows[1] - rows[0]) // 2)
 
 
-def _draw(panel: Axes, way: Way, max_acceleration: float | None) -> None:
+def _draw(panel: Axes, way: PathSamples, max_acceleration: float | None) -> None:
     least, actual, largest = way.rates.T
     far = BEYOND * (np.abs(actual).max() or 1.0)
     low, high = (np.clip(bound, -2.0 * far, 2.0 * far) for bound in (least, largest))

@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from cspr_jax.outputs.plots.fitting import legend_above
 from cspr_jax.outputs.plots.labels import COLOURS, line_look
-from cspr_jax.outputs.replay import Replay
+from cspr_jax.outputs.replay import PlayedPlan
 from cspr_jax.outputs.table_layout import two_digits
 
 # Share of the length of the path that typed digits may leave across a plane.
@@ -19,7 +19,7 @@ RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u207
 WINDOWS = 250  # of time, each with its largest deviation
 
 
-def replay_figure(replay: Replay) -> Figure:
+def replay_figure(replay: PlayedPlan) -> Figure:
     """Planned and played path, and deviations of path and tensions.
 
     Args:
@@ -51,7 +51,7 @@ def replay_figure(replay: Replay) -> Figure:
     return figure
 
 
-def _paths(panel: Axes, replay: Replay, j: int) -> None:
+def _paths(panel: Axes, replay: PlayedPlan, j: int) -> None:
     ways: tuple[tuple[str, np.ndarray, dict[str, Any]], ...] = (
         ("planned", replay.position, {"color": "black", "linewidth": 2.2, "alpha": 0.35}),
         ("played", replay.played.position, {"color": COLOURS[1], "linewidth": 1.0, "linestyle": "--"}),
@@ -65,7 +65,7 @@ def _paths(panel: Axes, replay: Replay, j: int) -> None:
     legend_above(panel, 2)
 
 
-def _deviations(panel: Axes, replay: Replay, values: dict[str, np.ndarray]) -> None:
+def _deviations(panel: Axes, replay: PlayedPlan, values: dict[str, np.ndarray]) -> None:
     # The largest of each window: rounding is noise, which would fill the panel.
     starts = np.unique(np.linspace(0.0, len(replay.time), WINDOWS, endpoint=False).astype(int))
     time = replay.time[starts]

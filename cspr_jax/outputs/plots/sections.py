@@ -17,7 +17,7 @@ from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbe
 from cspr_jax.outputs.plots.marks import mark, marked
 from cspr_jax.outputs.plots.obstacles import draw_obstacles
 from cspr_jax.outputs.plots.steps import edges, number_scale
-from cspr_jax.outputs.plots.worded import word_scale, worded
+from cspr_jax.outputs.plots.word_ticks import word_scale, worded
 from cspr_jax.schema.quantities import EVERY
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result

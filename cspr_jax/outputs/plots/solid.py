@@ -14,12 +14,12 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.boundary import Boundary, Sides, boundary, sides_of
+from cspr_jax.outputs.plots.boundary import Boundary, BoundarySides, boundary, sides_of
 from cspr_jax.outputs.plots.conditions import conditions
 from cspr_jax.outputs.plots.labels import COLOURS, axis_label, robot_name
 from cspr_jax.outputs.plots.obstacles import COLOUR as OBSTACLE
 from cspr_jax.outputs.plots.obstacles import faces_of, obstacles
-from cspr_jax.outputs.plots.posed import Posed, posed
+from cspr_jax.outputs.plots.robot_at import Posed, posed
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.store.result import Result
 
@@ -76,7 +76,7 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
     return figure
 
 
-def _middle(sides: Sides) -> np.ndarray:
+def _middle(sides: BoundarySides) -> np.ndarray:
     # Centroid of the points inside; if it is not in the workspace itself the point inside that is nearest.
     grid = np.stack(np.meshgrid(*sides.points, indexing="ij"), axis=-1)
     inside = grid[sides.verdict == 0]

@@ -11,10 +11,10 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.fitting import legend_above
 from cspr_jax.outputs.plots.labels import cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.motion import boundaries, doubt, draw_limits
-from cspr_jax.outputs.plots.moving import limits_of
-from cspr_jax.outputs.plots.reasons import reasons
+from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.outputs.plots.tensions import draw_tensions, extremes
 from cspr_jax.outputs.plots.trajectory import draw_trajectory, legend_of
+from cspr_jax.outputs.plots.verdict_colours import reasons
 from cspr_jax.store.result import Result
 
 # Lines of the table; of a longer plan the first ones.
@@ -23,12 +23,12 @@ WIDTHS = (0.15, 0.12, 0.22, 0.18, 0.33)
 HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
 
 
-def summary_figure(result: Result, spec: RobotFile, keys: PlanFile) -> Figure:
+def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
     """The plan on a page.
 
     Args:
         result: its motion.
-        spec: the robot whose cables have these tensions.
+        robot_file: the robot whose cables have these tensions.
         keys: the plan, whose limits go before the robot's.
 
     Returns:
@@ -38,12 +38,12 @@ def summary_figure(result: Result, spec: RobotFile, keys: PlanFile) -> Figure:
     figure = Figure(figsize=(7.2, 8.2 + 0.22 * len(cells)), layout="constrained")
     parts = figure.add_gridspec(4, 1, height_ratios=[4.4, 2.0, 1.6, 0.3 + 0.22 * len(cells)])
     space = figure.add_subplot(parts[0], projection="3d", computed_zorder=False)
-    draw_trajectory(figure, space, result, spec)
+    draw_trajectory(figure, space, result, robot_file)
     figure.legend(*legend_of(result), loc="outside lower center", ncols=6)
     over_time = figure.add_subplot(parts[1])
-    draw_tensions(over_time, result, limits_of(spec, keys))
-    legend_above(over_time, len(spec.base_points) + 4)
-    _rates(figure.add_subplot(parts[2], sharex=over_time), result, limits_of(spec, keys, "speed"))
+    draw_tensions(over_time, result, limits_of(robot_file, keys))
+    legend_above(over_time, len(robot_file.base_points) + 4)
+    _rates(figure.add_subplot(parts[2], sharex=over_time), result, limits_of(robot_file, keys, "speed"))
     if cells:
         table = figure.add_subplot(parts[3])
         table.axis("off")

@@ -8,16 +8,16 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.motion import FAR, boundaries, doubt, draw_limits
-from cspr_jax.outputs.plots.moving import limits_of
+from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.store.result import Result
 
 
-def tensions_figure(result: Result, spec: RobotFile, keys: PlanFile) -> Figure:
+def tensions_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
     """The band of tensions over time, with the limits.
 
     Args:
         result: the motion.
-        spec: the robot whose cables have these tensions.
+        robot_file: the robot whose cables have these tensions.
         keys: the plan, whose limits go before the robot's.
 
     Returns:
@@ -25,7 +25,7 @@ def tensions_figure(result: Result, spec: RobotFile, keys: PlanFile) -> Figure:
     """
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     panel = figure.subplots()
-    draw_tensions(panel, result, limits_of(spec, keys))
+    draw_tensions(panel, result, limits_of(robot_file, keys))
     figure.legend(loc="outside lower center", ncols=4)
     figure.suptitle(f"{robot_name(result)}: tensions over time\n{extremes(result)}{doubt(result)}")
     return figure

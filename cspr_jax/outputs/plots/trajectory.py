@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.motion import doubt
-from cspr_jax.outputs.plots.moving import moving
+from cspr_jax.outputs.plots.robot_along import moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, set_space, shape_of
 from cspr_jax.store.result import Result
 
@@ -24,37 +24,37 @@ ACROSS, BESIDE, LOW, HIGH = 5.2, 1.2, 3.6, 7.2
 TOGETHER = 0.08
 
 
-def trajectory_figure(result: Result, spec: RobotFile) -> Figure:
+def trajectory_figure(result: Result, robot_file: RobotFile) -> Figure:
     """The motion in space.
 
     Args:
         result: the motion.
-        spec: the robot whose cables have these tensions.
+        robot_file: the robot whose cables have these tensions.
 
     Returns:
         the figure.
     """
-    points = np.concatenate([result.data["position"], np.asarray(spec.base_points, float)])
+    points = np.concatenate([result.data["position"], np.asarray(robot_file.base_points, float)])
     height = float(np.clip(ACROSS * shape_of(points) + BESIDE, LOW, HIGH))
     figure = Figure(figsize=(7.2, height), layout="constrained")
     panel = figure.add_subplot(projection="3d", computed_zorder=False)
-    draw_trajectory(figure, panel, result, spec)
+    draw_trajectory(figure, panel, result, robot_file)
     figure.legend(*legend_of(result), loc="outside lower center", ncols=6)
     figure.suptitle(f"{robot_name(result)}: trajectory, {result.axes['t'][-1]:.4g} s{doubt(result)}")
     return figure
 
 
-def draw_trajectory(figure: Figure, panel: Any, result: Result, spec: RobotFile) -> None:
+def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: RobotFile) -> None:
     """Path, spools, flight of a released object, and the robot where segments begin and end.
 
     Args:
         figure: for the colour bar.
         panel: axes in three dimensions, without computed z order.
         result: the motion.
-        spec: the robot whose cables have these tensions.
+        robot_file: the robot whose cables have these tensions.
     """
     rows = _instants(result)
-    robot, path = moving(result.data, spec, rows), result.data["position"]
+    robot, path = moving(result.data, robot_file, rows), result.data["position"]
     flight = result.data.get("flight_position", np.empty((0, 3)))
     set_space(
         panel,

@@ -8,14 +8,14 @@ from matplotlib.colors import BoundaryNorm, to_hex
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.colours import Scale, scale_of
 from cspr_jax.outputs.plots.conditions import is_margin, said, shown_first
+from cspr_jax.outputs.plots.fixed_axes import notes
 from cspr_jax.outputs.plots.labels import WORDS, as_drawn, axis_label, label, unit, value
-from cspr_jax.outputs.plots.notes import notes
 from cspr_jax.outputs.plots.obstacles import COLOUR, obstacles, outline, section_of
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.planes import in_order
-from cspr_jax.outputs.plots.posed import asked, robot_of
-from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
-from cspr_jax.outputs.plots.worded import word_scale, worded
+from cspr_jax.outputs.plots.robot_at import asked, robot_of
+from cspr_jax.outputs.plots.verdict_colours import FEASIBLE_COLOUR, REASONS
+from cspr_jax.outputs.plots.word_ticks import word_scale, worded
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
 from cspr_jax.schema.verdicts import SENTENCES, Verdict, conjunction
 from cspr_jax.store.result import Result

@@ -9,9 +9,9 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import WRITTEN, cable_names
-from cspr_jax.outputs.plots.moving import limits_of, moving
 from cspr_jax.outputs.plots.pages.packing import packed
-from cspr_jax.outputs.plots.reasons import FEASIBLE_COLOUR, REASONS
+from cspr_jax.outputs.plots.robot_along import limits_of, moving
+from cspr_jax.outputs.plots.verdict_colours import FEASIBLE_COLOUR, REASONS
 from cspr_jax.plans.causes import cause_text
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
@@ -27,7 +27,7 @@ def motion_content(
     title: str,
     columns: Mapping[str, np.ndarray],
     segments: Mapping[str, np.ndarray],
-    spec: RobotFile | None,
+    robot_file: RobotFile | None,
     keys: PlanFile | None,
 ) -> dict[str, Any]:
     """What a page shows of a motion.
@@ -36,18 +36,18 @@ def motion_content(
         title: of the motion.
         columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, and the flight if there is one.
         segments: by the names of `schema.motion_quantities.SEGMENTS`.
-        spec: the robot whose cables have these tensions; None: the file does not keep it.
+        robot_file: the robot whose cables have these tensions; None: the file does not keep it.
         keys: the plan, for the limits; None: the file does not keep it.
 
     Returns:
         plain values, for JSON.
     """
     rows = _chosen(np.asarray(columns["t"]))
-    robot = moving(columns, spec, rows)
+    robot = moving(columns, robot_file, rows)
     return {
         "title": title,
-        "facts": _facts(np.asarray(columns["t"]), segments, spec, keys),
-        "isDown": spec is None or spec.z_axis == "down",
+        "facts": _facts(np.asarray(columns["t"]), segments, robot_file, keys),
+        "isDown": robot_file is None or robot_file.z_axis == "down",
         "count": len(rows),
         "cables": cable_names(columns),
         "base": np.round(robot.base, 9).tolist(),
@@ -58,29 +58,30 @@ def motion_content(
         "edges": robot.corners.shape[1] // 2,
         **{name: packed(np.asarray(columns[name])[rows]) for name in OF_CABLES if name in columns},
         "flight": np.asarray(columns["flight_position"]).tolist() if "flight_position" in columns else None,
-        "limits": {name: _limits(spec, keys, quantity) for name, quantity in OF_CABLES.items()},
+        "limits": {name: _limits(robot_file, keys, quantity) for name, quantity in OF_CABLES.items()},
         "segments": _segments(segments),
     }
 
 
-def _limits(spec: RobotFile | None, keys: PlanFile | None, quantity: str) -> list[dict[str, Any]]:
-    if spec is None or keys is None:
+def _limits(robot_file: RobotFile | None, keys: PlanFile | None, quantity: str) -> list[dict[str, Any]]:
+    if robot_file is None or keys is None:
         return []
-    return [{"words": words, "value": value} for words, value in limits_of(spec, keys, quantity)]
+    return [{"words": words, "value": value} for words, value in limits_of(robot_file, keys, quantity)]
 
 
 def _facts(
-    time: np.ndarray, segments: Mapping[str, np.ndarray], spec: RobotFile | None, keys: PlanFile | None
+    time: np.ndarray, segments: Mapping[str, np.ndarray], robot_file: RobotFile | None, keys: PlanFile | None
 ) -> list[tuple[str, str]]:
     # Robot, limits and duration, in words.
     count = len(segments.get("segment_end", ()))
     of_segments = f" in {count} segment{'s' if count > 1 else ''}" if count else ""
     facts = [("duration", f"{time[-1] - time[0]:.4g} s{of_segments}")]
-    if spec is None or keys is None:
+    if robot_file is None or keys is None:
         return [("robot", "the file keeps neither robot nor limits; --plan gives them"), *facts]
-    body = "platform" if spec.is_platform else "point mass"
-    robot = f"{shortened(spec.name)}, {body} of {spec.mass:.4g} kg on {len(spec.base_points)} cables, z {spec.z_axis}"
-    limits = ", ".join(filter(None, (_bound(row, limits_of(spec, keys, row)) for row in UNITS)))
+    body = "platform" if robot_file.is_platform else "point mass"
+    cables = f"on {len(robot_file.base_points)} cables, z {robot_file.z_axis}"
+    robot = f"{shortened(robot_file.name)}, {body} of {robot_file.mass:.4g} kg {cables}"
+    limits = ", ".join(filter(None, (_bound(row, limits_of(robot_file, keys, row)) for row in UNITS)))
     return [("robot", robot), ("limits", limits or "none, but that all cables are taut"), *facts]
 
 

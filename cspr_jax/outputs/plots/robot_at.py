@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.notes import table
+from cspr_jax.outputs.plots.fixed_axes import table
 from cspr_jax.robots.shapes import FLAT, UNIT_TOLERANCE, hull, is_flat, rotation_matrix
 from cspr_jax.store.result import Result
 
@@ -68,16 +69,16 @@ def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
     Raises:
         InputError: the map has no orientation there, but numbers that are none.
     """
-    spec = robot_of(result)
+    robot_file = robot_of(result)
     azimuth, tilt, torsion = (angles.get(name, 0.0) for name in ("tilt_azimuth", "tilt", "torsion"))
     turn = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
-    quaternion = np.array(asked(result).orientation or [1.0, 0.0, 0.0, 0.0])
+    quaternion = np.array(asked(result).orientation or IDENTITY)
     size = np.linalg.norm(quaternion)
     if abs(size - 1.0) > UNIT_TOLERANCE:
         raise InputError("workspace.orientation", quaternion.tolist(), "of length 1")
     turn = turn @ rotation_matrix(quaternion / size)
-    base = np.array(spec.base_points, float)
-    own = np.zeros_like(base) if spec.platform_points is None else np.array(spec.platform_points, float)
+    base = np.array(robot_file.base_points, float)
+    own = np.zeros_like(base) if robot_file.platform_points is None else np.array(robot_file.platform_points, float)
     faces, edges = hull_of(own)
     return Posed(base, place + own @ turn.T, place + faces @ turn.T, place + edges @ turn.T)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.outputs.plots.posed import hull_of
+from cspr_jax.outputs.plots.robot_at import hull_of
 from cspr_jax.robots.shapes import rotation_matrix
 from cspr_jax.schema.limits import LIMITS
 
@@ -28,24 +28,24 @@ class Moving(NamedTuple):
     corners: np.ndarray
 
 
-def moving(columns: Mapping[str, np.ndarray], spec: RobotFile | None, rows: np.ndarray) -> Moving:
+def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows: np.ndarray) -> Moving:
     """The robot at some rows of its motion.
 
     Args:
         columns: by the names of `schema.motion_quantities.TRAJECTORY`.
-        spec: the robot whose cables have these tensions; None: it is not known, and has no cables here.
+        robot_file: the robot whose cables have these tensions; None: it is not known, and has no cables here.
         rows: (n,) which.
 
     Returns:
         the robot.
     """
     position, quaternion = np.asarray(columns["position"])[rows], columns.get("quaternion")
-    if spec is None:
+    if robot_file is None:
         return Moving(np.empty((0, 3)), position, np.empty((len(rows), 0, 3)), np.empty((len(rows), 0, 3)))
-    base = np.asarray(spec.base_points, float)
-    own = np.zeros_like(base) if spec.platform_points is None else np.asarray(spec.platform_points, float)
-    if spec.centre_of_mass is not None:  # whose position a motion holds
-        own = own - np.asarray(spec.centre_of_mass, float)
+    base = np.asarray(robot_file.base_points, float)
+    own = np.zeros_like(base) if robot_file.platform_points is None else np.asarray(robot_file.platform_points, float)
+    if robot_file.centre_of_mass is not None:  # whose position a motion holds
+        own = own - np.asarray(robot_file.centre_of_mass, float)
     edges, turn = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
         edges, turn = hull_of(own)[1], np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
@@ -54,11 +54,11 @@ def moving(columns: Mapping[str, np.ndarray], spec: RobotFile | None, rows: np.n
     return Moving(base, position, attached, corners)
 
 
-def limits_of(spec: RobotFile, asked: PlanFile, quantity: str = "tension") -> list[tuple[str, float]]:
+def limits_of(robot_file: RobotFile, asked: PlanFile, quantity: str = "tension") -> list[tuple[str, float]]:
     """Limits of a quantity, to be drawn beside its values.
 
     Args:
-        spec: the robot.
+        robot_file: the robot.
         asked: the plan, whose limits go before the robot's.
         quantity: of `schema.limits.LIMITS`.
 
@@ -68,7 +68,7 @@ def limits_of(spec: RobotFile, asked: PlanFile, quantity: str = "tension") -> li
     found = []
     for row in LIMITS:
         own = getattr(asked, row.name, None)
-        given = getattr(spec, row.name, None) if own is None else own
+        given = getattr(robot_file, row.name, None) if own is None else own
         if row.quantity != quantity or given is None:
             continue
         values = np.unique(np.atleast_1d(np.asarray(given, float)))

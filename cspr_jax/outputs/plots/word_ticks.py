@@ -6,7 +6,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
 
 from cspr_jax.outputs.plots.colours import NONE_COLOUR, Scale
 from cspr_jax.outputs.plots.labels import COLOURS
-from cspr_jax.outputs.plots.reasons import reasons
+from cspr_jax.outputs.plots.verdict_colours import reasons
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import meanings_of
 from cspr_jax.store.result import Result

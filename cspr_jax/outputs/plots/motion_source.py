@@ -11,7 +11,7 @@ from cspr_jax.config.plan import PlanFile, kept_plan, read_plan
 from cspr_jax.config.reading import checked, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.outputs.plots.moving import moving
+from cspr_jax.outputs.plots.robot_along import moving
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.store.result import Result
@@ -50,35 +50,37 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
         raise ConfigError("--plan", f"{path}: cannot be combined with {file}, which keeps what it was made of")
     text = read_text(path)
     keys = read_plan(text, path)
-    spec = as_moved(resolve_robot(keys.robot, path, path.parent), [FAMILIES[name].legs for name in keys.families])
-    _check_cables(result, file, spec, path)
+    robot_file = as_moved(resolve_robot(keys.robot, path, path.parent), [FAMILIES[name].legs for name in keys.families])
+    _check_cables(result, file, robot_file, path)
     attributes = {
-        "robot": spec.name,
-        "robot_settings": canonical_json(spec.settings),
+        "robot": robot_file.name,
+        "robot_settings": canonical_json(robot_file.settings),
         "plan": text,
         "family": keys.family,
-        "base_points": np.asarray(spec.base_points, float),
-        "mass": spec.mass,
-        "z_axis": spec.z_axis,
+        "base_points": np.asarray(robot_file.base_points, float),
+        "mass": robot_file.mass,
+        "z_axis": robot_file.z_axis,
         **({"z0": keys.z0} if isinstance(keys.z0, float) else {}),
     }
     return dataclasses.replace(result, attributes=result.attributes | attributes)
 
 
-def _check_cables(result: Result, file: str, spec: RobotFile, path: Path) -> None:
+def _check_cables(result: Result, file: str, robot_file: RobotFile, path: Path) -> None:
     # Whether the lengths are those of this robot in these poses; of cables over pulleys only their number is known.
     count = result.data["tension"].shape[1]
-    if len(spec.base_points) != count:
-        raise ConfigError(path, f"its robot {spec.name} has {len(spec.base_points)} cables: {file} has {count}")
-    if spec.is_platform is not ("quaternion" in result.data):
-        raise ConfigError(path, f"its robot {spec.name} and {file}: must both turn, or both be point masses")
-    if spec.pulley_radius is None and "length" in result.data:
-        robot, length = moving(result.data, spec, np.arange(len(result.axes["t"]))), result.data["length"]
+    if len(robot_file.base_points) != count:
+        raise ConfigError(
+            path, f"its robot {robot_file.name} has {len(robot_file.base_points)} cables: {file} has {count}"
+        )
+    if robot_file.is_platform is not ("quaternion" in result.data):
+        raise ConfigError(path, f"its robot {robot_file.name} and {file}: must both turn, or both be point masses")
+    if robot_file.pulley_radius is None and "length" in result.data:
+        robot, length = moving(result.data, robot_file, np.arange(len(result.axes["t"]))), result.data["length"]
         gap = np.abs(np.linalg.norm(robot.attached - robot.base, axis=2) - length)
         row, cable = np.unravel_index(gap.argmax(), gap.shape)
         if gap[row, cable] > SAME_LENGTH * length.max():
             fault = f"cable {cable + 1} is {length[row, cable]:.6g} m long at t = {result.axes['t'][row]:.6g} s"
-            raise ConfigError(path, f"its robot {spec.name} is not that of {file}, where {fault}")
+            raise ConfigError(path, f"its robot {robot_file.name} is not that of {file}, where {fault}")
 
 
 def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]:
@@ -102,5 +104,5 @@ def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]
         raise InputError("--quantity", quantity, allowed, fault=fault)
     settings, text = (str(result.attributes[name]) for name in ("robot_settings", "plan"))
     # The settings were checked when the file was read.
-    spec = checked(RobotFile, json.loads(settings), file)
-    return spec.equivalent() if spec.translation_only else spec, kept_plan(text, Path(file))
+    robot_file = checked(RobotFile, json.loads(settings), file)
+    return robot_file.equivalent() if robot_file.translation_only else robot_file, kept_plan(text, Path(file))

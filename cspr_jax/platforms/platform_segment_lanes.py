@@ -16,15 +16,15 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import polynomial, sincospi
 from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation, stored
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
-from cspr_jax.motions.platform_kind import Kind
-from cspr_jax.platforms.platform_segment import PoseSegment
+from cspr_jax.motions.platform_kind import PlatformMotionKind
+from cspr_jax.platforms.platform_segment import PlatformSegment
 
 # Degree of Chebyshev fits on s in [0, 1] of W = arccos(s) / sqrt(1 - s^2) and of its derivatives, one each: accurate to
 # 2e-15. A derivative of the fit of W would be wrong by 3e-10.
 _DEGREE = 22
 
 
-class Instant(NamedTuple):
+class InstantLanes(NamedTuple):
     """Normalised time, and what depends on it and on the number of arcs alone: () or (n,) each.
 
     Fields:
@@ -46,7 +46,7 @@ class Instant(NamedTuple):
     cosine: Array
 
 
-class State(NamedTuple):
+class StateLanes(NamedTuple):
     """The platform at one instant of n segments: tuples of (n,) arrays, derivatives in normalised time.
 
     Fields:
@@ -67,7 +67,7 @@ class State(NamedTuple):
 
 
 @jax.jit
-def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> Instant:
+def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> InstantLanes:
     """Instant common to segments of the same number of arcs.
 
     Args:
@@ -80,10 +80,10 @@ def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> Inst
         the instant, (...) each.
     """
     a, a1, a2, a3 = derivatives(amplitude, tau, order=3)
-    return Instant(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
+    return InstantLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
 
 
-def squared_duration(segment: PoseSegment, arcs: Array) -> Array:
+def squared_duration(segment: PlatformSegment, arcs: Array) -> Array:
     """T^2, (3.77).
 
     Args:
@@ -98,7 +98,9 @@ def squared_duration(segment: PoseSegment, arcs: Array) -> Array:
 
 
 @partial(jax.jit, static_argnames="kind")
-def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind, one: Array | None = None) -> State:
+def state(
+    segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind, one: Array | None = None
+) -> StateLanes:
     """The state of the platform.
 
     Args:
@@ -120,10 +122,10 @@ def state(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind, one: Arra
         rotation = _exponential(*_half_vector(segment, now, _beat(segment, arcs, now, kind)))
     hub = tuple(segment.hub[:, i] for i in range(3))
     position = tuple(h + c for h, c in zip(hub, place[0], strict=True))
-    return State(position, place[1], place[2], *rotation)
+    return StateLanes(position, place[1], place[2], *rotation)
 
 
-def _straight(segment: PoseSegment, arcs: Array, now: Instant, *, variable: bool) -> tuple[Vector, ...]:
+def _straight(segment: PlatformSegment, arcs: Array, now: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
     omega, size = segment.sense * math.pi * arcs, segment.end_radius
     if variable:
         inner = now.a * omega * omega + now.a2
@@ -137,7 +139,7 @@ def _straight(segment: PoseSegment, arcs: Array, now: Instant, *, variable: bool
     return tuple(tuple(segment.plane[:, i, 0] * (size * x) for i in range(3)) for x in (place, pace, bend))
 
 
-def _ellipse(segment: PoseSegment, arcs: Array, now: Instant, *, variable: bool) -> tuple[Vector, ...]:
+def _ellipse(segment: PlatformSegment, arcs: Array, now: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
     # `pose_segment._swing`.
     omega, nu = segment.sense * math.pi * arcs, segment.precession / arcs
     span = segment.end_radius - segment.start_radius
@@ -162,7 +164,9 @@ def _ellipse(segment: PoseSegment, arcs: Array, now: Instant, *, variable: bool)
     return tuple(vectors)
 
 
-def _beat(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> tuple[Array, Array, Array]:
+def _beat(
+    segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
+) -> tuple[Array, Array, Array]:
     # `oscillating_slerp.beat`, at the phase that the instant knows.
     how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
@@ -179,7 +183,7 @@ def _beat(segment: PoseSegment, arcs: Array, now: Instant, kind: Kind) -> tuple[
 
 
 def _about_one_axis(
-    segment: PoseSegment, now: Instant, beats: tuple[Array, ...], one: Array | None
+    segment: PlatformSegment, now: InstantLanes, beats: tuple[Array, ...], one: Array | None
 ) -> tuple[Matrix, Vector, Vector]:
     # The envelope leaves the reference orientation along one axis: the angle is 2 beta Theta_env A.
     axis = tuple(segment.turn.across[:, i] for i in range(1, 4))
@@ -206,7 +210,9 @@ def _angle_ratio_coefficients() -> list[list[float]]:
 _RATIO = _angle_ratio_coefficients()
 
 
-def _half_vector(segment: PoseSegment, now: Instant, beats: tuple[Array, ...]) -> tuple[Vector, Vector, Vector]:
+def _half_vector(
+    segment: PlatformSegment, now: InstantLanes, beats: tuple[Array, ...]
+) -> tuple[Vector, Vector, Vector]:
     # Half of the rotation vector and its derivatives, as in `oscillating_slerp`.
     how, (beta, beta1, beta2) = segment.turn, beats
     sine, cosine = sincospi(how.angle * now.a / math.pi)

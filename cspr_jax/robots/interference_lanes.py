@@ -7,12 +7,12 @@ from jax import Array
 
 from cspr_jax.arithmetic.lanes import Matrix, Vector, cross, dot, turned_back
 from cspr_jax.robots.interference import PARALLEL
-from cspr_jax.robots.wrench_lanes import Cables
+from cspr_jax.robots.wrench_lanes import CableLanes
 
 TINY = 1e-30  # m^2
 
 
-def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: Cables) -> list[Vector]:
+def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: CableLanes) -> list[Vector]:
     """The shortest vectors between cables.
 
     Args:
@@ -81,7 +81,7 @@ def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vect
     return tuple(jnp.where(inside, w, jnp.where(is_first, a, b)) for w, a, b in zip(up, *left, strict=True))
 
 
-def cable_directions(wires: Cables, turn: Matrix) -> list[Vector]:
+def cable_directions(wires: CableLanes, turn: Matrix) -> list[Vector]:
     """The cables from the platform to the spools, in the platform's axes; not of unit length.
 
     Args:

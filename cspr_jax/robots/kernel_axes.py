@@ -1,0 +1,53 @@
+"""Robots in the axes of the kernels: from the centroid of their spools, z down."""
+
+import dataclasses
+from typing import Any, TypeVar
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import Frame, frame_of
+from cspr_jax.robots.limits import NO_LIMITS
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.pulleys import Pulleys
+from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.robots.robot import check_moved
+
+RobotKind = TypeVar("RobotKind", bound=PointMassRobot | PlatformRobot)
+
+
+def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
+    """A robot as the kernels take it: from the centroid of its spools, z down, without limits.
+
+    Args:
+        robot: in its own axes.
+
+    Returns:
+        the robot, and the frame that takes points to it and back.
+    """
+    frame = frame_of(robot.base_points, robot.z_axis)
+    changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
+    if isinstance(robot, PlatformRobot):
+        changes["platform_points"] = leaf(frame.turned(robot.platform_points))
+        changes["inertia"] = frame.turned_tensor(leaf(robot.inertia))
+        if robot.centre_of_mass is not None:
+            changes["centre_of_mass"] = leaf(frame.turned(robot.centre_of_mass))
+    if robot.pulleys is not None:
+        changes["pulleys"] = Pulleys(robot.pulleys.radius, leaf(frame.turned(robot.pulleys.axes)))
+    return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
+
+
+def prepared(robot: RobotKind) -> tuple[RobotKind, Frame]:
+    """A robot as the kernels take it, a platform also in its reference axes.
+
+    Args:
+        robot: in its own axes.
+
+    Returns:
+        the robot, and the frame that takes points to it and back.
+
+    Raises:
+        InputError: a robot that no trajectory moves, as `robots.robot.check_moved` says.
+    """
+    check_moved(robot)
+    own, frame = centred(robot)
+    return (aligned(own)[0] if isinstance(own, PlatformRobot) else own), frame  # type: ignore[return-value]
