@@ -1,12 +1,13 @@
-"""What is one row: a trajectory family, from a plan file to a motion file and a picture; and legs of several families.
+"""A family and its map as one folder, from TOML to files, pictures, pages and MuJoCo; legs of several families.
 
-Nothing of the package is touched by the family of this file: its motion, its leg and its row are in a module beside
-the plan.
+Nothing of the package is touched by the family of this file: motion, leg, map and rows are a folder beside the plan.
 """
 
 import importlib
 import json
+import shutil
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 import h5py
@@ -16,11 +17,12 @@ from support.commands import cspr
 from support.platforms import state_of
 
 import cspr_jax
+from cspr_jax.schema import map_kinds
 from cspr_jax.schema.families import FAMILIES, moving, registered
 from cspr_jax.store.result import open_result
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
-MODULE = (Path(__file__).parents[2] / "docs" / "examples" / "straight_lines.py").read_text("utf-8")
+FAMILY = Path(__file__).parents[2] / "docs" / "examples" / "straight_lines"
 PLAN = """schema = 1
 robot = "prototype"
 family = "straight-line"
@@ -34,16 +36,32 @@ position = [0.1, 0.05, 1.5]
 position = {last}
 """
 
+SWEEP = """schema = 1
+map = "line-durations"
+robot = "prototype"
+[axes]
+x = [-0.4, 0.0, 0.3]
+y = [0.0, 0.2]
+z = [1.2]
+z0 = [1.7]
+[trajectory]
+family = "straight-line"
+"""
+
 
 @pytest.fixture
 def lines(tmp_path, monkeypatch):
-    """The module of a family, registered."""
-    (tmp_path / "straight_lines.py").write_text(MODULE)
+    """The folder of a family and its map, registered."""
+    shutil.copytree(FAMILY, tmp_path / "straight_lines")
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
-    with registered(importlib.import_module("straight_lines").FAMILY):
+    family = importlib.import_module("straight_lines")
+    with ExitStack() as rows:
+        rows.enter_context(registered(family.FAMILY))
+        rows.enter_context(map_kinds.registered(family.KIND, *family.QUANTITIES))
         yield tmp_path
-    sys.modules.pop("straight_lines")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "straight_lines"]:
+        sys.modules.pop(name)
 
 
 def planned(folder, *, last: str = "[-0.05, -0.1, 1.6]", more: str = "") -> tuple[int, dict]:
@@ -76,6 +94,32 @@ def test_a_family_from_file_to_picture(lines):
     assert open_result(path).attributes["feasible"] == 0
     code, _, err = cspr("plot", path, "-o", lines / "motion.png")
     assert (code, err) == (0, "") and (lines / "motion.png").stat().st_size > 10_000
+    code, _, err = cspr("report", lines / "plan.toml", "-o", lines / "motion.html")
+    assert (code, err) == (0, "cspr: not proved feasible; the page says so\n")
+    assert "prototype" in (lines / "motion.html").read_text()
+
+
+def test_mujoco_plays_a_family(lines):
+    """Open loop: the same path, and the same tensions."""
+    planned(lines)
+    code, out, err = cspr("replay", lines / "plan.toml", "--anyway", "--json")
+    assert (code, err) == (1, "")
+    deviations = json.loads(out)["largest_deviation"]
+    assert deviations["path"]["value"] < 1e-9 and deviations["tension"]["value"] < 1e-9
+
+
+def test_a_map_of_a_family(lines):
+    """From a sweep file to HDF5, a picture and a page."""
+    (lines / "durations.toml").write_text(SWEEP)
+    code, out, err = cspr("run", lines / "durations.toml", "-o", lines / "run")
+    assert (code, err) == (0, "")
+    with h5py.File(out.splitlines()[-1]) as file:
+        x, y = np.meshgrid([-0.4, 0.0, 0.3], [0.0, 0.2], indexing="ij")
+        ways = np.stack([x, y, np.full_like(x, -0.5)], axis=-1)
+        np.testing.assert_allclose(file["line_duration"][..., 0, 0], np.linalg.norm(ways, axis=-1) / 0.05, rtol=1e-12)
+    for command, suffix in (("plot", ".png"), ("report", ".html")):
+        code, _, err = cspr(command, lines / "run", "-o", lines / f"map{suffix}")
+        assert (code, err) == (0, "") and (lines / f"map{suffix}").stat().st_size > 10_000
 
 
 def test_what_a_sample_refutes(lines):
