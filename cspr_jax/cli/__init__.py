@@ -21,7 +21,7 @@ EPILOGUE = (
     "5 numerical self-check failed; 70 internal error; 130, 143 stopped, run it again to go on"
 )
 
-# Of a process that is ours: Python's passes over the many objects of jax take a tenth of what a command takes.
+# Set only in a process that is ours: Python's passes over the many objects of jax take a tenth of a command's time.
 FEWER_COLLECTIONS = (200_000, 20, 50)
 
 
@@ -31,7 +31,7 @@ class _Parser(argparse.ArgumentParser):
         self.exit(ExitCode.BAD_INPUT, f"{printable(f'{self.prog}: {message} (see {self.prog} --help)')}\n")
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        # Of help and versions; the usual one says nothing where it cannot print.
+        # Help and versions come through here; the usual method says nothing where it cannot print.
         if file is sys.stdout:
             write(message)
         else:
@@ -74,8 +74,8 @@ def _answered(options: argparse.Namespace, prompt: Prompt) -> int:
     try:
         return int(options.command(options))
     except CsprError as error:
-        every = error.lines if isinstance(error, ConfigError) and getattr(options, "all_errors", False) else None
-        for line in every or error.args:
+        lines = error.lines if isinstance(error, ConfigError) and getattr(options, "all_errors", False) else None
+        for line in lines or error.args:
             warn(line)
         return int(error.exit_code)
     except KeyboardInterrupt:
@@ -132,7 +132,7 @@ def _flushed(code: int) -> int:
 
 
 def _close_output() -> None:
-    # What is left in its buffer would be tried once more.
+    # Python would otherwise try once more to write what is left in the buffer.
     with contextlib.suppress(OSError):
         sys.stdout.close()
 
@@ -148,7 +148,7 @@ def _completion(options: argparse.Namespace) -> int:
     return ExitCode.DONE
 
 
-# In the order of the help. A new command is a row of one of these modules.
+# Commands come in the order of the help. A new command is a row of one of these modules.
 COMMANDS = (
     *(*runs.COMMANDS, *plans.COMMANDS, *pictures.COMMANDS, *tables.COMMANDS, *listings.COMMANDS),
     Command("completion", "print a script for a shell that completes commands", _add_completion, _completion),

@@ -20,13 +20,13 @@ def _import(options: argparse.Namespace) -> int:
         raise ConfigError("-o", f"{options.output}: must end in .toml")
     from cspr_jax.api.imports import import_robot
 
-    found = import_robot(options.file, options.set)
-    for line in found.warnings:
+    robot = import_robot(options.file, options.set)
+    for line in robot.warnings:
         warn(f"{options.file}: {line}")
     if options.output is None:
-        write(found.to_toml())
+        write(robot.to_toml())
     else:
-        print_path(found.save(options.output))
+        print_path(robot.save(options.output))
     return ExitCode.DONE
 
 

@@ -51,14 +51,14 @@ def _report(options: argparse.Namespace) -> int:
     from cspr_jax.outputs.plots import selection
 
     cells = [selection.places(words.split(","), "--cell") for words in options.cell]
-    given = options.result if options.result.suffix == ".toml" else selection.result_at(options.result)
-    output = options.output or given.with_suffix(".html")
+    source = options.result if options.result.suffix == ".toml" else selection.result_at(options.result)
+    output = options.output or source.with_suffix(".html")
     with waiting():
         prepare_jax(options, quick=True)
         from cspr_jax.api.reports import report
 
         choices = {name: getattr(options, name) for name in ("trajectories", "quantity", "best", "plan")}
-        warnings = report(given, output, cells=cells, **choices)
+        warnings = report(source, output, cells=cells, **choices)
     for line in warnings:
         warn(line)
     print_path(output)

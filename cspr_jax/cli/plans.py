@@ -144,13 +144,13 @@ def _replay(options: argparse.Namespace) -> int:
     with waiting():
         from cspr_jax.api.replays import replay
 
-        found = replay(plan, anyway=True, **({} if options.step is None else {"step": options.step}))
+        played = replay(plan, anyway=True, **({} if options.step is None else {"step": options.step}))
         if options.output is not None:
-            found.plot(output=options.output, **look)
+            played.plot(output=options.output, **look)
     if options.json:
-        print_json(found.to_dict())
+        print_json(played.to_dict())
     else:
-        for line in found.lines():
+        for line in played.lines():
             print_line(line)
     return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
 

@@ -93,7 +93,7 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _pace(state: dict[str, Any]) -> list[str]:
-    # What only some runs have to say.
+    # Return the lines that only some runs have to say.
     lines = list[str]()
     if state["cells_per_second"] is not None and state["result"] is None:
         left = datetime.timedelta(seconds=round(state["seconds_left"]))
@@ -138,11 +138,11 @@ def _volume(options: argparse.Namespace) -> int:
     from cspr_jax.api import volumes
     from cspr_jax.outputs.plots.selection import result_at
 
-    found = volumes.workspace_volume(result_at(options.path))
+    volume = volumes.workspace_volume(result_at(options.path))
     if options.json:
-        print_json(found.to_dict())
+        print_json(volume.to_dict())
     else:
-        for line in found.lines():
+        for line in volume.lines():
             print_line(line)
     return ExitCode.DONE
 

@@ -66,7 +66,7 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
 
 
 def _add(parent: ElementTree.Element, tag: str, **attributes) -> ElementTree.Element:
-    # Words as they are, numbers with all their digits; no -0.
+    # Words are written as they are, numbers with all their digits; there is no -0.
     text = {
         name: value if isinstance(value, str) else " ".join(repr(float(x) + 0.0) for x in np.ravel(value))
         for name, value in attributes.items()
@@ -86,11 +86,11 @@ def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: flo
         effector = _add(world, "body", name="effector", pos=start, quat=moved.coordinates(())[0][0, 3:])
         _add(effector, "freejoint", name="pose")
     radius = MASS_RADIUS * size
-    # What does not turn may have any inertia but none.
+    # An end effector that does not turn may have any inertia, but it must have one.
     moments, axes = _principal(0.4 * body.mass * radius**2 * np.eye(3) if body.inertia is None else body.inertia)
     quaternion = np.roll(axes.as_quat(), 1)
     _add(effector, "inertial", pos=np.zeros(3), mass=body.mass, diaginertia=moments, quat=quaternion)
-    # What is drawn has neither weight nor contacts.
+    # Drawn bodies have neither weight nor contacts.
     drawn = {"rgba": ORANGE, "contype": "0", "conaffinity": "0"}
     _add(effector, "geom", type="sphere", size=radius, **drawn)
     for point in np.unique(body.points, axis=0):

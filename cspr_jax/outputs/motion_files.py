@@ -51,7 +51,7 @@ _FIELDS = {
 LARGEST_ROWS = 20_000_000
 # Rows of the flight of a released object.
 FLIGHT_ROWS = 101
-# What may be infinite on the way of a motion that is finite.
+# Quantities that may be infinite along the way although the motion itself is finite.
 OPEN = ("tension", "tension_residual", "tension_each", "tension_couple", "path_acceleration")
 # A tick that lies so near to the end of a segment, in parts of a tick, is that end.
 SAME_TICK = 1e-6
@@ -131,7 +131,7 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
     duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     is_redundant = plan.problem.robot.n_cables > plan.problem.robot.dof
-    # Of other motions nothing depends on limits, and which there are decides what is compiled.
+    # Other motions do not depend on limits, and which limits there are decides what is compiled.
     needs_limits = is_redundant or any(isinstance(motion, TimedLine) for motion in motions)
     limits = plan.problem.limits if needs_limits else NO_LIMITS
     with_couples = is_redundant and is_rectangle(plan.problem.robot.base_points)
@@ -140,10 +140,10 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
     for i, tau in enumerate(taus):
         # Segments of one length are compiled once.
         padded = np.concatenate([tau, np.ones(longest - len(tau))])
-        some = _states(
+        states_of_segment = _states(
             plan.problem.robot, limits, motions[i], padded, rule=plan.keys.tension_rule, with_couples=with_couples
         )
-        state, of_cables = jax.tree.map(np.asarray, some)
+        state, of_cables = jax.tree.map(np.asarray, states_of_segment)
         state = outward(plan.frame, state)
         part = {name: getattr(state, field) for name, field in _FIELDS.items()} | of_cables
         part = {name: None if values is None else values[: len(tau)] for name, values in part.items()}
@@ -177,7 +177,7 @@ def write_rows(plan: PlannedMotions, path: Path, *, rate: float | None = None) -
 
 
 def _feasible_rows(plan: PlannedMotions, t: np.ndarray) -> np.ndarray:
-    # Of each row, whether its segment is feasible; a row at a boundary belongs to both.
+    # Tell for each row whether its segment is feasible; a row at a boundary belongs to both segments.
     ends = np.cumsum(plan.answers.duration)
     before, after = (np.searchsorted(ends, t, side).clip(max=len(ends) - 1) for side in ("left", "right"))
     good = plan.is_feasible
@@ -252,16 +252,16 @@ def flight(plan: PlannedMotions) -> dict[str, np.ndarray]:
     Returns:
         by the names of `schema.motion_quantities.FLIGHT`, in the axes of the robot file; none without a launch.
     """
-    own = released(plan)
-    if own is None or not np.isfinite(own.flight_time):
+    launch = released(plan)
+    if launch is None or not np.isfinite(launch.flight_time):
         return {}
-    time = np.linspace(0.0, own.flight_time, FLIGHT_ROWS)
+    time = np.linspace(0.0, launch.flight_time, FLIGHT_ROWS)
     down = plan.frame.turned(np.array([0.0, 0.0, float(plan.problem.robot.gravity)]))
-    position = own.position + own.velocity * time[:, None] + 0.5 * down * time[:, None] ** 2
-    columns = {"flight_t": own.time + time, "flight_position": position}
-    if own.scatter is not None:
-        count = len(own.scatter.landings)
-        columns |= {"throw": np.arange(1.0, count + 1.0), "landing": own.scatter.landings}
+    position = launch.position + launch.velocity * time[:, None] + 0.5 * down * time[:, None] ** 2
+    columns = {"flight_t": launch.time + time, "flight_position": position}
+    if launch.scatter is not None:
+        count = len(launch.scatter.landings)
+        columns |= {"throw": np.arange(1.0, count + 1.0), "landing": launch.scatter.landings}
     return columns
 
 

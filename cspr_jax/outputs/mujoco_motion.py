@@ -21,8 +21,8 @@ from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.patterns import PATTERNS
 
 STEP = 0.0005  # s, the longest that MuJoCo takes unless it is told another one
-# Of normalised time: rows at a jump are taken so far to either side of it, and jumps that are nearer to each other than
-# the other are one.
+# Parts of normalised time: rows at a jump are taken the first of them to either side of it, and jumps that are nearer
+# to each other than the second are one.
 BESIDE, ONE_JUMP = 4e-15, 1e-9
 _SIGNS = {"up": (1.0, 1.0, 1.0), "down": (1.0, -1.0, -1.0)}
 
@@ -139,7 +139,7 @@ def suspended(plan: PlannedMotions) -> Suspended:
         points = world.turned(plan.frame.turned(np.asarray(robot.platform_points)))
         inertia = world.turned_tensor(plan.frame.turned_tensor(np.asarray(robot.inertia)))
     limits = [getattr(keys, "tension_max", None) for keys in (plan.keys, written)]
-    limit = next((given for given in limits if given is not None), np.inf)
+    limit = next((value for value in limits if value is not None), np.inf)
     return Suspended(
         name=plan.robot_file.name,
         z_axis=plan.robot_file.z_axis,
@@ -205,16 +205,16 @@ def in_world(columns: Mapping[str, np.ndarray], segment: np.ndarray, z_axis: str
 
 
 def _instants(plan: PlannedMotions, step: float) -> tuple[list[np.ndarray], np.ndarray]:
-    # Normalised times of each segment, and all times: rows on either side of a jump have the same.
+    # Return the normalised times of each segment, and all times: rows on either side of a jump have the same time.
     taus, times, start = [], [], 0.0
     for motion, length in zip(plan.motions, plan.answers.duration.tolist(), strict=True):
-        knots, own = [0.0], []
+        knots, taus_of_motion = [0.0], []
         for knot in sorted(np.asarray(motion.breaks()).tolist()):
             knots += [knot] if knots[-1] + ONE_JUMP < knot < 1.0 - ONE_JUMP else []
         for first, last in itertools.pairwise([*knots, 1.0]):
             tau = np.linspace(first, last, 2 * math.ceil((last - first) * length / step) + 1)
             times.append(start + tau * length)
-            own.append(np.clip(tau, first + BESIDE * (first > 0.0), last - BESIDE * (last < 1.0)))
-        taus.append(np.concatenate(own))
+            taus_of_motion.append(np.clip(tau, first + BESIDE * (first > 0.0), last - BESIDE * (last < 1.0)))
+        taus.append(np.concatenate(taus_of_motion))
         start += length
     return taus, np.concatenate(times)

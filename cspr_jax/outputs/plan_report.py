@@ -56,7 +56,7 @@ def verdict_text(verdict: int, feasible: bool) -> str:
     return "feasible" if feasible else Verdict(int(verdict)).text
 
 
-# What only some families or robots have.
+# Fields that only some families or robots have.
 _OF_SOME = (
     "oscillations",
     "envelope_oscillations",
@@ -77,7 +77,7 @@ _OF_SOME = (
 
 
 def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
-    answers, asked = plan.answers, plan.demands
+    answers, demands = plan.answers, plan.demands
     arcs = int(answers.arcs[i])
     fields = {
         "from": i,
@@ -86,31 +86,31 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
         "arcs": arcs or None,
         "tried_arcs": int(answers.tried_arcs[i]),
         "duration": float(answers.duration[i]),
-        "tension_min": float(asked.tension_min[i]),
-        "tension_max": float(asked.tension_max[i]),
-        "mu_min": float(asked.mu_min[i]),
+        "tension_min": float(demands.tension_min[i]),
+        "tension_max": float(demands.tension_max[i]),
+        "mu_min": float(demands.mu_min[i]),
         "margin": float(answers.margin[i]),
         "margin_bound": float(answers.margin_bound[i]),
         "limit_margin": float(answers.limit_margin[i]),
         "tolerated": float(answers.tolerated[i]),
         "not_tolerated": float(answers.not_tolerated[i]),
         "tension_margin": _tension_margin(plan, i),
-        "det_sign_constant": bool(asked.depth_min[i] > 0.0),
+        "det_sign_constant": bool(demands.depth_min[i] > 0.0),
         "verdict": verdict_text(answers.verdict[i], bool(plan.is_feasible[i])),
         "cause": None if plan.is_feasible[i] else [cause.to_dict() for cause in plan.causes[i]],
         "fewer_arcs_undecided": bool(answers.verdict[i] & Verdict.FEWER_ARCS_UNDECIDED),
         "feasible_at_infinity": float(answers.feasible_at_infinity[i]),
-        "z_lowest": float(asked.lowest[i]),
-        "cable_length_max": float(asked.length_max[i]),
-        "cable_speed_max": float(asked.speed_max[i]),
-        "cable_acceleration_max": float(asked.acceleration_max[i]),
-        "samples": int(asked.samples[i]),
+        "z_lowest": float(demands.lowest[i]),
+        "cable_length_max": float(demands.length_max[i]),
+        "cable_speed_max": float(demands.speed_max[i]),
+        "cable_acceleration_max": float(demands.acceleration_max[i]),
+        "samples": int(demands.samples[i]),
     }
     return fields | dict.fromkeys(_OF_SOME) | plan.details(i)
 
 
 def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
-    # Of platforms on redundant cables, N: the margin is over the weight a cable.
+    # The margin of a platform on redundant cables is a multiple of the weight per cable; this one is in N.
     robot = plan.problem.robot
     if not plan.robot_file.is_platform or robot.n_cables == robot.dof:
         return None
@@ -157,7 +157,7 @@ Column = Callable[[dict[str, Any]], str]
 def _places(plan: PlannedMotions) -> dict[str, Column]:
     def position(segment: dict[str, Any]) -> str:
         pose = plan.keys.pose[segment["to"]]
-        # Where a launch ends follows from it: nobody gives that place.
+        # The end of a launch follows from the launch: nobody gives that place.
         digits = DIGITS if pose.rest or pose.position is not None else 4
         return f"({', '.join(f'{round(value, DIGITS) + 0.0:.{digits}g}' for value in plan.points[segment['to']])})"
 
@@ -165,7 +165,7 @@ def _places(plan: PlannedMotions) -> dict[str, Column]:
 
 
 def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
-    # Of lines their times. Oscillations are counted where every segment has them.
+    # Lines show their times. Oscillations are counted where every segment has them.
     lines = all(segment["active"] is not None for segment in segments)
     beziers = all(segment["control_points"] is not None for segment in segments)
     swings = all(segment["inclination"] is not None for segment in segments)
@@ -239,12 +239,12 @@ def _caption(plan: PlannedMotions) -> str:
 
 def _causes(plan: PlannedMotions) -> str:
     # A line for each segment that is not feasible, after its number in the table.
-    lines = [(i + 1, [cause.text for cause in own]) for i, own in enumerate(plan.causes) if own]
+    lines = [(i + 1, [cause.text for cause in causes]) for i, causes in enumerate(plan.causes) if causes]
     return "".join(f"\nto {to}: {'; '.join(words)}" for to, words in lines)
 
 
 def _launch(launch: dict[str, Any] | None) -> str:
-    # Of an object that is released, a line of its own; another one of where throws land.
+    # A released object gets a line of its own; a second line says where throws land.
     if launch is None:
         return ""
     release = launch["release"]
@@ -257,9 +257,9 @@ def _launch(launch: dict[str, Any] | None) -> str:
     line = f"\nreleased after {release['time']:.4f} s at ({places[0]}) m with {speed:.3f} m/s"
     line += f"; lands {launch['flight_time']:.4f} s later at ({places[1]}) m"
     if "scatter" in launch:
-        found = launch["scatter"]
-        sizes = [1e3 * found[name] for name in ("mean_error", "standard_deviation")]
-        line += f"\n{found['throws']} throws land {sizes[0]:.2f} ± {sizes[1]:.2f} mm from the target"
+        scatter = launch["scatter"]
+        sizes = [1e3 * scatter[name] for name in ("mean_error", "standard_deviation")]
+        line += f"\n{scatter['throws']} throws land {sizes[0]:.2f} ± {sizes[1]:.2f} mm from the target"
     return line
 
 

@@ -19,7 +19,7 @@ _LENT = threading.Lock()
 
 
 class PlayedPath(NamedTuple):
-    """Where MuJoCo goes.
+    """Path of MuJoCo's robot.
 
     Fields:
         position: (n, 3) of the mass centre, m.
@@ -80,7 +80,7 @@ class PlayedPlan:
         """
         cable = np.abs(self.tension_deviation).argmax(1)
         of_cables = np.abs(self.tension_deviation).max(1)
-        found = {
+        deviations = {
             "path": self._largest(self.path_deviation, "m"),
             "path_in_one_go": self._largest(self.through_deviation, "m"),
             "turn": self._largest(self.played.turned, "rad"),
@@ -88,7 +88,7 @@ class PlayedPlan:
             "tension": self._largest(of_cables, "N") | {"cable": int(cable[of_cables.argmax()]) + 1},
         }
         whole = {"robot": self.robot, "mujoco": self.mujoco, "duration": float(self.time[-1]), "steps": self.steps}
-        return whole | {"largest_deviation": found}
+        return whole | {"largest_deviation": deviations}
 
     def _largest(self, values: np.ndarray, units: str) -> dict[str, Any]:
         row = int(values.argmax())
@@ -101,19 +101,19 @@ class PlayedPlan:
         Returns:
             a line each.
         """
-        found = self.to_dict()["largest_deviation"]
+        deviations = self.to_dict()["largest_deviation"]
         text = [f"{self.robot}: {self.time[-1]:.2f} s in {self.steps} steps of MuJoCo {self.mujoco}"]
         for name, how in (("", "each segment from its start"), ("_in_one_go", "all in one go")):
-            far, turn = found[f"path{name}"], found[f"turn{name}"]
+            far, turn = deviations[f"path{name}"], deviations[f"turn{name}"]
             angle = f" and {two_digits(turn['value'])} rad" if self.played.turned.any() else ""
             text.append(f"path, {how}: at most {two_digits(far['value'])} m{angle} off the plan, {_place(far)}")
-        most = found["tension"]
+        most = deviations["tension"]
         text.append(f"tensions: at most {two_digits(most['value'])} N off, cable {most['cable']}, {_place(most)}")
         return text
 
 
-def _place(found: dict[str, Any]) -> str:
-    return f"at {found['t']:.2f} s in segment {found['segment']}"
+def _place(deviation: dict[str, Any]) -> str:
+    return f"at {deviation['t']:.2f} s in segment {deviation['segment']}"
 
 
 def need_mujoco() -> Any:
@@ -150,7 +150,7 @@ def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
     body, moved = suspended(plan), played(plan, step)
     rows, world = ends_of_steps(moved), upward(plan.robot_file.z_axis)
     ways = [way_of(body, moved, step, by_segment=by_segment) for by_segment in (True, False)]
-    own, through = (way._replace(position=world.turned(way.position)) for way in ways)
+    by_segment_path, through = (way._replace(position=world.turned(way.position)) for way in ways)
     return PlayedPlan(
         robot=plan.robot_file.name,
         z_axis=plan.robot_file.z_axis,
@@ -159,7 +159,7 @@ def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
         time=moved.time[rows],
         segment=moved.segment[rows],
         position=world.turned(moved.position[rows]),
-        played=own,
+        played=by_segment_path,
         through=through,
         tension=moved.tension[rows],
         tension_deviation=tension_deviation(body, moved),
@@ -179,7 +179,7 @@ def ends_of_steps(moved: Played) -> np.ndarray:
 
 
 def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> PlayedPath:
-    """Where the tensions of a motion take MuJoCo's robot, by its own integrator.
+    """Path on which the tensions of a motion take MuJoCo's robot, by its own integrator.
 
     Args:
         body: the robot.
@@ -195,7 +195,7 @@ def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bo
     """
     mujoco = need_mujoco()
     places, rates, _ = moved.coordinates(body.axes)
-    found, row = [], 0
+    coordinates, row = [], 0
 
     def pull(model: Any, data: Any) -> None:
         # RK4 asks at the start of a step, twice in its middle, and at its end.
@@ -209,12 +209,12 @@ def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bo
         for run in moved.runs():
             if by_segment and moved.segment[run.start] != moved.segment[run.start - 1]:
                 data.qpos[:], data.qvel[:] = places[run.start], rates[run.start]
-            found.append(data.qpos.copy())
+            coordinates.append(data.qpos.copy())
             for row in run[:-1:2]:
                 data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
                 mujoco.mj_step(model, data)
-                found.append(data.qpos.copy())
-    return _way(moved, np.array(found), body.axes)
+                coordinates.append(data.qpos.copy())
+    return _way(moved, np.array(coordinates), body.axes)
 
 
 @contextlib.contextmanager
@@ -229,14 +229,14 @@ def _callback_lent(mujoco: Any) -> Iterator[None]:
             mujoco.set_mjcb_control(before)
 
 
-def _way(moved: Played, found: np.ndarray, axes: Sequence[int]) -> PlayedPath:
+def _way(moved: Played, coordinates: np.ndarray, axes: Sequence[int]) -> PlayedPath:
     rows = ends_of_steps(moved)
     position, turned = moved.position[rows], np.zeros(len(rows))
     if moved.rotation is None:
-        position[:, list(axes)] = found
+        position[:, list(axes)] = coordinates
     else:
-        position[:] = found[:, :3]
-        turned = (moved.rotation[rows].inv() * Rotation.from_quat(np.roll(found[:, 3:], -1, axis=1))).magnitude()
+        position[:] = coordinates[:, :3]
+        turned = (moved.rotation[rows].inv() * Rotation.from_quat(np.roll(coordinates[:, 3:], -1, axis=1))).magnitude()
     return PlayedPath(position, turned)
 
 
@@ -258,11 +258,11 @@ def tension_deviation(body: Suspended, moved: Played) -> np.ndarray:
         model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
     rows = ends_of_steps(moved)
     data, (places, rates, accelerations) = mujoco.MjData(model), moved.coordinates(body.axes)
-    pulls, asked = np.empty((len(rows), model.nv, model.ntendon)), np.empty((len(rows), model.nv))
+    pulls, forces = np.empty((len(rows), model.nv, model.ntendon)), np.empty((len(rows), model.nv))
     for i, row in enumerate(rows.tolist()):
         data.qpos[:], data.qvel[:], data.qacc[:] = places[row], rates[row], accelerations[row]
         mujoco.mj_inverse(model, data)
         # A cable that shortens pulls.
-        pulls[i], asked[i] = -np.reshape(data.ten_J, (model.ntendon, model.nv)).T, data.qfrc_inverse
-    missing = asked - np.einsum("nij,nj->ni", pulls, moved.tension[rows])
+        pulls[i], forces[i] = -np.reshape(data.ten_J, (model.ntendon, model.nv)).T, data.qfrc_inverse
+    missing = forces - np.einsum("nij,nj->ni", pulls, moved.tension[rows])
     return np.einsum("nji,ni->nj", np.linalg.pinv(pulls), missing)

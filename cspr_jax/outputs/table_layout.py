@@ -46,7 +46,7 @@ class Cell:
 
     @property
     def differs(self) -> bool:
-        """Whether the computed number is not the printed one, by more than the rounding of the printed digits."""
+        """Tell whether the computed number differs from the printed one by more than the rounding of its digits."""
         if self.published is None:
             return False
         half = 0.5 * 10.0 ** -_decimals(self.printed)
@@ -73,12 +73,12 @@ def grid(
     blocks: list[Any] = []
     for name in variants:
         blocks += [terminal.cell(name, style="bold")] if name else []
-        own = [cell for cell in cells if cell.variant == name]
-        across = list(dict.fromkeys(cell.row if transposed else cell.column for cell in own))
+        cells_of_variant = [cell for cell in cells if cell.variant == name]
+        across = list(dict.fromkeys(cell.row if transposed else cell.column for cell in cells_of_variant))
         step = SIDE_BY_SIDE if len(across) > WIDEST else len(across)
         for first in range(0, len(across), step):
-            some = across[first : first + step]
-            part = [cell for cell in own if (cell.row if transposed else cell.column) in some]
+            heads_of_block = across[first : first + step]
+            part = [cell for cell in cells_of_variant if (cell.row if transposed else cell.column) in heads_of_block]
             blocks.append(_block(part, transposed, _HEADS | dict(heads)))
     return Group(terminal.cell(title, style="italic"), *blocks, terminal.cell(LEGEND, style="dim"))
 

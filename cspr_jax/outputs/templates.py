@@ -69,17 +69,17 @@ def sweep_template(kind: str) -> str:
     if kind not in MAP_KINDS:
         raise InputError("--map", kind, "one of " + ", ".join(MAP_KINDS))
     row = MAP_KINDS[kind]
-    every = _examples("map")
-    alike = (name for name, other in MAP_KINDS.items() if name in every and other.families == row.families)
-    values = dict(every[kind if kind in every else next(alike)], map=kind)
-    # What only other kinds have is refused.
+    examples = _examples("map")
+    alike = (name for name, other in MAP_KINDS.items() if name in examples and other.families == row.families)
+    values = dict(examples[kind if kind in examples else next(alike)], map=kind)
+    # Keys that only other kinds have are refused.
     refused = frozenset(key for other in MAP_KINDS.values() for key in other.keys) - frozenset(row.keys)
     for key in refused:
         table, _, name = key.partition(".")
         if not name:
             values.pop(table, None)
         elif isinstance(values.get(table), dict):
-            values[table] = {own: value for own, value in values[table].items() if own != name}
+            values[table] = {inner: value for inner, value in values[table].items() if inner != name}
     head = f"{row.description[:1].upper()}{row.description[1:]}."
     return f"# {head}\n" + _section("", SweepFile, values, refused)
 
@@ -98,9 +98,9 @@ def plan_template(family: str) -> str:
     """
     if family not in FAMILIES:
         raise InputError("--family", family, "one of " + ", ".join(FAMILIES))
-    every = _examples("family")
-    alike = (name for name, other in FAMILIES.items() if name in every and other.legs == FAMILIES[family].legs)
-    values = dict(every[family if family in every else next(alike)], family=family)
+    examples = _examples("family")
+    alike = (name for name, other in FAMILIES.items() if name in examples and other.legs == FAMILIES[family].legs)
+    values = dict(examples[family if family in examples else next(alike)], family=family)
     refused = frozenset(key for key, families in OWN.items() if family not in families)
     values = {key: value for key, value in values.items() if key not in refused}
     head = f"A plan: {FAMILIES[family].description}."
@@ -136,17 +136,17 @@ def write_new(path: Path, text: str) -> Path:
 
 
 def _examples(key: str) -> dict[str, dict[str, Any]]:
-    # By map or family, the first of each; those of one family and a few keys first.
+    # Return by map or family the first example of each; those of one family and a few keys come first.
     files = [tomllib.loads(path.read_text("utf-8")) for path in sorted(folder().glob("*.toml"))]
     kind = [values for values in files if key in values and ("pose" in values) == (key == "family")]
-    found: dict[str, dict[str, Any]] = {}
+    examples: dict[str, dict[str, Any]] = {}
     for values in sorted(kind, key=lambda values: len(str(values))):
-        found.setdefault(values[key], values)
-    return found
+        examples.setdefault(values[key], values)
+    return examples
 
 
 def _section(at: str, model: type[Table], values: Mapping[str, Any], refused: frozenset[str]) -> str:
-    # Plain keys first: behind the head of a table they would be its own.
+    # Plain keys come first: behind the head of a table they would be keys of the table.
     plain, tables = [], []
     for name in _ordered(model):
         field = model.model_fields[name]
@@ -169,7 +169,7 @@ def _tables(key: str, field: FieldInfo, model: type[Table], value: Any, refused:
     if key == MANY:
         each = value or [{}]
         first = f"\n[[{key}]]\n{_section(key, model, each[0], refused)}"
-        rest = [f"\n[[{key}]]\n" + "".join(f"{k} = {value_text(v)}\n" for k, v in own.items()) for own in each[1:]]
+        rest = [f"\n[[{key}]]\n" + "".join(f"{k} = {value_text(v)}\n" for k, v in entry.items()) for entry in each[1:]]
         return first + "".join(rest)
     head = f"[{key}]" if value else f"# [{key}]"
     return f"\n{head}  # {_default(field)}\n{_section(key, model, value or {}, refused)}"
@@ -194,7 +194,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def _model(annotation: Any) -> type[Table] | None:
-    # The table that a key holds: itself, or among the choices.
+    # Return the table that a key holds, itself or among its choices.
     if isinstance(annotation, type) and issubclass(annotation, Table):
         return annotation
-    return next((found for own in get_args(annotation) if (found := _model(own)) is not None), None)
+    return next((table for choice in get_args(annotation) if (table := _model(choice)) is not None), None)

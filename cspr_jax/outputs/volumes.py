@@ -57,7 +57,7 @@ class WorkspaceVolume:
         Returns:
             a line for each value of the other axes.
         """
-        found = []
+        texts = []
         for place in np.ndindex(self.volume.shape):
             at = ", ".join(
                 f"{name} {points[i]:.6g}" for (name, points), i in zip(self.axes.items(), place, strict=True)
@@ -70,8 +70,8 @@ class WorkspaceVolume:
                 )
             if self.undecided_fraction[place] > 0.0:
                 text += f"; {100.0 * self.undecided_fraction[place]:.4g} % of the grid undecided"
-            found.append(f"{at}: {text}" if at else text)
-        return found
+            texts.append(f"{at}: {text}" if at else text)
+        return texts
 
 
 def volume_of(result: Result) -> WorkspaceVolume:
@@ -98,7 +98,7 @@ def volume_of(result: Result) -> WorkspaceVolume:
 
     def placed(name: str) -> np.ndarray:
         values = result.data[name].transpose(*others, *order)
-        # Of places that have only one coordinate here there is one cell.
+        # A coordinate of places that has one value here has one cell along its axis.
         singles = tuple(i for i, k in enumerate(others) if names[k] in axes)
         return values.squeeze(axis=singles)
 
@@ -123,7 +123,7 @@ def volume_of(result: Result) -> WorkspaceVolume:
 
 
 def _widths(points: np.ndarray, name: str) -> np.ndarray:
-    # Of the parts of an axis that its points stand for.
+    # Return the widths of the parts of an axis that its points stand for.
     order = np.argsort(points)
     gaps = np.diff(points[order])
     widths = np.empty(len(points))
@@ -132,18 +132,18 @@ def _widths(points: np.ndarray, name: str) -> np.ndarray:
 
 
 def _weights(widths: list[np.ndarray]) -> np.ndarray:
-    found = widths[0]
+    weights = widths[0]
     for more in widths[1:]:
-        found = found[..., None] * more
-    return found
+        weights = weights[..., None] * more
+    return weights
 
 
 def _at_border(inside: np.ndarray, count: int) -> np.ndarray:
-    # Cells with a neighbour, along one of the last axes, on the other side.
-    found = np.zeros(inside.shape, bool)
+    # Mark the cells with a neighbour, along one of the last axes, on the other side.
+    at_border = np.zeros(inside.shape, bool)
     for axis in range(inside.ndim - count, inside.ndim):
-        values, border = np.moveaxis(inside, axis, 0), np.moveaxis(found, axis, 0)
+        values, border = np.moveaxis(inside, axis, 0), np.moveaxis(at_border, axis, 0)
         differs = values[1:] != values[:-1]
         border[1:] |= differs
         border[:-1] |= differs
-    return found
+    return at_border

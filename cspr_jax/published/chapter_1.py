@@ -32,7 +32,7 @@ def _horizontal(amplitude: Amplitude, w: Array) -> float:
 
 
 def _weights(name: str, direction: list[float]) -> Array:
-    # Of a robot of the catalogue, for a target on the level of p0, whatever z0.
+    # Return the weights of a robot of the catalogue for a target on the level of p0; they are the same whatever z0.
     path = CATALOGUE / f"{name}.toml"
     robot = kernel_robot(read_robot(path), TrajectoryKeys(), path)
     radius = np.linalg.norm(np.asarray(robot.base_points)[0, :2])

@@ -116,10 +116,10 @@ def attained(
     sizes = [len(angles) for _, angles in sets]
     places = np.repeat([place for place, _ in sets], sizes, axis=0)
     symmetry = symmetries(checker.problem.robot)
-    every = np.concatenate([angles for _, angles in sets])
+    orientations = np.concatenate([angles for _, angles in sets])
     z0 = places[:, 2]
     how = {"max_arcs": choice.max_arcs, "values": choice.values}
-    good = attainable.attained(checker, places, every, z0, tried=tried, symmetry=symmetry, **how)
+    good = attainable.attained(checker, places, orientations, z0, tried=tried, symmetry=symmetry, **how)
     return np.split(good, np.cumsum(sizes)[:-1])
 
 
@@ -154,8 +154,8 @@ def attained_there(
     """
     run = np.cumsum(sizes(sets)) // TOGETHER
     with double_precision():
-        own = [[sets[k] for k in np.flatnonzero(run == number)] for number in np.unique(run)]
-        return [good for some in own for good in attained(checker_of(amplitude), some, choice=choice, tried=tried)]
+        groups = [[sets[k] for k in np.flatnonzero(run == number)] for number in np.unique(run)]
+        return [good for group in groups for good in attained(checker_of(amplitude), group, choice=choice, tried=tried)]
 
 
 def sizes(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
@@ -187,13 +187,13 @@ def table_3_3(choice: TableSettings, workers: int = 1) -> dict[Key, float | None
     with Spread(workers) as spread:
         for amplitude, definition in itertools.product(choice.amplitudes, choice.definitions):
             with within(f"{amplitude}, {definition}"):
-                # All at once: full batches.
-                asked = [(place, n) for n in steps for place in places]
-                sets = spread(partial(accessible_there, amplitude, definition), asked, [n**3 for _, n in asked])
-                angles = [(place, inside.angles) for (place, _), inside in zip(asked, sets, strict=True)]
+                # All sets go together, so that batches are full.
+                requests = [(place, n) for n in steps for place in places]
+                sets = spread(partial(accessible_there, amplitude, definition), requests, [n**3 for _, n in requests])
+                angles = [(place, inside.angles) for (place, _), inside in zip(requests, sets, strict=True)]
                 masks = spread(partial(attained_there, amplitude, choice, None), angles, sizes(angles))
-            every = [_cells(inside, good) for inside, good in zip(sets, masks, strict=True)]
-            for row, fine, coarse in zip(PLACES, every[: len(places)], every[len(places) :], strict=True):
+            rows = [_cells(inside, good) for inside, good in zip(sets, masks, strict=True)]
+            for row, fine, coarse in zip(PLACES, rows[: len(places)], rows[len(places) :], strict=True):
                 errors = {f"{column}, error": abs(fine[column] - coarse[column]) for column in list(fine)[2:]}
                 cells |= {(row, column, variant(definition, amplitude)): x for column, x in (fine | errors).items()}
     return cells

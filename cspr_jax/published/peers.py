@@ -61,7 +61,7 @@ def grids() -> list[PoseGrid]:
     """
     level = _product(np.linspace(-4.0, 4.0, 81), np.linspace(-3.0, 3.0, 61), np.array([2.0, 3.0, 4.0]))
     turned = np.repeat(_turns(np.deg2rad([[30.0, -30.0, 5.0]])), len(level), axis=0)
-    found = [
+    studies = [
         PoseGrid(f"{name}, closure", robot, CLOSURE, level, turned)
         for name, robot in (("IPAnema 2", "ipanema-2"), ("IPAnema 2, set IROS 2016", "ipanema-2-iros"))
     ]
@@ -69,11 +69,11 @@ def grids() -> list[PoseGrid]:
     poses = _product(*[np.linspace(-end, end, count) for end, count in zip(ends, steps, strict=True)])
     poses[:, 2] += 1.0
     for condition in (FEASIBLE, STATIC, CLOSURE):
-        found.append(PoseGrid(f"IPAnema 1, {condition}", "ipanema-1", condition, poses[:, :3], _turns(poses[:, 3:])))
+        studies.append(PoseGrid(f"IPAnema 1, {condition}", "ipanema-1", condition, poses[:, :3], _turns(poses[:, 3:])))
     cube = _product(np.linspace(-6.0, 6.0, 10), np.linspace(-4.0, 4.0, 10), np.linspace(0.0, 4.0, 10))
     still = np.repeat(_turns(np.zeros((1, 3))), len(cube), axis=0)
-    found += [PoseGrid(f"CoGiRo, {condition}", "cogiro", condition, cube, still) for condition in (FEASIBLE, STATIC)]
-    return found
+    studies += [PoseGrid(f"CoGiRo, {condition}", "cogiro", condition, cube, still) for condition in (FEASIBLE, STATIC)]
+    return studies
 
 
 def peers() -> dict[Key, float | None]:
@@ -94,21 +94,21 @@ def peers() -> dict[Key, float | None]:
 
 def _row(grid: PoseGrid) -> dict[str, float]:
     robot = load_robot(grid.robot)
-    own, frame = centred(robot)
-    asked = requirement(own, grid.condition, robot.limits if grid.condition == FEASIBLE else Limits())
+    centred_robot, frame = centred(robot)
+    demand = requirement(centred_robot, grid.condition, robot.limits if grid.condition == FEASIBLE else Limits())
     turns = frame.turned_quaternions(grid.quaternions)
-    places = mass_centres(own, np.asarray(frame.inward(grid.positions)), turns)
+    places = mass_centres(centred_robot, np.asarray(frame.inward(grid.positions)), turns)
     start = time.perf_counter()
-    search = WorkspaceSearch(own, asked)
+    search = WorkspaceSearch(centred_robot, demand)
     answers = search(places, turns)
     count, seconds = len(places), time.perf_counter() - start
-    some = np.linspace(0, count - 1, min(SAMPLE, count)).astype(int)
-    matrices = np.asarray(geometry.wrench_matrices(own, places[some], turns[some]))
+    sample = np.linspace(0, count - 1, min(SAMPLE, count)).astype(int)
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places[sample], turns[sample]))
     matrices = matrices / search.unit[:, None]
     wrench = search.required(places[0], turns[0]).corners[0]
-    limits = (None, None) if grid.condition == CLOSURE else (asked.low, asked.high)
-    inside, clear = answers.verdict[some] == 0, np.abs(answers.margin[some]) > CLOSE * _size(asked)
-    found = {
+    limits = (None, None) if grid.condition == CLOSURE else (demand.low, demand.high)
+    inside, clear = answers.verdict[sample] == 0, np.abs(answers.margin[sample]) > CLOSE * _size(demand)
+    numbers = {
         "poses": float(count),
         "inside": float((answers.verdict == 0).sum()),
         "on the boundary": float((answers.verdict == Verdict.UNDECIDED).sum()),
@@ -117,11 +117,11 @@ def _row(grid: PoseGrid) -> dict[str, float]:
     for name, way in (("HiGHS", by_program), ("NNLS", by_squares)):
         start = time.perf_counter()
         verdicts = np.array([way(matrix, wrench, *limits) for matrix in matrices])
-        found[f"us, {name}"] = MICRO * (time.perf_counter() - start) / len(some)
-        found[f"differ, {name}"] = float(((verdicts != inside) & clear).sum())
-    return found
+        numbers[f"us, {name}"] = MICRO * (time.perf_counter() - start) / len(sample)
+        numbers[f"differ, {name}"] = float(((verdicts != inside) & clear).sum())
+    return numbers
 
 
-def _size(asked: Requirement) -> float:
-    finite = asked.high[np.isfinite(asked.high)]
-    return 1.0 if asked.condition == CLOSURE else float(max([*asked.low, *finite, asked.wrenches.size]))
+def _size(demand: Requirement) -> float:
+    finite = demand.high[np.isfinite(demand.high)]
+    return 1.0 if demand.condition == CLOSURE else float(max([*demand.low, *finite, demand.wrenches.size]))

@@ -46,25 +46,25 @@ def smallest_proportions(
     Returns:
         a part an annulus.
     """
-    preferred, some, rest = attainable.turns(values)
+    preferred, likely, rest = attainable.turns(values)
     sets = [one for annulus in annuli for one in annulus]
     owner = np.repeat(np.arange(len(annuli)), [len(annulus) for annulus in annuli])
     good = attained(sets, preferred)
-    shares = np.array([own.mean() for own in good])
+    shares = np.array([mask.mean() for mask in good])
     smallest = np.ones(len(annuli))
-    # All values at the place of each annulus with the smallest share so far; then, turn by turn, where less is attained
-    # than there. All annuli at once: no process waits for the end of one.
-    every, rising = np.arange(len(sets)), np.argsort(shares, kind="stable")
+    # All values are tried at the place of each annulus with the smallest share so far; then, turn by turn, where less
+    # is attained than there. All annuli go together, so that no process waits for the end of one.
+    all_sets, rising = np.arange(len(sets)), np.argsort(shares, kind="stable")
     only = rising[np.unique(owner[rising], return_index=True)[1]]
-    for which, tried in ((only, some), (only, rest), (every, some), (every, rest)):
-        left = which[shares[which] < smallest[owner[which]]].tolist()
+    for candidates, tried in ((only, likely), (only, rest), (all_sets, likely), (all_sets, rest)):
+        left = candidates[shares[candidates] < smallest[owner[candidates]]].tolist()
         if left:
-            found = attained([(sets[k][0], sets[k][1][~good[k]]) for k in left], tried)
-            for k, own in zip(left, found, strict=True):
-                good[k][~good[k]] = own
+            masks = attained([(sets[k][0], sets[k][1][~good[k]]) for k in left], tried)
+            for k, mask in zip(left, masks, strict=True):
+                good[k][~good[k]] = mask
                 shares[k] = good[k].mean()
         if tried is rest:
-            np.minimum.at(smallest, owner[which], shares[which])
+            np.minimum.at(smallest, owner[candidates], shares[candidates])
     return smallest.tolist()
 
 
@@ -87,10 +87,10 @@ def table_3_4(choice: TableSettings, workers: int = 1) -> dict[Key, float | None
                 return spread(partial(attained_there, amplitude, choice, tried), sets, sizes(sets))
 
             with within(f"{amplitude}, {definition}"):
-                asked = [[(place, divisions) for place in _places(amplitude, depth)] for depth in _DEPTHS]
-                every = list(itertools.chain(*asked))
-                inside = iter(spread(partial(accessible_there, amplitude, definition), every, [1] * len(every)))
-                annuli = [[(place, next(inside).angles) for place, _ in annulus] for annulus in asked]
+                requests = [[(place, divisions) for place in _places(amplitude, depth)] for depth in _DEPTHS]
+                places = list(itertools.chain(*requests))
+                inside = iter(spread(partial(accessible_there, amplitude, definition), places, [1] * len(places)))
+                annuli = [[(place, next(inside).angles) for place, _ in annulus] for annulus in requests]
                 smallest = smallest_proportions(attained, annuli, choice.values)
             for depth, part in zip(_DEPTHS, smallest, strict=True):
                 cells[f"{depth:g}", "proportion", variant(definition, amplitude)] = 100.0 * part
@@ -98,7 +98,7 @@ def table_3_4(choice: TableSettings, workers: int = 1) -> dict[Key, float | None
 
 
 def _places(amplitude: str, depth: float) -> list[np.ndarray]:
-    # Those of the annulus that no symmetry of the robot makes another one of.
+    # Return the places of the annulus, but one only of those that symmetries of the robot map onto each other.
     robot = checker_of(amplitude).problem.robot
     azimuths = np.unique(np.round(folded(symmetries(robot), _AZIMUTHS), 9))
     return [

@@ -211,15 +211,15 @@ def chosen(name: str, given: dict[str, Any]) -> TableSettings | None:
         return None
     usual = TableSettings()
 
-    def every(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
+    def values_of(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
         value, known = given[option], tuple(names)
         if value not in (None, "all", *known):
             raise ConfigError(option, f"{shown(value)}: must be one of {', '.join(known)}, all")
         return otherwise if value is None else known if value == "all" else (value,)
 
     return TableSettings(
-        every("--definition", chapter_3.DEFINITIONS, usual.definitions),
-        every("--amplitude", chapter_3.AMPLITUDES, usual.amplitudes),
+        values_of("--definition", chapter_3.DEFINITIONS, usual.definitions),
+        values_of("--amplitude", chapter_3.AMPLITUDES, usual.amplitudes),
         2 if given["--fine"] else 1,
         _count("--max-arcs", given["--max-arcs"], usual.max_arcs, LARGEST_ARCS),
         _count("--values", given["--values"], usual.values, LARGEST_VALUES),

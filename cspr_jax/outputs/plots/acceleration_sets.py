@@ -18,7 +18,7 @@ from cspr_jax.robots.wrench_sets import spanning, tension_range
 from cspr_jax.store.result import Result
 from cspr_jax.workspaces.acceleration_search import faces_of, judged
 
-# Rows looked at together: of many cables the faces of all would not fit into memory.
+# Rows that are looked at together: with many cables the faces of all rows would not fit into memory.
 ROWS = 1 << 14
 
 
@@ -92,8 +92,8 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         fault = f'"acceleration" of {robot_file.kind}'
         raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", fault=fault)
     place, words = None, ""
-    for axis, wanted in at.items():
-        place, words = nearest(result, axis, wanted)  # it refuses all but t
+    for axis, instant in at.items():
+        place, words = nearest(result, axis, instant)  # it refuses all but t
     with double_precision():
         robot, frame = (
             kernel_robot(robot_file, keys, file, any_cables=True),
@@ -130,11 +130,11 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
 
 
 def _tightest(robot: PointMassRobot, limits: Limits, positions: np.ndarray, motion: np.ndarray) -> int:
-    # The row with the smallest margin.
+    # Return the row with the smallest margin.
     margins = []
     for first in range(0, len(positions), ROWS):
-        here, asked = positions[first : first + ROWS], motion[first : first + ROWS]
-        margins.append(judged(robot, faces_of(robot, limits, here), here, asked)[0])
+        here, accelerations = positions[first : first + ROWS], motion[first : first + ROWS]
+        margins.append(judged(robot, faces_of(robot, limits, here), here, accelerations)[0])
     return int(np.nanargmin(np.concatenate(margins)))
 
 

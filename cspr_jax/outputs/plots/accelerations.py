@@ -23,7 +23,7 @@ from cspr_jax.store.result import Result
 X, Y, UP = np.eye(3)
 # Level parts of vectors below this, over gravity or the size of a normal, have no direction.
 LEVEL = 1e-6
-# Corners so far away, in sizes of what else is there, are not waited for.
+# Corners that are farther away than this, in sizes of all else in the picture, do not widen it.
 FAR = 2.0
 _INSIDE: dict[str, Any] = {"facecolor": COLOURS[5], "alpha": 0.3, "linewidth": 0.0}
 _FACE: dict[str, Any] = {"color": "black", "linewidth": 1.2}
@@ -78,38 +78,38 @@ def acceleration_figure(result: Result, file: str, at: dict[str, float]) -> Figu
         InputError: a platform, a file without its robot, no such instant, or cables that do not span the space there.
         ConfigError: a mistake in the plan that the file keeps.
     """
-    found = acceleration_set(result, file, at)
-    views = _views(found)
+    region = acceleration_set(result, file, at)
+    views = _views(region)
     size = (6.6, 6.0) if len(views) == 1 else (4.2 * len(views), 5.8 if doubt(result) else 5.4)
     figure = Figure(figsize=size, layout="constrained")
     legend: dict[str, Artist] = {}
     for panel, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
-        legend |= _draw(panel, found, view, 1.3 if len(views) == 1 else 1.0)
+        legend |= _draw(panel, region, view, 1.3 if len(views) == 1 else 1.0)
     figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4)
-    place = f"at ({', '.join(f'{number:.4g}' for number in found.position)}) m"
-    margin = f"margin {found.margin:.3g} m/s² to the face of {found.names[found.nearest]}"
+    place = f"at ({', '.join(f'{number:.4g}' for number in region.position)}) m"
+    margin = f"margin {region.margin:.3g} m/s² to the face of {region.names[region.nearest]}"
     axis = f"z axis {result.attributes.get('z_axis', 'down')}"
     title = f"{robot_name(result)}: feasible accelerations"
-    figure.suptitle(f"{title}\n{found.words}, {place}, {axis}\n{margin}{doubt(result)}")
+    figure.suptitle(f"{title}\n{region.words}, {place}, {axis}\n{margin}{doubt(result)}")
     return figure
 
 
-def _views(found: AccelerationSet) -> list[AccelerationView]:
+def _views(region: AccelerationSet) -> list[AccelerationView]:
     upward = "upward acceleration (m/s²)"
-    if found.is_planar:
+    if region.is_planar:
         labels = ("level acceleration, along x (m/s²)", upward)
-        return [AccelerationView("", Plane(found.actual, X, UP), labels, holds_rest=True, across_face=True)]
-    across = _level(-found.normals[found.nearest], 1.0)
-    along = _level(found.actual, -found.falling[2])
+        return [AccelerationView("", Plane(region.actual, X, UP), labels, holds_rest=True, across_face=True)]
+    across = _level(-region.normals[region.nearest], 1.0)
+    along = _level(region.actual, -region.falling[2])
 
     def vertical(title: str, way: np.ndarray, **others: bool) -> AccelerationView:
         label = f"level acceleration, azimuth {np.degrees(np.arctan2(way[1], way[0])):.3g}° (m/s²)"
-        return AccelerationView(f"vertical, {title}", Plane(found.actual, way, UP), (label, upward), **others)
+        return AccelerationView(f"vertical, {title}", Plane(region.actual, way, UP), (label, upward), **others)
 
     labels = ("acceleration along x (m/s²)", "acceleration along y (m/s²)")
-    height = f"{found.actual[2] if abs(found.actual[2]) > LEVEL * abs(found.falling[2]) else 0.0:.3g}"
+    height = f"{region.actual[2] if abs(region.actual[2]) > LEVEL * abs(region.falling[2]) else 0.0:.3g}"
     level = AccelerationView(
-        f"level, upward acceleration {height} m/s²", Plane(found.actual, X, Y), labels, is_level=True
+        f"level, upward acceleration {height} m/s²", Plane(region.actual, X, Y), labels, is_level=True
     )
     # An acceleration without a level part lies in every vertical section, and so does any in one of a level face.
     if along is None or across is None or abs(along @ across) > 1.0 - LEVEL:
@@ -123,57 +123,57 @@ def _views(found: AccelerationSet) -> list[AccelerationView]:
 
 
 def _level(vector: np.ndarray, size: float) -> np.ndarray | None:
-    # Direction of the level part of a vector; None where that is next to nothing beside a size.
+    # Return the direction of the level part of a vector; None where that part is next to nothing beside a size.
     part = np.hypot(*vector[:2])
     return np.array([*vector[:2], 0.0]) / part if part > LEVEL * size else None
 
 
-def _draw(panel: Axes, found: AccelerationSet, view: AccelerationView, shape: float) -> dict[str, Artist]:
+def _draw(panel: Axes, region: AccelerationSet, view: AccelerationView, shape: float) -> dict[str, Artist]:
     seen = view.plane.seen
-    window, polygon = _cut_out(found, view, shape)
+    window, polygon = _cut_out(region, view, shape)
     panel.fill(*polygon.corners.T, **_INSIDE)
     legend: dict[str, Artist] = {"feasible": Patch(**_INSIDE)}
     for k, owner in enumerate(polygon.owners):
         if owner != WINDOW:
             side = polygon.corners[[k, (k + 1) % len(polygon.owners)]]
-            panel.plot(*side.T, **(_NEAREST if owner == found.nearest else _FACE), zorder=2.5)
+            panel.plot(*side.T, **(_NEAREST if owner == region.nearest else _FACE), zorder=2.5)
     legend["nearest face"] = Line2D([], [], **_NEAREST)
     if view.across_face:
-        panel.plot(*seen(np.stack([found.actual, found.foot])).T, **_MARGIN, zorder=3.5)
+        panel.plot(*seen(np.stack([region.actual, region.foot])).T, **_MARGIN, zorder=3.5)
     legend["margin"] = Line2D([], [], **_MARGIN)
     legend["acceleration"] = Line2D([], [], **_POINT | {"linewidth": _ACTUAL["linewidth"]})
     if _shows_motion(view):
-        panel.plot(*seen(found.motion).T, **_MOTION, zorder=1.5)
-        legend["whole motion" + ("" if found.is_planar else ", projected")] = Line2D([], [], **_MOTION)
+        panel.plot(*seen(region.motion).T, **_MOTION, zorder=1.5)
+        legend["whole motion" + ("" if region.is_planar else ", projected")] = Line2D([], [], **_MOTION)
     if view.holds_rest:
-        _arrow(panel, seen(0.0 * X), seen(found.falling), _GRAVITY)
-        _arrow(panel, seen(0.0 * X), seen(found.actual), _ACTUAL)
-    panel.plot(*seen(found.actual), **_POINT, zorder=4.0)
+        _arrow(panel, seen(0.0 * X), seen(region.falling), _GRAVITY)
+        _arrow(panel, seen(0.0 * X), seen(region.actual), _ACTUAL)
+    panel.plot(*seen(region.actual), **_POINT, zorder=4.0)
     legend["gravity"] = Line2D([], [], **_GRAVITY)
-    if found.is_planar:
-        legend["cables"] = _directions(panel, found, view, window)
+    if region.is_planar:
+        legend["cables"] = _directions(panel, region, view, window)
     elif view.is_level:
-        legend["cables"] = _corners(panel, found, view)
+        legend["cables"] = _corners(panel, region, view)
     panel.set(xlim=(window.low[0], window.high[0]), ylim=(window.low[1], window.high[1]), aspect="equal")
     panel.set(xlabel=view.labels[0], ylabel=view.labels[1], title=view.title)
     panel.grid(alpha=0.3)
     return legend
 
 
-def _cut_out(found: AccelerationSet, view: AccelerationView, shape: float) -> tuple[Window, Polygon]:
-    # What is there to see, and as many corners of the section as lie near to it.
+def _cut_out(region: AccelerationSet, view: AccelerationView, shape: float) -> tuple[Window, Polygon]:
+    # The window holds the points to be seen, and as many corners of the section as lie near to these points.
     seen = view.plane.seen
-    points = [seen(np.stack([found.actual, found.foot]))]
+    points = [seen(np.stack([region.actual, region.foot]))]
     if not view.is_level:
-        points.append(seen(np.stack([0.0 * X, found.falling, found.apex])))
+        points.append(seen(np.stack([0.0 * X, region.falling, region.apex])))
     if _shows_motion(view):
-        points.append(seen(found.motion))
+        points.append(seen(region.motion))
     window = window_around(np.concatenate(points), shape=shape)
     wide = window_around(np.stack(window), margin=FAR, shape=shape)
-    corners, owners = section(view.plane, found.normals, found.offsets, wide)
+    corners, owners = section(view.plane, region.normals, region.offsets, wide)
     near = corners[(owners != WINDOW) & (np.roll(owners, 1) != WINDOW)]
     window = window_around(np.concatenate([*points, near]), shape=shape)
-    return window, section(view.plane, found.normals, found.offsets, window)
+    return window, section(view.plane, region.normals, region.offsets, window)
 
 
 def _shows_motion(view: AccelerationView) -> bool:
@@ -181,21 +181,21 @@ def _shows_motion(view: AccelerationView) -> bool:
     return view.is_level or view.holds_rest
 
 
-def _directions(panel: Axes, found: AccelerationSet, view: AccelerationView, window: Window) -> Artist:
-    # Of the cables of a planar robot.
+def _directions(panel: Axes, region: AccelerationSet, view: AccelerationView, window: Window) -> Artist:
+    # Draw the directions of the cables of a planar robot.
     size = 0.28 * (window.high - window.low).min()
-    start = view.plane.seen(found.apex)
-    for number, way in enumerate(view.plane.seen(found.cables), start=1):
+    start = view.plane.seen(region.apex)
+    for number, way in enumerate(view.plane.seen(region.cables), start=1):
         _arrow(panel, start, start + size * way, _CABLE)
         panel.annotate(str(number), start + 1.14 * size * way, **_NUMBER)
     return Line2D([], [], **_CABLE)
 
 
-def _corners(panel: Axes, found: AccelerationSet, view: AccelerationView) -> Artist:
-    # Where the cables' directions meet a level section, the others at their smallest tensions.
-    lengths = (found.actual[2] - found.apex[2]) / found.cables[:, 2]
-    corners = view.plane.seen(found.apex + lengths[:, None] * found.cables)
-    there = (lengths >= 0.0) & (lengths <= found.reach)
+def _corners(panel: Axes, region: AccelerationSet, view: AccelerationView) -> Artist:
+    # Mark where each cable's direction meets a level section while the other cables have their smallest tensions.
+    lengths = (region.actual[2] - region.apex[2]) / region.cables[:, 2]
+    corners = view.plane.seen(region.apex + lengths[:, None] * region.cables)
+    there = (lengths >= 0.0) & (lengths <= region.reach)
     middle = corners[there].mean(axis=0) if there.any() else np.zeros(2)
     for number in np.flatnonzero(there):
         panel.plot(*corners[number], **_CORNER, zorder=3.0)

@@ -9,14 +9,14 @@ import numpy as np
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
 
-# Where one of these is not positive, a pose is outside.
+# A pose is outside where one of these margins is not positive.
 MARGINS = ("wrench_margin", "closure_margin", "clearance", "floor_margin", "length_margin", "speed_margin")
 # Reasons to be outside whose margins files of earlier versions do not hold.
 LATER = {"floor_margin": Verdict.BELOW_FLOOR, "length_margin": Verdict.CABLE_TOO_LONG}
 WITHOUT_MARGIN = (Verdict.BELOW_FLOOR | Verdict.CABLE_TOO_LONG).value
-# Of the way between two points: what keeps the boundary off the points themselves.
+# Part of the way between two points that keeps the boundary off the points themselves.
 OFF = 1e-6
-# Where a simplex is cut: its corners inside (first number) and outside (second) whose edges the pieces join. Of a
+# Cuts of a simplex: each piece joins edges, named by their corners inside (first number) and outside (second). In a
 # simplex that is right-handed in the order inside, outside, triangles turn their outer side to the outside.
 CUTS: dict[tuple[int, int], list[list[tuple[int, int]]]] = {
     (1, 2): [[(0, 0), (0, 1)]],
@@ -73,8 +73,8 @@ def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Boundary
 
     def part(name: str) -> np.ndarray:
         data = result.data[name][tuple(index.get(axis, 0) if axis not in axes else slice(None) for axis in result.axes)]
-        kept = [axis for axis in result.axes if axis in axes]
-        return data.transpose([kept.index(axis) for axis in axes])[np.ix_(*orders)]
+        varying = [axis for axis in result.axes if axis in axes]
+        return data.transpose([varying.index(axis) for axis in axes])[np.ix_(*orders)]
 
     points = [result.axes[axis][order] for axis, order in zip(axes, orders, strict=True)]
     margins = [part(name).astype(float) for name in MARGINS if name in result.data]
@@ -102,19 +102,19 @@ def boundary(sides: BoundarySides) -> Boundary:
     inner, outer = number[edges[..., 0]], number[edges[..., 1]]
     pairs, pieces = np.unique(np.stack([inner, outer], -1).reshape(-1, 2), axis=0, return_inverse=True)
     pieces = pieces.reshape(inner.shape)
-    # Of a layer without thickness some pieces have two corners in one.
+    # Some pieces in a layer without thickness have the same corner twice.
     whole = (np.diff(np.sort(pieces, axis=1), axis=1) > 0).all(1)
     return Boundary(_crossings(sides, pairs), pieces[whole], (outer < 0).any(1)[whole])
 
 
 def _simplices(is_in: np.ndarray) -> list[tuple[np.ndarray, int]]:
-    # Of each cell that is cut, d! paths from its first corner to its last, one axis after the other: (n, d + 1) places
-    # in the flat grid, and 1 or -1 for their hand.
+    # Each cell that is cut gives d! paths from its first corner to its last, one axis after the other: (n, d + 1)
+    # places in the flat grid, and 1 or -1 for their hand.
     count = is_in.ndim
     lower = np.arange(is_in.size).reshape(is_in.shape)[(slice(-1),) * count].reshape(-1)
     steps = np.array([int(np.prod(is_in.shape[k + 1 :])) for k in range(count)])
-    every = np.array(list(itertools.product((0, 1), repeat=count))) @ steps
-    sure = np.stack([is_in.reshape(-1)[lower + step] for step in every])
+    offsets = np.array(list(itertools.product((0, 1), repeat=count))) @ steps
+    sure = np.stack([is_in.reshape(-1)[lower + step] for step in offsets])
     lower = lower[sure.any(0) & ~sure.all(0)]
     orders = list(itertools.permutations(range(count)))
     paths = [np.concatenate([[0], np.cumsum(steps[list(order)])]) for order in orders]
@@ -122,26 +122,27 @@ def _simplices(is_in: np.ndarray) -> list[tuple[np.ndarray, int]]:
 
 
 def _hand(order: Sequence[int]) -> int:
-    # Of a permutation: 1 if it is even, else -1.
+    # The sign of a permutation: 1 if it is even, else -1.
     return 1 if sum(a > b for a, b in itertools.combinations(order, 2)) % 2 == 0 else -1
 
 
 def _cut(is_in: np.ndarray, simplices: np.ndarray, hand: int) -> np.ndarray:
-    # (n_pieces, d, 2): of each corner of a piece, the points inside and outside between which it lies.
+    # Return (n_pieces, d, 2): for each corner of a piece, the points inside and outside between which it lies.
     count, sides = simplices.shape[1], is_in[simplices]
-    found = [np.empty((0, count - 1, 2), int)]
+    pieces = [np.empty((0, count - 1, 2), int)]
     for pattern in itertools.product((True, False), repeat=count):
         inner, outer = ([k for k in range(count) if pattern[k] is side] for side in (True, False))
-        some = simplices[(sides == pattern).all(1)]
+        matching = simplices[(sides == pattern).all(1)]
         for piece in CUTS.get((len(inner), len(outer)), []):
             turned = piece if hand * _hand([*inner, *outer]) > 0 else piece[::-1]
             ends = np.array([[inner[i], outer[j]] for i, j in turned])
-            found.append(some[:, ends])
-    return np.concatenate(found)
+            pieces.append(matching[:, ends])
+    return np.concatenate(pieces)
 
 
 def _crossings(sides: BoundarySides, pairs: np.ndarray) -> np.ndarray:
-    # (n, d) of (n, 2) points, the first inside; -1 for one beyond the end of the grid, at the first.
+    # Return (n, d) crossings between (n, 2) points, the first inside; a second point of -1 is beyond the end of the
+    # grid, and the crossing is at the first.
     inner, outer = pairs[:, 0], np.where(pairs[:, 1] < 0, pairs[:, 0], pairs[:, 1])
     part = np.where(sides.verdict.reshape(-1)[outer] & sides.unmeasured, 0.5, np.inf)
     for margin in sides.margins:
@@ -180,27 +181,27 @@ def outlines(sides: BoundarySides) -> list[tuple[np.ndarray, bool]]:
         (n, 2) corners of each line, on edges of the grid, the first again at the end of a closed one; and whether it
         runs along the end of the grid.
     """
-    found = boundary(sides)
+    surface = boundary(sides)
     lines = []
     for is_end in (True, False):
-        for chain in _chains(found.pieces[found.is_end == is_end]):
-            corners = found.corners[chain]
-            # Without those on diagonals, where only chance has put them: the sides of a cell are parted as well.
-            kept = np.isin(corners[:, 0], sides.points[0]) | np.isin(corners[:, 1], sides.points[1])
-            if not kept[0]:  # a closed line that starts on one
-                corners, kept = np.roll(corners[:-1], -1, axis=0), np.roll(kept[:-1], -1)
-                corners, kept = np.append(corners, corners[:1], axis=0), np.append(kept, kept[:1])
-            lines.append((corners[kept], is_end))
+        for chain in _chains(surface.pieces[surface.is_end == is_end]):
+            corners = surface.corners[chain]
+            # Leave out corners on diagonals, where only chance has put them: the sides of a cell are parted as well.
+            on_edge = np.isin(corners[:, 0], sides.points[0]) | np.isin(corners[:, 1], sides.points[1])
+            if not on_edge[0]:  # a closed line that starts on one
+                corners, on_edge = np.roll(corners[:-1], -1, axis=0), np.roll(on_edge[:-1], -1)
+                corners, on_edge = np.append(corners, corners[:1], axis=0), np.append(on_edge, on_edge[:1])
+            lines.append((corners[on_edge], is_end))
     return lines
 
 
 def _chains(lines: np.ndarray) -> list[np.ndarray]:
-    # Corners of pieces that meet in a corner, two at most, one after the other.
+    # Return the corners, one after the other, of pieces that meet in a corner, two at most.
     ends: dict[int, list[int]] = {}
     for a, b in lines.tolist():
         ends.setdefault(a, []).append(b)
         ends.setdefault(b, []).append(a)
-    found = []
+    chains = []
     for start in sorted(ends, key=lambda corner: (len(ends[corner]) != 1, corner)):
         while ends[start]:
             chain = [start]
@@ -208,5 +209,5 @@ def _chains(lines: np.ndarray) -> list[np.ndarray]:
                 following = ends[chain[-1]].pop()
                 ends[following].remove(chain[-1])
                 chain.append(following)
-            found.append(np.array(chain))
-    return found
+            chains.append(np.array(chain))
+    return chains

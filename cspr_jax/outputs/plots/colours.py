@@ -71,7 +71,7 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
     if most <= least:
         most = least + (abs(least) or 1.0)
     extend = {(False, False): "neither", (True, False): "max", (False, True): "min"}.get((above, below), "both")
-    # Of what has no limit there is no number to tell.
+    # An infinite value has no number to tell.
     ends = data[np.isfinite(data)]
     words = [f"up to {float(ends.max()):.3g}"] if (ends > most).any() else []
     words += [f"down to {float(ends.min()):.3g}"] if (ends < least).any() else []
@@ -87,20 +87,20 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
 
 
 def _bulk(values: np.ndarray) -> float:
-    # A value that occurs, not one between two.
+    # Return a value that occurs, not one between two values.
     part = 1.0 if values.size <= FEW else min(MOST, 1.0 - 1.5 / values.size)
     return float(np.quantile(values, part, method="inverted_cdf"))
 
 
 def _of_counts(data: np.ndarray) -> Scale:
-    # Counts from 1 on, each its own colour; 0 and less stand for none.
+    # Counts from 1 on have a colour each; 0 and less stand for none.
     counts = data[data > 0]
     least, most = (int(counts.min()), int(counts.max())) if counts.size else (1, 1)
     bulk = int(_bulk(counts)) if counts.size else 1
     stretched = most - least + 1 > max(TOLD_APART, STRETCH * (bulk - least + 1))
     end = max(bulk, least + TOLD_APART // 2) if stretched else most
     number, more, none = end - least + 1, end < most, bool((data <= 0).any())
-    every = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, number + more))
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, number + more))
     bounds = np.arange(least, end + 2) - 0.5
     step = next(step * 10**k for k in range(10) for step in (1, 2, 5) if number <= 12 * step * 10**k)
     ticks = [float(tick) for tick in range(-(-least // step) * step, end + 1, step)] or [float(least)]
@@ -108,8 +108,8 @@ def _of_counts(data: np.ndarray) -> Scale:
     if none:
         bounds = np.concatenate([[min(-0.5, float(data.min()) - 0.5)], bounds])
         ticks, texts = [float(bounds[:2].mean()), *ticks], ["none", *texts]
-    shown = [NONE_COLOUR, *every[:number]] if none else list(every[:number])
-    colours = ListedColormap(shown).with_extremes(over=every[-1])
+    shown = [NONE_COLOUR, *shades[:number]] if none else list(shades[:number])
+    colours = ListedColormap(shown).with_extremes(over=shades[-1])
     beyond, extend = (f"up to {most}", "max") if more else ("", "neither")
     return Scale(colours, BoundaryNorm(bounds, len(shown)), extend, beyond, (ticks, texts), whole=True)
 

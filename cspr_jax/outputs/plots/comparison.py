@@ -101,23 +101,23 @@ def comparison_figure(every: list[Compared], fixed: list[str]) -> Figure:
     return figure
 
 
-def _names(every: list[Compared]) -> list[str]:
-    # What tells the results apart: their conditions, with robot and file where these are the same.
-    words = [conditions(one.result) for one in every]
-    if len({robot_name(one.result) for one in every}) > 1:
-        words = [f"{robot_name(one.result)}: {text}" for one, text in zip(every, words, strict=True)]
-    stems = [Path(one.file).stem for one in every]
-    files = stems if len(set(stems)) == len(stems) else [one.file for one in every]
+def _names(compared: list[Compared]) -> list[str]:
+    # Conditions tell the results apart, with robot and file where the conditions are the same.
+    words = [conditions(one.result) for one in compared]
+    if len({robot_name(one.result) for one in compared}) > 1:
+        words = [f"{robot_name(one.result)}: {text}" for one, text in zip(compared, words, strict=True)]
+    stems = [Path(one.file).stem for one in compared]
+    files = stems if len(set(stems)) == len(stems) else [one.file for one in compared]
     return [f"{w} ({shortened(f)})" if words.count(w) > 1 else w for w, f in zip(words, files, strict=True)]
 
 
-def _check(every: list[Compared], plane: list[str]) -> None:
-    first = every[0]
-    if len(every) > len(COLOURS):
-        raise InputError("results", len(every), f"at most {len(COLOURS)} in one picture")
+def _check(compared: list[Compared], plane: list[str]) -> None:
+    first = compared[0]
+    if len(compared) > len(COLOURS):
+        raise InputError("results", len(compared), f"at most {len(COLOURS)} in one picture")
     if not plane:
         raise InputError("results", f"{first.file} over {first.across}", "maps over two or three of x, y and z")
-    for one in every[1:]:
+    for one in compared[1:]:
         if robot_of(one.result).base_points != robot_of(first.result).base_points:
             raise InputError("results", one.file, f"of a robot with the spools of that in {first.file}")
         if set(one.across) != set(first.across):
@@ -129,32 +129,32 @@ def _check(every: list[Compared], plane: list[str]) -> None:
                 raise InputError("results", f"{axis} of {one.file}", allowed)
 
 
-def _heights(every: list[Compared], over: str) -> np.ndarray:
-    # Evenly chosen of those where something is inside; of all if nothing is anywhere.
-    points = np.unique(every[0].result.axes[over])
-    told = np.zeros(len(points), bool)
-    for one in every:
+def _heights(compared: list[Compared], over: str) -> np.ndarray:
+    # Choose heights evenly among those where something is inside; among all if nothing is anywhere.
+    points = np.unique(compared[0].result.axes[over])
+    has_inside = np.zeros(len(points), bool)
+    for one in compared:
         inside = sides_of(one.result, one.across, one.at).verdict == 0
-        told |= np.moveaxis(inside, one.across.index(over), 0).reshape(len(points), -1).any(1)
-    shown = np.flatnonzero(told) if told.any() else np.arange(len(points))
+        has_inside |= np.moveaxis(inside, one.across.index(over), 0).reshape(len(points), -1).any(1)
+    shown = np.flatnonzero(has_inside) if has_inside.any() else np.arange(len(points))
     return points[shown[chosen(len(shown), PANELS)]]
 
 
 def _points(one: Compared, axis: str) -> np.ndarray:
-    # Of an axis out of the plane, those that are drawn.
+    # Return the drawn points of an axis out of the plane.
     if axis in one.across:
         return np.unique(one.result.axes[axis])
     return np.array([one.place[axis]]) if axis in one.place else np.empty(0)
 
 
-def _agree(some: np.ndarray, others: np.ndarray) -> bool:
-    return len(some) == len(others) and bool(np.allclose(some, others, rtol=SAME, atol=SAME))
+def _agree(points: np.ndarray, others: np.ndarray) -> bool:
+    return len(points) == len(others) and bool(np.allclose(points, others, rtol=SAME, atol=SAME))
 
 
-def _box(every: list[Compared], plane: list[str]) -> np.ndarray:
-    # (2, 2) corners: of the grids, and of the spools unless they are far.
-    grids = np.array([[f(one.result.axes[axis]) for axis in plane] for one in every for f in (np.min, np.max)])
-    base = np.array(robot_of(every[0].result).base_points)
+def _box(compared: list[Compared], plane: list[str]) -> np.ndarray:
+    # Return (2, 2) corners around the grids, and around the spools unless they are far.
+    grids = np.array([[f(one.result.axes[axis]) for axis in plane] for one in compared for f in (np.min, np.max)])
+    base = np.array(robot_of(compared[0].result).base_points)
     both = np.concatenate([grids, base[:, ["xyz".index(axis) for axis in plane]]])
     shown = both if (np.ptp(both, axis=0) <= STRETCH * np.ptp(grids, axis=0)).all() else grids
     room = MARGIN * np.ptp(shown, axis=0).max()
@@ -180,7 +180,7 @@ def _outline(panel: Axes, sides: BoundarySides, number: int) -> dict[str, Artist
 
 
 def _band(panel: Axes, sides: BoundarySides, number: int) -> None:
-    # All triangles of the grid with corners on both sides: where the boundary may lie.
+    # Fill all triangles of the grid with corners on both sides: the boundary may lie in them.
     triangles = step_of(sides)
     path = Path2D(
         np.concatenate([triangles, triangles[:, :1]], axis=1).reshape(-1, 2),
@@ -195,5 +195,5 @@ def _look(number: int) -> dict[str, Any]:
 
 def _add_legend(figure: Figure, words: list[str], marks: dict[str, Artist]) -> None:
     lines = [Line2D([], [], color=COLOURS[i], **_look(i)) for i in range(len(words))]
-    every = [*words, *marks]
-    figure.legend([*lines, *marks.values()], every, loc="outside lower center", ncols=len(every))
+    labels = [*words, *marks]
+    figure.legend([*lines, *marks.values()], labels, loc="outside lower center", ncols=len(labels))

@@ -16,13 +16,13 @@ MARGINS = {
     "wrench-closure": "closure_margin",
     "interference-free": "clearance",
 }
-# What a picture says of cells that a margin counts as inside, but that are not in the workspace.
+# A picture says this of cells that a margin counts as inside, but that are not in the workspace.
 EXCLUDED = "excluded by other conditions"
 SETS = {"maximum": "some", "inclusion": "some", "dextrous": "every", "total": "every"}
 
 
 def is_workspace(result: Result) -> bool:
-    """Whether a result is a map of a workspace with its verdicts.
+    """Tell whether a result is a map of a workspace with its verdicts.
 
     Args:
         result: any.
@@ -34,7 +34,7 @@ def is_workspace(result: Result) -> bool:
 
 
 def said(result: Result) -> list[str]:
-    """What the title of a picture of a map says of its conditions.
+    """Phrase with which the title of a picture of a map names its conditions.
 
     Args:
         result: any map.
@@ -58,13 +58,13 @@ def shown_first(result: Result) -> str:
     known = [name for name in MAP_KINDS[result.attributes["map"]].pictured if name in result.data]
     if is_workspace(result) and len({MARGINS[name] for name in asked(result).conditions}) > 1:
         return "verdict"
-    every = [*known, *result.data]
-    # Of a margin that nobody asks for there is no picture.
-    return next((name for name in every if not np.isnan(result.data[name]).all()), every[0])
+    names = [*known, *result.data]
+    # A margin that nobody asks for has no picture.
+    return next((name for name in names if not np.isnan(result.data[name]).all()), names[0])
 
 
 def is_margin(result: Result, name: str) -> bool:
-    """Whether a quantity is the margin of one condition of a workspace, positive inside.
+    """Tell whether a quantity is the margin of one condition of a workspace, positive inside.
 
     Args:
         result: any map.
@@ -93,7 +93,7 @@ def excluded(result: Result, name: str) -> np.ndarray:
 
 
 def conditions(result: Result) -> str:
-    """What the poses of a map of a workspace have to meet.
+    """Conditions that the poses of a map of a workspace have to meet.
 
     Args:
         result: the map.
@@ -101,21 +101,21 @@ def conditions(result: Result) -> str:
     Returns:
         the conditions with their numbers, and the orientations that they are asked of if the map says which.
     """
-    wanted, limits, robot = asked(result), table(result.settings, "limits"), robot_of(result)
+    workspace, limits, robot = asked(result), table(result.settings, "limits"), robot_of(result)
     words = []
-    for name in wanted.conditions:
+    for name in workspace.conditions:
         words.append(name + (f" {_tensions(limits, robot)}" if name == "wrench-feasible" else ""))
-    words += _wrenches(wanted)
+    words += _wrenches(workspace)
     for key, text in (("floor", "floor at z = {} m"), ("cable_length_max", "cables up to {} m")):
-        given = limits.get(key, getattr(robot, key, None))
-        if given is not None:
-            words.append(text.format(_numbers(given)))
-    if wanted.speed is not None or wanted.angular_speed is not None:
-        given = ((wanted.speed, "m/s"), (wanted.angular_speed, "rad/s"))
-        words.append("moving at up to " + " and ".join(f"{value:.4g} {unit}" for value, unit in given if value))
-    if wanted.obstacle:
-        words.append("one obstacle" if len(wanted.obstacle) == 1 else f"{len(wanted.obstacle)} obstacles")
-    return ", ".join(words + _orientations(wanted))
+        bound = limits.get(key, getattr(robot, key, None))
+        if bound is not None:
+            words.append(text.format(_numbers(bound)))
+    if workspace.speed is not None or workspace.angular_speed is not None:
+        speeds = ((workspace.speed, "m/s"), (workspace.angular_speed, "rad/s"))
+        words.append("moving at up to " + " and ".join(f"{value:.4g} {unit}" for value, unit in speeds if value))
+    if workspace.obstacle:
+        words.append("one obstacle" if len(workspace.obstacle) == 1 else f"{len(workspace.obstacle)} obstacles")
+    return ", ".join(words + _orientations(workspace))
 
 
 def _tensions(limits: dict, robot: RobotFile) -> str:
@@ -126,37 +126,37 @@ def _tensions(limits: dict, robot: RobotFile) -> str:
     return f"{least} to {_numbers(high)} N"
 
 
-def _numbers(given) -> str:
-    # One for all cables, or the range of theirs.
-    low, high = np.min(given), np.max(given)
+def _numbers(limit) -> str:
+    # Write one number if all cables have it, else the range of their numbers.
+    low, high = np.min(limit), np.max(limit)
     return f"{low:.4g}" if low == high else f"{low:.4g} .. {high:.4g}"
 
 
-def _wrenches(wanted: WorkspaceTable) -> list[str]:
+def _wrenches(workspace: WorkspaceTable) -> list[str]:
     words = []
-    if wanted.wrenches is not None:
-        words.append("one wrench" if len(wanted.wrenches) == 1 else f"{len(wanted.wrenches)} wrenches")
+    if workspace.wrenches is not None:
+        words.append("one wrench" if len(workspace.wrenches) == 1 else f"{len(workspace.wrenches)} wrenches")
     for name, text in (("wrench_box", "box"), ("wrench_ellipsoid", "ellipsoid")):
-        sizes = getattr(wanted, name)
+        sizes = getattr(workspace, name)
         if sizes is not None:
             words.append(f"{text} of wrenches ±({', '.join(f'{size:.4g}' for size in sizes)})")
-    if wanted.acceleration is not None:
-        words.append(f"accelerations up to {wanted.acceleration:.4g} m/s²")
+    if workspace.acceleration is not None:
+        words.append(f"accelerations up to {workspace.acceleration:.4g} m/s²")
     return words
 
 
-def _orientations(wanted: WorkspaceTable) -> list[str]:
+def _orientations(workspace: WorkspaceTable) -> list[str]:
     words = []
-    if wanted.orientations is not None:
-        text = SETS[wanted.orientations]
-        if wanted.quaternions is not None:
-            text += f" one of {len(wanted.quaternions)} orientations"
-        elif wanted.tilt_max is not None:
-            text += f" tilt up to {np.degrees(wanted.tilt_max):.4g}°"
-            text += f" with torsion up to {np.degrees(wanted.torsion_max):.4g}°" if wanted.torsion_max else ""
+    if workspace.orientations is not None:
+        text = SETS[workspace.orientations]
+        if workspace.quaternions is not None:
+            text += f" one of {len(workspace.quaternions)} orientations"
+        elif workspace.tilt_max is not None:
+            text += f" tilt up to {np.degrees(workspace.tilt_max):.4g}°"
+            text += f" with torsion up to {np.degrees(workspace.torsion_max):.4g}°" if workspace.torsion_max else ""
         else:
             text += " orientation"
         words.append(text)
-    if wanted.orientation is not None:
-        words.append(f"orientation ({', '.join(f'{part:.3g}' for part in wanted.orientation)})")
+    if workspace.orientation is not None:
+        words.append(f"orientation ({', '.join(f'{part:.3g}' for part in workspace.orientation)})")
     return words

@@ -96,8 +96,8 @@ def _envelope(results: list[Result], quantity: str | None, at: dict[str, float],
     _refuse("--envelope", {"--quantity": quantity, "--lines": lines})
     elsewhere = {axis: points[0] for axis, points in result.axes.items() if axis not in AXES and len(points) > 1}
     view = _view(result, "verdict", elsewhere | at)
-    told = zip(elsewhere | at, view.fixed, strict=True)
-    view = view._replace(fixed=[words if axis in at else first_of(result, axis) for axis, words in told])
+    fixed_axes = zip(elsewhere | at, view.fixed, strict=True)
+    view = view._replace(fixed=[words if axis in at else first_of(result, axis) for axis, words in fixed_axes])
     if set(view.across) != set(AXES):
         raise InputError("--at", sorted(at), "no axis of " + ", ".join(AXES))
     return envelope_figure(
@@ -106,9 +106,9 @@ def _envelope(results: list[Result], quantity: str | None, at: dict[str, float],
 
 
 def _refuse(option: str, others: dict[str, str | bool | None]) -> None:
-    for key, given in others.items():
-        if given:
-            raise InputError(key, given, f"absent with {option}")
+    for key, value in others.items():
+        if value:
+            raise InputError(key, value, f"absent with {option}")
 
 
 def _solid(results: list[Result], at: dict[str, float]) -> Figure:
@@ -124,13 +124,13 @@ def _solid(results: list[Result], at: dict[str, float]) -> Figure:
 
 
 def _comparison(names: list[str], results: list[Result], at: dict[str, float]) -> Figure:
-    every, constant = [], list[list[str]]()
+    compared, constant = [], list[list[str]]()
     for name, result in zip(names, results, strict=True):
         across = [axis for axis in _varying(result, at) if axis not in TILT_TORSION]
         index, fixed = _fixed(result, at, across)
-        every.append(Compared(result, name, across, index))
+        compared.append(Compared(result, name, across, index))
         constant.append(notes(result, "", fixed, [*across, *index]))
-    return comparison_figure(every, [note for note in constant[0] if all(note in other for other in constant)])
+    return comparison_figure(compared, [note for note in constant[0] if all(note in other for other in constant)])
 
 
 def _varying(result: Result, at: dict[str, float]) -> list[str]:
@@ -138,11 +138,11 @@ def _varying(result: Result, at: dict[str, float]) -> list[str]:
 
 
 def _fixed(result: Result, at: dict[str, float], across: list[str]) -> tuple[dict[str, int], list[str]]:
-    # Which point of each other axis, the first where nobody says, and what the picture says of it.
-    chosen_points = {axis: nearest(result, axis, wanted) for axis, wanted in at.items()}
+    # Return the point of each other axis, the first where nobody says which, and the words of the picture for it.
+    chosen_points = {axis: nearest(result, axis, coordinate) for axis, coordinate in at.items()}
     others = {axis: (0, first_of(result, axis)) for axis in result.axes if axis not in across}
-    every = others | chosen_points
-    return {axis: place for axis, (place, _) in every.items()}, [words for _, words in every.values()]
+    point_of_axis = others | chosen_points
+    return {axis: place for axis, (place, _) in point_of_axis.items()}, [words for _, words in point_of_axis.values()]
 
 
 def _overlay(
@@ -189,11 +189,11 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     order = in_order(result, view.across)
     view = _panelled(result, view, order)
     data, hatched, panels = view.data, view.excluded, view.across[2] if len(view.across) > 2 else None
-    told = _told(result, at, order) if tuple(view.across[:2]) == POLAR else None
+    says = _telling_cells(result, at, order) if tuple(view.across[:2]) == POLAR else None
     if not panels:
-        data, hatched, told = data[..., None], hatched[..., None], None if told is None else told[..., None]
+        data, hatched, says = data[..., None], hatched[..., None], None if says is None else says[..., None]
     section = Section(view.name, view.across[:2], panels, view.place, _constant(result, view), hatched)
-    return section_figure(result, section, data, told)
+    return section_figure(result, section, data, says)
 
 
 def _constant(result: Result, view: MapView, name: str | None = None) -> list[str]:
@@ -201,8 +201,8 @@ def _constant(result: Result, view: MapView, name: str | None = None) -> list[st
     return [*said(result), *fixed]
 
 
-def _told(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
-    # The same for every quantity of a file, so that their pictures show the same sections.
+def _telling_cells(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:
+    # The answer is the same for every quantity of a file, so that their pictures show the same sections.
     names = ["verdict"] if "verdict" in result.data else list(result.data)
     telling = [tells(name, _panelled(result, _view(result, name, at), order).data) for name in names]
     return np.any(telling, axis=0)
@@ -226,7 +226,7 @@ def _lines_figure(result: Result, view: MapView, by: str) -> Figure:
 
 
 def _panelled(result: Result, view: MapView, order: list[str]) -> MapView:
-    # At most three axes, in this order; the others at their first point.
+    # Keep at most three axes, in this order; the others are at their first point.
     data, hatched = (x.transpose([view.across.index(axis) for axis in order]) for x in (view.data, view.excluded))
     fixed, place = list(view.fixed), dict(view.place)
     for extra in order[3:]:
@@ -241,8 +241,8 @@ def _view(result: Result, quantity: str | None, at: dict[str, float]) -> MapView
     if name not in result.data:
         raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
     fixed, place = [], {}
-    for axis, wanted in at.items():
-        place[axis], words = nearest(result, axis, wanted)
+    for axis, coordinate in at.items():
+        place[axis], words = nearest(result, axis, coordinate)
         fixed.append(words)
     across = [axis for axis, points in result.axes.items() if len(points) > 1 and axis not in place]
     if not across:

@@ -43,9 +43,9 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> F
     for place, view in enumerate(((22.0, -60.0), (12.0, 30.0)), start=1):
         panel = figure.add_subplot(1, 2, place, projection="3d", elev=view[0], azim=view[1], computed_zorder=False)
         panel.set_box_aspect((4.0, 4.0, 3.0), zoom=1.12)
-        for which, look in ((accessible, _ACCESSIBLE), (attained, _ATTAINED)):
+        for orientations, look in ((accessible, _ACCESSIBLE), (attained, _ATTAINED)):
             for level in shown:
-                _outline(panel, azimuth, tilt, which[level], float(np.degrees(torsion[level])), look)
+                _outline(panel, azimuth, tilt, orientations[level], float(np.degrees(torsion[level])), look)
         panel.set(
             xlim=(-reach, reach),
             ylim=(-reach, reach),
@@ -53,10 +53,10 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> F
             xlabel="tilt · cos azimuth (°)",
             ylabel="tilt · sin azimuth (°)",
         )
-        # Turned by itself, it may stand on its head.
+        # A label that is turned by matplotlib may stand on its head.
         panel.zaxis.set_rotate_label(False)
         panel.set_zlabel("torsion (°)", rotation=90.0)
-        # Few ticks: an axis may be seen nearly from its end.
+        # An axis has few ticks, since it may be seen nearly from its end.
         for axis in (panel.xaxis, panel.yaxis):
             axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 3, 4.5, 9, 10], prune="both"))
     handles = [Line2D([], [], color=colour, linewidth=width) for colour, width in (_ACCESSIBLE, _ATTAINED)]
@@ -69,7 +69,7 @@ def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> F
 def _outline(
     panel, azimuth: np.ndarray, tilt: np.ndarray, inside: np.ndarray, height: float, look: tuple[str, float]
 ) -> None:
-    # Of (n_azimuths, n_tilts) cells. Around: the first azimuth again; outward: one tilt beyond, so that it closes.
+    # Outline (n_azimuths, n_tilts) cells. The first azimuth comes again, and one tilt beyond, so that the line closes.
     around = np.append(azimuth, azimuth[0] + 2.0 * np.pi)
     outward = np.degrees(np.append(tilt, 2.0 * tilt[-1] - tilt[-2]))
     x, y = (np.outer(f(around), outward) for f in (np.cos, np.sin))

@@ -32,7 +32,7 @@ RANDOM = re.compile(rb"_anim_img([0-9a-f]{32})")
 # are whole hundredths of a second. The pictures of a page are whole ones each.
 RATES, MOST, OF_PAGES = (20, 10, 5, 2, 1), 600, 150
 SIZE, DPI = (10.0, 5.6), 90
-# Pages of more than so many MB are none that one opens.
+# Nobody opens a page of more MB than this.
 LARGEST = 100.0
 MARK = "#D55E00"
 
@@ -71,8 +71,8 @@ def film(
     rate = next((rate for rate in RATES if seconds * rate <= most), RATES[-1])
     # The end is seen, if a part of a picture later.
     count = int(np.ceil(seconds * rate - 1e-9)) + 1
-    wanted = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])
-    rows = np.clip(np.searchsorted(time, wanted - 1e-9), 0, len(time) - 1)
+    instants = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])
+    rows = np.clip(np.searchsorted(time, instants - 1e-9), 0, len(time) - 1)
     writer = _writer(ending, rate)
     stage("film")
     picture = _Picture(title, columns, robot_file, keys, rows)
@@ -87,11 +87,11 @@ def film(
 
 def _named_by_content(page: bytes) -> bytes:
     # matplotlib names the parts of a page at random; the same film has the same bytes, two films different names.
-    found = RANDOM.search(page)
-    if found is None:
+    match = RANDOM.search(page)
+    if match is None:
         return page
-    content = hashlib.sha256(page.replace(found[1], b"")).hexdigest()[: len(found[1])]
-    return page.replace(found[1], content.encode())
+    content = hashlib.sha256(page.replace(match[1], b"")).hexdigest()[: len(match[1])]
+    return page.replace(match[1], content.encode())
 
 
 def _settings(ending: str) -> Any:
@@ -115,7 +115,7 @@ def _writer(ending: str, rate: int) -> AbstractMovieWriter:
     if ending == ".html":
         return HTMLWriter(fps=rate, embed_frames=True, default_mode="loop")
     _encoder()
-    # What every player knows.
+    # Every player knows this codec and this pixel format.
     return FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
 
 
@@ -125,8 +125,8 @@ class _Picture:
     def __init__(
         self, title: str, columns: Mapping[str, np.ndarray], robot_file: RobotFile, keys: PlanFile, rows: np.ndarray
     ) -> None:
-        every = np.arange(len(columns["t"]))
-        self.robot, self._path = moving(columns, robot_file, rows), moving(columns, robot_file, every).position
+        all_rows = np.arange(len(columns["t"]))
+        self.robot, self._path = moving(columns, robot_file, rows), moving(columns, robot_file, all_rows).position
         self._rows, self._time = rows, np.asarray(columns["t"], float)
         self.tension = np.asarray(columns["tension"], float)
         self._names = cable_names(columns)
@@ -141,7 +141,7 @@ class _Picture:
         self._draw_space(is_down=robot_file.z_axis == "down")
         self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(robot_file, keys))
         self.figure.suptitle(title)
-        # Once: places of axes do not change. A figure with any layout is drawn twice for each picture.
+        # Lay the figure out once: places of axes do not change, and with any layout it is drawn twice for each picture.
         self.show(0)
         fit(self.figure)
         fill_places(self.figure)
@@ -194,6 +194,6 @@ class _Picture:
             edge.set_data_3d(*robot.corners[number, 2 * k : 2 * k + 2].T)
         self._mass.set_data_3d(*robot.position[number][:, None])
         self._behind.set_data_3d(*self._path[: row + 1].T)
-        now = float(self._time[row])
-        self._mark.set_xdata([now, now])
-        self._clock.set_text(f"t = {now:.2f} s")
+        instant = float(self._time[row])
+        self._mark.set_xdata([instant, instant])
+        self._clock.set_text(f"t = {instant:.2f} s")

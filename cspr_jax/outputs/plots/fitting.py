@@ -19,7 +19,7 @@ SHORTEST = 8
 HYPHEN = re.compile(r"(?<![\w.\-])-(?=\.?\d)")
 # The line of a title that says what is not proved begins so.
 DOUBT = "NOT PROVED FEASIBLE"
-# Of a panel's place, what its tick labels leave.
+# Part of a panel's place that its tick labels leave free.
 BETWEEN_LABELS = 0.82
 ABOVE = "legend above its panel"
 
@@ -126,7 +126,7 @@ def _fit_title(figure: Figure, room: float, *, has_title: bool, lines: int | Non
 
 
 def _fit_above(panel: Axes, room: float) -> None:
-    # A legend above its panel: as many entries side by side as fit.
+    # A legend above its panel has as many entries side by side as fit.
     legend = panel.get_legend()
     if legend is None or legend.get_gid() != ABOVE:
         return
@@ -174,7 +174,7 @@ def _minus_of(words: Callable[..., str]) -> Callable[..., str]:
 
 
 def _fit_legend(figure: Figure, legend: Legend, room: float) -> None:
-    # Below the panels: as many entries side by side as fit, then entries on several lines.
+    # A legend below the panels has as many entries side by side as fit, then entries on several lines.
     handles = [handle for handle in legend.legend_handles if handle is not None]
     words = [text.get_text() for text in legend.get_texts()]
     where: Literal["lower center", "outside lower center"]
@@ -190,7 +190,8 @@ def _fit_legend(figure: Figure, legend: Legend, room: float) -> None:
 
 
 def _shares(panel: Axes) -> tuple[float, float]:
-    # Of the picture's width and height; a colour bar beside several panels has no place in their grid.
+    # Return a panel's shares of the picture's width and height; a colour bar beside several panels has no place in
+    # their grid.
     place = panel.get_subplotspec()
     if place is None:
         return 1.0, 1.0
@@ -199,8 +200,8 @@ def _shares(panel: Axes) -> tuple[float, float]:
 
 
 def _break(text: Text, room: float, *, upright: bool = False) -> None:
-    given = text.get_text()
-    if not given.strip():
+    original = text.get_text()
+    if not original.strip():
         return
 
     def fits(line: str) -> bool:
@@ -209,7 +210,7 @@ def _break(text: Text, room: float, *, upright: bool = False) -> None:
         return (extent.height if upright else extent.width) <= room
 
     lines = []
-    for line in given.split("\n"):
+    for line in original.split("\n"):
         broken = [line] if fits(line) else _packed(line.split(", "), ", ", fits)
         for part in broken:
             lines += [part] if fits(part) else _packed(part.split(" "), " ", fits)
@@ -217,7 +218,7 @@ def _break(text: Text, room: float, *, upright: bool = False) -> None:
 
 
 def _packed(parts: list[str], joint: str, fits) -> list[str]:
-    # As many parts on each line as fit; the joint stays at the end of a line that goes on.
+    # Put as many parts on each line as fit; the joint stays at the end of a line that goes on.
     lines = [parts[0]]
     for part in parts[1:]:
         if fits(lines[-1] + joint + part):

@@ -31,13 +31,13 @@ def start(result: Result) -> dict[str, float]:
     Returns:
         its coordinates; empty if it is none.
     """
-    given = table(table(result.settings, "trajectory"), "from").get("position") or ()
+    coordinates = table(table(result.settings, "trajectory"), "from").get("position") or ()
     moving = any(axis.startswith("from_") for axis in (*result.axes, *result.choices))
-    return {} if moving else dict(zip("xyz", given, strict=False))
+    return {} if moving else dict(zip("xyz", coordinates, strict=False))
 
 
 def starts_at_rest(result: Result, name: str) -> bool:
-    """Whether a quantity belongs to motions that start at rest.
+    """Tell whether a quantity belongs to motions that start at rest.
 
     Args:
         result: a map.

@@ -79,7 +79,7 @@ def section(plane: Plane, normals: np.ndarray, offsets: np.ndarray, window: Wind
 
 
 def _cut(polygon: Polygon, normal: np.ndarray, offset: float, owner: int) -> Polygon:
-    # The part of a polygon where normal @ corner >= offset.
+    # Return the part of a polygon where normal @ corner >= offset.
     slacks = polygon.corners @ normal - offset
     corners, owners = [], []
     for k, slack in enumerate(slacks):

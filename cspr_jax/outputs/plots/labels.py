@@ -127,7 +127,7 @@ def unit(result: Result, name: str) -> str:
 
 
 def is_angle(result: Result, name: str) -> bool:
-    """Whether an axis or a quantity is an angle, in radians in the file and in degrees in pictures.
+    """Tell whether an axis or a quantity is an angle, in radians in the file and in degrees in pictures.
 
     Args:
         result: gives its unit.

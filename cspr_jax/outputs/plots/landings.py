@@ -24,8 +24,8 @@ def landing_figure(result: Result) -> Figure:
     """
     figure = Figure(figsize=(6.4, 5.6), layout="constrained")
     panel = figure.subplots()
-    every = result.data["landing"]
-    known = every[np.isfinite(every).all(1)] * MILLIMETRES
+    landings = result.data["landing"]
+    known = landings[np.isfinite(landings).all(1)] * MILLIMETRES
     panel.plot(*known[:SHOWN].T, linestyle="", marker=".", markersize=3, color=COLOURS[0], alpha=0.35, rasterized=True)
     if len(known) > 1:
         for part, style in ((1.0, "-"), (2.0, "--")):
@@ -36,15 +36,15 @@ def landing_figure(result: Result) -> Figure:
     panel.grid(alpha=0.3)
     panel.legend(loc="upper right")
     sizes = np.linalg.norm(known, axis=1)
-    missed = len(every) - len(known)
-    words = f"{len(every)} throws, distance from the target {sizes.mean():.2f} ± {sizes.std():.2f} mm"
+    missed = len(landings) - len(known)
+    words = f"{len(landings)} throws, distance from the target {sizes.mean():.2f} ± {sizes.std():.2f} mm"
     panel.set_title(words + (f"; {missed} never at its height" if missed else ""), fontsize="medium")
     figure.suptitle(f"{robot_name(result)}: where throws land")
     return figure
 
 
 def _ellipse(panel: Axes, points: np.ndarray, part: float, style: str) -> None:
-    # Of so many standard deviations of the sample.
+    # Draw the ellipse whose axes are this many standard deviations of the sample.
     squares, axes = np.linalg.eigh(np.cov(points.T))
     width, height = 2.0 * part * np.sqrt(np.maximum(squares[::-1], 0.0))
     angle = float(np.degrees(np.arctan2(axes[1, 1], axes[0, 1])))

@@ -48,14 +48,14 @@ def panels(
     lines = -(-count // columns)
     kind = {"projection": "polar"} if polar else {}
     grid = figure.subplots(lines, columns, squeeze=False, sharex=not polar, sharey=same, subplot_kw=kind)
-    every = list(grid.flat[:count])
-    bottom = every[max(0, count - columns) :]
+    shown = list(grid.flat[:count])
+    bottom = shown[max(0, count - columns) :]
     for panel in grid.flat[count:]:
         panel.set_visible(False)
     if not polar:
         for panel in bottom:
             panel.tick_params(labelbottom=True)
-    return every, bottom, list(grid[:, 0])
+    return shown, bottom, list(grid[:, 0])
 
 
 def in_degrees(axis: Axis, span: float) -> None:

@@ -69,21 +69,21 @@ def line_figure(
     columns = columns_of(count)
     figure = Figure(figsize=(6.8, 4.4) if count == 1 else (3.4 * columns + 1.0, 3.4 * -(-count // columns) + 0.9))
     figure.set_layout_engine("constrained")
-    every, bottom, left = panels(figure, count)
+    axes, bottom, left = panels(figure, count)
     drawn = [[_as_drawn(result, name, across, line) for line in lines] for lines in groups.values()]
     drawn, words = _in_words(result, name, drawn)
-    for panel, heading, lines in zip(every, groups, drawn, strict=True):
+    for panel, heading, lines in zip(axes, groups, drawn, strict=True):
         _draw(panel, lines)
         panel.set_title(heading)
     for panel in bottom:
         panel.set_xlabel(axis_label(result, across))
     for panel in left:
         panel.set_ylabel(label(result, name))
-    _ticks(every[0], result, across, drawn, words)
+    _ticks(axes[0], result, across, drawn, words)
     if any(line.name for line in drawn[0]):
-        own = every[0].lines[: len(drawn[0])]
-        legend = every[0].legend(own, [""] * len(own), frameon=True, framealpha=0.9, fontsize="small")
-        # Set afterwards: a name that begins with an underscore would be left out.
+        handles = axes[0].lines[: len(drawn[0])]
+        legend = axes[0].legend(handles, [""] * len(handles), frameon=True, framealpha=0.9, fontsize="small")
+        # Texts are set afterwards, since matplotlib leaves out a name that begins with an underscore.
         for text, line in zip(legend.get_texts(), drawn[0], strict=True):
             text.set_text(line.name)
     if any(line.excluded is not None and line.excluded.any() for lines in drawn for line in lines):
@@ -119,22 +119,22 @@ def _draw(panel: Axes, lines: list[PlottedLine]) -> None:
 
 
 def _in_words(result: Result, name: str, groups: list[list[PlottedLine]]) -> tuple[list[list[PlottedLine]], list[str]]:
-    # What stands for words becomes numbers from 0 on, one above the other, with their words.
-    every = [line.values for lines in groups for line in lines]
-    found = worded(result, name, np.concatenate(every))
-    if found is None:
+    # Values that stand for words become numbers from 0 on, one above the other, with their words.
+    arrays = [line.values for lines in groups for line in lines]
+    meaning = worded(result, name, np.concatenate(arrays))
+    if meaning is None:
         return groups, []
-    numbers, words, _ = found
-    parts = iter(np.split(numbers, np.cumsum([len(values) for values in every])[:-1]))
+    numbers, words, _ = meaning
+    parts = iter(np.split(numbers, np.cumsum([len(values) for values in arrays])[:-1]))
     return [[dataclasses.replace(line, values=next(parts)) for line in lines] for lines in groups], words
 
 
 def _ticks(panel: Axes, result: Result, across: str, groups: list[list[PlottedLine]], words: list[str]) -> None:
-    every = np.concatenate([line.values for lines in groups for line in lines])
+    numbers = np.concatenate([line.values for lines in groups for line in lines])
     if words:
         panel.set_yticks(range(len(words)), labels=words)
-    elif every.dtype.kind in "iu":
-        in_whole_numbers(panel.yaxis, none=bool((every == 0).any()))
+    elif numbers.dtype.kind in "iu":
+        in_whole_numbers(panel.yaxis, none=bool((numbers == 0).any()))
     if is_angle(result, across):
         in_degrees(panel.xaxis, float(np.ptp(groups[0][0].points)))
     elif across == "cable":
@@ -181,13 +181,13 @@ def names_of(results: list[Result], stems: list[str]) -> list[str]:
 
 
 def _amplitude(result: Result) -> str:
-    given = table(result.settings, "trajectory").get("amplitude")
-    if isinstance(given, dict):
-        given = ", ".join(
+    amplitude = table(result.settings, "trajectory").get("amplitude")
+    if isinstance(amplitude, dict):
+        amplitude = ", ".join(
             f"epsilon = {part}" if key == "epsilon" else f"{key} {part}" if key == "polynomial" else str(part)
-            for key, part in sorted(given.items(), reverse=True)
+            for key, part in sorted(amplitude.items(), reverse=True)
         )
-    return shortened(given) if isinstance(given, str) else ""
+    return shortened(amplitude) if isinstance(amplitude, str) else ""
 
 
 def overlaid(names: list[str], results: list[tuple[Result, str, PlottedLine]]) -> tuple[str, list[PlottedLine]]:

@@ -21,7 +21,7 @@ _EDGE: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyl
 
 
 class _Section(NamedTuple):
-    # What a mark has to know of its section: its space, its axes, their names without "from_", where it is, the spools.
+    # A section as its marks need it: its space, its axes, their names without "from_", where it is, the spools.
     panel: Axes | None
     result: Result
     space: tuple[str, ...]
@@ -68,7 +68,7 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
 
 
 def marked(result: Result, name: str, across: list[str], over: str, place: dict[str, float]) -> list[int]:
-    """Those of many parallel sections that contain P0 or the fixed end of the motions.
+    """Find the sections, among many parallel ones, that contain P0 or the fixed end of the motions.
 
     Args:
         result: the map.
@@ -83,18 +83,18 @@ def marked(result: Result, name: str, across: list[str], over: str, place: dict[
     section = _section(None, result, across, place)
     if section is None or over not in section.space:
         return []
-    every = result.axes[over]
+    points = result.axes[over]
     indices = []
     for point in _points(section, name).values():
-        gaps = every - _coordinate(over.removeprefix("from_"), point[None], section.centre, None)[0]
+        gaps = points - _coordinate(over.removeprefix("from_"), point[None], section.centre, None)[0]
         nearest = int(np.argmin(np.abs(gaps)))
-        if _contains(section._replace(place=section.place | {over: float(every[nearest])}), point):
+        if _contains(section._replace(place=section.place | {over: float(points[nearest])}), point):
             indices.append(nearest)
     return sorted(set(indices))
 
 
 def _section(panel: Axes | None, result: Result, across: list[str], place: dict[str, float]) -> _Section | None:
-    # None where nothing of this space can be marked.
+    # Return None where nothing of this space can be marked.
     space = next((space for space in (OF_TARGETS, OF_STARTS) if set(across) <= set(space)), None)
     base = np.asarray(result.attributes.get("base_points", 0.0), float)
     if space is None or base.ndim != 2 or base.shape[1] != 3 or not np.isfinite(base).all():
@@ -103,7 +103,7 @@ def _section(panel: Axes | None, result: Result, across: list[str], place: dict[
 
 
 def _points(section: _Section, name: str) -> dict[str, np.ndarray]:
-    # P0, and the end that all motions share, by their words.
+    # Return P0, and the end that all motions share, by their words.
     words, end = ("start", start(section.result)) if section.space is OF_TARGETS else ("target", section.place)
     points = {"P0": _rest_point(section, name)}
     if all(axis in end for axis in "xyz"):
@@ -119,15 +119,15 @@ def _rest_point(section: _Section, name: str) -> np.ndarray | None:
         return None
     if depth is None and "z" in place and starts_at_rest(result, name):
         # z0 is chosen for each target: its own depth, or by the inclination.
-        given = table(result.settings, "trajectory").get("inclination")
-        inclination = place.get("inclination", 0.0 if given is None else given)
+        setting = table(result.settings, "trajectory").get("inclination")
+        inclination = place.get("inclination", 0.0 if setting is None else setting)
         if isinstance(inclination, float) and inclination > -1.0:
             depth = float(frame.depth(place["z"])) / (1.0 + inclination)
     return None if depth is None else frame.outward(np.array([0.0, 0.0, depth]))
 
 
 def _coordinate(name: str, points: np.ndarray, centre: np.ndarray, azimuth: float | None) -> np.ndarray:
-    # Of (n, 3) points. A vertical half-plane takes what is projected onto it.
+    # Return one coordinate of (n, 3) points. In a vertical half-plane it is that of their projections onto it.
     if name in "xyz":
         return points[:, "xyz".index(name)]
     x, y = (points - centre)[:, :2].T
@@ -137,7 +137,7 @@ def _coordinate(name: str, points: np.ndarray, centre: np.ndarray, azimuth: floa
 
 
 def _drawn(section: _Section, points: np.ndarray) -> np.ndarray:
-    # (n, 2) of (n, 3), in the units of the picture; an azimuth within the turn that the axis shows.
+    # Return (n, 2) of (n, 3), in the units of the picture; an azimuth lies within the turn that the axis shows.
     columns = []
     for axis, name in zip(section.across, section.names, strict=True):
         column = _coordinate(name, points, section.centre, section.place.get("azimuth"))
@@ -167,7 +167,7 @@ def _contains(section: _Section, point: np.ndarray) -> bool:
         nearest = int(np.argmin(np.abs(gaps)))
         ordered = np.unique(points)
         steps = np.diff(ordered)
-        # That towards the point; beyond the last one the last.
+        # Take the step towards the point; beyond the last step, the last one.
         side = int(np.searchsorted(ordered, points[nearest])) - (gaps[nearest] > 0.0)
         step = steps[min(max(side, 0), len(steps) - 1)] if len(steps) else 2e-6 * max(1.0, abs(here))
         if points[nearest] != here or abs(gaps[nearest]) > 0.5 * step:
@@ -203,21 +203,21 @@ def _spools(section: _Section) -> dict[str, Artist]:
         return {}
     if symbol:
         return {"spools": Line2D([], [], color="black", linewidth=1.0 if outline else 0.0, **look)}
-    # The same shape in the legend.
+    # The legend shows the same shape.
     middle, size = 0.5 * (flat.min(axis=0) + flat.max(axis=0)), np.ptp(flat, axis=0).max()
     shape = Path(np.concatenate([flat, flat[:1]]) / size - middle / size, closed=True)
     return {"spools": Line2D([], [], marker=shape, markersize=13, markerfacecolor="none", color="black", linestyle="")}
 
 
 def _inside(limits: tuple, points: np.ndarray) -> np.ndarray:
-    # What lies on an edge is seen too.
+    # Points on an edge are seen, too.
     low, high = (np.array([f(pair) for pair in limits]) for f in (min, max))
     slack = 0.01 * (high - low)
     return np.all((points >= low - slack) & (points <= high + slack), axis=1)
 
 
 def _crosses(points: np.ndarray) -> bool:
-    # Whether two sides of the closed polygon cross, other than at a common corner.
+    # Tell whether two sides of the closed polygon cross, other than at a common corner.
     ends = np.roll(points, -1, axis=0)
 
     def side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:

@@ -14,7 +14,7 @@ from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.schema.motion_quantities import PARTS
 from cspr_jax.store.result import Result
 
-# Of longer plans the lines would hide the rest.
+# In longer plans the lines would hide the rest.
 BOUNDARIES = 200
 # Share of the distance between spools that typed digits may leave between points of one plane.
 ONE_PLANE = 1e-9
@@ -33,20 +33,20 @@ def motion_figure(result: Result) -> Figure:
         the figure.
     """
     time, position, tension = result.axes["t"], result.data["position"], result.data["tension"]
-    # Of a planar robot, spools and path are in one vertical plane y = constant. Old files lack the spools.
+    # The spools and the path of a planar robot lie in one vertical plane y = constant. Old files lack the spools.
     points = np.vstack([position, result.attributes.get("base_points", np.empty((0, 3)))])
     is_planar = np.ptp(points[:, 1]) <= ONE_PLANE * np.ptp(points[:, 0])
-    # A file without P0 is of straight lines, whose accelerations are what there is to see.
+    # A file without P0 is of straight lines, of which the accelerations are worth seeing.
     z0 = result.attributes.get("z0")
     more = [
         name
-        for name, wanted in (
+        for name, is_shown in (
             ("velocity", "flight_position" in result.data),
             ("acceleration", z0 is None),
             ("bounds", "path_acceleration" in result.data),
             ("couple", "tension_couple" in result.data),
         )
-        if wanted
+        if is_shown
     ]
     places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["tension", "tension"], *([name] * 2 for name in more)]
     heights = [1.2, 1.0, *[0.8] * len(more)]
@@ -154,8 +154,8 @@ def doubt(result: Result) -> str:
     if not len(none):
         return f"\n{DOUBT}"
     wrong = np.flatnonzero(none & (result.data.get("segment_verdict", none) != 0)) + 1
-    which = ", ".join(str(number) for number in wrong[:6]) + (", ..." if len(wrong) > 6 else "")
-    return f"\n{DOUBT}: segment{'s' if len(wrong) > 1 else ''} {which}"
+    listed = ", ".join(str(number) for number in wrong[:6]) + (", ..." if len(wrong) > 6 else "")
+    return f"\n{DOUBT}: segment{'s' if len(wrong) > 1 else ''} {listed}"
 
 
 def _path(panel: Axes, position: np.ndarray, j: int) -> None:
@@ -167,7 +167,7 @@ def _path(panel: Axes, position: np.ndarray, j: int) -> None:
 
 
 def _flight(panel: Axes, position: np.ndarray, j: int) -> None:
-    # Of a released object.
+    # Draw the flight of a released object.
     panel.plot(position[:, 0], position[:, j], color=COLOURS[1], linewidth=1.2, linestyle="--", label="flight")
     for row, marker, name in ((0, "o", "release"), (-1, "x", "landing")):
         place = position[row, 0], position[row, j]

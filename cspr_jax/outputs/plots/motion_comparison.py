@@ -71,10 +71,11 @@ def _place(panel: Axes, results: list[Result], j: int) -> None:
 
 
 def _names(results: list[Result], files: list[str]) -> list[str]:
-    # The family where it tells them apart, else the file; with the duration, and what is not proved.
+    # A motion is named by its family where that tells the motions apart, else by its file; the duration follows, and
+    # whether it is not proved.
     families = [str(result.attributes.get("family", "")) for result in results]
     stems = [Path(file).stem for file in files]
-    own = stems if len(set(stems)) == len(stems) else files
-    words = families if len(set(families)) == len(families) and all(families) else own
+    labels = stems if len(set(stems)) == len(stems) else files
+    words = families if len(set(families)) == len(families) and all(families) else labels
     ends = [f"{result.axes['t'][-1]:.4g} s{', not proved feasible' if doubt(result) else ''}" for result in results]
     return [f"{shortened(word)}, {end}" for word, end in zip(words, ends, strict=True)]

@@ -21,7 +21,7 @@ SAME_LENGTH = 1e-6
 
 
 def keeps_plan(result: Result) -> bool:
-    """Whether a motion has its robot and its plan.
+    """Tell whether a motion has its robot and its plan.
 
     Args:
         result: the motion.
@@ -66,7 +66,7 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
 
 
 def _check_cables(result: Result, file: str, robot_file: RobotFile, path: Path) -> None:
-    # Whether the lengths are those of this robot in these poses; of cables over pulleys only their number is known.
+    # The lengths must be those of this robot in these poses; for cables over pulleys only their number is known.
     count = result.data["tension"].shape[1]
     if len(robot_file.base_points) != count:
         raise ConfigError(

@@ -60,8 +60,8 @@ def path_figure(result: Result, file: str) -> Figure:
     rows = -(-len(shown) // columns)
     size = (6.8, 4.8) if len(shown) == 1 else (3.8 * columns + 0.6, 3.3 * rows + 1.2)
     figure = Figure(figsize=size, layout="constrained")
-    every, bottom, left = panels(figure, len(shown), same=False)
-    for panel, way in zip(every, shown, strict=True):
+    axes, bottom, left = panels(figure, len(shown), same=False)
+    for panel, way in zip(axes, shown, strict=True):
         _draw(panel, way, keys.max_acceleration)
         panel.set_title(f"segment {way.number}: {way.length:.4g} m in {way.duration:.4g} s")
     for panel in bottom:
@@ -69,7 +69,7 @@ def path_figure(result: Result, file: str) -> Figure:
     for panel in left:
         panel.set_ylabel("acceleration s'' (1/s²)")
     handles = {
-        words: artist for panel in every for artist, words in zip(*panel.get_legend_handles_labels(), strict=True)
+        words: artist for panel in axes for artist, words in zip(*panel.get_legend_handles_labels(), strict=True)
     }
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3 if len(shown) == 1 else 5)
     figure.suptitle(f"{robot_name(result)}: acceleration along straight lines{doubt(result)}")
@@ -96,14 +96,14 @@ def _ways(result: Result, robot_file: RobotFile, keys: PlanFile) -> list[PathSam
 
 
 def _poses(result: Result, robot_file: RobotFile, keys: PlanFile) -> np.ndarray:
-    # (n, 3) as in the file; a rest pose without a position is P0.
+    # Return (n, 3) as in the file; a rest pose without a position is P0.
     frame, depth = frame_of(robot_file.base_points, robot_file.z_axis), result.attributes.get("z0", np.nan)
     rest = frame.outward(np.array([0.0, 0.0, depth]))
     return np.array([rest if pose.position is None else pose.position for pose in keys.pose])
 
 
 def _first_row(time: np.ndarray, start: float) -> int:
-    # Of two rows at a boundary the first one belongs to the segment before it.
+    # The first of two rows at a boundary belongs to the segment before it.
     rows = np.searchsorted(time, start + np.array([-1e-12, 1e-12]) * max(abs(start), 1.0), "left")
     return int(rows[0] + (rows[1] - rows[0]) // 2)
 
@@ -117,8 +117,8 @@ def _draw(panel: Axes, way: PathSamples, max_acceleration: float | None) -> None
     panel.plot(way.s, high, color=COLOURS[0], linewidth=1.3, linestyle="-.", label="largest feasible")
     panel.plot(way.s, actual, color="black", linewidth=1.6, label="of the motion")
     panel.axhline(0.0, color="black", linewidth=0.8)
-    every = np.concatenate([low, actual, high])
-    bottom, top = max(1.1 * np.nanmin(every), -far), min(1.1 * np.nanmax(every), far)
+    rates = np.concatenate([low, actual, high])
+    bottom, top = max(1.1 * np.nanmin(rates), -far), min(1.1 * np.nanmax(rates), far)
     for sign in (1.0, -1.0):
         level = np.nan if max_acceleration is None else sign * max_acceleration / way.length
         if bottom < level < top:

@@ -66,12 +66,12 @@ def _paths(panel: Axes, replay: PlayedPlan, j: int) -> None:
 
 
 def _deviations(panel: Axes, replay: PlayedPlan, values: dict[str, np.ndarray]) -> None:
-    # The largest of each window: rounding is noise, which would fill the panel.
+    # Draw the largest value of each window: rounding is noise, which would fill the panel.
     starts = np.unique(np.linspace(0.0, len(replay.time), WINDOWS, endpoint=False).astype(int))
     time = replay.time[starts]
-    drawn = {name: _largest(some, starts) for name, some in values.items()}
-    for k, (name, some) in enumerate(drawn.items()):
-        panel.plot(time, some, linewidth=1.0, label=name, **line_look(k))
+    drawn = {name: _largest(deviations, starts) for name, deviations in values.items()}
+    for k, (name, deviations) in enumerate(drawn.items()):
+        panel.plot(time, deviations, linewidth=1.0, label=name, **line_look(k))
     _whole_decades(panel, np.concatenate(list(drawn.values())))
     panel.set_xlabel("time (s)")
     panel.margins(x=0.01)
@@ -83,7 +83,7 @@ def _deviations(panel: Axes, replay: PlayedPlan, values: dict[str, np.ndarray]) 
 
 
 def _whole_decades(panel: Axes, values: np.ndarray) -> None:
-    # From one power of ten to another, so that at least two ticks have their numbers.
+    # The axis goes from one power of ten to another, so that at least two ticks have their numbers.
     positive = values[np.isfinite(values) & (values > 0.0)]
     if not len(positive):
         return
@@ -96,6 +96,6 @@ def _whole_decades(panel: Axes, values: np.ndarray) -> None:
 
 
 def _largest(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    # Of each window; what is exactly 0 leaves a gap.
-    found = np.maximum.reduceat(values, starts)
-    return np.where(found > 0.0, found, np.nan)
+    # Return the largest value of each window; a value of exactly 0 leaves a gap.
+    largest = np.maximum.reduceat(values, starts)
+    return np.where(largest > 0.0, largest, np.nan)

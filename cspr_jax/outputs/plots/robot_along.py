@@ -43,14 +43,14 @@ def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows
     if robot_file is None:
         return Moving(np.empty((0, 3)), position, np.empty((len(rows), 0, 3)), np.empty((len(rows), 0, 3)))
     base = np.asarray(robot_file.base_points, float)
-    own = np.zeros_like(base) if robot_file.platform_points is None else np.asarray(robot_file.platform_points, float)
+    body = np.zeros_like(base) if robot_file.platform_points is None else np.asarray(robot_file.platform_points, float)
     if robot_file.centre_of_mass is not None:  # whose position a motion holds
-        own = own - np.asarray(robot_file.centre_of_mass, float)
+        body = body - np.asarray(robot_file.centre_of_mass, float)
     edges, turn = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
-        edges, turn = hull_of(own)[1], np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
-    # What turns with the platform, at each row.
-    attached, corners = (position[:, None] + np.einsum("rij,kj->rki", turn, x) for x in (own, edges.reshape(-1, 3)))
+        edges, turn = hull_of(body)[1], np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
+    # These points turn with the platform, at each row.
+    attached, corners = (position[:, None] + np.einsum("rij,kj->rki", turn, x) for x in (body, edges.reshape(-1, 3)))
     return Moving(base, position, attached, corners)
 
 
@@ -65,14 +65,14 @@ def limits_of(robot_file: RobotFile, asked: PlanFile, quantity: str = "tension")
     Returns:
         words and values, in the axes of the file; each value once, and none that bounds nothing.
     """
-    found = []
+    limits = []
     for row in LIMITS:
-        own = getattr(asked, row.name, None)
-        given = getattr(robot_file, row.name, None) if own is None else own
-        if row.quantity != quantity or given is None:
+        limit_of_plan = getattr(asked, row.name, None)
+        limit = getattr(robot_file, row.name, None) if limit_of_plan is None else limit_of_plan
+        if row.quantity != quantity or limit is None:
             continue
-        values = np.unique(np.atleast_1d(np.asarray(given, float)))
+        values = np.unique(np.atleast_1d(np.asarray(limit, float)))
         values = values[np.isfinite(values) & ((values > 0.0) | (not row.per_cable))]
         words = ("smallest allowed" if row.sense == "least" else "largest allowed") if row.per_cable else "floor"
-        found += [(words, value) for value in values.tolist()]
-    return found
+        limits += [(words, value) for value in values.tolist()]
+    return limits

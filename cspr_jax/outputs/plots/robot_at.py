@@ -44,7 +44,7 @@ def robot_of(result: Result) -> RobotFile:
 
 
 def asked(result: Result) -> WorkspaceTable:
-    """What a map of a workspace asks of its poses.
+    """Requirements of a map of a workspace on its poses.
 
     Args:
         result: the map.
@@ -78,9 +78,9 @@ def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
         raise InputError("workspace.orientation", quaternion.tolist(), "of length 1")
     turn = turn @ rotation_matrix(quaternion / size)
     base = np.array(robot_file.base_points, float)
-    own = np.zeros_like(base) if robot_file.platform_points is None else np.array(robot_file.platform_points, float)
-    faces, edges = hull_of(own)
-    return Posed(base, place + own @ turn.T, place + faces @ turn.T, place + edges @ turn.T)
+    body = np.zeros_like(base) if robot_file.platform_points is None else np.array(robot_file.platform_points, float)
+    faces, edges = hull_of(body)
+    return Posed(base, place + body @ turn.T, place + faces @ turn.T, place + edges @ turn.T)
 
 
 def _about(axis: str, angle: float) -> np.ndarray:
@@ -97,8 +97,8 @@ def hull_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         (m, 3, 3) faces and (k, 2, 3) edges of it, m.
     """
     if not is_flat(points):
-        found = hull(points)
-        return found.triangles, found.edges
+        solid = hull(points)
+        return solid.triangles, solid.edges
     from scipy.spatial import ConvexHull
 
     _, spread, axes = np.linalg.svd(points - points.mean(0))

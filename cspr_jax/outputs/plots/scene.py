@@ -45,7 +45,7 @@ def set_space(panel: Any, points: np.ndarray, *, is_down: bool) -> None:
         half = (0.5 + ROOM) * signs[k] * size[k]
         panel.set(**{f"{name}lim": (middle[k] - half, middle[k] + half), f"{name}label": f"{name} (m)"})
         axis = getattr(panel, f"{name}axis")
-        # Turned by itself, a label may stand on its head.
+        # A label that is turned by matplotlib may stand on its head.
         axis.set_rotate_label(False)
         axis.label.set_rotation(90.0 if name == "z" else 0.0)
         axis.labelpad = rcParams["font.size"] * (0.2 if name == "z" else 1.1)
@@ -120,7 +120,7 @@ def _axes(panel: Any) -> tuple[Any, ...]:
 
 
 def box_in_space(panel: Any) -> Bbox:
-    """Where the corners of a box in space are drawn.
+    """Rectangle in which the corners of a box in space are drawn.
 
     Args:
         panel: axes in three dimensions.
@@ -136,7 +136,7 @@ def box_in_space(panel: Any) -> Bbox:
 
 
 def words_in_space(panel: Any) -> list[Bbox]:
-    """Where ticks and labels of axes in space are written.
+    """Rectangles in which ticks and labels of axes in space are written.
 
     Args:
         panel: axes in three dimensions.
@@ -150,7 +150,7 @@ def words_in_space(panel: Any) -> list[Bbox]:
 
 
 def _leave_out(panel: Any) -> None:
-    # Of few ticks those whose numbers would still meet others; an axis may be seen nearly from its end.
+    # Even among few ticks, leave out those whose numbers would meet others: an axis may be seen nearly from its end.
     taken = [axis.label.get_window_extent() for axis in _axes(panel)]
     for axis in _axes(panel):
         places = []

@@ -71,18 +71,20 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
     if over is not None:
         shown = _moved(shown, marked(result, name, across, over, alone))
     figure = Figure(figsize=_size(result, across, len(shown)), layout="constrained")
-    every, bottom, left = panels(figure, len(shown), polar=polar)
+    axes, bottom, left = panels(figure, len(shown), polar=polar)
     # The points of an axis may come in any order, and twice.
     orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in across]
     points = [as_drawn(result, axis, result.axes[axis][order]) for axis, order in zip(across, orders, strict=True)]
     data = as_drawn(result, name, data[np.ix_(*orders, shown)])
     excluded = section.excluded[np.ix_(*orders, shown)]
-    # Beyond every scale: of an infinite deficit there is no colour.
+    # An infinite deficit is beyond every scale, and has no colour.
     endless = np.isneginf(data) if data.dtype.kind == "f" else np.zeros(data.shape, bool)
     data = np.where(endless, np.nan, data) if endless.any() else data
     quantity = EVERY[name]
-    found = worded(result, name, data)
-    cells, scale = (data, number_scale(result, name, data)) if found is None else (found[0], word_scale(*found[1:]))
+    meaning = worded(result, name, data)
+    cells, scale = (
+        (data, number_scale(result, name, data)) if meaning is None else (meaning[0], word_scale(*meaning[1:]))
+    )
     titles = values(result, over, result.axes[over][shown]) if over is not None else []
     legend: dict[str, Artist] = {"no value": Patch(color=NONE_COLOUR)} if scale.missing and not endless.all() else {}
     if endless.any():
@@ -91,7 +93,7 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
         }
     if excluded.any():
         legend[EXCLUDED] = Patch(facecolor="white", hatch=HATCH, edgecolor="black")
-    for k, panel in enumerate(every):
+    for k, panel in enumerate(axes):
         image = _section(panel, result, cells[:, :, k], across, points, scale)
         _hatch(panel, excluded[:, :, k], points)
         if quantity.contoured and not polar:
@@ -104,30 +106,30 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
     words = list(section.fixed)
     if polar:
         outward = np.flatnonzero(says[:, orders[1]][:, :, shown].any((0, 2)))
-        reach_polar(every, edges(points[1])[outward[-1] + 1 if len(outward) else -1], unit(result, across[1]))
+        reach_polar(axes, edges(points[1])[outward[-1] + 1 if len(outward) else -1], unit(result, across[1]))
         words.append(f"around: {axis_label(result, across[0])}, outward: {axis_label(result, across[1])}")
     else:
         _name_axes(result, across, bottom, left)
-    add_bar(figure, image, every, scale, label(result, name))
+    add_bar(figure, image, axes, scale, label(result, name))
     if legend:
         figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=len(legend))
     figure.suptitle(f"{heading(result, name)}\n{', '.join(words)}")
     return figure
 
 
-def _moved(shown: np.ndarray, wanted: list[int]) -> np.ndarray:
-    # Evenly chosen sections, the nearest ones moved to where there is something to mark.
+def _moved(shown: np.ndarray, marked_indices: list[int]) -> np.ndarray:
+    # Move, of evenly chosen sections, the nearest ones to where there is something to mark.
     indices = shown.tolist()
-    for index in wanted:
+    for index in marked_indices:
         if index not in indices:
-            free = [other for other in indices if other not in wanted]
+            free = [other for other in indices if other not in marked_indices]
             if free:
                 indices[indices.index(min(free, key=lambda other: abs(other - index)))] = index
     return np.sort(indices)
 
 
 def _size(result: Result, across: list[str], count: int) -> tuple[float, float]:
-    # Inches. Panels in metres have the shape of their range.
+    # Return inches. Panels in metres have the shape of their range.
     columns = columns_of(count)
     side = SINGLE if count == 1 else PANEL
     width, height = side, side
@@ -176,7 +178,7 @@ def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], 
         x = np.interp(np.arange(parts * (len(x) - 1) + 1) / parts, np.arange(len(x)), np.radians(x))
         y, cells = np.maximum(y, 0.0), np.repeat(cells, parts, axis=0)
     if cells.dtype.kind == "f":
-        # What is infinite lies beyond an end of the scale; only what is not a number has no value.
+        # Infinite values lie beyond an end of the scale; only NaN is drawn as no value.
         cells = np.ma.masked_invalid(np.clip(cells, -LARGEST, LARGEST))
     image = panel.pcolormesh(x, y, cells.T, cmap=scale.colours, norm=scale.norm, rasterized=True)
     if _equal(result, across):
@@ -187,7 +189,7 @@ def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], 
 
 
 def _hatch(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
-    # One path of all cells, so that the lines of the hatch go on from one to the next.
+    # Draw one path of all cells, so that the lines of the hatch go on from one cell to the next.
     if not cells.any():
         return
     x, y = map(edges, points)
@@ -199,7 +201,8 @@ def _hatch(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
 
 
 def _loci(panel: Axes, cells: np.ndarray, points: list[np.ndarray]) -> None:
-    # Where a whole number of oscillations is just too few: the hexagons of thesis Fig. 1.6 on horizontal transitions.
+    # Lines where a whole number of oscillations is just too few: on horizontal transitions they are the hexagons of
+    # thesis Fig. 1.6.
     levels = np.arange(1.0, np.nanmax(np.where(np.abs(cells) < 1e4, cells, np.nan), initial=1.0))
     if min(cells.shape) < 2 or not 0 < len(levels) <= 40:
         return

@@ -9,7 +9,7 @@ from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.outputs.plots.labels import value
 from cspr_jax.store.result import Result
 
-# What is asked for and what there is are the same but for rounding.
+# A value that is asked for and a point of an axis are the same but for rounding.
 SAME = 1e-9
 
 

@@ -31,7 +31,7 @@ BACK, FRONT = 0.4, 0.3  # opacities
 WIDTH, LEAST_HEIGHT = 7.2, 4.4
 WIDE, HIGH, MIDDLE = 0.76, 0.68, 0.51
 MARGIN = 0.02  # around what is drawn, of its largest side
-# Of the side of a panel: what the diagonal of a box takes that mplot3d shows without zoom.
+# Share of the side of a panel that the diagonal of a box takes where mplot3d shows it without zoom.
 DIAGONAL = 1.03
 
 
@@ -62,8 +62,8 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
     angles = {axis: float(result.axes[axis][place]) for axis, place in index.items()}
     robot = posed(result, _middle(sides), angles)
     bodies = obstacles(result)
-    every = np.concatenate([surface.corners, robot.base, robot.attached, *bodies])
-    box = np.stack([every.min(0), every.max(0)]) + np.array([[-1.0], [1.0]]) * MARGIN * np.ptp(every, axis=0).max()
+    points = np.concatenate([surface.corners, robot.base, robot.attached, *bodies])
+    box = np.stack([points.min(0), points.max(0)]) + np.array([[-1.0], [1.0]]) * MARGIN * np.ptp(points, axis=0).max()
     figure, panel = _panel(box[1] - box[0])
     eye = _axes(panel, result, box)
     _draw_surface(panel, surface, eye)
@@ -77,7 +77,7 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
 
 
 def _middle(sides: BoundarySides) -> np.ndarray:
-    # Centroid of the points inside; if it is not in the workspace itself the point inside that is nearest.
+    # Return the centroid of the points inside; if it is not in the workspace itself, the point inside that is nearest.
     grid = np.stack(np.meshgrid(*sides.points, indexing="ij"), axis=-1)
     inside = grid[sides.verdict == 0]
     middle = inside.mean(0)
@@ -110,7 +110,7 @@ def _panel(sizes: np.ndarray) -> tuple[Figure, Axes3D]:
 
 
 def _axes(panel: Axes3D, result: Result, box: np.ndarray) -> _Eye:
-    # Equal scales. Where z points down y is turned too, so that nothing is mirrored.
+    # Scales are equal. Where z points down y is turned, too, so that nothing is mirrored.
     is_down = result.attributes.get("z_axis", "down") == "down"
     signs = np.array([1.0, -1.0, -1.0]) if is_down else np.ones(3)
     for name, sign, (low, high) in zip(SPACE, signs, box.T, strict=True):
@@ -127,26 +127,30 @@ def _axes(panel: Axes3D, result: Result, box: np.ndarray) -> _Eye:
 
 
 def _draw_surface(panel: Axes3D, surface: Boundary, eye: _Eye) -> None:
-    # What is turned away lies behind the robot, what is turned to the eye before it.
+    # Triangles that are turned away lie behind the robot, those that are turned to the eye before it.
     triangles = surface.corners[surface.pieces]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     is_front = normals @ eye.towards > 0.0
     shades = _shades(surface, normals, eye)
-    for which, opacity, layer in ((~is_front, BACK, 1.0), (is_front, FRONT, 3.0)):
-        # Opaque, and made transparent as a whole: else the edges of neighbours would show as a net.
-        some = Poly3DCollection(
-            triangles[which], facecolors=shades[which], edgecolors=shades[which], linewidths=0.4, zorder=layer
+    for is_drawn, opacity, layer in ((~is_front, BACK, 1.0), (is_front, FRONT, 3.0)):
+        # Triangles are opaque, and made transparent as a whole: else the edges of neighbours would show as a net.
+        collection = Poly3DCollection(
+            triangles[is_drawn],
+            facecolors=shades[is_drawn],
+            edgecolors=shades[is_drawn],
+            linewidths=0.4,
+            zorder=layer,
         )
-        some.set_rasterized(True)
-        some.set_agg_filter(partial(_fainter, opacity))
-        panel.add_collection3d(some)
-        lines = _level_lines(triangles[which], panel.zaxis.get_major_locator()())
+        collection.set_rasterized(True)
+        collection.set_agg_filter(partial(_fainter, opacity))
+        panel.add_collection3d(collection)
+        lines = _level_lines(triangles[is_drawn], panel.zaxis.get_major_locator()())
         panel.add_collection3d(Line3DCollection(lines, colors=LINES, linewidths=0.5, zorder=layer + 0.1))
 
 
 def _level_lines(triangles: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    # (n, 2, 3) where triangles pass heights.
-    found = []
+    # Return (n, 2, 3) segments in which triangles pass heights.
+    segments = []
     for height in heights:
         above = triangles[..., 2] > height
         cut = above.any(1) & ~above.all(1)
@@ -154,12 +158,12 @@ def _level_lines(triangles: np.ndarray, heights: np.ndarray) -> np.ndarray:
         alone = np.argmax(above[cut] == (above[cut].sum(1, keepdims=True) == 1), axis=1)
         first, *others = (triangles[cut, (alone + k) % 3] for k in range(3))
         parts = [(height - first[:, 2:]) / (other[:, 2:] - first[:, 2:]) for other in others]
-        found.append(np.stack([first + p * (other - first) for p, other in zip(parts, others, strict=True)], axis=1))
-    return np.concatenate(found) if found else np.empty((0, 2, 3))
+        segments.append(np.stack([first + p * (other - first) for p, other in zip(parts, others, strict=True)], axis=1))
+    return np.concatenate(segments) if segments else np.empty((0, 2, 3))
 
 
 def _fainter(opacity: float, image: np.ndarray, dpi: float) -> tuple[np.ndarray, float, float]:
-    # matplotlib calls it twice of a collection in space.
+    # matplotlib calls this filter twice for a collection in space.
     del dpi
     faint = image.copy()
     faint[..., 3] = np.minimum(faint[..., 3], opacity)
@@ -167,7 +171,7 @@ def _fainter(opacity: float, image: np.ndarray, dpi: float) -> tuple[np.ndarray,
 
 
 def _shades(surface: Boundary, normals: np.ndarray, eye: _Eye) -> np.ndarray:
-    # (m, 3) colours in the light of a lamp beside the eye; normals of neighbours are mixed, so that facets do not show.
+    # Return (m, 3) colours in the light of a lamp beside the eye; normals of neighbours are mixed to hide facets.
     mixed = np.zeros(surface.corners.shape)
     for k in range(3):
         np.add.at(mixed, surface.pieces[:, k], normals)
@@ -210,20 +214,20 @@ def _draw_obstacles(panel: Axes3D, bodies: list[np.ndarray], eye: _Eye, surface:
 
 
 def _legend(surface: Boundary, *, has_obstacles: bool = False) -> tuple[list[Any], list[str]]:
-    every: dict[str, Any] = {"workspace": Patch(color=SURFACE, alpha=0.55)}
+    entries: dict[str, Any] = {"workspace": Patch(color=SURFACE, alpha=0.55)}
     if surface.is_end.any():
-        every["end of the grid"] = Patch(color=END, alpha=0.55)
+        entries["end of the grid"] = Patch(color=END, alpha=0.55)
     if has_obstacles:
-        every["obstacles"] = Patch(color=OBSTACLE)
-    every["cables"] = Line2D([], [], color=CABLES, linewidth=1.1)
-    every["spools"] = Line2D([], [], color="black", marker="s", markersize=4.0, linestyle="")
-    return list(every.values()), list(every)
+        entries["obstacles"] = Patch(color=OBSTACLE)
+    entries["cables"] = Line2D([], [], color=CABLES, linewidth=1.1)
+    entries["spools"] = Line2D([], [], color="black", marker="s", markersize=4.0, linestyle="")
+    return list(entries.values()), list(entries)
 
 
 def _volume(result: Result, index: dict[str, int]) -> str:
-    found: WorkspaceVolume = volume_of(result)
-    place = tuple(index[axis] for axis in found.axes)
-    size, error = float(found.volume[place]), float(found.error[place])
+    volume: WorkspaceVolume = volume_of(result)
+    place = tuple(index[axis] for axis in volume.axes)
+    size, error = float(volume.volume[place]), float(volume.error[place])
     if error == 0.0:
         return f"volume {size:.4g} m³"
     digits = max(0, 1 - int(np.floor(np.log10(error))))  # two of the error

@@ -42,7 +42,7 @@ INCH = 2.54  # cm
 SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
 # Width and letters of pictures for papers, cm and points; their heights follow from what they show.
 PRESETS = {"column": (8.5, 8.0), "page": (17.5, 9.0)}
-# Of the height, what panels take at least; where they have less the picture gets higher, at most so often.
+# Panels take at least this share of the height; where they have less the picture gets higher, at most so often.
 LEAST_SHARE, HIGHER, TRIES = 0.5, 1.2, 6
 # Letters that nobody chose get smaller instead where the size is given, down to so many points.
 SMALLER, LEAST_LETTERS = 0.92, 5.0
@@ -201,7 +201,7 @@ def _give_room(figure: Figure, style: Style) -> None:
             for axis in (axis for panel in figure.axes for axis in (panel.xaxis, panel.yaxis)):
                 for words in axis.get_ticklabels()[:1]:
                     axis.set_tick_params(labelsize=SMALLER * float(words.get_fontsize()))
-    # What has no room for its panels is refused where it is written.
+    # A picture without room for its panels is refused where it is written.
 
 
 def rendered(figure: Figure, ending: str, style: Style) -> bytes:

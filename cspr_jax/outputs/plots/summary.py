@@ -78,6 +78,6 @@ def _cells(result: Result) -> list[list[str]]:
         margin = f"{data['segment_margin'][k]:.4g}" if np.isfinite(data["segment_margin"][k]) else "none"
         number = f"{k + 1}" if count <= SEGMENTS else f"{k + 1} of {count}"
         # Straight lines and Bezier segments have no arcs; a segment that is not feasible has none that will do.
-        told = f"{arcs}" if arcs else "none" if data["segment_verdict"][k] else "-"
-        cells.append([number, told, f"{duration:.4g}", margin, words[int(numbers[0])]])
+        arcs_text = f"{arcs}" if arcs else "none" if data["segment_verdict"][k] else "-"
+        cells.append([number, arcs_text, f"{duration:.4g}", margin, words[int(numbers[0])]])
     return cells

@@ -104,7 +104,7 @@ def name_spools(panel: Any, base: np.ndarray) -> None:
 
 
 def _instants(result: Result) -> np.ndarray:
-    # Rows at the ends of segments, evenly chosen if there are many.
+    # Return the rows at the ends of segments, evenly chosen if there are many.
     time = result.axes["t"]
     ends = np.concatenate([time[:1], result.data.get("segment_end", time[-1:])])
     rows = np.clip(np.searchsorted(time, ends - 1e-9 * max(time[-1], 1.0)), 0, len(time) - 1)
@@ -121,7 +121,7 @@ def legend_of(result: Result) -> tuple[list[Line2D], list[str]]:
         lines and words.
     """
     hollow: dict[str, Any] = {"linestyle": "", "color": "black", "markerfacecolor": "white"}
-    every = {
+    entries = {
         "path": Line2D([], [], color="black", linewidth=1.2),
         "start": Line2D([], [], marker="o", **hollow),
         "end": Line2D([], [], marker="D", **hollow),
@@ -129,5 +129,5 @@ def legend_of(result: Result) -> tuple[list[Line2D], list[str]]:
         "spools, by cable": Line2D([], [], linestyle="", marker="s", color="0.35"),
     }
     if "flight_position" in result.data:
-        every["flight"] = Line2D([], [], color=COLOURS[2], linewidth=1.4, linestyle="--")
-    return list(every.values()), list(every)
+        entries["flight"] = Line2D([], [], color=COLOURS[2], linewidth=1.4, linestyle="--")
+    return list(entries.values()), list(entries)

@@ -42,6 +42,6 @@ def reasons(verdicts: np.ndarray, unflagged: str) -> tuple[np.ndarray, list[str]
     for number, flag in reversed(list(enumerate(REASONS, start=1))):
         numbers = np.where(flags & flag.value, number, numbers)
     used = np.unique(numbers)
-    every = [(unflagged, FEASIBLE_COLOUR), *REASONS.values()]
-    words, colours = zip(*(every[number] for number in used), strict=True)
+    entries = [(unflagged, FEASIBLE_COLOUR), *REASONS.values()]
+    words, colours = zip(*(entries[number] for number in used), strict=True)
     return np.searchsorted(used, numbers), list(words), list(colours)

@@ -16,7 +16,7 @@ MORE = (*COLOURS, "#F0E442", "#000000")
 
 
 def worded(result: Result, name: str, values: np.ndarray) -> tuple[np.ndarray, list[str], list[str]] | None:
-    """What the values of a quantity stand for.
+    """Words that the values of a quantity stand for.
 
     Args:
         result: gives the settings, on which the words may depend.

@@ -40,14 +40,14 @@ def order_of(result: Result) -> tuple[list[str], list[np.ndarray]]:
     varying = [axis for axis, points in result.axes.items() if len(np.unique(points)) > 1]
     alone = [axis for axis in result.axes if axis not in varying]
     order = in_order(result, varying)
-    # Of a map over one axis the plane is a line.
+    # The plane of a map over one axis is a line.
     plane = order[:2] if len(order) > 1 else [*order, *alone][:2]
     names = [*(axis for axis in [*alone, *order] if axis not in plane), *reversed(plane)]
     return names, [np.unique(result.axes[axis], return_index=True)[1] for axis in names]
 
 
 def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, Any], list[str]]:
-    """What a page shows of a map.
+    """Content of the page of a map.
 
     Args:
         result: the map.
@@ -83,7 +83,7 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
         quantities.append(content)
     return {
         "shape": shape,
-        "axes": [_axis(result, name, result.axes[name][own]) for name, own in zip(names, points, strict=True)],
+        "axes": [_axis(result, name, result.axes[name][indices]) for name, indices in zip(names, points, strict=True)],
         "quantities": quantities,
         "reasons": _reasons(arranged("verdict"), quantity_of(kind.name, "verdict").unflagged)
         if "verdict" in result.data
@@ -98,7 +98,7 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
 
 
 def _is_asked(result: Result, name: str) -> bool:
-    # What a map was not asked for has no value anywhere; of workspaces some of it follows from the verdict alone.
+    # A quantity that a map was not asked for has no value anywhere; in workspaces some follow from the verdict alone.
     data = result.data[name]
     if data.dtype.kind == "f" and np.isnan(data).all():
         return False
@@ -110,7 +110,7 @@ def _is_asked(result: Result, name: str) -> bool:
 
 
 def _spools(result: Result, plane: list[str]) -> dict[str, list[float]] | None:
-    # Of the robot of a workspace, seen along the axis out of the plane.
+    # Return the spools of a workspace's robot, seen along the axis out of the plane.
     if result.attributes["map"] != WORKSPACE or "verdict" not in result.data or not set(plane) <= set(SPACE):
         return None
     base = np.asarray(robot_of(result).base_points, float)
@@ -145,7 +145,7 @@ def _cut(body: np.ndarray, plane: list[str], third: str, place: float) -> np.nda
 
 
 def _closed(corners: np.ndarray) -> dict[str, list[float]]:
-    # In metres to a tenth of a millimetre, upward and across.
+    # Return the closed line in metres to a tenth of a millimetre, upward and across.
     rounded = np.round(np.concatenate([corners, corners[:1]]), 4)
     return {"up": rounded[:, 0].tolist(), "across": rounded[:, 1].tolist()}
 
@@ -162,9 +162,9 @@ def _axis(result: Result, name: str, points: np.ndarray) -> dict[str, Any]:
 
 def _quantity(result: Result, name: str, data: np.ndarray) -> dict[str, Any]:
     row = quantity_of(result.attributes["map"], name)
-    found, drawn = worded(result, name, data), as_drawn(result, name, data)
-    if found is not None:
-        drawn, scale = found[0], word_scale(*found[1:])
+    meaning, drawn = worded(result, name, data), as_drawn(result, name, data)
+    if meaning is not None:
+        drawn, scale = meaning[0], word_scale(*meaning[1:])
     else:
         scale = scale_of(drawn, signed=row.signed)
     return {
@@ -173,15 +173,15 @@ def _quantity(result: Result, name: str, data: np.ndarray) -> dict[str, Any]:
         "unit": unit(result, name),
         "description": row.description,
         "isMargin": is_margin(result, name),
-        "isCount": drawn.dtype.kind in "iu" and found is None,
-        "words": None if found is None else found[1],
+        "isCount": drawn.dtype.kind in "iu" and meaning is None,
+        "words": None if meaning is None else meaning[1],
         "values": packed(drawn),
         "scale": _scale(scale),
     }
 
 
 def _scale(scale: Scale) -> dict[str, Any]:
-    # Colours for a browser: steps where matplotlib has steps, of which the first may stand for "none".
+    # Return colours for a browser: steps where matplotlib has steps, of which the first may stand for "none".
     if not isinstance(scale.norm, BoundaryNorm):
         shades = [_hex(scale, part) for part in np.linspace(0.0, 1.0, SHADES).tolist()]
         ends = float(scale.norm.vmin or 0.0), float(scale.norm.vmax or 0.0)
@@ -210,19 +210,19 @@ def _hex(scale: Scale, place: float) -> str:
 
 
 def _reasons(verdicts: np.ndarray, unflagged: str) -> dict[str, Any]:
-    # Each combination of flags that occurs, with its sentences and the colour of the first reason.
+    # Return each combination of flags that occurs, with its sentences and the colour of the first reason.
     flags, index = np.unique(conjunction(verdicts.astype(np.int64)), return_inverse=True)
     entries = []
     for code in flags.tolist():
-        own = [flag for flag in (*REASONS, *SENTENCES) if code & flag.value]
-        word, colour = next((REASONS[flag] for flag in own if flag in REASONS), (unflagged, FEASIBLE_COLOUR))
+        set_flags = [flag for flag in (*REASONS, *SENTENCES) if code & flag.value]
+        word, colour = next((REASONS[flag] for flag in set_flags if flag in REASONS), (unflagged, FEASIBLE_COLOUR))
         entries.append(
             {
                 "word": word,
                 "colour": colour,
                 "isInside": code == 0,
                 "text": Verdict(code).text.replace("_", " ").replace("+", ", ") if code else unflagged,
-                "sentences": [SENTENCES[flag] for flag in dict.fromkeys(own) if flag in SENTENCES],
+                "sentences": [SENTENCES[flag] for flag in dict.fromkeys(set_flags) if flag in SENTENCES],
             }
         )
     return {"entries": entries, "values": packed(index.reshape(verdicts.shape))}

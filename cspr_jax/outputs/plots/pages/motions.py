@@ -30,7 +30,7 @@ def motion_content(
     robot_file: RobotFile | None,
     keys: PlanFile | None,
 ) -> dict[str, Any]:
-    """What a page shows of a motion.
+    """Content of the page of a motion.
 
     Args:
         title: of the motion.
@@ -72,7 +72,7 @@ def _limits(robot_file: RobotFile | None, keys: PlanFile | None, quantity: str) 
 def _facts(
     time: np.ndarray, segments: Mapping[str, np.ndarray], robot_file: RobotFile | None, keys: PlanFile | None
 ) -> list[tuple[str, str]]:
-    # Robot, limits and duration, in words.
+    # Describe robot, limits and duration in words.
     count = len(segments.get("segment_end", ()))
     of_segments = f" in {count} segment{'s' if count > 1 else ''}" if count else ""
     facts = [("duration", f"{time[-1] - time[0]:.4g} s{of_segments}")]
@@ -90,7 +90,7 @@ def _bound(quantity: str, limits: list[tuple[str, float]]) -> str:
         return f"floor at z = {limits[0][1]:.4g} m" if limits else ""
     parts = []
     for words, phrase in (("smallest allowed", "at least"), ("largest allowed", "at most")):
-        values = [value for own, value in limits if own == words]
+        values = [value for sense, value in limits if sense == words]
         if values:
             each = f" to {values[-1]:.4g}, by cable" if len(values) > 1 else ""
             parts.append(f"{phrase} {values[0]:.4g}{each}")
@@ -99,10 +99,10 @@ def _bound(quantity: str, limits: list[tuple[str, float]]) -> str:
 
 
 def _chosen(time: np.ndarray) -> np.ndarray:
-    # Evenly in time, as many as there are or a page takes; where segments meet rows are twice.
+    # Choose rows evenly in time, as many as there are or a page takes; where segments meet rows are twice.
     count = min(len(time), MOST_ROWS)
-    wanted = np.linspace(time[0], time[-1], count)
-    return np.unique(np.clip(np.searchsorted(time, wanted - 1e-12), 0, len(time) - 1))
+    instants = np.linspace(time[0], time[-1], count)
+    return np.unique(np.clip(np.searchsorted(time, instants - 1e-12), 0, len(time) - 1))
 
 
 def _segments(segments: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:

@@ -26,7 +26,7 @@ def packed(values: np.ndarray) -> dict[str, Any]:
     else:
         low, high = int(values.min(initial=0)), int(values.max(initial=0))
         name = "int32" if low < 0 or high > 65535 else "uint8" if high < 256 else "uint16"
-    # No time of writing: the same values are the same text.
+    # The time of writing is left out, so that the same values are the same text.
     data = gzip.compress(np.ascontiguousarray(values, np.dtype(name).newbyteorder("<")).tobytes(), 6, mtime=0)
     return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}
 

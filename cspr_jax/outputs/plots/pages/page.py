@@ -43,7 +43,7 @@ def page_of(title: str, content: dict[str, Any]) -> str:
         "content": data,
         "scripts": "\n".join(_part(name) for name in SCRIPTS),
     }
-    # In one pass: what is put in is not searched again.
+    # One pass replaces all places, so that inserted text is not searched again.
     return PLACE.sub(lambda match: parts[match[1]], _part(FRAME))
 
 

@@ -37,14 +37,14 @@ def telling(data: dict[str, np.ndarray], verdict: np.ndarray, count: int) -> lis
 
 
 def _extremes(values: dict[str, np.ndarray]) -> list[int]:
-    found = []
-    for own in values.values():
-        if np.isfinite(own).any():
-            found += [int(np.nanargmin(own)), int(np.nanargmax(own))]
+    cells = []
+    for numbers in values.values():
+        if np.isfinite(numbers).any():
+            cells += [int(np.nanargmin(numbers)), int(np.nanargmax(numbers))]
     counts = next((values[name] for name in ("arcs", "oscillations") if name in values), None)
     if counts is not None and "margin" in values:
         for number in np.unique(counts):
             least = np.where(counts == number, values["margin"], np.inf)
             if np.isfinite(least).any():
-                found.append(int(np.argmin(least)))
-    return found
+                cells.append(int(np.argmin(least)))
+    return cells
