@@ -25,7 +25,7 @@ DEFINITIONS = ("grid", "scan", "equal-volume")
 # Steps along rays that are tried at a time: few rays go farther, and with the usual step they fill three batches of
 # `OrientationSteps`.
 LEG = 23
-WHOLE = 8.0 * math.pi**2  # of SO(3), in the measure sin(theta) d phi d theta d sigma
+WHOLE = 8.0 * math.pi**2  # volume of SO(3), in the measure sin(theta) d phi d theta d sigma
 
 
 class Accessible(NamedTuple):
@@ -110,7 +110,7 @@ def _scan(steps: OrientationSteps, towards: np.ndarray, divisions: int) -> Itera
 def _section(
     steps: OrientationSteps, towards: np.ndarray, centre: np.ndarray, torsion: float, divisions: int
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    # Along rays in the polar plane (theta cos phi, theta sin phi), up to the first step that cannot be made.
+    # Go along rays in the polar plane (theta cos phi, theta sin phi), up to the first step that cannot be made.
     step, count = math.pi / divisions, 2 * divisions
     azimuth = np.arange(count) * step
     rays = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
@@ -126,13 +126,13 @@ def _section(
     ends = centre + (made * step)[:, None] * rays
     ray, last = np.nonzero(np.arange(count) < made[:, None])
     reached = _angles(centre + far[last + 1, None] * rays[ray], np.asarray(torsion))
-    # Of a sector of the plane, where the measure is sin(theta) / theta.
+    # Each orientation stands for a sector of the plane, where the measure is sin(theta) / theta.
     volume = far[last + 1] * np.sinc(reached[:, 1] / math.pi) * step**3 / WHOLE
     return (reached, volume), ends.mean(0)
 
 
 def _free(steps: OrientationSteps, towards: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    # Of orientations along rays (n, m + 1, 3): (n, m) which steps can be made, and all before them.
+    # Take orientations along rays, (n, m + 1, 3); return (n, m) which steps can be made, and all before them.
     samples = steps.at(from_tilt_torsion(angles.reshape(-1, 3) + towards))
     index = np.arange(angles[..., 0].size).reshape(len(angles), -1)
     free = steps.passable(samples, index[:, :-1].ravel(), index[:, 1:].ravel()).reshape(len(angles), -1)
@@ -141,6 +141,6 @@ def _free(steps: OrientationSteps, towards: np.ndarray, angles: np.ndarray) -> n
 
 
 def _angles(points: np.ndarray, torsion: np.ndarray) -> np.ndarray:
-    # Of points of the polar plane.
+    # Turn points of the polar plane, and the torsion, into angles of tilt and torsion.
     tilt = np.hypot(points[..., 0], points[..., 1])
     return np.stack([np.arctan2(points[..., 1], points[..., 0]), tilt, np.broadcast_to(torsion, tilt.shape)], axis=-1)

@@ -96,9 +96,9 @@ def settled(
     others = np.flatnonzero(smallest.arcs == 0)
     checks.put(others, checker.check(rows(segments, others), tried[others], margins=margins))
     known = np.flatnonzero(~np.isnan(checks.tolerated))
-    found = checker.tolerated(rows(segments, known), tried[known])
-    checks.tolerated[known] = np.maximum(checks.tolerated[known], found.proved)
-    checks.not_tolerated[known] = np.minimum(checks.not_tolerated[known], found.refuted)
+    tolerances = checker.tolerated(rows(segments, known), tried[known])
+    checks.tolerated[known] = np.maximum(checks.tolerated[known], tolerances.proved)
+    checks.not_tolerated[known] = np.minimum(checks.not_tolerated[known], tolerances.refuted)
     duration = checker.durations(segments, tried)
     beta_hats = np.stack(candidates.beta_hats, axis=1)
     if checker.kind.plain:  # (3.66) has the one that its cosine has
@@ -139,7 +139,7 @@ def _reasons(
     max_arcs: int,
     fixed: np.ndarray | None,
 ) -> np.ndarray:
-    # Flags of what stands in the way of motions without a number of arcs.
+    # Return the flags of the criteria that keep motions from having a number of arcs.
     limits = sum({flag.value for flag in itertools.compress(checker.flags, checker.is_limit)})
     basic = checks.verdict & ~(limits & ~Verdict.SLACK_CABLE.value)
     by_limits = refused.arcs > 0
@@ -153,7 +153,7 @@ def _reasons(
     named = np.zeros(len(basic), int)
     for flag, column in zip(checker.flags, broken.T, strict=True):
         named |= np.where(column, flag.value, 0)
-    # Proved but for limits, or for what a closer look at all of the robots within the uncertainty says.
+    # These motions are proved but for limits, or but for the robots within the uncertainty, at a closer look.
     alone = named | (checks.verdict & (Verdict.UNCERTAINTY | Verdict.UNDECIDED).value)
     return np.where(by_limits, alone, basic | named)
 
@@ -205,16 +205,16 @@ def reached(
     checks.put(cell[best], of_trials.checks.rows(best))
     np.minimum.at(undecided, cell, np.where(of_trials.undecided > 0, of_trials.undecided, NEVER))
     smallest = FewestArcs(arcs, np.where(undecided < NEVER, undecided, 0), checks)
-    # Where there is none, the value at which the fewest limits refuse the motion, if there is one.
+    # A motion without an answer takes the value at which the fewest limits refuse it, if there is such a value.
     open_ones = np.flatnonzero(((arcs == 0) & (undecided == NEVER))[cell])
     of_limits = refused_by_limits(checker, trial.rows(open_ones), max_arcs=max_arcs)
     refused = Refused(np.zeros(len(values), int), np.zeros((len(values), len(checker.flags)), bool))
     ranks = rank(checker.flags, of_limits.broken)
     best = np.lexsort((of_limits.arcs, ranks))[::-1]  # written last: the fewest limits, then the fewest arcs
     best = best[of_limits.arcs[best] > 0]
-    which = cell[open_ones[best]]
-    refused.arcs[which], refused.broken[which] = of_limits.arcs[best], of_limits.broken[best]
-    beta_hats[which] = trial.beta_hats[1][open_ones[best]]
+    cells = cell[open_ones[best]]
+    refused.arcs[cells], refused.broken[cells] = of_limits.arcs[best], of_limits.broken[best]
+    beta_hats[cells] = trial.beta_hats[1][open_ones[best]]
     chosen = _with_ends(motions, beta_hats, same=same)
     return settled(checker, chosen, smallest, refused=refused, max_arcs=max_arcs, margins=margins)[0]
 

@@ -26,7 +26,7 @@ CANDIDATES = 262_144
 TELLING = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
 OTHERS = np.array([338, 192, 260, 3, 74, 63, 32, 330, 1, 49, 134, 56, 436, 168, 8]) / 96.0
 BESIDE_START = 6.0 / 96.0
-# So many instants an arc where only the best of bad candidates is looked for.
+# The search for the best of bad candidates looks at so many instants an arc.
 COARSEST = 4
 
 
@@ -81,7 +81,8 @@ def _motions(robot: PlatformRobot, odd, motions) -> PlatformSegment:
 
 
 class _Segments:
-    # Of candidates: all but beta-hat is of the motion, and is found once for each parity of the number of arcs.
+    # Segments of candidates. All but beta-hat belongs to the motion, and is computed once for each parity of the number
+    # of arcs.
 
     def __init__(self, robot: PlatformRobot, candidates: Candidates) -> None:
         self._candidates = candidates
@@ -89,12 +90,12 @@ class _Segments:
             in_batches(partial(_motions, robot, np.asarray(odd)), candidates[:3], size=BATCH) for odd in (False, True)
         ]
 
-    def __call__(self, arcs: int, which: np.ndarray) -> PlatformSegment:
-        # (k,) indices of candidates.
-        motion, (first, last) = self._candidates.motion[which], self._candidates.beta_hats
+    def __call__(self, arcs: int, indices: np.ndarray) -> PlatformSegment:
+        # The indices (k,) number candidates.
+        motion, (first, last) = self._candidates.motion[indices], self._candidates.beta_hats
         segments = rows(self._of_motions[arcs % 2], motion)
         return dataclasses.replace(
-            segments, turn=segments.turn._replace(start_beta_hat=first[which], end_beta_hat=last[which])
+            segments, turn=segments.turn._replace(start_beta_hat=first[indices], end_beta_hat=last[indices])
         )
 
 
@@ -154,7 +155,7 @@ def smallest_arcs(
 
 
 def _instants(arcs: int, before: np.ndarray) -> np.ndarray:
-    # So many arcs before the end; at the start, where nothing fails, those of shorter motions.
+    # Go so many arcs back from the end, or to the start of a shorter motion, where nothing fails.
     return np.maximum(1.0 - before / arcs, 0.0)
 
 
@@ -167,7 +168,7 @@ def _sieved(
     *,
     limits: bool = True,
 ) -> np.ndarray:
-    # Those that some instants do not refute.
+    # Keep the candidates that none of the instants refutes.
     if not len(alive):
         return alive
     return alive[~checker.sieve.refuted(segments(arcs, alive), arcs, tau, limits=limits)]
@@ -205,7 +206,7 @@ def refused_by_limits(
 
 
 def _but_for_limits(checker: MotionChecker, segments: PlatformSegment, arcs: int) -> tuple[np.ndarray, np.ndarray]:
-    # Which motions are proved but for the limits that they break, (n,), and these limits, (n, n_criteria).
+    # Tell which motions are proved but for the limits that they break, (n,), and return these limits, (n, n_criteria).
     each, is_limit = np.full(len(segments.rate), arcs), checker.is_limit
     first = checker.check(segments, each, whole=False, margins=False, ignored=is_limit)
     is_proved, broken = first.verdict == 0, checker.breaks(first.slack) & is_limit
@@ -246,7 +247,7 @@ def unavoidable(
         return suspects
     only = np.zeros(len(suspects), int) if fixed is None else fixed
     segments, ends = _Segments(checker.problem.robot, candidates), np.array([0.0, 1.0])
-    # What is broken at an end of a motion is so with every number of arcs.
+    # A criterion that is broken at an end of a motion is broken with every number of arcs.
     certain = suspects & checker.breaks(checker.sampled(segments(2, np.arange(len(only))), 2, ends))
     suspects = suspects & ~certain
     for arcs in range(1, max_arcs + 1):
@@ -268,15 +269,15 @@ def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs:
     Returns:
         (n,).
     """
-    every = np.arange(len(candidates.motion))
-    best, highest = np.ones(len(every), int), np.full(len(every), -np.inf)
+    indices = np.arange(len(candidates.motion))
+    best, highest = np.ones(len(indices), int), np.full(len(indices), -np.inf)
     if not len(best):
         return best
     segments = _Segments(checker.problem.robot, candidates)
     for arcs in range(1, max_arcs + 1):
         stage(f"best of what fails, arcs {arcs} of {max_arcs}")
         tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
-        lowest = checker.sieve.lowest(segments(arcs, every), arcs, tau)
+        lowest = checker.sieve.lowest(segments(arcs, indices), arcs, tau)
         best, highest = np.where(lowest > highest, arcs, best), np.maximum(lowest, highest)
     return best
 
@@ -292,6 +293,6 @@ def segments_with(robot: PlatformRobot, candidates: Candidates, arcs: np.ndarray
     Returns:
         leaves (n, ...), each of the parity of its number of arcs.
     """
-    segments, every = _Segments(robot, candidates), np.arange(len(arcs))
-    even, odd = (segments(k, every) for k in (0, 1))
+    segments, indices = _Segments(robot, candidates), np.arange(len(arcs))
+    even, odd = (segments(k, indices) for k in (0, 1))
     return jax.tree.map(lambda a, b: np.where((arcs % 2 == 1).reshape(-1, *[1] * (a.ndim - 1)), b, a), even, odd)

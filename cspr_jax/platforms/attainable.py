@@ -16,7 +16,7 @@ from cspr_jax.robots.symmetries import NONE, Symmetries, alike
 
 # Values of beta-hat tried at the target.
 VALUES = 20
-# Of other values than the preferred one, one in so many is tried before the rest.
+# The preferred value comes first; one in so many of the others is then tried before the rest.
 FEWER = 5
 # Large parts fill their batches: candidates of a search for the smallest numbers of arcs, motions of one that only asks
 # whether.
@@ -49,14 +49,14 @@ def attainable(
     Returns:
         the answers.
     """
-    some, own = _once(checker, places, angles, z0, symmetry)
+    representatives, inverse = _once(checker, places, angles, z0, symmetry)
 
-    def part(which):
-        which = some[which]
-        motions, beta_hats = _motions(checker, places[which], angles[which], z0[which], values)
+    def part(rows):
+        rows = representatives[rows]
+        motions, beta_hats = _motions(checker, places[rows], angles[rows], z0[rows], values)
         return reached(checker, motions, beta_hats, max_arcs=max_arcs, margins=margins)
 
-    return joined(in_parts(part, len(some), LARGE // values)).rows(own)
+    return joined(in_parts(part, len(representatives), LARGE // values)).rows(inverse)
 
 
 def attained(
@@ -72,7 +72,7 @@ def attained(
 ) -> np.ndarray:
     """Orientations of places that some number of arcs and some value of beta-hat attains.
 
-    What `attainable` says too, which tells how, and why not; with half of the work.
+    `attainable` says this too, and tells how, and why not; this function takes half of the work.
 
     Args:
         checker: of motions from rest.
@@ -87,13 +87,13 @@ def attained(
     Returns:
         (n,).
     """
-    some, own = _once(checker, places, angles, z0, symmetry)
+    representatives, inverse = _once(checker, places, angles, z0, symmetry)
     each = turns(values) if tried is None else (tried,)
 
-    def part(which):
-        which = some[which]
-        motions, beta_hats = _motions(checker, places[which], angles[which], z0[which], values)
-        is_attained = np.zeros(len(which), bool)
+    def part(rows):
+        rows = representatives[rows]
+        motions, beta_hats = _motions(checker, places[rows], angles[rows], z0[rows], values)
+        is_attained = np.zeros(len(rows), bool)
         for turn in each:
             left, options = np.flatnonzero(~is_attained), beta_hats[:, turn]
             size = max(CANDIDATES // max(options.shape[1], 1), 1)
@@ -104,11 +104,11 @@ def attained(
         return is_attained
 
     # Places differ in what they take: each part gets some of all.
-    mixed = np.argsort(np.arange(len(some)) % MIXED, kind="stable")
-    found = np.empty(len(some), bool)
-    some[:] = some[mixed]
-    found[mixed] = np.concatenate(in_parts(part, len(some), PART))
-    return found[own]
+    mixed = np.argsort(np.arange(len(representatives)) % MIXED, kind="stable")
+    flags = np.empty(len(representatives), bool)
+    representatives[:] = representatives[mixed]
+    flags[mixed] = np.concatenate(in_parts(part, len(representatives), PART))
+    return flags[inverse]
 
 
 def turns(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -120,20 +120,20 @@ def turns(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     Returns:
         numbers of values from 0 on: the preferred one; some of the others; the rest.
     """
-    every = np.arange(1, values)
-    return np.array([0]), every[every % FEWER == 0], every[every % FEWER != 0]
+    numbers = np.arange(1, values)
+    return np.array([0]), numbers[numbers % FEWER == 0], numbers[numbers % FEWER != 0]
 
 
 def _once(checker: PlatformChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
-    # Orientations that stand for others too, and where each of all is among them.
-    some, own = np.unique(alike(symmetry, np.c_[places, z0], angles), return_inverse=True)
-    return some, own.ravel()
+    # Find the orientations that stand for others too, and the place of each orientation among these.
+    representatives, inverse = np.unique(alike(symmetry, np.c_[places, z0], angles), return_inverse=True)
+    return representatives, inverse.ravel()
 
 
 def _motions(
     checker: PlatformChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
 ) -> tuple[Candidates, np.ndarray]:
-    # Transitions from rest, and (n, values) of beta-hat at their ends.
+    # Return transitions from rest, and (n, values) of beta-hat at their ends.
     robot, count = checker.problem.robot, len(angles)
     ends = (places, from_tilt_torsion(angles + cylindrical_frames(places)))
     beta_hats, can_end = end_options(robot, *ends, z0, values)

@@ -38,7 +38,7 @@ from cspr_jax.schema.verdicts import Verdict
 BLOCKS, ARCS = 1024, 32 * MANY
 # Instants that are looked at together.
 SAMPLES = 1 << 18
-# Where margins are asked for no bound is less than this part of what is attained.
+# No bound may stay below this part of the attained value, if margins are asked for.
 NEAR = 0.5
 
 
@@ -76,7 +76,7 @@ class PlatformChecker(MotionChecker):
             self._robustness = Robustness(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
         self._allowed = allowance(np.arange(len(self.flags)) >= len(flags(Limits())))
-        # Where each criterion is among those that depend on the motion, and then those that depend on the pose alone.
+        # Each criterion has a place in a list: criteria that depend on the motion, then those of the pose alone.
         self._order = np.array(order(problem.limits))
         self._n_moving = 1 + len(of_motion(problem))
 
@@ -101,8 +101,8 @@ class PlatformChecker(MotionChecker):
         for start in range(0, len(motions.arcs), size):
             row = np.repeat(np.arange(start, min(start + size, len(motions.arcs))), len(tau))
             instants = np.tile(tau, len(row) // len(tau))
-            every = in_batches(kernel, (*motions.items(row), instants), size=self.batch)
-            least.append(np.stack(every[:-1], axis=1).reshape(-1, len(tau), len(self.flags)).min(1))
+            slacks = in_batches(kernel, (*motions.items(row), instants), size=self.batch)
+            least.append(np.stack(slacks[:-1], axis=1).reshape(-1, len(tau), len(self.flags)).min(1))
         return np.concatenate(least)
 
     def check(
@@ -132,30 +132,34 @@ class PlatformChecker(MotionChecker):
         tensions = self._tensions.prove(*motions, near=near, margins=margins, ignored=moving_ignored)
         checks.verdict[:] = np.where(tensions.is_refuted, Verdict.SLACK_CABLE.value, Verdict.UNDECIDED.value)
         checks.instant[:] = np.where(tensions.is_refuted, tensions.instant, np.nan)
-        some = np.flatnonzero(np.logical_or(whole, ~tensions.is_refuted))
-        if not len(some):
+        open_rows = np.flatnonzero(np.logical_or(whole, ~tensions.is_refuted))
+        if not len(open_rows):
             return checks
-        part = motions.rows(some)
+        part = motions.rows(open_rows)
         places = self._places.prove(*part, margins=margins, ignored=still_ignored)
-        checks.instant[some] = np.where(tensions.is_refuted[some], tensions.instant[some], places.instant)
-        is_finite = ~np.isnan(tensions.attained[some]).any(1) & ~np.isnan(places.attained).any(1)
+        checks.instant[open_rows] = np.where(
+            tensions.is_refuted[open_rows], tensions.instant[open_rows], places.instant
+        )
+        is_finite = ~np.isnan(tensions.attained[open_rows]).any(1) & ~np.isnan(places.attained).any(1)
         is_finite &= self.durations(*part) > 0.0
-        is_proved = tensions.is_proved[some] & places.is_proved & is_finite
-        checks.bound[some] = np.where(is_proved, np.minimum(tensions.bound[some, 0], places.bound[:, 0]), np.nan)
-        least = self._attained(tensions.attained[some], places.attained)
+        is_proved = tensions.is_proved[open_rows] & places.is_proved & is_finite
+        checks.bound[open_rows] = np.where(
+            is_proved, np.minimum(tensions.bound[open_rows, 0], places.bound[:, 0]), np.nan
+        )
+        least = self._attained(tensions.attained[open_rows], places.attained)
         if margins:
-            samples = _samples(moving, tensions, some), _samples(still, places, np.arange(len(some)))
+            samples = _samples(moving, tensions, open_rows), _samples(still, places, np.arange(len(open_rows)))
             self._narrow(least, part, samples, np.logical_or(whole, is_proved))
         verdict = self._verdict(least[:-1], is_proved, places, ignored)
         if ignored is None:
-            self._weigh(checks, some, part, verdict)
-        checks.verdict[some] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
-        checks.slack[some] = np.where(is_finite, least[:-1], np.nan).T
-        checks.gap[some] = np.where(is_finite, least[-1], np.nan)
+            self._weigh(checks, open_rows, part, verdict)
+        checks.verdict[open_rows] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
+        checks.slack[open_rows] = np.where(is_finite, least[:-1], np.nan).T
+        checks.gap[open_rows] = np.where(is_finite, least[-1], np.nan)
         return checks
 
     def _compile(self, motions: Motions, *, margins: bool) -> None:
-        # Both proofs at once, before the first: XLA takes seconds for each, on one core. Other threads wait.
+        # Compile both proofs at once, before the first: XLA takes seconds for each, on one core. Other threads wait.
         with self._compiling:
             if margins not in self._compiled:
                 one = motions.rows(np.arange(1))
@@ -168,20 +172,20 @@ class PlatformChecker(MotionChecker):
             return super().tolerated(segments, arcs)
         return self._robustness.tolerated(segments, arcs)
 
-    def _weigh(self, checks: PlatformChecks, some: np.ndarray, motions: Motions, verdict: np.ndarray) -> None:
-        # Judges motions that are feasible as they are planned by all robots within the uncertainty.
-        which = np.flatnonzero(verdict == Verdict.FEASIBLE)
-        if self._robustness is None or not len(which):
+    def _weigh(self, checks: PlatformChecks, rows: np.ndarray, motions: Motions, verdict: np.ndarray) -> None:
+        # Judge motions that are feasible as they are planned by all robots within the uncertainty.
+        feasible = np.flatnonzero(verdict == Verdict.FEASIBLE)
+        if self._robustness is None or not len(feasible):
             return
-        found = self._robustness.tolerated(*motions.rows(which), whole=False)
-        checks.tolerated[some[which]], checks.not_tolerated[some[which]] = found
-        open_ones = np.where(found.refuted <= 1.0, Verdict.UNCERTAINTY.value, Verdict.UNDECIDED.value)
-        verdict[which] = np.where(found.proved >= 1.0, Verdict.FEASIBLE.value, open_ones)
+        tolerances = self._robustness.tolerated(*motions.rows(feasible), whole=False)
+        checks.tolerated[rows[feasible]], checks.not_tolerated[rows[feasible]] = tolerances
+        open_ones = np.where(tolerances.refuted <= 1.0, Verdict.UNCERTAINTY.value, Verdict.UNDECIDED.value)
+        verdict[feasible] = np.where(tolerances.proved >= 1.0, Verdict.FEASIBLE.value, open_ones)
 
     def _verdict(
         self, least: np.ndarray, is_proved: np.ndarray, places: PlaceProof, ignored: np.ndarray | None
     ) -> np.ndarray:
-        # What is broken for certain is said alone.
+        # If a criterion is broken for certain, the verdict says only that.
         verdict = Verdict.CABLE_CABLE.value * places.met | Verdict.CABLE_PLATFORM.value * places.hit
         broken = self.breaks(least.T) & (True if ignored is None else ~ignored)
         for flag, column in zip(self.flags, broken.T, strict=True):
@@ -189,26 +193,26 @@ class PlatformChecker(MotionChecker):
         return np.where(is_proved | (verdict != 0), verdict, Verdict.UNDECIDED.value)
 
     def _attained(self, moving: np.ndarray, still: np.ndarray) -> np.ndarray:
-        # (n_criteria + 1, n) in the order of the flags, then the distance between cables. Proofs have the determinant
-        # among what depends on the motion, second.
-        every = np.concatenate([moving[:, :1], moving[:, 2:], moving[:, 1:2], still[:, :-1]], axis=1)
-        return np.concatenate([every[:, self._order], still[:, -1:]], axis=1).T
+        # Return (n_criteria + 1, n) in the order of the flags, then the distance between cables. Proofs have the
+        # determinant second among the criteria that depend on the motion.
+        columns = np.concatenate([moving[:, :1], moving[:, 2:], moving[:, 1:2], still[:, :-1]], axis=1)
+        return np.concatenate([columns[:, self._order], still[:, -1:]], axis=1).T
 
     def _narrowed_criteria(self) -> tuple[np.ndarray, np.ndarray]:
-        # Where the values of both proofs are among the criteria, the distance between cables last. The determinant
-        # stands second among what depends on the motion, and first after it among all.
-        own = np.argsort(self._order)
-        moving = own[[0, self._n_moving, *range(1, self._n_moving)]]
-        return moving, np.append(own[self._n_moving + 1 :], len(self.flags))
+        # Find the places of the values of both proofs among the criteria, the distance between cables last. The
+        # determinant stands second among the criteria that depend on the motion, and first after these among all.
+        places = np.argsort(self._order)
+        moving = places[[0, self._n_moving, *range(1, self._n_moving)]]
+        return moving, np.append(places[self._n_moving + 1 :], len(self.flags))
 
-    def _narrow(self, least: np.ndarray, motions: Motions, samples: tuple[Samples, ...], wanted: np.ndarray) -> None:
-        # Puts margins of wanted motions into what was attained, (n_criteria + 1, n).
+    def _narrow(self, least: np.ndarray, motions: Motions, samples: tuple[Samples, ...], selected: np.ndarray) -> None:
+        # Put margins of the selected motions into the attained values, (n_criteria + 1, n).
         def values_at(row: np.ndarray, tau: np.ndarray) -> np.ndarray:
             kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
             return np.stack(in_batches(kernel, (*motions.items(row), tau), size=self.batch))
 
-        every = np.flatnonzero(wanted)
-        if not len(every):
+        rows = np.flatnonzero(selected)
+        if not len(rows):
             return
         # Limits on speeds and accelerations are proved as other functions of the same sign, and beyond a singularity
         # nothing is: only true slacks count.
@@ -216,16 +220,16 @@ class PlatformChecker(MotionChecker):
         least[np.isneginf(least)] = np.inf
         # The ends of motions, and what may jump at a knot.
         for tau in (0.0, 1.0, *self._knots):
-            least[:, every] = np.fmin(least[:, every], values_at(every, np.full(len(every), tau)))
+            least[:, rows] = np.fmin(least[:, rows], values_at(rows, np.full(len(rows), tau)))
         for one in samples:
-            narrowed(values_at, least, one, wanted)
+            narrowed(values_at, least, one, selected)
 
 
-def _samples(which: np.ndarray, proof: TensionProof | PlaceProof, some: np.ndarray) -> Samples:
-    # At the instants of blocks of some of the motions, numbered among these.
-    own = np.full(len(proof.is_proved), -1)
-    own[some] = np.arange(len(some))
-    row = own[proof.row]
+def _samples(criteria: np.ndarray, proof: TensionProof | PlaceProof, rows: np.ndarray) -> Samples:
+    # Take samples at the instants of blocks of some of the motions, and number the motions among these.
+    numbers = np.full(len(proof.is_proved), -1)
+    numbers[rows] = np.arange(len(rows))
+    row = numbers[proof.row]
     # Not by a mask as an index, which would leave blocks as the slowest axis in memory.
     row, tau, nodes = (np.compress(row >= 0, x, axis=-1) for x in (row, proof.first.tau, proof.first.nodes))
-    return Samples(which, row, tau, nodes)
+    return Samples(criteria, row, tau, nodes)

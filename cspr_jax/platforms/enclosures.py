@@ -62,10 +62,10 @@ def _moving(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) ->
 
 @partial(jax.jit, static_argnames="pairs")
 def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Array, Array, Array]:
-    # Where pairs of cables are nearest (n, n_pairs, 2), the shortest vectors (n, n_pairs, 3), and what projections of
-    # cables onto the sectors of their corners leave (n, 6, 3).
+    # Return the places at which pairs of cables are nearest (n, n_pairs, 2), the shortest vectors (n, n_pairs, 3), and
+    # the residuals of the projections of cables onto the sectors of their corners (n, 6, 3).
     sides, normal = platform
-    one, two = ([sides[:, which, k] for k in range(3)] for which in range(2))
+    one, two = ([sides[:, side, k] for k in range(3)] for side in range(2))
     left = jax.vmap(lambda ray: jnp.stack(residual((one, two), normal, -ray.T), axis=1))(rays)
     if not pairs:
         return jnp.zeros((len(rays), 0, 2)), jnp.zeros((len(rays), 0, 3)), left
@@ -87,9 +87,9 @@ class _Middle(NamedTuple):
 
 
 class _Within(NamedTuple):
-    # How far the tangents of the rays lead to the stops of k blocks (k, 6, 3), and bounds of changes within these: of
-    # velocities and accelerations of the attachment points, of what rays differ from their tangents, of rays (k, 6), of
-    # force and whirl (k,).
+    # Ways that the tangents of the rays lead to the stops of k blocks (k, 6, 3), and bounds of changes within these
+    # blocks: of velocities and accelerations of the attachment points, of the deviations of rays from their tangents,
+    # of rays (k, 6), of force and whirl (k,).
     way: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
@@ -106,12 +106,16 @@ def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Mid
     turn = np.stack([np.stack(row, axis=1) for row in here.turn], axis=1)
     base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
 
-    def own(vectors: np.ndarray) -> np.ndarray:
+    def in_platform(vectors: np.ndarray) -> np.ndarray:
         return np.einsum("kji,k...j->k...i", turn, vectors)
 
     time = np.sqrt(squared)
-    away, velocity, acceleration = own(position[:, None] - base), own(velocity), own(acceleration)
-    omega, spin = own(omega) / time[:, None], own(spin) / squared[:, None]
+    away, velocity, acceleration = (
+        in_platform(position[:, None] - base),
+        in_platform(velocity),
+        in_platform(acceleration),
+    )
+    omega, spin = in_platform(omega) / time[:, None], in_platform(spin) / squared[:, None]
     velocity, acceleration = velocity / time[:, None], acceleration / squared[:, None]
     whirl = _skew(spin) + _skew(omega) @ _skew(omega)
     inertia = np.asarray(robot.inertia) / float(robot.mass)
@@ -131,15 +135,16 @@ def _skew(vectors: np.ndarray) -> np.ndarray:
     return np.cross(vectors[:, None], np.eye(3)[None]).swapaxes(1, 2)
 
 
-def _within(robot: PlatformRobot, found: _Middle, moving: _Moving, half: np.ndarray, arcs: np.ndarray) -> _Within:
-    # In real time by `near`; of what has no bound of its derivative by Cauchy's inequality, from values on discs.
+def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.ndarray, arcs: np.ndarray) -> _Within:
+    # Bound changes in real time by `near`; where a derivative has no bound, by Cauchy's inequality from values on
+    # discs.
     near, wide, squared = (
         *(Reach(*(x[:, None] for x in y)) for y in (moving.near, moving.wide)),
         moving.squared[:, None],
     )
     half, radius, time = half[:, None], RADIUS / (math.pi * arcs[:, None]), np.sqrt(squared)
     arms = np.linalg.norm(np.asarray(robot.platform_points), axis=1)
-    away = np.linalg.norm(found.rays - np.asarray(robot.platform_points), axis=2) + half * near.speed
+    away = np.linalg.norm(middle.rays - np.asarray(robot.platform_points), axis=2) + half * near.speed
     jerk = wide.bend / radius
     force = jerk / squared + near.omega * (near.bend / squared + float(robot.gravity))
     whirl = (wide.spin / radius + 3.0 * near.omega * near.spin) / squared
@@ -147,7 +152,7 @@ def _within(robot: PlatformRobot, found: _Middle, moving: _Moving, half: np.ndar
     pull = near.bend + arms * (near.spin + near.omega**2)
     steep = jerk + arms * wide.growth * (wide.spin + wide.omega**2) / radius
     bent = 0.5 * half**2 * (near.bend + 2.0 * near.omega * near.speed + (near.spin + near.omega**2) * away)
-    way = found.pace * (half * time)[..., None]
+    way = middle.pace * (half * time)[..., None]
     return _Within(
         way,
         half * (pull + near.omega * pace) / time,
@@ -175,31 +180,31 @@ class _Columns:
         return Distances(bound, change, tilt, slope, swing, np.array(spools), here, here_spools)
 
 
-def _distances(problem: Problem, pairs: tuple, found: _Middle, within: _Within, met) -> Distances:
+def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within, met) -> Distances:
     robot, (places, gaps, left) = problem.robot, met
-    columns, tips = _Columns(len(found.rays)), np.asarray(robot.platform_points)
+    columns, tips = _Columns(len(middle.rays)), np.asarray(robot.platform_points)
     for n, pair in enumerate(pairs):
-        _add_gap(columns, gaps[:, n], places[:, n], found, within, tips, pair)
+        _add_gap(columns, gaps[:, n], places[:, n], middle, within, tips, pair)
     for k in range(CABLES):
         e, height = unit_vectors(left[:, k]), np.linalg.norm(left[:, k], axis=1)
         change = np.abs(np.sum(e * within.way[:, k], axis=1)) + within.bent[:, k]
-        columns.add(-np.sum(e * found.rays[:, k], axis=1), change, 1.0, height, 1.0)
+        columns.add(-np.sum(e * middle.rays[:, k], axis=1), change, 1.0, height, 1.0)
     longest = problem.limits.cable_length_max
     for k, length in enumerate([] if longest is None else np.asarray(longest).tolist()):
-        room = length * (1.0 + TOUCHED) - np.linalg.norm(found.rays[:, k], axis=1)
+        room = length * (1.0 + TOUCHED) - np.linalg.norm(middle.rays[:, k], axis=1)
         columns.add(room, within.moved[:, k], 1.0, room, 1.0)
     return columns.distances()
 
 
-def _add_gap(columns: _Columns, gaps, places, found: _Middle, within: _Within, tips: np.ndarray, pair) -> None:
+def _add_gap(columns: _Columns, gaps, places, middle: _Middle, within: _Within, tips: np.ndarray, pair) -> None:
     # The distance of two cables, by the four pairs of their ends: seen from the platform the spools alone move.
     i, j = pair
     e, gap = unit_vectors(gaps), np.linalg.norm(gaps, axis=1)
-    tilt = _tilted(found.rays[:, i], found.rays[:, j], places)
+    tilt = _tilted(middle.rays[:, i], middle.rays[:, j], places)
     slope = np.linalg.norm(tilt, axis=1)
     along = [np.sum(e * within.way[:, k], axis=1) for k in pair]
     for first, last in itertools.product((1.0, 0.0), repeat=2):
-        apart = (tips[j] - last * found.rays[:, j]) - (tips[i] - first * found.rays[:, i])
+        apart = (tips[j] - last * middle.rays[:, j]) - (tips[i] - first * middle.rays[:, i])
         change = np.abs(first * along[0] - last * along[1]) + first * within.bent[:, i] + last * within.bent[:, j]
         swing = slope * (first * within.moved[:, i] + last * within.moved[:, j])
         tilted = np.sum(tilt * apart, axis=1), slope, swing
@@ -252,11 +257,11 @@ class Robustness:
             the multiples.
         """
         blocks = parts_of_arcs(arcs, self._knots, PARTS)
-        asked = requirements_of(self._problem, np.asarray(segments.rate) / CABLES)
-        return tolerated(blocks, arcs, asked, partial(self.enclosure, segments, arcs), whole=whole)
+        requirements = requirements_of(self._problem, np.asarray(segments.rate) / CABLES)
+        return tolerated(blocks, arcs, requirements, partial(self.enclosure, segments, arcs), whole=whole)
 
     def enclosure(self, segments: PlatformSegment, arcs: np.ndarray, blocks: Blocks) -> Enclosure:
-        """What is known of blocks of motions.
+        """Enclosure of blocks of motions.
 
         Args:
             segments: leaves (n, ...), of the parity of `arcs`.
@@ -266,30 +271,30 @@ class Robustness:
         Returns:
             the enclosure.
         """
-        problem, own = self._problem._replace(limits=Limits()), arcs[blocks.row].astype(float)
-        items = rows(segments, blocks.row), own, blocks.start, blocks.stop
+        problem, block_arcs = self._problem._replace(limits=Limits()), arcs[blocks.row].astype(float)
+        items = rows(segments, blocks.row), block_arcs, blocks.start, blocks.stop
         kernel = partial(_moving, problem, np.ones(()), kind=self._kind)
         moving = in_batches(kernel, items, size=self._batch)
         half = 0.5 * (blocks.stop - blocks.start)
-        found = _middle(problem.robot, moving.here, moving.squared)
-        within = _within(problem.robot, found, moving, half, own)
+        middle = _middle(problem.robot, moving.here, moving.squared)
+        within = _within(problem.robot, middle, moving, half, block_arcs)
         points = np.asarray(problem.robot.platform_points)
         touching = partial(_contacts, self._platform, points, pairs=self._pairs)
-        met = in_batches(lambda x: touching(*x), (found.rays,), size=self._batch)
+        met = in_batches(lambda x: touching(*x), (middle.rays,), size=self._batch)
         low, high = self._certifier.ranges(blocks, segments, arcs)
         scale = np.asarray(segments.rate)[blocks.row, None] / CABLES
         return Enclosure(
-            rays=found.rays,
+            rays=middle.rays,
             arms=points,
-            force=found.force,
-            moment=found.moment,
-            whirl=found.whirl,
+            force=middle.force,
+            moment=middle.moment,
+            whirl=middle.whirl,
             way=within.way,
             bent=within.bent,
             force_change=within.force[:, 0],
             whirl_change=within.whirl[:, 0],
             low=scale * low,
             high=scale * high,
-            distances=_distances(self._problem, self._pairs, found, within, met),
-            rates=Rates(found.velocity, found.acceleration, within.velocity, within.acceleration),
+            distances=_distances(self._problem, self._pairs, middle, within, met),
+            rates=Rates(middle.velocity, middle.acceleration, within.velocity, within.acceleration),
         )

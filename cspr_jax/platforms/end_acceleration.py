@@ -59,7 +59,7 @@ def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array
     still = jnp.zeros(3)
     right = jnp.stack([jnp.concatenate([-eta * position, still]), jnp.concatenate([still, moment])], axis=1)
     offset, slope = solved(matrix, right)[0].T  # (3.79)
-    # Of (3.13): the combined tension that the translation asks for; eta where both centroids are at the origin.
+    # By (3.13) the translation asks for this combined tension, which is eta where both centroids are at the origin.
     cables, _ = rays(robot, position, rotation)
     pull = jnp.mean(cables, axis=0)
     even = eta * jnp.dot(position, pull) / jnp.dot(pull, pull) / robot.n_cables

@@ -2,7 +2,8 @@
 
 Such a motion is a straight swing and a rotation about one axis. What depends on the number of arcs and on the instant
 is a table: position and acceleration are one number each times a vector of the segment, and angle, angular speed and
-angular acceleration are linear in the two values of beta-hat. The same mechanics as `pose_lanes` (tests compare them).
+angular acceleration are linear in the two values of beta-hat. The mechanics are those
+of `platform_segment_lanes` (tests compare them).
 """
 
 import math
@@ -41,7 +42,7 @@ class Swings(NamedTuple):
 
 
 class Swing(NamedTuple):
-    """Their state at one instant.
+    """State of swings at one instant.
 
     Fields:
         position: m.

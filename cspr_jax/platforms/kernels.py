@@ -30,11 +30,14 @@ def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind
         digits; the smallest distance between cables, m.
     """
     segments, arcs, tau = items
-    now = instant(problem.amplitude, segments.sense, arcs, tau)
-    here = state(segments, arcs, now, kind)
+    instant_lanes = instant(problem.amplitude, segments.sense, arcs, tau)
+    here = state(segments, arcs, instant_lanes, kind)
     wires = cables(problem.robot, here.position, here.turn)
-    every = [*moving_slacks(problem, segments, arcs, now, kind), *still_slacks(problem, segments, here, wires)]
+    slacks = [
+        *moving_slacks(problem, segments, arcs, instant_lanes, kind),
+        *still_slacks(problem, segments, here, wires),
+    ]
     squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, wires)]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
     # Not stacked: XLA would compute all of them for each.
-    return *(every[k] for k in order(problem.limits)), nearest
+    return *(slacks[k] for k in order(problem.limits)), nearest

@@ -1,4 +1,4 @@
-"""Of values at the nodes of blocks what a verdict needs: the smallest of each criterion, and where the worst lies."""
+"""Reduce node values of blocks to what a verdict needs: the smallest of each criterion, and where the worst lies."""
 
 from collections.abc import Sequence
 

@@ -40,14 +40,14 @@ from cspr_jax.schema.families import WITHOUT_BETA_HAT
 # A third derivative that changes more than this, relative to its largest value, just beside a knot makes tensions jump.
 JUMP, NEAR_KNOT = 1e-6, 1e-12
 _JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
-# Arcs that a motion that limits alone refuse counts for, beside its own: more than a sequence of feasible ones has.
+# A motion that limits alone refuse counts as so many arcs beside its own: more than a sequence of feasible ones has.
 REFUSED = 100_000
 # Up to so many segments compiling for large batches takes longer than it saves.
 SOME = 1000
 
 
 class _Poses(Leg):
-    # Poses of a platform, joined by the motions of chapter 3; what they are, `variable` says.
+    # Poses of a platform, joined by the motions of chapter 3; `variable` says by which ones.
 
     variable: ClassVar[bool]
 
@@ -88,33 +88,34 @@ class _Poses(Leg):
                 reference_pose(problem.robot, z0)
         except InputError as error:
             raise ConfigError(self.stops.path, self.stops.robot_file.typed(error)) from error
-        answers, segments = self._found(problem, np.array([z0]))
+        answers, segments = self._search(problem, np.array([z0]))
         pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
-        return answers, [PlatformMotion(own, problem.amplitude, leaf(arcs), self._kind) for own, arcs in pairs]
+        return answers, [PlatformMotion(segment, problem.amplitude, leaf(arcs), self._kind) for segment, arcs in pairs]
 
     def answers(self, problem: Problem, depths: np.ndarray) -> PlatformMotionAnswers:
         """Answers for several depths; see `Leg.answers`."""
-        return self._found(problem, depths)[0]
+        return self._search(problem, depths)[0]
 
     def warnings(self, problem: Problem) -> list[str]:
         """Tensions that jump; see `Leg.warnings`."""
         return [_JUMPS.format(problem.amplitude.name)] if self.variable and _jumps(problem.amplitude) else []
 
-    def _found(self, problem: Problem, depths: np.ndarray) -> tuple[PlatformMotionAnswers, PlatformSegment]:
-        # The values of beta-hat that give the fewest arcs in sum.
+    def _search(self, problem: Problem, depths: np.ndarray) -> tuple[PlatformMotionAnswers, PlatformSegment]:
+        # Choose the values of beta-hat that give the fewest arcs in sum.
         count, z0 = len(self), np.repeat(depths, len(self))
         points = self.stops.points(depths)
         quaternions = self._quaternions(points[0])
         checker = pose_checker(problem, self._kind, batch=FEW if len(z0) <= SOME else MANY)
         beta_hats = [
-            self._beta_hats(checker, own, quaternions, float(depth)) for own, depth in zip(points, depths, strict=True)
+            self._beta_hats(checker, places, quaternions, float(depth))
+            for places, depth in zip(points, depths, strict=True)
         ]
         if len(depths) == 1:
             self._refuse_slack(beta_hats[0])
-        # Every pair of values at the ends of every segment, for every depth.
-        pairs = [[self._pairs(i, own[i], own[i + 1]) for i in range(count)] for own in beta_hats]
-        motion = np.repeat(np.arange(len(z0)), [pair[0].size for own in pairs for pair in own])
-        first, last = (np.concatenate([pair[k].ravel() for own in pairs for pair in own]) for k in (0, 1))
+        # Try every pair of values at the ends of every segment, for every depth.
+        pairs = [[self._pairs(i, values[i], values[i + 1]) for i in range(count)] for values in beta_hats]
+        motion = np.repeat(np.arange(len(z0)), [pair[0].size for of_depth in pairs for pair in of_depth])
+        first, last = (np.concatenate([pair[k].ravel() for of_depth in pairs for pair in of_depth]) for k in (0, 1))
         trial = self._candidates(points, quaternions, z0, motion, (first, last))
         fixed, largest = np.tile(self.stops.arcs, len(depths)), self.stops.max_arcs
         of_trials = smallest_arcs(checker, trial, max_arcs=largest, fixed=fixed, beyond=BEYOND)
@@ -125,7 +126,7 @@ class _Poses(Leg):
         return settled(checker, trial.rows(path), best, refused=why, max_arcs=largest, fixed=fixed)
 
     def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: FewestArcs, fixed: np.ndarray) -> Refused:
-        # Of candidates of segments of which none is feasible, or nearly so.
+        # Find the candidates that only limits refuse, in segments where no candidate is feasible, or nearly so.
         is_open = np.ones(len(trial.z0), bool)
         is_open[trial.motion[(of_trials.arcs > 0) | (of_trials.undecided > 0)]] = False
         rows, count = np.flatnonzero(is_open[trial.motion]), len(trial.motion)
@@ -198,13 +199,13 @@ class VariablePoses(_Poses):
 
 
 def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarray:
-    # Which candidate of each segment of each depth, (n_depths * n_segments,); rather one that limits alone refuse than
-    # another one that fails.
+    # Choose a candidate of each segment of each depth, (n_depths * n_segments,); rather one that limits alone refuse
+    # than another one that fails.
     arcs = np.where(arcs > 0, arcs, np.where(refused > 0, refused + REFUSED, 0))
     places, last = [], 0
-    for own in pairs:
+    for of_depth in pairs:
         costs, starts = [], []
-        for first, _ in own:
+        for first, _ in of_depth:
             starts.append(last)
             last += first.size
             counts = arcs[starts[-1] : last].reshape(first.shape)
@@ -216,7 +217,7 @@ def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarra
 
 
 def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
-    # Of a pose in the file's axes; that of tilt and torsion follows from the place.
+    # Return the orientation of a pose in the file's axes; an orientation by tilt and torsion follows from the place.
     reference = np.array(IDENTITY)
     if pose.tilt_torsion is not None and pose.quaternion is not None:
         raise ConfigError(path, f"{name}.quaternion: cannot be combined with tilt_torsion")
@@ -229,7 +230,7 @@ def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
 
 
 def _is_determined(problem: Problem) -> bool:
-    # Whether the motion determines the tensions, and a reference pose what is singular.
+    # Tell whether the motion determines the tensions, and a reference pose says what is singular.
     return problem.robot.n_cables == problem.robot.dof
 
 
@@ -258,6 +259,6 @@ def _check_pose(
 
 
 def _jumps(amplitude: Amplitude) -> bool:
-    # Whether A''' jumps between pieces.
+    # Tell whether A''' jumps between pieces.
     sides = [derivatives(amplitude, jnp.asarray(amplitude.knots) + s, order=3)[3] for s in (-NEAR_KNOT, NEAR_KNOT)]
     return bool((np.abs(np.asarray(sides[1] - sides[0])) > JUMP * float(amplitude.largest[3])).any())

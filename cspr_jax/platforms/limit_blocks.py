@@ -137,12 +137,12 @@ def _tension_sizes(sizes: Sizes, _: Array) -> list[Array]:
     return [jnp.where(is_straight, kappa * ray / sizes.z0, jnp.inf) for kappa, ray, is_straight in each]
 
 
-def _tension_slacks(found: Enclosed, limit: Array, is_least: bool) -> Pair:
-    limit, (low, high), (under, over) = limit[None, :, None], found.coefficients, found.nodes
+def _tension_slacks(enclosed: Enclosed, limit: Array, is_least: bool) -> Pair:
+    limit, (low, high), (under, over) = limit[None, :, None], enclosed.coefficients, enclosed.nodes
     if is_least:
-        here, bound = at_most(over, found.share) - limit, ratio(low, found.regular) - limit
+        here, bound = at_most(over, enclosed.share) - limit, ratio(low, enclosed.regular) - limit
     else:
-        here, bound = limit + at_most(-under, found.share), limit + ratio(-high, found.regular)
+        here, bound = limit + at_most(-under, enclosed.share), limit + ratio(-high, enclosed.regular)
     return jnp.min(here, axis=1), jnp.min(bound, axis=(0, 1))
 
 
@@ -153,11 +153,11 @@ def _rates(here: Here) -> list[tuple[Array, Array, Array]]:
 
 
 def _speeds(here: Here, limit: Array) -> list[Pair]:
-    every = []
+    values = []
     for k, (length, rate, _) in enumerate(_rates(here)):
         share = rate * rate / (here.squared * limit[k] ** 2)
-        every.append((length / here.z0) ** 2 * (1.0 - share))
-    return _paired(every)
+        values.append((length / here.z0) ** 2 * (1.0 - share))
+    return _paired(values)
 
 
 def _speed_sizes(sizes: Sizes, limit: Array) -> list[Array]:
@@ -167,35 +167,35 @@ def _speed_sizes(sizes: Sizes, limit: Array) -> list[Array]:
     ]
 
 
-def _speed_slacks(found: Enclosed, _: Array, __: bool) -> Pair:
-    return jnp.min(found.nodes[1], axis=1), jnp.min(found.coefficients[0], axis=(0, 1))
+def _speed_slacks(enclosed: Enclosed, _: Array, __: bool) -> Pair:
+    return jnp.min(enclosed.nodes[1], axis=1), jnp.min(enclosed.coefficients[0], axis=(0, 1))
 
 
 def _accelerations(here: Here, limit: Array) -> list[Pair]:
-    every = []
+    pairs = []
     for k, (length, _, bend) in enumerate(_rates(here)):
         cubed = (length / here.z0) ** 3
-        every.append((cubed, cubed * bend / (here.squared * limit[k])))
-    return every
+        pairs.append((cubed, cubed * bend / (here.squared * limit[k])))
+    return pairs
 
 
 def _acceleration_sizes(sizes: Sizes, limit: Array) -> list[Array]:
-    every = []
+    bounds = []
     for k, (ray, pace, pull) in enumerate(zip(sizes.rays, sizes.paces, sizes.pulls, strict=True)):
         bend = ray**2 * (2.0 * pace**2 + ray * pull) / (sizes.squared * sizes.z0**3 * limit[k])
-        every += [jnp.where(sizes.is_straight[k], (ray / sizes.z0) ** 3, jnp.inf), bend]
-    return every
+        bounds += [jnp.where(sizes.is_straight[k], (ray / sizes.z0) ** 3, jnp.inf), bend]
+    return bounds
 
 
-def _acceleration_slacks(found: Enclosed, _: Array, __: bool) -> Pair:
-    (low, high), (under, over) = found.coefficients, found.nodes
+def _acceleration_slacks(enclosed: Enclosed, _: Array, __: bool) -> Pair:
+    (low, high), (under, over) = enclosed.coefficients, enclosed.nodes
     worst = jnp.maximum(jnp.abs(low[:, 1::2]), jnp.abs(high[:, 1::2]))
-    # As near to zero as rounding lets it be.
+    # Take accelerations as near to zero as rounding lets them be.
     bends = jnp.maximum(jnp.maximum(under[:, 1::2], -over[:, 1::2]), 0.0)
     return jnp.min(over[:, ::2] - bends, axis=1), jnp.min(low[:, ::2] - worst, axis=(0, 1))
 
 
-# By the name that rows of `schema.limits` call them.
+# The keys are the names that rows of `schema.limits` call the quantities.
 QUANTITIES = {
     "tension": LimitOnBlocks(CABLES, _tensions, _tension_sizes, _tension_slacks),
     "speed": LimitOnBlocks(CABLES, _speeds, _speed_sizes, _speed_slacks),

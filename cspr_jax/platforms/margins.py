@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Parabolas one after the other, each through points so much nearer; a value that spreads less is not narrowed.
+# Parabolas follow one another, each through points so much nearer; a value that spreads less is not narrowed.
 ROUNDS, NEARER, LEVEL = 5, 3.0, 1e-9
 
 
@@ -39,16 +39,16 @@ def narrowed(
     place, value, item = low_points(samples, wanted)
     if not len(place):
         return
-    row, which, tau = samples.row[item], samples.which[value], samples.tau[place, item]
+    row, criterion, tau = samples.row[item], samples.which[value], samples.tau[place, item]
     last = len(samples.tau) - 1
     beside = [np.abs(samples.tau[np.clip(place + k, 0, last), item] - tau) for k in (-1, 1)]
     width = np.maximum(*beside)
     for _ in range(ROUNDS):
         points = np.clip(tau[:, None] + width[:, None] * np.array([-1.0, 0.0, 1.0]), 0.0, 1.0)
-        found = _values(values_at, least, row, points, which)
-        tau = _vertex(points, found)
+        values = _values(values_at, least, row, points, criterion)
+        tau = _vertex(points, values)
         width = width / NEARER
-    _values(values_at, least, row, tau[:, None], which)
+    _values(values_at, least, row, tau[:, None], criterion)
 
 
 def low_points(samples: Samples, wanted: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -63,9 +63,9 @@ def low_points(samples: Samples, wanted: np.ndarray) -> tuple[np.ndarray, ...]:
     """
     values, row = samples.values, samples.row
     smallest = np.full((values.shape[1], len(wanted)), np.inf)
-    own = values.min(0)
-    for kept, found in zip(smallest, own, strict=True):
-        np.minimum.at(kept, row, found)
+    lowest = values.min(0)
+    for least, block_values in zip(smallest, lowest, strict=True):
+        np.minimum.at(least, row, block_values)
     falls = values[1:] < values[:-1]
     side = np.ones_like(falls[:1])
     is_low = np.concatenate([side, falls]) & np.concatenate([~falls, side])
@@ -80,18 +80,18 @@ def low_points(samples: Samples, wanted: np.ndarray) -> tuple[np.ndarray, ...]:
     return place[reaches], value[reaches], item[reaches]
 
 
-def _values(values_at: Callable, least: np.ndarray, row: np.ndarray, points: np.ndarray, which: np.ndarray):
-    # (j, m) of each candidate's own criterion; all criteria learn from them.
+def _values(values_at: Callable, least: np.ndarray, row: np.ndarray, points: np.ndarray, criterion: np.ndarray):
+    # Return values (j, m) of each candidate's own criterion; all criteria learn from the points.
     count = points.shape[1]
     rows = np.repeat(row, count)
-    found = values_at(rows, points.ravel())
-    for kept, values in zip(least, found, strict=True):
-        np.fmin.at(kept, rows, values)
-    return found[np.repeat(which, count), np.arange(len(rows))].reshape(points.shape)
+    attained = values_at(rows, points.ravel())
+    for lowest, values in zip(least, attained, strict=True):
+        np.fmin.at(lowest, rows, values)
+    return attained[np.repeat(criterion, count), np.arange(len(rows))].reshape(points.shape)
 
 
 def _vertex(points: np.ndarray, values: np.ndarray) -> np.ndarray:
-    # Of the parabola through three points, within them; the lowest of them where it has no minimum there.
+    # Find the vertex of the parabola through three points; if it has no minimum within them, the lowest of the points.
     (a, b, c), (x, y, z) = points.T, values.T
     with np.errstate(invalid="ignore", divide="ignore"):
         top = (b - a) ** 2 * (y - z) - (b - c) ** 2 * (y - x)

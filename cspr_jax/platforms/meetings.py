@@ -109,9 +109,9 @@ def _sign_changes(values: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, ..
     return np.nonzero((is_high[:-1] & is_low[1:]) | (is_low[:-1] & is_high[1:]))
 
 
-def _within(vectors: np.ndarray, which: tuple[np.ndarray, ...], bent: np.ndarray) -> _Around:
-    # Of vectors at instants, during the steps after them.
-    step, block, cable = which
+def _within(vectors: np.ndarray, indices: tuple[np.ndarray, ...], bent: np.ndarray) -> _Around:
+    # Enclose vectors at instants during the steps after these.
+    step, block, cable = indices
     before, after = vectors[step, block, cable], vectors[step + 1, block, cable]
     return _Around(0.5 * (before + after), 0.5 * _size(after - before) + bent[block, cable])
 

@@ -48,14 +48,14 @@ class PlatformChecks:
     not_tolerated: np.ndarray
 
     def put(self, which: np.ndarray, others: "PlatformChecks") -> None:
-        """Write others into it.
+        """Write other checks into these.
 
         Args:
             which: (m,) their places.
             others: of m motions.
         """
-        for mine, theirs in zip(vars(self).values(), vars(others).values(), strict=True):
-            mine[which] = theirs
+        for column, new_column in zip(vars(self).values(), vars(others).values(), strict=True):
+            column[which] = new_column
 
     def rows(self, which: np.ndarray) -> "PlatformChecks":
         """Checks of some of the motions.
@@ -123,7 +123,7 @@ class MotionChecker(abc.ABC):
     sieve: Sieve
 
     def __init__(self, problem: Problem, kind: PlatformMotionKind, *, batch: int) -> None:
-        """Keep what is asked about."""
+        """Keep the problem, the kind of the motions, and the size of a batch."""
         self.problem, self.kind, self.batch = problem, kind, batch
 
     def durations(self, segments: PlatformSegment, arcs: np.ndarray) -> np.ndarray:
@@ -164,7 +164,7 @@ class MotionChecker(abc.ABC):
 
     @property
     def is_limit(self) -> np.ndarray:
-        """Whether each criterion of `flags` is one of a limit, (n_criteria,)."""
+        """Mask of the criteria of `flags` that are those of limits, (n_criteria,)."""
         return np.arange(len(self.flags)) >= BASIC
 
     @abc.abstractmethod

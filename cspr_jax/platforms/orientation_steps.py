@@ -140,15 +140,15 @@ class OrientationSteps:
         is_regular = self.regular(samples)
         ways = np.flatnonzero(is_regular[first] & is_regular[last])
         free = np.zeros(len(first), bool)
-        for some in np.array_split(ways, max(1, -(-len(ways) // STEPS))):
-            one, two = first[some], last[some]
+        for chunk in np.array_split(ways, max(1, -(-len(ways) // STEPS))):
+            one, two = first[chunk], last[chunk]
             met = cables_cross(samples.gaps[one], samples.gaps[two]).any(1)
             directions = samples.cable_directions
             hit = platform_hit(self._contacts.sides, self._contacts.normal, directions[one], directions[two])
-            free[some] = ~met & ~hit.any(1)
+            free[chunk] = ~met & ~hit.any(1)
         return free
 
 
 def _squares(vectors: np.ndarray) -> np.ndarray:
-    # Of lengths; three components are too few for a reduction along the last axis to be fast.
+    # Square the lengths of vectors; three components are too few for a reduction along the last axis to be fast.
     return np.einsum("...k,...k->...", vectors, vectors)

@@ -12,7 +12,7 @@ from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# What has no value where nothing is accessible.
+# These quantities have no value where nothing is accessible.
 FLOATS = tuple(name for name in MAP_KINDS["orientations"].quantities if QUANTITIES[name].kind == "float")
 
 
@@ -27,28 +27,28 @@ class OrientationsMap(AttainabilityMap):
         places, z0 = self._targets(cells), self._depths(cells)
         # An axis of the file turned over turns phi and sigma around.
         angles = self._frame.turned_angles(np.stack([cells[name] for name in TILT_TORSION], axis=1))
-        some, count = np.flatnonzero(self._accessible(places, angles) & (z0 > 0.0)), len(z0)
-        every = {name: np.full(count, np.nan) for name in FLOATS}
-        every |= {"arcs": np.zeros(count, int), "tried_arcs": np.zeros(count, int)}
-        every["verdict"] = np.full(count, Verdict.NOT_ACCESSIBLE.value, FLAGS)
-        if len(some):
-            answers = self._attainable(places[some], angles[some], z0[some], margins=True)
+        rows, count = np.flatnonzero(self._accessible(places, angles) & (z0 > 0.0)), len(z0)
+        results = {name: np.full(count, np.nan) for name in FLOATS}
+        results |= {"arcs": np.zeros(count, int), "tried_arcs": np.zeros(count, int)}
+        results["verdict"] = np.full(count, Verdict.NOT_ACCESSIBLE.value, FLAGS)
+        if len(rows):
+            answers = self._attainable(places[rows], angles[rows], z0[rows], margins=True)
             columns = vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
-            for name, values in every.items():
-                values[some] = columns[name]
-        return every
+            for name, values in results.items():
+                values[rows] = columns[name]
+        return results
 
     def _accessible(self, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        # (n,) whether each orientation is, on the grid of which the angles are points.
+        # Tell which orientations are accessible, (n,), on the grid of which the angles are points.
         divisions = self._orientations.divisions
-        every, own = np.unique(np.round(places, DIGITS), axis=0, return_inverse=True)
+        distinct, inverse = np.unique(np.round(places, DIGITS), axis=0, return_inverse=True)
         index, inside = _index(angles, divisions), np.zeros(len(places), bool)
-        for k, place in enumerate(every):
+        for k, place in enumerate(distinct):
             free = np.zeros((2 * divisions, divisions, 2 * divisions), bool)
             free[_index(accessible(self._problem.robot, place, "grid", divisions).angles, divisions)] = True
             free[:, 0] = free[0, 0]  # without a tilt its azimuth says nothing
-            which = own.ravel() == k
-            inside[which] = free[tuple(i[which] for i in index)]
+            is_here = inverse.ravel() == k
+            inside[is_here] = free[tuple(i[is_here] for i in index)]
         return inside
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -57,6 +57,6 @@ class OrientationsMap(AttainabilityMap):
 
 
 def _index(angles: np.ndarray, divisions: int) -> tuple[np.ndarray, ...]:
-    # Places of (phi, theta, sigma) on the grid.
+    # Find the places of (phi, theta, sigma) on the grid.
     phi, theta, sigma = np.round(angles.T * (divisions / math.pi)).astype(int)
     return phi % (2 * divisions), theta, sigma % (2 * divisions)

@@ -33,13 +33,13 @@ from cspr_jax.schema.limits import Limit
 # Steps of a block, and the instants between them.
 STEPS = 4
 PLACES = np.linspace(-1.0, 1.0, STEPS + 1)
-# Of coordinates of some size: what lengths and heights may be wrong by.
+# Lengths and heights may be wrong by this part of the size of coordinates.
 ROUNDING = 1e-13
 TINY = 1e-30
 
 
 class PlaceBounds(NamedTuple):
-    """What is known of n blocks.
+    """Bounds and attained values of n blocks.
 
     Fields:
         clear: (n,) lower bound of the distance between cables that can meet, and of that of the cables from the sectors
@@ -60,8 +60,8 @@ class PlaceBounds(NamedTuple):
 
 
 class _Bends(NamedTuple):
-    # (n,) what second derivatives take off between two instants, m: of the centre, of a unit arm, of unit vectors seen
-    # from the platform.
+    # Amounts (n,) that second derivatives take off between two instants, m: of the centre, of a unit arm, of unit
+    # vectors seen from the platform.
     centre: Array
     arm: Array
     seen: Array
@@ -106,8 +106,8 @@ def place_blocks(
     bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
     share = (2.0 * half / STEPS) ** 2 / 8.0
     turning = bounds.spin + bounds.omega**2
-    now = stored(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
-    here = state(segments, arcs, now, kind, one)
+    instant = stored(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
+    here = state(segments, arcs, instant, kind, one)
     position, turn = stored((here.position, here.turn), one)
     away = [
         dot(x, x) for x in ([position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
@@ -117,16 +117,16 @@ def place_blocks(
     gaps, left = _separators(problem.robot, platform, pairs, (position, turn), one)
 
     def on(place):
-        now = at(place)
-        lines = cables(problem.robot, now.position, now.turn)
+        pose = at(place)
+        lines = cables(problem.robot, pose.position, pose.turn)
         apart = _apart(problem.robot, pairs, gaps, lines, bends)
-        away = zip(left, interference_lanes.cable_directions(lines, now.turn), strict=True)
+        away = zip(left, interference_lanes.cable_directions(lines, pose.turn), strict=True)
         clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
-        values = _slacks(problem, segments, now, lines)
+        values = _slacks(problem, segments, pose, lines)
         if margins and pairs:
-            found = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, lines)]
-            values.append(jnp.sqrt(smallest(found)))
-        # Two numbers a loop.
+            squares = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, lines)]
+            values.append(jnp.sqrt(smallest(squares)))
+        # Pack two real numbers into one complex number: two numbers a loop.
         return lax.complex(clear, values[0]), *values[1:]
 
     first, *others = lax.map(on, PLACES)
@@ -135,28 +135,28 @@ def place_blocks(
         nodes.append(jnp.full_like(nodes[0], jnp.inf))
     steps = _steps(problem, segments, bends)
     if margins:
-        every, place = jnp.stack(nodes, axis=1), jnp.zeros_like(half)
+        attained, place = jnp.stack(nodes, axis=1), jnp.zeros_like(half)
     else:
-        every, place = least_nodes(nodes, allowance(np.arange(len(nodes) - 1) >= 1), PLACES)
+        attained, place = least_nodes(nodes, allowance(np.arange(len(nodes) - 1) >= 1), PLACES)
     size = jnp.max(jnp.abs(problem.robot.base_points)) + segments.hub[:, 2]
     return PlaceBounds(
         jnp.min(jnp.real(first), axis=0) - ROUNDING * size,
         jnp.stack([jnp.min(x, axis=0) - step - ROUNDING for x, step in zip(nodes[:-1], steps, strict=True)]),
-        every,
+        attained,
         place,
         jnp.stack(bends),
     )
 
 
 def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array) -> tuple[list[Vector], list[Vector]]:
-    # Unit vectors between cables, one a pair, and off the sectors, one a cable, by position and turn in the middle.
-    # Of all pairs, or cables, at a time: components (m, n), lanes last, which XLA writes with vectors, in little code.
+    # Find unit vectors between cables, one a pair, and off sectors, one a cable, by position and turn in the middle.
+    # All pairs, or cables, go at a time: components (m, n), lanes last, which XLA writes with vectors, in little code.
     position, turn = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
     points, base = ([x[:, k, None] for k in range(3)] for x in (robot.platform_points, robot.base_points))
     rays = stored([position[k] + dot(turn[k], points) - base[k] for k in range(3)], one)
     seen = turned_back(turn, [-x for x in rays])
     sides, normal = platform
-    first, last = ([sides[:, which, k, None] for k in range(3)] for which in range(2))
+    first, last = ([sides[:, side, k, None] for k in range(3)] for side in range(2))
     left = _units(interference_lanes.residual((first, last), [normal[k] for k in range(3)], seen))
     if not pairs:
         return [], left
@@ -173,7 +173,7 @@ def _units(vectors: Vector) -> list[Vector]:
 
 
 def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: CableLanes, bends: _Bends) -> Array:
-    # The least over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed between instants.
+    # Return the least over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed in between.
     if not pairs:
         return jnp.full_like(bends.centre, jnp.inf)
     sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
@@ -192,7 +192,7 @@ def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: CableL
 
 
 def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, wires: CableLanes) -> list[Array]:
-    # Of the depth below the spools, and of limits on the pose.
+    # Return the slacks of the depth below the spools, and of limits on the pose.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     normal = plane_normal(robot)
     values = [dot([normal[i] for i in range(3)], here.position) / z0]
@@ -207,7 +207,8 @@ def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, wires
 
 
 def _steps(problem: Problem, segments: PlatformSegment, bends: _Bends) -> list[Array]:
-    # What these may fall below their values at two instants; a length is convex along the chord of its ray.
+    # Bound how far these slacks may fall below their values at two instants; a length is convex along the chord of its
+    # ray.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     steps = [jnp.sqrt(jnp.sum(plane_normal(robot) ** 2)) * bends.centre / z0]
     factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]

@@ -78,8 +78,8 @@ def wires_beside(problem: Problem, items, *, kind: PlatformMotionKind) -> tuple[
         (n, n_cables, 3) from spool to platform, and from platform to spool in platform axes, m.
     """
     segments, arcs, middles, off = items
-    now = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
-    here = state(segments, arcs, now, kind)
+    instant = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
+    here = state(segments, arcs, instant, kind)
     wires = cables(problem.robot, here.position, here.turn)
     return interference_lanes.as_arrays(wires.rays, interference_lanes.cable_directions(wires, here.turn))
 
@@ -126,23 +126,23 @@ class PlaceCertifier:
         blocks, work = parts_of_arcs(arcs, self._knots, self._parts[not margins]), WorkList(arcs, self._limits, ignored)
         met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
 
-        def look(some: Blocks, level: int) -> BlockBounds:
-            found = self._bounds(some, segments, arcs, margins=margins)
-            is_clear = np.asarray(found.clear) > touch
+        def look(part: Blocks, level: int) -> BlockBounds:
+            bounds = self._bounds(part, segments, arcs, margins=margins)
+            is_clear = np.asarray(bounds.clear) > touch
             doubtful = np.flatnonzero(~is_clear)
             if level >= NEAR_CONTACT and len(doubtful):
-                own = some.some(doubtful)
-                cables = self._cables(own, np.asarray(found.bends)[:, doubtful], (segments, arcs))
-                base, between = np.asarray(self._problem.robot.base_points), own.instants(MIDDLES[:, None])
+                doubtful_blocks = part.some(doubtful)
+                cables = self._cables(doubtful_blocks, np.asarray(bounds.bends)[:, doubtful], (segments, arcs))
+                base, between = np.asarray(self._problem.robot.base_points), doubtful_blocks.instants(MIDDLES[:, None])
                 for flag, step in (
                     (met, cables_meet(base, self._near.pairs, cables)),
                     (hit, cables_hit(self._near.sides, self._near.normal, cables)),
                 ):
-                    which = np.flatnonzero(step >= 0)
-                    flag[own.row[which]] = True
-                    work.refute(own.row[which], between[step[which], which])
-            nodes, bound = np.asarray(found.nodes), np.asarray(found.slacks)
-            tau = some.instants(PLACES[:, None] if margins else np.asarray(found.place)[None])
+                    meeting = np.flatnonzero(step >= 0)
+                    flag[doubtful_blocks.row[meeting]] = True
+                    work.refute(doubtful_blocks.row[meeting], between[step[meeting], meeting])
+            nodes, bound = np.asarray(bounds.nodes), np.asarray(bounds.slacks)
+            tau = part.instants(PLACES[:, None] if margins else np.asarray(bounds.place)[None])
             return BlockBounds(nodes, bound, tau, lambda _: is_clear)
 
         first = work.work_off(blocks, look)
@@ -165,12 +165,12 @@ class PlaceCertifier:
         return in_batches(kernel, items, size=self._batch, axis=-1)
 
     def _cables(self, blocks: Blocks, bends: np.ndarray, motions) -> CablesOfStep:
-        # At the instants of blocks.
+        # Return the cables at the instants of blocks.
         segments, arcs = motions
-        own = np.tile(np.arange(len(blocks.row)), len(PLACES))
-        row, middle = blocks.row[own], 0.5 * (blocks.start + blocks.stop)[own]
+        block = np.tile(np.arange(len(blocks.row)), len(PLACES))
+        row, middle = blocks.row[block], 0.5 * (blocks.start + blocks.stop)[block]
         items = rows(segments, row), arcs[row].astype(float), middle, blocks.instants(PLACES[:, None]).ravel() - middle
-        found = in_batches(partial(wires_beside, self._problem, kind=self._kind), items, size=self._batch)
-        rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in found)
+        vectors = in_batches(partial(wires_beside, self._problem, kind=self._kind), items, size=self._batch)
+        rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in vectors)
         centre, arm, platform = bends
         return CablesOfStep(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)

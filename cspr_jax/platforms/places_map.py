@@ -36,12 +36,12 @@ class OrientationWorkspaceMap(PlatformMap):
         radius, azimuth = np.hypot(places[:, 0], places[:, 1]), np.arctan2(places[:, 1], places[:, 0])
         azimuth = folded(self._alike, azimuth)
         places = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), places[:, 2]], axis=1)
-        every, own = np.unique(np.round(np.c_[places, depths], DIGITS), axis=0, return_inverse=True)
-        answers = self._places(every[:, :3], every[:, 3])
-        return {name: values[own.ravel()] for name, values in answers.items()}
+        distinct, inverse = np.unique(np.round(np.c_[places, depths], DIGITS), axis=0, return_inverse=True)
+        answers = self._places(distinct[:, :3], distinct[:, 3])
+        return {name: values[inverse.ravel()] for name, values in answers.items()}
 
     def _depths(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # z0 of horizontal transitions, where none is given; not needed for what is accessible.
+        # Return z0; where none is given, that of horizontal transitions. Accessible orientations do not need it.
         depth = self._targets(cells)[:, 2]
         return np.asarray(cells.get("z0", depth), float)
 
@@ -73,26 +73,26 @@ class AttainabilityMap(OrientationWorkspaceMap):
     def _attainable(
         self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, *, margins: bool
     ) -> PlatformMotionAnswers:
-        # Of (n, 3) angles at (n, 3) places, both in the kernels' axes.
+        # Ask about (n, 3) angles at (n, 3) places, both in the kernels' axes.
         values, most = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
-        asked = self._checker, places, angles, z0
-        return attainable(*asked, max_arcs=most, values=values, symmetry=self._alike, margins=margins)
+        arguments = self._checker, places, angles, z0
+        return attainable(*arguments, max_arcs=most, values=values, symmetry=self._alike, margins=margins)
 
     def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
         fine, coarse = (self._sets(places, k) for k in (1, 2))
         # All places together, with both steps: full batches.
-        every = [*fine, *coarse]
-        counts = [len(inside.angles) for inside in every]
-        own = np.repeat(np.tile(np.arange(len(places)), 2), counts)
-        own = np.where((z0 > 0.0)[own], own, -1)
-        verdicts, arcs = np.full(len(own), Verdict.NO_ARCS.value), np.zeros(len(own), int)
-        some = np.flatnonzero(own >= 0)
-        if len(some):
-            angles = np.concatenate([inside.angles for inside in every])[some]
-            answers = self._attainable(places[own[some]], angles, z0[own[some]], margins=False)
-            verdicts[some], arcs[some] = answers.verdict, answers.arcs
+        sets = [*fine, *coarse]
+        counts = [len(inside.angles) for inside in sets]
+        place_index = np.repeat(np.tile(np.arange(len(places)), 2), counts)
+        place_index = np.where((z0 > 0.0)[place_index], place_index, -1)
+        verdicts, arcs = np.full(len(place_index), Verdict.NO_ARCS.value), np.zeros(len(place_index), int)
+        valid = np.flatnonzero(place_index >= 0)
+        if len(valid):
+            angles = np.concatenate([inside.angles for inside in sets])[valid]
+            answers = self._attainable(places[place_index[valid]], angles, z0[place_index[valid]], margins=False)
+            verdicts[valid], arcs[valid] = answers.verdict, answers.arcs
         stops = np.cumsum(counts)[:-1]
-        pieces = zip(every, np.split(arcs, stops), np.split(verdicts, stops), strict=True)
+        pieces = zip(sets, np.split(arcs, stops), np.split(verdicts, stops), strict=True)
         rows = [_of_attained(*piece) for piece in pieces]
         columns = {name: np.array([row[name] for row in rows[: len(places)]]) for name in rows[0]}
         columns["main_reason"] = columns["main_reason"].astype(FLAGS)
@@ -122,7 +122,7 @@ def _of_sets(fine: list[Accessible], coarse: list[Accessible]) -> dict[str, np.n
 
 
 def _of_attained(inside: Accessible, arcs: np.ndarray, verdicts: np.ndarray) -> dict[str, float]:
-    # Of one place; NaN where nothing is accessible.
+    # Summarise the orientations of one place; values are NaN where nothing is accessible.
     count, good = len(arcs), arcs > 0
     if not count:
         names = ("attainable_fraction", "attainable_volume", "mean_arcs", "undecided_fraction", *REFUSALS)

@@ -135,20 +135,20 @@ def reach(
 
 
 def _polynomial_sizes(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
-    # Of |A|, |A'|, |A''|, |A'''|.
+    # Bound |A|, |A'|, |A''| and |A'''|.
     sizes = [jnp.abs(term) for term in terms]
     return tuple(polynomial([math.perm(i, j) * sizes[i] for i in range(j, len(sizes))], along) for j in range(4))
 
 
 class _Trigonometric(NamedTuple):
-    # Of |sin|, |cos|, and the imaginary part of the cosine.
+    # Bounds of |sin|, |cos|, and the imaginary part of the cosine.
     sine: Array
     cosine: Array
     aside: Array
 
 
 class _Beats(NamedTuple):
-    # Of |beta|, |beta'|, |beta''|, and the imaginary part of beta.
+    # Bounds of |beta|, |beta'|, |beta''|, and the imaginary part of beta.
     value: Array
     rate: Array
     bend: Array
@@ -156,7 +156,8 @@ class _Beats(NamedTuple):
 
 
 def _trigonometric(middle: tuple[Array, Array], along: Array, growth: Array) -> _Trigonometric:
-    # Within `along` of an angle whose |sin| and |cos| are `middle`; growth is exp of the largest imaginary part.
+    # Bound sines and cosines within `along` of an angle whose |sin| and |cos| are `middle`; growth is exp of the
+    # largest imaginary part.
     shrunk = 1.0 / growth
     cosh, sinh = 0.5 * (growth + shrunk), 0.5 * (growth - shrunk)
     near = jnp.minimum(along, 1.0)
@@ -172,7 +173,8 @@ def _trigonometric(middle: tuple[Array, Array], along: Array, growth: Array) -> 
 def _swing(
     segment: PlatformSegment, arcs: Array, middle: Middle, axes, sizes, first, kind: PlatformMotionKind
 ) -> tuple[Array, Array]:
-    # Of |p'| and |p''|: the terms of `platform_segment_lanes`, and the growth of the frame that turns with the ellipse.
+    # Bound |p'| and |p''| by the terms of `platform_segment_lanes`, and by the growth of the frame that turns with the
+    # ellipse.
     omega = math.pi * arcs
     sine, cosine, _ = first
     if kind.from_rest:
@@ -203,7 +205,7 @@ def _hypotenuse(a: Array, b: Array) -> Array:
 
 
 def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
-    # Of (3.93), by terms.
+    # Bound (3.93) by its terms.
     how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
     slope = (how.end_beta_hat - how.start_beta_hat) * share
@@ -218,7 +220,7 @@ def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, th
 
 
 def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:
-    # Of |u|, |u'|, |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
+    # Bound |u|, |u'| and |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
     how = segment.turn
     rate, bend = angle * sizes[1], angle * sizes[2]
     grown = jnp.exp(axes[1] * rate)
@@ -236,8 +238,8 @@ def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: A
 
 
 def _angle_ratio(off: Array) -> tuple[Array, ...]:
-    # Of W = arccos(s) / sqrt(1 - s^2) and the sizes of its derivatives where |1 - s| is at most so large: their series
-    # in 1 - s have positive terms alone, so that they are largest on the axis.
+    # Bound W = arccos(s) / sqrt(1 - s^2) and the sizes of its derivatives where |1 - s| is at most so large: their
+    # series in 1 - s have positive terms alone, so that they are largest on the axis.
     is_inside = off < FARTHEST
     s = 1.0 - jnp.where(is_inside, off, 1.0)
     square = 1.0 - s * s

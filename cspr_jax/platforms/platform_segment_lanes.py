@@ -1,4 +1,4 @@
-"""The state of many platforms on their way, one lane a segment: the fast form of `pose_segment.motion`.
+"""The state of many platforms on their way, one lane a segment: the fast form of `platform_segment.motion`.
 
 The same mechanics (tests compare them), written for numbers instead of small vectors. A transition from rest needs
 neither an ellipse nor a quaternion: it is a straight swing, and a rotation about one axis.
@@ -140,7 +140,7 @@ def _straight(segment: PlatformSegment, arcs: Array, now: InstantLanes, *, varia
 
 
 def _ellipse(segment: PlatformSegment, arcs: Array, now: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
-    # `pose_segment._swing`.
+    # Compute the same as `platform_segment._swing`.
     omega, nu = segment.sense * math.pi * arcs, segment.precession / arcs
     span = segment.end_radius - segment.start_radius
     r, r1, r2, r3 = segment.start_radius + span * now.a, span * now.a1, span * now.a2, span * now.a3
@@ -167,7 +167,7 @@ def _ellipse(segment: PlatformSegment, arcs: Array, now: InstantLanes, *, variab
 def _beat(
     segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
 ) -> tuple[Array, Array, Array]:
-    # `oscillating_slerp.beat`, at the phase that the instant knows.
+    # Compute the same as `oscillating_slerp.beat`, at the phase that the instant knows.
     how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
     sine, cosine = segment.sense * now.sine, now.cosine
@@ -196,15 +196,15 @@ def _about_one_axis(
 
 
 def _angle_ratio_coefficients() -> list[list[float]]:
-    # Of W and its derivatives in x = 1 - s, in powers of x, by fits to the series, which are exact.
+    # Fit powers of x = 1 - s to the series of W and of its derivatives in x, which are exact.
     terms = np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(120))])
     nodes = np.polynomial.chebyshev.chebpts1(64) * 0.5 + 0.5
-    every = []
+    coefficients = []
     for order in range(3):
         values = np.polynomial.Polynomial(terms).deriv(order)(nodes)
         fit = np.polynomial.Chebyshev.fit(nodes, values, _DEGREE, domain=[0, 1])
-        every.append([float(c) for c in fit.convert(kind=np.polynomial.Polynomial).coef])
-    return every
+        coefficients.append([float(c) for c in fit.convert(kind=np.polynomial.Polynomial).coef])
+    return coefficients
 
 
 _RATIO = _angle_ratio_coefficients()

@@ -18,7 +18,8 @@ BATCH = 1024
 
 @jax.jit
 def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
-    # Of each pose (3.91), the interval (3.92), the determinant over that at the same depth in the middle, the depth.
+    # Return for each pose (3.91), the interval (3.92), the determinant over that at the same depth in the middle, and
+    # the depth.
     def one(position, quaternion, z0):
         end, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
         share = determinant_share(robot, position, rotations.matrix(quaternion))

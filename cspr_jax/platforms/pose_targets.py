@@ -45,9 +45,9 @@ def start_beta_hat(checker: PlatformChecker, starts: Poses, z0: np.ndarray) -> n
         (n,).
     """
     # Starts are few, and end_options costs as much for each.
-    every, own = np.unique(np.c_[starts[0], starts[1], z0], axis=0, return_inverse=True)
-    values = end_options(checker.problem.robot, every[:, :3], every[:, 3:7], every[:, 7], 1)[0][:, 0]
-    return np.where(np.isnan(values), AT_REST, values)[own.ravel()]
+    distinct, inverse = np.unique(np.c_[starts[0], starts[1], z0], axis=0, return_inverse=True)
+    values = end_options(checker.problem.robot, distinct[:, :3], distinct[:, 3:7], distinct[:, 7], 1)[0][:, 0]
+    return np.where(np.isnan(values), AT_REST, values)[inverse.ravel()]
 
 
 def pose_arcs(
@@ -71,16 +71,16 @@ def pose_arcs(
         the answers.
     """
 
-    def part(which: slice) -> PlatformMotionAnswers:
-        some = motions.motions(np.arange(len(motions.z0))[which])
+    def part(piece: slice) -> PlatformMotionAnswers:
+        targets = motions.motions(np.arange(len(motions.z0))[piece])
         values, can_end = end_options(
-            checker.problem.robot, *some.end, some.z0, 1 if beta_hat == "preferred" else OPTIONS
+            checker.problem.robot, *targets.end, targets.z0, 1 if beta_hat == "preferred" else OPTIONS
         )
         if beat in WITHOUT_BETA_HAT:
-            values = np.zeros((len(some.z0), 1))
+            values = np.zeros((len(targets.z0), 1))
         elif isinstance(beta_hat, float):
-            values = np.full((len(some.z0), 1), beta_hat)
+            values = np.full((len(targets.z0), 1), beta_hat)
         values = np.where(can_end[:, None], values, np.nan)
-        return reached(checker, some, values, max_arcs=max_arcs, same=beat not in _OWN)
+        return reached(checker, targets, values, max_arcs=max_arcs, same=beat not in _OWN)
 
     return joined(in_parts(part, len(motions.z0), CANDIDATES // (OPTIONS if beta_hat is None else 1)))

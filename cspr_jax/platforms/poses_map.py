@@ -50,7 +50,7 @@ class PosesMap(PlatformMap):
         return vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
 
     def _starts(self, z0: np.ndarray) -> tuple[Poses, np.ndarray]:
-        # Poses and values of beta-hat.
+        # Return the poses at the starts, and the values of beta-hat there.
         start, count = self._keys.trajectory.start, len(z0)
         if start is None or start.position is None:
             return rest_poses(z0), np.full(count, AT_REST)
@@ -58,8 +58,8 @@ class PosesMap(PlatformMap):
         turned = np.tile(self._frame.turned_quaternions(self._quaternion), (count, 1))
         if start.tilt_torsion is not None:
             turned = orientations(self._frame, place, np.tile(start.tilt_torsion, (count, 1)))
-        own = start.beta_hat
-        beta_hats = start_beta_hat(self._checker, (place, turned), z0) if own is None else np.full(count, own)
+        beta_hat = start.beta_hat
+        beta_hats = start_beta_hat(self._checker, (place, turned), z0) if beta_hat is None else np.full(count, beta_hat)
         return (place, turned), beta_hats
 
     def refuse_hopeless(self, grid: Grid) -> None:

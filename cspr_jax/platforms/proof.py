@@ -120,11 +120,11 @@ class Certifier:
         blocks = parts_of_arcs(arcs, self._knots, self._parts[not margins])
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
 
-        def look(some: Blocks, _: int) -> BlockBounds:
-            found = self._looked_at(some, motions, margins=margins)
-            tau = some.instants(chebyshev.nodes()[:, None] if margins else np.asarray(found.place)[None])
-            nodes, bound = np.asarray(found.nodes), np.asarray(found.bound)
-            return BlockBounds(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[some.row, 0], 0.0))
+        def look(part: Blocks, _: int) -> BlockBounds:
+            bounds = self._looked_at(part, motions, margins=margins)
+            tau = part.instants(chebyshev.nodes()[:, None] if margins else np.asarray(bounds.place)[None])
+            nodes, bound = np.asarray(bounds.nodes), np.asarray(bounds.bound)
+            return BlockBounds(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[part.row, 0], 0.0))
 
         work = WorkList(arcs, self._limits, ignored)
         first = work.work_off(blocks, look)
@@ -132,21 +132,21 @@ class Certifier:
         return TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.instant, blocks.row, first)
 
     def _looked_at(self, blocks: Blocks, motions, *, margins: bool) -> TensionBounds:
-        found = self.bounds(0, blocks, motions, margins=margins, least=not margins)
+        bounds = self.bounds(0, blocks, motions, margins=margins, least=not margins)
         for k in range(1, len(self._orders)):
-            # What is not proved because the first three cables lie nearly in one plane.
-            open_ones = np.flatnonzero(_rounding_matters(found) & ~(found.bound > TOLERANCE).all(0))
+            # These blocks are not proved because the first three cables lie nearly in one plane.
+            open_ones = np.flatnonzero(_rounding_matters(bounds) & ~(bounds.bound > TOLERANCE).all(0))
             if not len(open_ones):
                 break
             better = self.bounds(k, blocks.some(open_ones), motions, margins=margins, least=not margins)
-            # Values of nodes too: where such cables are in one plane they are rounding, and could refute.
-            surer = better.rounding < found.rounding[open_ones]
-            found.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
-            found.place[open_ones[surer]] = better.place[surer]
-            found.bound[:, open_ones] = np.fmax(found.bound[:, open_ones], better.bound)
-            found.rounding[open_ones] = np.minimum(found.rounding[open_ones], better.rounding)
-            found.allowed[open_ones] = np.minimum(found.allowed[open_ones], better.allowed)
-        return found
+            # Replace values of nodes too: where such cables are in one plane they are rounding, and could refute.
+            surer = better.rounding < bounds.rounding[open_ones]
+            bounds.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
+            bounds.place[open_ones[surer]] = better.place[surer]
+            bounds.bound[:, open_ones] = np.fmax(bounds.bound[:, open_ones], better.bound)
+            bounds.rounding[open_ones] = np.minimum(bounds.rounding[open_ones], better.rounding)
+            bounds.allowed[open_ones] = np.minimum(bounds.allowed[open_ones], better.allowed)
+        return bounds
 
     def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool, least: bool = False) -> TensionBounds:
         """Bounds on blocks.
@@ -166,12 +166,12 @@ class Certifier:
         return in_batches(kernel, items, size=self._batch, axis=-1)
 
     def _items(self, order: int, blocks: Blocks, motions) -> tuple[Problem, tuple]:
-        # The robot with its cables in an order, and its blocks as kernels take them.
+        # Return the robot with its cables in an order, and its blocks as kernels take them.
         segments, arcs, standing = motions
         problem, sign, _ = self._orders[order]
         self._count(len(blocks.row) * (chebyshev.DEGREE + 1))
-        own = rows(segments, blocks.row), arcs[blocks.row].astype(float), sign * standing[blocks.row]
-        return problem, (*own, blocks.start, blocks.stop)
+        motion_items = rows(segments, blocks.row), arcs[blocks.row].astype(float), sign * standing[blocks.row]
+        return problem, (*motion_items, blocks.start, blocks.stop)
 
     def ranges(self, blocks: Blocks, segments: PlatformSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Ranges of the tensions on blocks.
@@ -187,28 +187,29 @@ class Certifier:
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
         count = len(blocks.row)
         low, high = np.full((count, CABLES), -np.inf), np.full((count, CABLES), np.inf)
-        which = np.arange(count)
+        remaining = np.arange(count)
         for k, order in enumerate(self._orders):
-            problem, items = self._items(k, blocks.some(which), motions)
+            problem, items = self._items(k, blocks.some(remaining), motions)
             kernel = partial(tension_ranges, problem._replace(limits=Limits()), np.ones(()), kind=self._kind)
-            found = in_batches(kernel, items, size=self._batch, axis=-1)
-            own = np.ix_(which, np.array(order.cables))
-            low[own], high[own] = np.fmax(low[own], found.low.T), np.fmin(high[own], found.high.T)
-            # As in `_looked_at`, where the first three cables lie nearly in one plane.
-            which = which[_rounding_matters(found)]
-            if not len(which):
+            bounds = in_batches(kernel, items, size=self._batch, axis=-1)
+            index = np.ix_(remaining, np.array(order.cables))
+            low[index], high[index] = np.fmax(low[index], bounds.low.T), np.fmin(high[index], bounds.high.T)
+            # Go on as in `_looked_at`, where the first three cables lie nearly in one plane.
+            remaining = remaining[_rounding_matters(bounds)]
+            if not len(remaining):
                 break
         return low, high
 
 
-def _rounding_matters(found: TensionBounds | TensionRange) -> np.ndarray:
+def _rounding_matters(bounds: TensionBounds | TensionRange) -> np.ndarray:
     # Elsewhere no other order of the cables gives better bounds: only shorter blocks do.
-    rounding, allowed = np.asarray(found.rounding), np.asarray(found.allowed)
+    rounding, allowed = np.asarray(bounds.rounding), np.asarray(bounds.allowed)
     return (rounding > 0.25 * TOLERANCE) & (rounding >= MATTERS * allowed)
 
 
 def _orders(problem: Problem) -> list[_Order]:
-    # As it is, then those whose first, third and fifth ray span the largest volumes at rest, a unit below the spools.
+    # The robot's own order comes first, then the orders whose first, third and fifth ray span the largest volumes at
+    # rest, a unit below the spools.
     robot = problem.robot
     base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
     rays = arms + np.array([0.0, 0.0, float(np.abs(base).max())]) - base
@@ -216,11 +217,11 @@ def _orders(problem: Problem) -> list[_Order]:
     threes = sorted(
         itertools.combinations(range(CABLES), 3), key=lambda three: -abs(float(np.linalg.det(rays[list(three)])))
     )
-    every = [list(range(CABLES))]
+    orders = [list(range(CABLES))]
     for three in threes[: ORDERS - 1]:
         others = [k for k in range(CABLES) if k not in three]
-        every.append([k for pair in zip(three, others, strict=True) for k in pair])
-    return [_Order(_reordered(problem, order), _sign(order), order) for order in every]
+        orders.append([k for pair in zip(three, others, strict=True) for k in pair])
+    return [_Order(_reordered(problem, order), _sign(order), order) for order in orders]
 
 
 def _sign(order: list[int]) -> float:
@@ -233,11 +234,11 @@ def _reordered(problem: Problem, order: list[int]) -> Problem:
     points = {name: np.asarray(getattr(robot, name))[order] for name in ("base_points", "platform_points")}
     changed = dataclasses.replace(robot, **points, joints=tuple(range(CABLES)), limits=Limits())
     each = {row.name: getattr(limits, row.name) for row in LIMITS}
-    own: dict[str, Any] = {
+    values: dict[str, Any] = {
         row.name: np.asarray(each[row.name])[order] if row.per_cable and each[row.name] is not None else each[row.name]
         for row in LIMITS
     }
-    return problem._replace(robot=changed, limits=Limits(**own))
+    return problem._replace(robot=changed, limits=Limits(**values))
 
 
 def determinant_at_rest(problem: Problem, segments: PlatformSegment) -> np.ndarray:
@@ -250,8 +251,8 @@ def determinant_at_rest(problem: Problem, segments: PlatformSegment) -> np.ndarr
     Returns:
         (n,) m^9.
     """
-    robot, (depths, own) = problem.robot, np.unique(np.asarray(segments.hub)[:, 2], return_inverse=True)
+    robot, (depths, inverse) = problem.robot, np.unique(np.asarray(segments.hub)[:, 2], return_inverse=True)
     arms = np.asarray(robot.platform_points)
     forces = np.asarray(robot.base_points) - arms - np.array([0.0, 0.0, 1.0]) * depths[:, None, None]
     wrenches = np.concatenate([forces, np.cross(arms, forces)], axis=2)
-    return -np.linalg.det(wrenches)[own.ravel()]
+    return -np.linalg.det(wrenches)[inverse.ravel()]

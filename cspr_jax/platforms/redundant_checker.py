@@ -45,7 +45,7 @@ class MarginSieve:
     """
 
     def __init__(self, checker: "RedundantChecker") -> None:
-        """Of a checker."""
+        """Keep the checker."""
         self._checker = checker
 
     def lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
@@ -64,10 +64,10 @@ class MarginSieve:
         return is_refuted
 
     def _least(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        # (n, n_slacks) the margin first; not the distances between cables.
+        # Return (n, n_slacks), the margin first, without the distances between cables.
         motions = Motions(segments, np.full(len(segments.rate), arcs))
-        found = self._checker.values(motions, np.tile(tau, (len(motions.arcs), 1)))[:, :, :-1].min(1)
-        return np.where(np.isnan(found), -np.inf, found)
+        least = self._checker.values(motions, np.tile(tau, (len(motions.arcs), 1)))[:, :, :-1].min(1)
+        return np.where(np.isnan(least), -np.inf, least)
 
 
 class RedundantChecker(MotionChecker):
@@ -104,14 +104,16 @@ class RedundantChecker(MotionChecker):
         """
         row = np.repeat(np.arange(len(tau)), tau.shape[1])
         kernel = partial(instants, self.problem, self._pairs, kind=self.kind)
-        now = in_batches(kernel, (*motions.items(row), tau.ravel()), size=self.batch)
+        states = in_batches(kernel, (*motions.items(row), tau.ravel()), size=self.batch)
         is_finite = (
-            np.isfinite(now.position).all(1) & np.isfinite(now.quaternion).all(1) & np.isfinite(now.wrench).all(1)
+            np.isfinite(states.position).all(1)
+            & np.isfinite(states.quaternion).all(1)
+            & np.isfinite(states.wrench).all(1)
         )
         margin = np.full(len(row), np.nan)
-        some = now.position[is_finite], now.quaternion[is_finite], now.wrench[is_finite]
-        margin[is_finite] = self._workspace(*some).margin
-        values = np.concatenate([margin[:, None] / self._weight, now.slacks], axis=1)
+        poses = states.position[is_finite], states.quaternion[is_finite], states.wrench[is_finite]
+        margin[is_finite] = self._workspace(*poses).margin
+        values = np.concatenate([margin[:, None] / self._weight, states.slacks], axis=1)
         return values.reshape(*tau.shape, -1)
 
     def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
@@ -159,12 +161,12 @@ class RedundantChecker(MotionChecker):
         """Check motions in full, by samples: nothing is proved; see `MotionChecker.check`."""
         checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         for count in np.unique(arcs).tolist():
-            # Those of one number of samples together.
+            # Motions with one number of samples are checked together.
             alike = np.flatnonzero(arcs == count)
             size = max(ROOM // (SAMPLES * count), 1)
             for start in range(0, len(alike), size):
-                some = alike[start : start + size]
-                checks.put(some, self._checked(motions.rows(some), count, whole, ignored))
+                piece = alike[start : start + size]
+                checks.put(piece, self._checked(motions.rows(piece), count, whole, ignored))
         return checks
 
     def _checked(self, motions: Motions, count: int, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:
@@ -189,14 +191,14 @@ class RedundantChecker(MotionChecker):
         return checks
 
     def _met(self, motions: Motions, tau: np.ndarray) -> np.ndarray:
-        # Motions in which cables pass through each other between samples.
+        # Find motions in which cables pass through each other between samples.
         many, steps = len(motions.arcs), len(tau) - 1
         ends = tuple(np.tile(part, many) for part in (tau[:-1], tau[1:]))
         row = np.repeat(np.arange(many), steps)
 
-        def vectors(which: np.ndarray, when: np.ndarray) -> CableVectors:
+        def vectors(motion_row: np.ndarray, when: np.ndarray) -> CableVectors:
             kernel = partial(cable_vectors, self.problem, self._pairs, kind=self.kind)
-            return in_batches(kernel, (*motions.items(which), when), size=self.batch)
+            return in_batches(kernel, (*motions.items(motion_row), when), size=self.batch)
 
         if not len(self._pairs):
             return np.zeros(many, bool)
@@ -225,14 +227,15 @@ class RedundantChecker(MotionChecker):
 
 
 def _refuted_at(least: np.ndarray, when: np.ndarray) -> np.ndarray:
-    # Of smallest values (n, n_values), the margin first, when the margin is below zero, else the worst of the others.
+    # Take smallest values (n, n_values), the margin first, and when they are attained; return when the margin is below
+    # zero, else when the worst of the others is.
     worst = np.where(least[:, 0] <= -TOLERANCE, 0, least.argmin(1))
     row = np.arange(len(least))
     return np.where(least[row, worst] <= -TOLERANCE, when[row, worst], np.nan)
 
 
 def _in_order(values: np.ndarray) -> np.ndarray:
-    # Of margin, other limits and distance those that have a flag (n, n_criteria): there is no determinant, and no side
-    # of the spools to be on.
+    # Take margin, other limits and distance; keep those that have a flag (n, n_criteria): there is no determinant, and
+    # no side of the spools to be on.
     nothing, always = np.full((len(values), 1), np.nan), np.full((len(values), 1), np.inf)
     return np.concatenate([values[:, :1], nothing, always, values[:, 1:-1]], axis=1)

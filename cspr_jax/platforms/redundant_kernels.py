@@ -20,7 +20,7 @@ from cspr_jax.schema.limits import Limit
 
 
 class PoseInstants(NamedTuple):
-    """What motions ask for at n instants.
+    """Poses, wrenches and slacks of motions at n instants.
 
     Fields:
         position: (n, 3) m.
@@ -51,7 +51,7 @@ def other_limits(limits: Limits) -> list[Limit]:
 def instants(
     problem: Problem, pairs: Array, items: tuple[PlatformSegment, Array, Array], *, kind: PlatformMotionKind
 ) -> PoseInstants:
-    """What motions ask for, each at an instant.
+    """Poses, wrenches and slacks of motions, each at an instant.
 
     Args:
         problem: robot, limits, amplitude.
@@ -68,10 +68,11 @@ def instants(
         motion = PlatformMotion(segment, problem.amplitude, arcs, kind)
         state = motion.state(tau)
         length, rate, bend = cable_motion(robot, state)
-        now = Values(jnp.zeros_like(length), state.position[2], length, jnp.abs(rate), jnp.abs(bend))
+        quantities = Values(jnp.zeros_like(length), state.position[2], length, jnp.abs(rate), jnp.abs(bend))
         scale = scales(robot.n_cables, robot.mass * robot.gravity, motion.z0)
         each = (
-            slack(row, getattr(limits, row.name), getattr(now, row.quantity), scale) for row in other_limits(limits)
+            slack(row, getattr(limits, row.name), getattr(quantities, row.quantity), scale)
+            for row in other_limits(limits)
         )
         apart = jnp.linalg.norm(gaps(robot, pairs, state.position, state.rotation), axis=1)
         nearest = jnp.min(apart, initial=jnp.inf)

@@ -57,15 +57,15 @@ def smallest_tensions(
     """
     if single_precision:
         robot, segments = _of_one_size(robot, segments)
-    kept = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if single_precision else x.dtype))
-    robot, segments, number = kept((robot, segments, jnp.asarray(arcs)))
+    cast = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if single_precision else x.dtype))
+    robot, segments, number = cast((robot, segments, jnp.asarray(arcs)))
     if kind.from_rest:
-        at, table = _from_rest(robot, segments), kept(rest_table(amplitude, arcs, tau, kind))
+        at, table = _from_rest(robot, segments), cast(rest_table(amplitude, arcs, tau, kind))
     else:
-        table = kept(jax.vmap(lambda t: instant(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
+        table = cast(jax.vmap(lambda t: instant(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
 
-        def at(now):
-            return lowest_tension(robot, segments, number, now, kind)
+        def at(instant_lanes):
+            return lowest_tension(robot, segments, number, instant_lanes, kind)
 
     # One number a loop: XLA would compute the tension once for each of several.
     values = row_by_row(at, table)
@@ -74,7 +74,7 @@ def smallest_tensions(
 
 
 def _of_one_size(robot: PlatformRobot, segments: PlatformSegment) -> tuple[PlatformRobot, PlatformSegment]:
-    # With the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
+    # Take the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
     # eighteenth, which float32 has no room for. Tensions over their value at rest do not depend on the unit.
     unit = jnp.sqrt(jnp.mean(robot.base_points**2))
     smaller = dataclasses.replace(
@@ -94,18 +94,18 @@ def _of_one_size(robot: PlatformRobot, segments: PlatformSegment) -> tuple[Platf
 
 
 def _from_rest(robot: PlatformRobot, segments: PlatformSegment):
-    which, inertia = swings(segments), robot.inertia / robot.mass
+    motions, inertia = swings(segments), robot.inertia / robot.mass
     # I e has the same direction in platform axes as about the fixed ones before the turn, which leaves the axis alone.
-    own = tuple(dot([inertia[i, j] for j in range(3)], which.axis) for i in range(3))
+    axis_inertia = tuple(dot([inertia[i, j] for j in range(3)], motions.axis) for i in range(3))
 
     def at(row):
-        here = swing(which, row)
+        here = swing(motions, row)
         wires = cables(robot, here.position, here.turn)
-        weight = tuple(dot(line, own) for line in here.turn)
-        whirl = cross(which.axis, weight)
+        weight = tuple(dot(line, axis_inertia) for line in here.turn)
+        whirl = cross(motions.axis, weight)
         moment = tuple(here.spin * a + here.squared_speed * b for a, b in zip(weight, whirl, strict=True))
         force = (here.acceleration[0], here.acceleration[1], here.acceleration[2] - robot.gravity)
-        return certain_tension(which.rate, segments.regular, wires, balance(wires, force, moment))
+        return certain_tension(motions.rate, segments.regular, wires, balance(wires, force, moment))
 
     return at
 
@@ -120,7 +120,7 @@ def _rough_and_certain(
     *,
     kind: PlatformMotionKind,
 ) -> tuple[Array, Array]:
-    # As `smallest_tensions`, in float32; and in float64 at the instant of that, (n,) each.
+    # Compute `smallest_tensions` in float32, and the tension at its instant in float64, (n,) each.
     lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, single_precision=True)
     when = jnp.minimum(when, len(tau) - 1)  # there is none where all are NaN
     if kind.from_rest:
@@ -181,18 +181,18 @@ class TensionSieve(NamedTuple):
             alive = np.flatnonzero(~is_refuted)
             if not len(alive):
                 break
-            some = segments if len(alive) == len(is_refuted) else rows(segments, alive)
+            remaining = segments if len(alive) == len(is_refuted) else rows(segments, alive)
             if len(alive) <= room(self.size // FEWER):  # not worth two looks
-                is_refuted[alive] = ~(self._lowest(some, arcs, chunk) > self.least)
+                is_refuted[alive] = ~(self._lowest(remaining, arcs, chunk) > self.least)
                 continue
             self.count_instants(len(alive) * (len(chunk) + 1))
             kernel = partial(_rough_and_certain, self.robot, self.amplitude, float(arcs), chunk, kind=self.kind)
-            lowest, certain = in_batches(kernel, some, size=self.size)
+            lowest, certain = in_batches(kernel, remaining, size=self.size)
             is_refuted[alive] = (lowest < 0.0) & ~(certain > self.least)
         return is_refuted
 
     def _lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        # Of few motions, in float64.
+        # Look at few motions, in float64.
         self.count_instants(len(segments.rate) * len(tau))
         kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
         return in_batches(kernel, segments, size=self.size // FEWER)[0]

@@ -29,23 +29,23 @@ from cspr_jax.schema.limits import Limit
 FLAT = 1e-3
 
 
-def _balanced(robot: PlatformRobot, now: StateLanes, wires: CableLanes, squared: Array) -> Balance:
+def _balanced(robot: PlatformRobot, here: StateLanes, wires: CableLanes, squared: Array) -> Balance:
     def slowed(vector):
         return tuple(x / squared for x in vector)
 
     # The moment is of second order in time like the force: omega enters squared.
-    force, moment = inertial_wrench(robot, slowed(now.acceleration), now.turn, now.omega, now.spin)
+    force, moment = inertial_wrench(robot, slowed(here.acceleration), here.turn, here.omega, here.spin)
     return balance(wires, force, slowed(moment))
 
 
 def _is_flat(wires: CableLanes, balance: Balance) -> Array:
-    # Where three of the cables are nearly in one plane.
+    # Tell where three of the cables are nearly in one plane.
     a, b, c = (dot(wires.rays[k], wires.rays[k]) for k in range(0, CABLES, 2))
     return balance.volume * balance.volume < FLAT**2 * a * b * c
 
 
 def _smallest_tension(rate: Array, balance: Balance) -> Array:
-    # Over its value at rest in P0 if all were equal.
+    # Return the smallest tension over its value at rest in P0 if all were equal.
     share = CABLES / (rate * balance.denominator)
     return smallest([x * share for x in balance.numerators])
 
@@ -110,7 +110,7 @@ def moving_slacks(
     balance = _balanced(robot, here, wires, squared)
     is_flat = _is_flat(wires, balance)
     values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment.rate, balance))]
-    rows = _given(limits, of_motion=True)
+    rows = _limit_rows(limits, of_motion=True)
     if not rows:
         return values
     lengths, rates, bends = cable_rates(wires, here.velocity, here.acceleration, here.omega, here.spin)
@@ -144,18 +144,18 @@ def still_slacks(problem: Problem, segment: PlatformSegment, here: StateLanes, w
     values = [normalised_determinant(robot, wires) / segment.regular, below]
     scale = scales(CABLES, robot.mass * robot.gravity, z0)
     each = {"depth": [here.position[2]], "length": [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]}
-    return values + [_least(row, limits, each[row.quantity], scale) for row in _given(limits, of_motion=False)]
+    return values + [_least(row, limits, each[row.quantity], scale) for row in _limit_rows(limits, of_motion=False)]
 
 
-def _given(limits: Limits, *, of_motion: bool) -> list[Limit]:
+def _limit_rows(limits: Limits, *, of_motion: bool) -> list[Limit]:
     return [row for row in limits_set(limits) if row.of_motion == of_motion]
 
 
 def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
     # Smallest slack of a limit, of a quantity of each cable or of one alone.
     limit = getattr(limits, row.name)
-    own = [limit[k] for k in range(len(each))] if row.per_cable else [limit]
-    return smallest([slack(row, x, value, scale) for x, value in zip(own, each, strict=True)])
+    bounds = [limit[k] for k in range(len(each))] if row.per_cable else [limit]
+    return smallest([slack(row, x, value, scale) for x, value in zip(bounds, each, strict=True)])
 
 
 def order(limits: Limits) -> list[int]:
@@ -167,6 +167,6 @@ def order(limits: Limits) -> list[int]:
     Returns:
         n_criteria indices.
     """
-    moving, still = _given(limits, of_motion=True), _given(limits, of_motion=False)
-    every = ["taut", *moving, "regular", "below", *still]
-    return [every.index(which) for which in ("taut", "regular", "below", *limits_set(limits))]
+    moving, still = _limit_rows(limits, of_motion=True), _limit_rows(limits, of_motion=False)
+    criteria = ["taut", *moving, "regular", "below", *still]
+    return [criteria.index(criterion) for criterion in ("taut", "regular", "below", *limits_set(limits))]

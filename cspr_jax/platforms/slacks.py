@@ -56,6 +56,6 @@ def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Ar
     rows = limits_set(limits)
     if not rows:
         return jnp.stack(basic)
-    now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
-    every = (slack(row, getattr(limits, row.name), getattr(now, row.quantity), scale) for row in rows)
-    return jnp.stack([*basic, *(jnp.min(x) for x in every)])
+    quantities, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
+    slacks = (slack(row, getattr(limits, row.name), getattr(quantities, row.quantity), scale) for row in rows)
+    return jnp.stack([*basic, *(jnp.min(x) for x in slacks)])

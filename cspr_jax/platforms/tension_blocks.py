@@ -64,7 +64,7 @@ class TensionBounds(NamedTuple):
 
 
 class _Block(NamedTuple):
-    # Of n blocks.
+    # Parameters of n blocks.
     segments: PlatformSegment
     squared: Array  # T^2, s^2
     regular: Array  # det J(P0), m^9
@@ -101,16 +101,16 @@ def tension_blocks(
     Returns:
         the bounds.
     """
-    found = _taken(problem, one, items, kind=kind, margins=margins, single_precision=least)
-    # What margins alone need comes last, and is not bounded.
-    nodes, bound = _bounds(problem, found)
+    taken = _taken(problem, one, items, kind=kind, margins=margins, single_precision=least)
+    # Values that margins alone need come last, and are not bounded.
+    nodes, bound = _bounds(problem, taken)
     if margins:
-        nodes[1] = nodes[1] * found.values[:, len(found.rests)]
+        nodes[1] = nodes[1] * taken.values[:, len(taken.rests)]
     if least:
-        every, place = least_nodes(nodes, allowance(np.arange(len(nodes)) >= BASIC), chebyshev.nodes())
+        node_values, place = least_nodes(nodes, allowance(np.arange(len(nodes)) >= BASIC), chebyshev.nodes())
     else:
-        every, place = jnp.stack(nodes, axis=1), jnp.zeros_like(bound[0])
-    return TensionBounds(every, place, jnp.stack(bound), *_allowances(found))
+        node_values, place = jnp.stack(nodes, axis=1), jnp.zeros_like(bound[0])
+    return TensionBounds(node_values, place, jnp.stack(bound), *_allowances(taken))
 
 
 class TensionRange(NamedTuple):
@@ -143,11 +143,11 @@ def tension_ranges(problem: Problem, one: Array, items, *, kind: PlatformMotionK
     Returns:
         the ranges.
     """
-    found = _taken(problem, one, items, kind=kind, margins=False)
-    low, high = (_coefficients(found.values) + sign * found.rests[None] for sign in (-1.0, 1.0))
+    taken = _taken(problem, one, items, kind=kind, margins=False)
+    low, high = (_coefficients(taken.values) + sign * taken.rests[None] for sign in (-1.0, 1.0))
     regular = low[:, REGULAR, None], high[:, REGULAR, None]
     least, most = ratio(low[:, :CABLES], regular), ratio(-high[:, :CABLES], regular)
-    return TensionRange(jnp.min(least, axis=0), -jnp.min(most, axis=0), *_allowances(found))
+    return TensionRange(jnp.min(least, axis=0), -jnp.min(most, axis=0), *_allowances(taken))
 
 
 def _coefficients(values: Array) -> Array:
@@ -156,8 +156,8 @@ def _coefficients(values: Array) -> Array:
     return (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
 
 
-def _allowances(found: "_Taken") -> tuple[Array, Array]:
-    return jnp.max(found.rounding[:CABLES], axis=0), jnp.max(found.rests[:CABLES], axis=0)
+def _allowances(taken: "_Taken") -> tuple[Array, Array]:
+    return jnp.max(taken.rounding[:CABLES], axis=0), jnp.max(taken.rests[:CABLES], axis=0)
 
 
 class _Taken(NamedTuple):
@@ -177,8 +177,8 @@ def _taken(
     block = _Block(segments, squared_duration(segments, arcs), regular, problem.robot.gravity / segments.rate)
 
     def at(off):
-        now = instant_beside(middle, segments.sense, arcs, off * half)
-        return state(segments, arcs, stored(now, one), kind, one)
+        instant = instant_beside(middle, segments.sense, arcs, off * half)
+        return state(segments, arcs, stored(instant, one), kind, one)
 
     def values_at(node):
         return [x for pair in _values(problem, block, at(node), margins=margins) for x in pair]
@@ -195,8 +195,8 @@ def _taken(
 
     def sizes_on(ellipse):
         along, pairs, factor = ellipse
-        found = _sizes(problem, block, Reach(*packed.parts(pairs)), along * half, lengths)
-        return packed.paired([jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in found])
+        bounds = _sizes(problem, block, Reach(*packed.parts(pairs)), along * half, lengths)
+        return packed.paired([jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in bounds])
 
     factors = np.append(chebyshev.remainders(radii), ROUNDING)
     sizes = jnp.stack(packed.parts(lax.map(sizes_on, (axes[:, 0], lax.map(reach_on, axes), factors))))
@@ -211,8 +211,8 @@ def _taken(
 
 
 def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool) -> list[Pair]:
-    # At one node, two at a time, which XLA then computes in one loop: kappa and D, what rounding is multiplied with,
-    # what the limits need, and what makes of D the normalised determinant.
+    # Return the values at one node, two at a time, which XLA then computes in one loop: kappa and D, the factor of
+    # rounding, the values that the limits need, and the factor that makes of D the normalised determinant.
     robot = problem.robot
     wires = cables(robot, here.position, here.turn)
 
@@ -220,13 +220,13 @@ def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool)
         return tuple(x / block.squared for x in vector)
 
     force, moment = inertial_wrench(robot, slowed(here.acceleration), here.turn, here.omega, here.spin)
-    found = balance(wires, force, slowed(moment))
-    inverse = 1.0 / found.volume
+    balanced = balance(wires, force, slowed(moment))
+    inverse = 1.0 / balanced.volume
     squares = [dot(ray, ray) for ray in wires.rays]
     amplified = math.prod(squares[2::2], start=squares[0]) * inverse * inverse
     share = inverse * inverse * inverse / block.regular
-    kappa = [x * (share * (CABLES * block.z0 / robot.gravity)) for x in found.numerators]
-    regular = found.denominator * share
+    kappa = [x * (share * (CABLES * block.z0 / robot.gravity)) for x in balanced.numerators]
+    regular = balanced.denominator * share
     pairs = [*zip(kappa[::2], kappa[1::2], strict=True), (regular, amplified)]
     instant = Here(here, wires, kappa, block.squared, block.z0)
     for quantity, row in _quantities(problem).items():
@@ -240,8 +240,8 @@ def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool)
     return pairs
 
 
-def _level(like: Array):
-    one, nothing = jnp.ones_like(like), jnp.zeros_like(like)
+def _level(template: Array):
+    one, nothing = jnp.ones_like(template), jnp.zeros_like(template)
     return tuple(tuple(one if i == j else nothing for j in range(3)) for i in range(3))
 
 
@@ -254,7 +254,7 @@ def _quantities(problem: Problem) -> dict[str, list[Limit]]:
 
 
 def _lengths(robot: PlatformRobot, here: StateLanes) -> tuple[list[Array], list[Array]]:
-    # Of the cables, and from the spools to the mass centre.
+    # Return the lengths of the cables, and the distances from the spools to the mass centre.
     wires = cables(robot, here.position, here.turn)
     offs = [tuple(here.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]
     rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (wires.rays, offs))
@@ -262,17 +262,17 @@ def _lengths(robot: PlatformRobot, here: StateLanes) -> tuple[list[Array], list[
 
 
 def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths) -> list[Array]:
-    # Largest sizes on an ellipse of what `_values` gives, in its order, by Hadamard's inequality: moments in platform
-    # axes, over the mean arm times the growth.
+    # Bound the sizes on an ellipse of the values that `_values` gives, in its order, by Hadamard's inequality: moments
+    # are in platform axes, over the mean arm times the growth.
     robot, squared, z0 = problem.robot, block.squared, block.z0
     sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
     arm, arms = jnp.sqrt(jnp.mean(sizes**2)), [sizes[k] for k in range(CABLES)]
     shift, turn = along * bounds.speed, jnp.minimum(along * bounds.turn, bounds.growth + 1.0)
-    moved = [shift + own * turn for own in arms]
+    moved = [shift + lever * turn for lever in arms]
     rays = [ray + move for ray, move in zip(lengths[0], moved, strict=True)]
     columns = [
-        jnp.sqrt(ray**2 + (own / arm * (away + shift)) ** 2)
-        for ray, own, away in zip(rays, arms, lengths[1], strict=True)
+        jnp.sqrt(ray**2 + (lever / arm * (away + shift)) ** 2)
+        for ray, lever, away in zip(rays, arms, lengths[1], strict=True)
     ]
     inertia = robot.inertia / robot.mass
     apart = inertia - jnp.trace(inertia) / 3.0 * jnp.eye(3)
@@ -281,30 +281,31 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     wrench = jnp.sqrt(force**2 + (whirl / squared / (arm * bounds.growth)) ** 2)
     whole = (arm * bounds.growth) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
     kappa = [CABLES * z0 / robot.gravity * whole * wrench / column for column in columns]
-    paces = [bounds.speed + own * bounds.turn for own in arms]
-    pulls = [bounds.bend + own * bounds.growth * (bounds.spin + bounds.omega**2) for own in arms]
+    paces = [bounds.speed + lever * bounds.turn for lever in arms]
+    pulls = [bounds.bend + lever * bounds.growth * (bounds.spin + bounds.omega**2) for lever in arms]
     is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
-    found = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0)
-    every = [*kappa, whole, jnp.zeros_like(whole)]
+    cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0)
+    largest = [*kappa, whole, jnp.zeros_like(whole)]
     for quantity, row in _quantities(problem).items():
-        every += QUANTITIES[quantity].sizes(found, getattr(problem.limits, row[0].name))
-    return every
+        largest += QUANTITIES[quantity].sizes(cable_sizes, getattr(problem.limits, row[0].name))
+    return largest
 
 
-def _bounds(problem: Problem, found: _Taken) -> tuple[list[Array], list[Array]]:
-    # Smallest slacks at the nodes, (m, n) each, as large as rounding lets them be; and their lower bounds, (n,) each.
-    rests, block = found.rests, found.block
-    values = found.values[:, : len(rests)]
-    every = _coefficients(values)
+def _bounds(problem: Problem, taken: _Taken) -> tuple[list[Array], list[Array]]:
+    # Return the smallest slacks at the nodes, (m, n) each, as large as rounding lets them be; and their lower bounds,
+    # (n,) each.
+    rests, block = taken.rests, taken.block
+    values = taken.values[:, : len(rests)]
+    coefficients = _coefficients(values)
 
     def around(middle, off, part):
         return middle[:, part] - off[None, part], middle[:, part] + off[None, part]
 
     one = slice(REGULAR, REGULAR + 1)
-    regular, share = around(every, rests, one), around(values, found.rounding, one)
-    # Of quotients with one denominator the smallest has the smallest numerator.
-    least = jnp.min(every[:, :CABLES] - rests[None, :CABLES], axis=1, keepdims=True)
-    doubt = jnp.max(found.rounding[None, :CABLES], axis=1, keepdims=True)
+    regular, share = around(coefficients, rests, one), around(values, taken.rounding, one)
+    # Among quotients with one denominator, the smallest has the smallest numerator.
+    least = jnp.min(coefficients[:, :CABLES] - rests[None, :CABLES], axis=1, keepdims=True)
+    doubt = jnp.max(taken.rounding[None, :CABLES], axis=1, keepdims=True)
     kappa = jnp.min(values[:, :CABLES], axis=1, keepdims=True) + doubt
     nodes = [at_most(kappa, share)[:, 0], share[1][:, 0]]
     bound = [jnp.min(ratio(least, regular), axis=(0, 1)), jnp.min(regular[0], axis=(0, 1))]
@@ -313,7 +314,7 @@ def _bounds(problem: Problem, found: _Taken) -> tuple[list[Array], list[Array]]:
     for quantity, rows in _quantities(problem).items():
         factor, size = scale.get(quantity, (1.0, jnp.ones(())))
         part = slice(part.stop, part.stop + QUANTITIES[quantity].width)
-        enclosed = Enclosed(around(every, rests, part), around(values, found.rounding, part), regular, share)
+        enclosed = Enclosed(around(coefficients, rests, part), around(values, taken.rounding, part), regular, share)
         for row in rows:
             limit = getattr(problem.limits, row.name) * (factor / size)
             slacks[row.name] = QUANTITIES[quantity].slacks(enclosed, limit, row.sense == "least")

@@ -11,13 +11,13 @@ from cspr_jax.motions.blocks import Blocks
 TOLERANCE = 1e-6
 # So many times a block is halved at most, and so many of an arc may be open.
 HALVINGS, OPEN = 21, 64
-# How many times at once, the first time, the second time, and then: few blocks are open by then, and a batch of them
-# costs as much as a full one.
+# Blocks are halved so many times at once, the first time, the second time, and then: few blocks are open by then, and
+# a batch of them costs as much as a full one.
 AT_ONCE = (1, 2, 3)
 
 
 class BlockBounds(NamedTuple):
-    """What was found of k blocks.
+    """Bounds and attained values of k blocks.
 
     Fields:
         nodes: (m, n_criteria or more, k) values at instants: slacks first.
@@ -51,7 +51,7 @@ class WorkList:
     """
 
     def __init__(self, arcs: np.ndarray, limits: np.ndarray, ignored: np.ndarray | None = None) -> None:
-        """Nothing is known yet."""
+        """Start with nothing known."""
         self._ignored = np.zeros(len(limits), bool) if ignored is None else ignored
         self._arcs, self._allowed = arcs, np.where(self._ignored, np.inf, allowance(limits))
         self.is_refuted, self.is_stuck = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool)
@@ -68,11 +68,11 @@ class WorkList:
         Returns:
             what was found of the blocks that were given.
         """
-        first = found = look(blocks, 0)
-        self.attained = np.full((len(self._arcs), found.nodes.shape[1]), np.inf)
+        first = bounds = look(blocks, 0)
+        self.attained = np.full((len(self._arcs), bounds.nodes.shape[1]), np.inf)
         halved = 0
         for more in itertools.chain(AT_ONCE, itertools.repeat(AT_ONCE[-1])):
-            is_open = self._told(blocks, found, last=halved >= HALVINGS)
+            is_open = self._take_in(blocks, bounds, last=halved >= HALVINGS)
             self.is_stuck |= np.bincount(blocks.row[is_open], minlength=len(self._arcs)) > OPEN * self._arcs
             is_open &= ~self.is_stuck[blocks.row]
             if not is_open.any():
@@ -81,7 +81,7 @@ class WorkList:
             for _ in range(more):
                 blocks = blocks.halves()
             halved += more
-            found = look(blocks, halved)
+            bounds = look(blocks, halved)
         self.bound[self.is_refuted | self.is_stuck] = np.nan
         return first
 
@@ -96,16 +96,16 @@ class WorkList:
         is_new = np.isnan(self.instant[row])
         self.instant[row[is_new]] = tau[is_new]
 
-    def _told(self, blocks: Blocks, found: BlockBounds, *, last: bool) -> np.ndarray:
-        # Takes in what was found of blocks; which of them are to be halved.
-        least, low = found.nodes.min(0).T, found.bound.T
+    def _take_in(self, blocks: Blocks, bounds: BlockBounds, *, last: bool) -> np.ndarray:
+        # Take in the bounds of blocks; return which of the blocks are to be halved.
+        least, low = bounds.nodes.min(0).T, bounds.bound.T
         _lower(self.attained, blocks.row, least)
         slack = least[:, : low.shape[1]]
         # NaN refutes nothing, and proves nothing.
-        self._note_instants(blocks, found)
+        self._note_instants(blocks, bounds)
         self.is_refuted[blocks.row[(slack + self._allowed < -TOLERANCE).any(1)]] = True
         is_above = (low > TOLERANCE - self._allowed) | self._ignored
-        is_proved = is_above.all(1) & found.is_enough(self.attained)
+        is_proved = is_above.all(1) & bounds.is_enough(self.attained)
         with np.errstate(invalid="ignore"):  # of infinities: singular poses, blocks without a bound
             is_known = ((slack - low <= 0.5 * TOLERANCE) & ~is_above).any(1)
         is_done = is_proved | is_known | last | np.isnan(least).any(1)
@@ -113,24 +113,24 @@ class WorkList:
         _lower(self.bound, blocks.row[is_done], low[is_done])
         return ~is_done & ~(self.is_refuted | self.is_stuck)[blocks.row]
 
-    def _note_instants(self, blocks: Blocks, found: BlockBounds) -> None:
-        worst = (found.nodes[:, : len(self._allowed)] + self._allowed[None, :, None]).min(1)
+    def _note_instants(self, blocks: Blocks, bounds: BlockBounds) -> None:
+        worst = (bounds.nodes[:, : len(self._allowed)] + self._allowed[None, :, None]).min(1)
         place = worst.argmin(0)
-        value, tau = worst[place, np.arange(len(place))], found.tau[place, np.arange(len(place))]
+        value, tau = worst[place, np.arange(len(place))], bounds.tau[place, np.arange(len(place))]
         breaks = np.flatnonzero(value < self._worst[blocks.row])
         breaks = breaks[np.argsort(-value[breaks], kind="stable")]  # the worst of a motion is written last
         self._worst[blocks.row[breaks]], self.instant[blocks.row[breaks]] = value[breaks], tau[breaks]
 
 
 def _lower(values: np.ndarray, row: np.ndarray, others: np.ndarray) -> None:
-    # Takes values of rows, which stand side by side, into the smallest ones.
+    # Take values of rows, which stand side by side, into the smallest ones.
     if len(row):
         first = np.flatnonzero(np.diff(row, prepend=-1))
         values[row[first]] = np.minimum(values[row[first]], np.minimum.reduceat(others, first))
 
 
 def allowance(limits: np.ndarray) -> np.ndarray:
-    """What slacks may be below zero: limits may be touched; cables may not be slack, and the rest may not be reached.
+    """Allowance of slacks below zero: limits may be touched; cables may not be slack, and the rest may not be reached.
 
     Args:
         limits: (n_criteria,) whether each is the slack of a limit.
