@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 ROUNDS = 64
-# Where bound and attained value agree, over the scale of the values.
+# A bound and an attained value agree within this, over the scale of the values.
 AGREED = 1e-12
-# Blocks after which halving ends: what is proved by then is the answer.
+# Halving ends after this many blocks: the bounds that are proved by then are the answer.
 MOST = 2_000_000
 
 

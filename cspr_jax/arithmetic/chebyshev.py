@@ -57,7 +57,7 @@ def bernstein() -> np.ndarray:
 
 
 def remainders(radii: np.ndarray) -> np.ndarray:
-    """What bounds on ellipses are to be multiplied with for a bound of the remainder.
+    """Factors by which bounds on ellipses are multiplied for a bound of the remainder.
 
     Args:
         radii: (m,) rho, above 1.

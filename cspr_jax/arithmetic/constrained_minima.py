@@ -32,22 +32,22 @@ class Judged(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=0)
-def _screened(parts: Parts, given: Any, places: Array) -> tuple[Array, Array]:
+def _screened(parts: Parts, arguments: Any, places: Array) -> tuple[Array, Array]:
     def one(x):
-        value, margins = parts(given, x)
+        value, margins = parts(arguments, x)
         return value, jnp.min(margins)
 
     return jax.vmap(one)(places)
 
 
 @partial(jax.jit, static_argnums=0)
-def _both(parts: Parts, given: Any, x: Array) -> tuple[Array, Array]:
-    return parts(given, x)
+def _both(parts: Parts, arguments: Any, x: Array) -> tuple[Array, Array]:
+    return parts(arguments, x)
 
 
 @partial(jax.jit, static_argnums=0)
-def _slopes(parts: Parts, given: Any, x: Array) -> tuple[Array, Array]:
-    return jax.jacfwd(lambda own: parts(given, own))(x)
+def _slopes(parts: Parts, arguments: Any, x: Array) -> tuple[Array, Array]:
+    return jax.jacfwd(lambda unknowns: parts(arguments, unknowns))(x)
 
 
 def least(
@@ -72,40 +72,40 @@ def least(
     value, margin = in_batches(partial(_screened, parts, given), places, size=BATCH)
     usable = np.isfinite(value) & np.isfinite(margin)
     margin = np.where(usable, margin, -np.inf)
-    # Those that are feasible and have a small objective first, then those that come nearest.
+    # Feasible places come first, the smallest objective ahead; then the places that are nearest to being feasible.
     order = np.lexsort((np.where(margin > 0.0, value, -margin), margin <= 0.0))
-    best, own = places[order[0]], judged(places[order[0]])
+    best, verdict = places[order[0]], judged(places[order[0]])
     size = float(value[order[0]])
     for start in places[order[:IMPROVED]]:
-        found = _improved(parts, given, start, list(zip(low, high, strict=True)), judged)
-        other, length = judged(found), float(_both(parts, given, jnp.asarray(found))[0])
+        candidate = _improved(parts, given, start, list(zip(low, high, strict=True)), judged)
+        other, length = judged(candidate), float(_both(parts, given, jnp.asarray(candidate))[0])
         if (other.feasible, -length if other.feasible else other.margin) > (
-            own.feasible,
-            -size if own.feasible else own.margin,
+            verdict.feasible,
+            -size if verdict.feasible else verdict.margin,
         ):
-            best, own, size = found, other, length
+            best, verdict, size = candidate, other, length
     return best
 
 
 def _improved(
     parts: Parts,
-    given: Any,
+    arguments: Any,
     start: np.ndarray,
     bounds: list[tuple[float, float]],
     judged: Callable[[np.ndarray], Judged],
 ) -> np.ndarray:
     from scipy.optimize import minimize  # likewise
 
-    def of(function, which: int) -> Callable[[np.ndarray], np.ndarray]:
-        return lambda x: np.asarray(function(parts, given, jnp.asarray(x))[which])
+    def of(function, index: int) -> Callable[[np.ndarray], np.ndarray]:
+        return lambda x: np.asarray(function(parts, arguments, jnp.asarray(x))[index])
 
-    found = start
+    place = start
     for margin in MARGINS:
         limit = {"type": "ineq", "fun": lambda x, m=margin: of(_both, 1)(x) - m, "jac": of(_slopes, 1)}
         with np.errstate(all="ignore"):
             answer = minimize(
                 of(_both, 0),
-                found,
+                place,
                 jac=of(_slopes, 0),
                 method="SLSQP",
                 bounds=bounds,
@@ -114,7 +114,7 @@ def _improved(
             )
         if not np.isfinite(answer.x).all():
             break
-        found = answer.x
-        if judged(found).feasible:
+        place = answer.x
+        if judged(place).feasible:
             break
-    return found
+    return place

@@ -58,7 +58,7 @@ def moves_of(unknowns: int, population: int) -> Moves:
     """
     random = np.random.default_rng(0)
     shape = (GENERATIONS * population, population)
-    # Of a permutation and the same one rolled, no two members are one.
+    # A permutation and the same one rolled pair no member with itself.
     first = random.permuted(np.tile(np.arange(population), (shape[0], 1)), axis=1)
     taken = random.random((*shape, unknowns)) < CHANCE
     np.put_along_axis(taken, random.integers(unknowns, size=(*shape, 1)), True, axis=2)
@@ -71,46 +71,46 @@ def _leaders(population: int) -> int:
 
 
 @partial(jax.jit, static_argnums=0)
-def _evolved(parts: Parts, given: Any, asked: Array, places: Array, moves: Moves, questions: Any) -> Array:
+def _evolved(parts: Parts, arguments: Any, margins: Array, places: Array, moves: Moves, questions: Any) -> Array:
     def one(question: Any) -> Array:
-        judged = partial(_judged, parts, given, question)
+        judged = partial(_judged, parts, arguments, question)
         value, margin = judged(places)
 
-        def search(wanted: Array, own: Moves) -> Array:
-            rank = _rank(value, margin, wanted)
+        def search(threshold: Array, search_moves: Moves) -> Array:
+            rank = _rank(value, margin, threshold)
             groups = jnp.arange(len(places)).reshape(-1, GROUP)
             at = jnp.take_along_axis(groups, jnp.argmin(rank[groups], axis=1)[:, None], axis=1)[:, 0]
-            members, rank = lax.scan(partial(_generation, judged, wanted), (places[at], rank[at]), own)[0]
+            members, rank = lax.scan(partial(_generation, judged, threshold), (places[at], rank[at]), search_moves)[0]
             return members[jnp.argmin(rank)]
 
-        return jax.vmap(search)(asked, moves)
+        return jax.vmap(search)(margins, moves)
 
     return jax.vmap(one)(questions)
 
 
-def _judged(parts: Parts, given: Any, question: Any, places: Array) -> tuple[Array, Array]:
-    value, margin = jax.vmap(lambda x: parts(given, question, x))(places)
+def _judged(parts: Parts, arguments: Any, question: Any, places: Array) -> tuple[Array, Array]:
+    value, margin = jax.vmap(lambda x: parts(arguments, question, x))(places)
     usable = (value * 0.0 == 0.0) & (margin * 0.0 == 0.0)
     return jnp.where(usable, value, jnp.inf), jnp.where(usable, margin, -jnp.inf)
 
 
 def _generation(
-    judged: Callable[[Array], tuple[Array, Array]], wanted: Array, state: tuple[Array, Array], move: Moves
+    judged: Callable[[Array], tuple[Array, Array]], threshold: Array, state: tuple[Array, Array], move: Moves
 ) -> tuple[tuple[Array, Array], None]:
-    own, rank = state
-    good = own[lax.top_k(-rank, _leaders(len(own)))[1]][move.leader]
-    moved = own + move.step * (good - own + own[move.first] - own[move.second])
+    members, rank = state
+    good = members[lax.top_k(-rank, _leaders(len(members)))[1]][move.leader]
+    moved = members + move.step * (good - members + members[move.first] - members[move.second])
     # Half of the way to the bound where a step goes beyond it.
-    moved = jnp.where(moved < 0.0, 0.5 * own, jnp.where(moved > 1.0, 0.5 * (own + 1.0), moved))
-    moved = jnp.where(move.taken, moved, own)
-    new = _rank(*judged(moved), wanted)
+    moved = jnp.where(moved < 0.0, 0.5 * members, jnp.where(moved > 1.0, 0.5 * (members + 1.0), moved))
+    moved = jnp.where(move.taken, moved, members)
+    new = _rank(*judged(moved), threshold)
     better = new <= rank
-    return (jnp.where(better[:, None], moved, own), jnp.where(better, new, rank)), None
+    return (jnp.where(better[:, None], moved, members), jnp.where(better, new, rank)), None
 
 
-def _rank(value: Array, margin: Array, wanted: Array) -> Array:
+def _rank(value: Array, margin: Array, threshold: Array) -> Array:
     # Places with the margin first, by their objective; then the others, by their margin. The least is the best.
-    return jnp.where(margin >= wanted, -1.0 - 1.0 / (1.0 + value), -margin)
+    return jnp.where(margin >= threshold, -1.0 - 1.0 / (1.0 + value), -margin)
 
 
 def evolved(
@@ -132,12 +132,12 @@ def evolved(
     from scipy.stats import qmc  # it takes a second to import
 
     places = qmc.Halton(unknowns, seed=0).random(GROUP * population)
-    own = moves_of(unknowns, population)
-    # Each search its own ones: what one misses, another one may find.
-    moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(asked))]), own)
+    base_moves = moves_of(unknowns, population)
+    # Each search gets its own moves: one may find the place that another one misses.
+    moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(asked))]), base_moves)
     kernel = partial(_evolved, parts, given, np.asarray(asked), places, moves)
 
-    def part(some: slice) -> np.ndarray:
-        return in_batches(kernel, jax.tree.map(lambda x: x[some], questions), size=BATCH)
+    def part(rows: slice) -> np.ndarray:
+        return in_batches(kernel, jax.tree.map(lambda x: x[rows], questions), size=BATCH)
 
     return np.concatenate(in_parts(part, len(jax.tree.leaves(questions)[0]), PART))

@@ -14,7 +14,7 @@ from jax import Array, lax
 # Terms that keep the truncation below half a unit in the last place on |x| <= pi / 2.
 _SINE_TERMS = {"float64": 11, "float32": 7}
 _COSINE_TERMS = {"float64": 12, "float32": 7}
-# Of dtypes and of ranks, as jax names it, whatever the caller's is. Tests set what is strictest.
+# Promotion of dtypes and of ranks, as jax names it, holds whatever the caller's is. Tests set the strictest.
 PROMOTION = ("standard", "allow")
 
 
@@ -89,7 +89,7 @@ _users: list[int] = []
 
 
 def _refuse_fork() -> None:
-    # What jax computes there would wait for ever.
+    # A computation of jax in a forked process would wait for ever.
     if not _users:
         _users.append(os.getpid())
     if _users[0] != os.getpid():

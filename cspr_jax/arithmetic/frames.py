@@ -15,14 +15,14 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0)
 _TURN = {"down": (1.0, 1.0, 1.0), "up": (1.0, -1.0, -1.0)}
 
 
-def _numbers(given):
-    # As float64, but for arrays that are not NumPy's: those of jax stay what they are, so that they can be traced.
-    return given if hasattr(given, "at") else np.asarray(given, float)
+def _numbers(values):
+    # Convert to float64, except arrays of jax: they stay as they are, so that they can be traced.
+    return values if hasattr(values, "at") else np.asarray(values, float)
 
 
-def _beside(vector, given):
-    # Of the same rank, for those who have jax raise where ranks differ.
-    return vector.reshape((1,) * (given.ndim - 1) + vector.shape)
+def _beside(vector, array):
+    # Give the vector the rank of the array: callers may have jax raise where ranks differ.
+    return vector.reshape((1,) * (array.ndim - 1) + vector.shape)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,9 +48,9 @@ class Frame:
         Returns:
             (..., 3) from the centroid of the spools, z down, m.
         """
-        given = _numbers(points)
-        origin, rest, signs = (_beside(x, given) for x in (self.origin, self.rest, self.signs))
-        return ((given - origin) - rest) * signs
+        array = _numbers(points)
+        origin, rest, signs = (_beside(x, array) for x in (self.origin, self.rest, self.signs))
+        return ((array - origin) - rest) * signs
 
     def outward(self, points) -> np.ndarray:
         """Points of the kernels in the file's coordinates.
@@ -61,9 +61,9 @@ class Frame:
         Returns:
             (..., 3) m.
         """
-        given = _numbers(points)
-        origin, rest, signs = (_beside(x, given) for x in (self.origin, self.rest, self.signs))
-        return origin + (given * signs + rest)
+        array = _numbers(points)
+        origin, rest, signs = (_beside(x, array) for x in (self.origin, self.rest, self.signs))
+        return origin + (array * signs + rest)
 
     def depth(self, height) -> np.ndarray:
         """Depth below the centroid of the spools of a z of the file.
@@ -96,8 +96,8 @@ class Frame:
         Returns:
             (..., 3).
         """
-        given = _numbers(vectors)
-        return given * _beside(self.signs, given)
+        array = _numbers(vectors)
+        return array * _beside(self.signs, array)
 
     def turned_tensor(self, tensor):
         """A tensor in the other axes, either way.
@@ -131,8 +131,8 @@ class Frame:
             (..., 4).
         """
         # The first sign is always +1, as that of the scalar part is.
-        given = _numbers(quaternions)
-        return given * _beside(self.signs[np.array([0, 0, 1, 2])], given)
+        array = _numbers(quaternions)
+        return array * _beside(self.signs[np.array([0, 0, 1, 2])], array)
 
 
 def frame_of(base_points, z_axis: str) -> Frame:

@@ -148,6 +148,6 @@ def lowest(ends: np.ndarray, jet: Jet) -> np.ndarray:
     least = ends.min(0)
     with np.errstate(invalid="ignore"):
         low = least - np.maximum(jet.bend[1], 0.0) / 8.0
-        # Where the slope has one sign, no value lies below the lower end.
+        # A function whose slope has one sign has no value below the lower end.
         steady = (jet.slope[0] >= 0.0) | (jet.slope[1] <= 0.0)
     return np.where(steady, least, np.where(np.isnan(low), -np.inf, low))

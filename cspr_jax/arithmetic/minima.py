@@ -105,11 +105,11 @@ def narrowed_places(
     for _ in range(ROUNDS):
         points = np.clip(place[..., None] + width * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
         samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
-        # Of each place of a function its own values alone: (n_motions, PLACES, n_functions, POINTS).
-        own = np.moveaxis(samples[:, :, column, :, column], 0, 2)
-        lowest = own.min((1, 3))
-        place = np.take_along_axis(points, own.argmin(3)[..., None], axis=3)[..., 0]
-        best = np.take_along_axis(place, own.min(3).argmin(1)[:, None], axis=1)[:, 0]
+        # Each place of a function takes its own values alone: (n_motions, PLACES, n_functions, POINTS).
+        own_samples = np.moveaxis(samples[:, :, column, :, column], 0, 2)
+        lowest = own_samples.min((1, 3))
+        place = np.take_along_axis(points, own_samples.argmin(3)[..., None], axis=3)[..., 0]
+        best = np.take_along_axis(place, own_samples.min(3).argmin(1)[:, None], axis=1)[:, 0]
         when = np.where(lowest < smallest, best, when)
         smallest = np.minimum(smallest, lowest)
         width = 2.0 * width / (POINTS - 1)

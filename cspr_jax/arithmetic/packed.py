@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-# What rounding to float32 changes of a number, as a part of it; numbers above the largest become that.
+# Rounding to float32 changes a number by this part of it; numbers above the largest become the largest.
 ROUNDING = 2.0**-24
 LARGEST = float(np.finfo(np.float32).max)
 WIDTH = 4
@@ -17,7 +17,7 @@ _HALF = 32  # bits
 
 
 def paired(values: Sequence[Array]) -> tuple[Array, ...]:
-    """Two numbers a complex one.
+    """Pack two real numbers into one complex number.
 
     Args:
         values: an even number of float64 arrays of one shape.
@@ -29,7 +29,7 @@ def paired(values: Sequence[Array]) -> tuple[Array, ...]:
 
 
 def parts(pairs: Sequence[Array]) -> list[Array]:
-    """What `paired` has put together.
+    """Take apart the numbers that `paired` has packed.
 
     Args:
         pairs: complex arrays.
@@ -41,7 +41,7 @@ def parts(pairs: Sequence[Array]) -> list[Array]:
 
 
 def packed(values: Sequence[Array]) -> tuple[Array, ...]:
-    """Four numbers a complex one, rounded to float32.
+    """Pack four real numbers, rounded to float32, into one complex number.
 
     Args:
         values: float64 arrays of one shape.
@@ -54,7 +54,7 @@ def packed(values: Sequence[Array]) -> tuple[Array, ...]:
 
 
 def unpacked(fours: Sequence[Array]) -> list[Array]:
-    """What `packed` has put together.
+    """Take apart the numbers that `packed` has packed.
 
     Args:
         fours: complex arrays.

@@ -18,10 +18,10 @@ def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """
     n, m = first.shape[-1], second.shape[-1]
     shape = np.broadcast_shapes(first.shape[:-1], second.shape[:-1])
-    found = np.zeros((*shape, n + m - 1))
+    coefficients = np.zeros((*shape, n + m - 1))
     for i in range(n):
-        found[..., i : i + m] += first[..., i, None] * second
-    return found
+        coefficients[..., i : i + m] += first[..., i, None] * second
+    return coefficients
 
 
 def total(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -49,12 +49,12 @@ def derivatives(table: np.ndarray, order: int) -> list[np.ndarray]:
     Returns:
         order + 1 tables: (..., n), (..., n - 1), ...; of constants (..., 1).
     """
-    found = [table]
+    tables = [table]
     for _ in range(order):
-        last = found[-1]
+        last = tables[-1]
         size = last.shape[-1]
-        found.append(last[..., 1:] * np.arange(1, size) if size > 1 else np.zeros_like(last))
-    return found
+        tables.append(last[..., 1:] * np.arange(1, size) if size > 1 else np.zeros_like(last))
+    return tables
 
 
 def over(table: np.ndarray, start: np.ndarray, width: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ BESIDE = 1e-6
 
 
 def is_same(points: np.ndarray, first: int, second: int) -> bool:
-    """Whether two points are one.
+    """Tell whether two points coincide.
 
     Args:
         points: (n, 3) m.

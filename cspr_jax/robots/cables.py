@@ -48,10 +48,10 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
             raise InputError("cable_diameter", cable_diameter, "a number >= 0, in m")
         changes["cable_diameter"] = leaf(cable_diameter)
     if pulley_radius is not None:
-        found = pulleys_of(pulley_radius, pulley_axes, robot.n_cables, robot.z_axis)
-        if PATTERNS[robot.pattern].is_planar and np.asarray(found.axes)[:, 1].any():
+        pulleys = pulleys_of(pulley_radius, pulley_axes, robot.n_cables, robot.z_axis)
+        if PATTERNS[robot.pattern].is_planar and np.asarray(pulleys.axes)[:, 1].any():
             raise InputError("pulley_axes", pulley_axes, "vectors with y = 0: the plane of a planar robot")
-        changes["pulleys"] = found
+        changes["pulleys"] = pulleys
     elif pulley_axes is not None:
         raise InputError("pulley_axes", pulley_axes, "absent without pulley_radius")
     return dataclasses.replace(robot, **changes) if changes else robot

@@ -22,7 +22,8 @@ from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, 
 
 # Poses of a batch on a CPU: of 16384 to 131072 about the same.
 BATCH = 65_536
-# Of the diameter, and of the platform's shape: what of a cable next to its attachment point is not held against it.
+# The part of a cable next to its attachment point that is not held against it is so many diameters long, or has this
+# part of the size of the platform's shape.
 LEAVE_DIAMETERS, LEAVE_SIZE = 10.0, 0.01
 # Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; 2.2 was met.
 ROUNDING = 16.0
@@ -69,14 +70,14 @@ class Scene:
 
     @property
     def meetings(self) -> tuple[Meeting, ...]:
-        """What `Clearances.nearest` counts."""
+        """Pairs of bodies that `Clearances.nearest` counts."""
         cables = range(len(self.base_points))
-        found = [Meeting("cables", i, j) for i, j in self.pairs]
-        found += [Meeting("obstacle", i, j) for j in range(len(self.obstacles)) for i in cables]
+        pairs_of_bodies = [Meeting("cables", i, j) for i, j in self.pairs]
+        pairs_of_bodies += [Meeting("obstacle", i, j) for j in range(len(self.obstacles)) for i in cables]
         if self.body is not None:
-            found += [Meeting("platform", i, -1) for i in cables]
-            found += [Meeting("platform-obstacle", -1, j) for j in range(len(self.obstacles))]
-        return tuple(found)
+            pairs_of_bodies += [Meeting("platform", i, -1) for i in cables]
+            pairs_of_bodies += [Meeting("platform-obstacle", -1, j) for j in range(len(self.obstacles))]
+        return tuple(pairs_of_bodies)
 
 
 class Clearances(NamedTuple):
@@ -126,19 +127,19 @@ def scene(
             shape of a point mass.
     """
     base = np.asarray(robot.base_points, float)
-    given = np.asarray(diameter, float)
-    if (given.ndim and given.shape != (len(base),)) or not (np.isfinite(given) & (given >= 0.0)).all():
+    diameters = np.asarray(diameter, float)
+    if (diameters.ndim and diameters.shape != (len(base),)) or not (np.isfinite(diameters) & (diameters >= 0.0)).all():
         raise InputError("diameter", diameter, f"one length, or {len(base)}, not negative")
     if body is not None and not isinstance(robot, PlatformRobot):
         raise InputError("body", None, "must be None", fault="a point mass has no shape")
     if leave is None:
         size = 0.0 if body is None else float(np.ptp(_corners(body), axis=0).max())
-        leave = max(LEAVE_DIAMETERS * float(given.max()), LEAVE_SIZE * size)
+        leave = max(LEAVE_DIAMETERS * float(diameters.max()), LEAVE_SIZE * size)
     if not 0.0 <= leave < np.inf:
         raise InputError("leave", leave, "a length, not negative")
     platform = np.asarray(robot.platform_points, float) if isinstance(robot, PlatformRobot) else np.zeros_like(base)
     pairs = pairs_apart(robot) if isinstance(robot, PlatformRobot) else ()
-    return Scene(base, platform, np.broadcast_to(given, (len(base),)), pairs, tuple(obstacles), body, float(leave))
+    return Scene(base, platform, np.broadcast_to(diameters, (len(base),)), pairs, tuple(obstacles), body, float(leave))
 
 
 def attachment_hull(robot: PlatformRobot) -> Hull | None:
@@ -180,15 +181,15 @@ def clearances(
     Raises:
         InputError: arrays of other shapes.
     """
-    given = _checked(scene, positions, quaternions, ends)
-    if not len(given.place):
+    poses = _checked(scene, positions, quaternions, ends)
+    if not len(poses.place):
         return _nothing(0)
-    found = _all(scene, given, threshold, np.dtype(dtype))
-    again = np.flatnonzero(found.is_open)
+    answers = _all(scene, poses, threshold, np.dtype(dtype))
+    again = np.flatnonzero(answers.is_open)
     if dtype == "float32" and len(again):
-        for old, new in zip(found, _all(scene, given.some(again), threshold, np.dtype("float64")), strict=True):
+        for old, new in zip(answers, _all(scene, poses.some(again), threshold, np.dtype("float64")), strict=True):
             old[again] = new
-    return found
+    return answers
 
 
 class _Given(NamedTuple):
@@ -214,8 +215,8 @@ def _checked(scene: Scene, positions, quaternions, ends) -> _Given:
     if place.ndim != 2 or place.shape[1] != 3:
         raise InputError("positions", None, "must be (n, 3)", fault=f"an array of shape {place.shape}")
 
-    def checked(name: str, given, shape: tuple[int, ...]) -> np.ndarray | None:
-        array = None if given is None else np.asarray(given, float)
+    def checked(name: str, values, shape: tuple[int, ...]) -> np.ndarray | None:
+        array = None if values is None else np.asarray(values, float)
         if array is not None and array.shape != shape:
             raise InputError(name, None, f"must be {shape}", fault=f"an array of shape {array.shape}")
         return array
@@ -224,26 +225,26 @@ def _checked(scene: Scene, positions, quaternions, ends) -> _Given:
     return _Given(place, turn, checked("ends", ends, (len(place), len(scene.base_points), 3)))
 
 
-def _all(scene: Scene, given: _Given, threshold: float, dtype: np.dtype) -> Clearances:
+def _all(scene: Scene, all_poses: _Given, threshold: float, dtype: np.dtype) -> Clearances:
     # From the centroid of the spools, so that float32 has the digits where they are needed.
     origin = scene.base_points.mean(0)
     terms = list(_terms(scene, origin, dtype))
-    own = max(float(np.abs(x).max()) for x in (scene.base_points - origin, scene.platform_points))
-    reach = max([own] + [_reach(shape, origin) for shape in scene.obstacles])
+    extent = max(float(np.abs(x).max()) for x in (scene.base_points - origin, scene.platform_points))
+    reach = max([extent] + [_reach(shape, origin) for shape in scene.obstacles])
     bound = ROUNDING * float(np.finfo(dtype).eps)
 
     def one(part: slice) -> Clearances:
-        poses = given.some(part).lanes(origin, dtype)
+        poses = all_poses.some(part).lanes(origin, dtype)
         answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, size=BATCH)
-        found = _least([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
+        answer = _least([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
         far = [np.abs(x) for x in poses.position]
         size = np.maximum(np.maximum(np.maximum(far[0], far[1]), far[2]), reach)
         # NaN is open.
-        return found._replace(is_open=~(np.abs(found.clearance - threshold) > bound * size))
+        return answer._replace(is_open=~(np.abs(answer.clearance - threshold) > bound * size))
 
     if not terms:
-        return _nothing(len(given.place))
-    parts = in_parts(one, len(given.place), room(BATCH))
+        return _nothing(len(all_poses.place))
+    parts = in_parts(one, len(all_poses.place), room(BATCH))
     return Clearances(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
@@ -253,17 +254,17 @@ def _nothing(count: int) -> Clearances:
 
 
 def _least(terms: Sequence[tuple[Kind, int, np.ndarray]]) -> Clearances:
-    # Of what each kernel found, in its dtype.
-    _, first, found = terms[0]
-    clearance, nearest = found.real.copy(), found.imag.astype(np.int32) + np.int32(first)
-    for _, first, found in terms[1:]:
-        # Of a pose that is NaN the first is, and stays.
-        is_less = found.real < clearance
-        np.copyto(clearance, found.real, where=is_less)
-        np.copyto(nearest, found.imag.astype(np.int32) + np.int32(first), where=is_less)
+    # Take the least of the distances from all kernels, in their dtype.
+    _, first, distances = terms[0]
+    clearance, nearest = distances.real.copy(), distances.imag.astype(np.int32) + np.int32(first)
+    for _, first, distances in terms[1:]:
+        # A pose that gives NaN has it from the first kernel on, and keeps it.
+        is_less = distances.real < clearance
+        np.copyto(clearance, distances.real, where=is_less)
+        np.copyto(nearest, distances.imag.astype(np.int32) + np.int32(first), where=is_less)
 
     def least(*kinds: Kind) -> np.ndarray:
-        values = [found.real for kind, _, found in terms if kind in kinds]
+        values = [distances.real for kind, _, distances in terms if kind in kinds]
         return functools.reduce(np.minimum, values, np.full(len(clearance), np.inf, clearance.dtype)).astype(float)
 
     kinds = least("cables"), least("obstacle", "platform-obstacle"), least("platform")

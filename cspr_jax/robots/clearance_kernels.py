@@ -123,7 +123,7 @@ def _rotation(poses: PoseLanes) -> Matrix | None:
 
 
 def _cables(points: Points, poses: PoseLanes) -> tuple[Sequence[Vector], Sequence[Vector]]:
-    # Where cables leave their spools, and from there to the platform.
+    # Return the points at which cables leave their spools, and the rays from there to the platform.
     turn, count = _rotation(poses), points.base.shape[0]
     arms = [_three(points.platform[k]) for k in range(count)]
     if turn is not None:
@@ -165,23 +165,23 @@ def _lines(points: Points, poses: PoseLanes) -> tuple[list[Array] | None, list[A
 
 @jax.jit
 def _nearest_pair(points: Points, starts: list[Array] | None, rays: list[Array], pairs: Array) -> Array:
-    like = rays[0][0]
+    template = rays[0][0]
 
     def line(k):
-        ends = [jnp.broadcast_to(points.base[k, i], like.shape) for i in range(3)]
+        ends = [jnp.broadcast_to(points.base[k, i], template.shape) for i in range(3)]
         return ends if starts is None else [x[k] for x in starts], [x[k] for x in rays]
 
-    def step(found, pair):
+    def step(best, pair):
         (i, j), place = pair
         thick = 0.5 * (points.diameters[i] + points.diameters[j])
         distance = segments(*line(i), *line(j)) - thick
         # As `clearance_lanes.nearest` does: the first of equal ones, and NaN stays.
-        is_kept = jnp.isnan(jnp.real(found)) | (distance >= jnp.real(found))
-        return jnp.where(is_kept, found, lax.complex(distance, jnp.full_like(distance, place))), None
+        is_kept = jnp.isnan(jnp.real(best)) | (distance >= jnp.real(best))
+        return jnp.where(is_kept, best, lax.complex(distance, jnp.full_like(distance, place))), None
 
-    far = jnp.full_like(like, jnp.inf)
+    far = jnp.full_like(template, jnp.inf)
     start = lax.complex(far, jnp.zeros_like(far))
-    return lax.scan(step, start, (pairs, jnp.arange(len(pairs), dtype=like.dtype)))[0]
+    return lax.scan(step, start, (pairs, jnp.arange(len(pairs), dtype=template.dtype)))[0]
 
 
 @jax.jit
@@ -197,7 +197,7 @@ def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Array:
         (n,) complex: distance from the surface less half a diameter, m, and the cable.
     """
     ends, rays = _cables(points, poses)
-    found = []
+    gaps = []
     for k, (end, ray) in enumerate(zip(ends, rays, strict=True)):
         if isinstance(solid, Ball):
             apart = point_segment(_three(solid.centre), end, ray) - solid.radius
@@ -205,8 +205,8 @@ def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Array:
             apart = segments(_three(solid.start), _three(solid.ray), end, ray) - solid.radius
         else:
             apart = segment_box(*_in_brick(solid, end, ray), _three(solid.half))
-        found.append(apart - 0.5 * points.diameters[k])
-    return nearest(found)
+        gaps.append(apart - 0.5 * points.diameters[k])
+    return nearest(gaps)
 
 
 def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]:
@@ -228,23 +228,23 @@ def of_platform(points: Points, poses: PoseLanes, own: Own, leave: Array) -> Arr
     Returns:
         (n,) complex: distance from the surface less half a diameter, m, and the cable.
     """
-    turn, found = _rotation(poses), []
+    turn, gaps = _rotation(poses), []
     _, rays = _cables(points, poses)
     for k, ray in enumerate(rays):
         away = tuple(-x for x in _inward(turn, ray))
         length = jnp.sqrt(lanes.dot(away, away))
-        # Of a cable that is shorter its end is left.
+        # A cable that is shorter than that keeps only its end.
         part = jnp.where(length > leave, leave / jnp.where(length > leave, length, 1.0), 1.0)
         start = tuple(x + part * y for x, y in zip(_three(points.platform[k]), away, strict=True))
         rest = tuple((1.0 - part) * x for x in away)
-        found.append(_from_own(own, start, rest) - 0.5 * points.diameters[k])
-    return nearest(found)
+        gaps.append(_from_own(own, start, rest) - 0.5 * points.diameters[k])
+    return nearest(gaps)
 
 
-def _from_own(own: Own, start: Vector, ray: Vector) -> Array:
-    if isinstance(own, Brick):
-        return segment_box(*_in_brick(own, start, ray), _three(own.half))
-    return segment_hull(start, ray, own)
+def _from_own(body: Own, start: Vector, ray: Vector) -> Array:
+    if isinstance(body, Brick):
+        return segment_box(*_in_brick(body, start, ray), _three(body.half))
+    return segment_hull(start, ray, body)
 
 
 @jax.jit

@@ -18,9 +18,9 @@ from cspr_jax.arithmetic.lanes import Vector, cross, dot
 Numbers = Sequence[Array]
 
 
-def _tiny(like: Array) -> Array:
-    # Beside a sum of squares: keeps 0 / 0 from being NaN.
-    return jnp.asarray(np.finfo(like.dtype).tiny, like.dtype)
+def _tiny(template: Array) -> Array:
+    # Return a number that is nothing beside a sum of squares, and keeps 0 / 0 from being NaN.
+    return jnp.asarray(np.finfo(template.dtype).tiny, template.dtype)
 
 
 def _greater(a: Array, b: Array) -> Array:
@@ -110,7 +110,7 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     start, stop, rise, fall = zero, one, slope(zero), slope(one)
     is_first, is_last = rise >= 0.0, fall <= 0.0
     for k in range(3):
-        # Of a segment that lies in a plane any place will do.
+        # For a segment that lies in a plane any place will do.
         inverse = 1.0 / jnp.where(u[k] == 0.0, jnp.ones_like(u[k]), u[k])
         for side in (-half[k], half[k]):
             part = _fraction((side - a[k]) * inverse)
@@ -121,7 +121,7 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     steep = fall - rise
     part = start - rise * (stop - start) / jnp.where(steep > 0.0, steep, one)
     part = jnp.where(is_first, zero, jnp.where(is_last, one, _fraction(part)))
-    # Where the slope is small beside its own rounding in a plane, that plane is the better place.
+    # If the slope in a plane is small beside its own rounding, that plane is the better place.
     first, *others = (_beyond(_along(a, u, place), half) for place in (part, start, stop))
     least = dot(first, first)
     for beyond in others:
@@ -150,7 +150,7 @@ def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
         square = w[i] * w[i] + w[j] * w[j]
         shadow = jnp.abs(c[i] * w[j] - c[j] * w[i]) - (half[i] * size[j] + half[j] * size[i])
         across = shadow / jnp.sqrt(_greater(square, _tiny(square)))
-        # Of a segment along the third axis there is no such line.
+        # A segment along the third axis has no such line.
         gap = jnp.where((square > _tiny(square)) & (across > gap), across, gap)
     return gap
 
@@ -325,11 +325,11 @@ def hull_box(hull: Polyhedron, centre: Vector, axes: Sequence[Vector], half: Num
         far = jnp.full_like(largest, jnp.inf)
         low, high = lax.fori_loop(0, len(corners), of_corner, (far, -far))
         largest = _greater(_greater(gap(axis, high), gap([-x for x in axis], -low)), largest)
-    return lax.fori_loop(0, len(hull.edges), lambda edge, found: _of_edge(hull, edge, axes, gap, found), largest)
+    return lax.fori_loop(0, len(hull.edges), lambda edge, widest: _of_edge(hull, edge, axes, gap, widest), largest)
 
 
 def _of_edge(hull: Polyhedron, edge: Array, axes: Sequence[Vector], gap, largest: Array) -> Array:
-    # Of the lines across an edge of a polyhedron and those of a box.
+    # Compare the shadows on the lines across an edge of the polyhedron and an edge of the box.
     start, (a, b) = (
         [hull.edges[edge, 0, k] for k in range(3)],
         [[hull.sides[edge, i, k] for k in range(3)] for i in (0, 1)],
@@ -337,7 +337,7 @@ def _of_edge(hull: Polyhedron, edge: Array, axes: Sequence[Vector], gap, largest
     along, turn = [hull.edges[edge, 1, k] - start[k] for k in range(3)], cross(a, b)
     for axis in axes:
         line = cross(along, axis)
-        # Of nearly parallel edges rounding has left a part along the edge.
+        # Rounding has left a part along the edge if the edges are nearly parallel.
         part = dot(line, along) / dot(along, along)
         line = tuple(x - part * y for x, y in zip(line, along, strict=True))
         square = dot(line, line)
@@ -349,6 +349,6 @@ def _of_edge(hull: Polyhedron, edge: Array, axes: Sequence[Vector], gap, largest
         )
         scale = sign / jnp.sqrt(_greater(square, _tiny(square)))
         line = tuple(scale * x for x in line)
-        found = gap(line, dot(start, line))
-        largest = jnp.where((square > _tiny(square)) & (sign != 0.0) & (found > largest), found, largest)
+        width = gap(line, dot(start, line))
+        largest = jnp.where((square > _tiny(square)) & (sign != 0.0) & (width > largest), width, largest)
     return largest

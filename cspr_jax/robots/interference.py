@@ -97,7 +97,7 @@ def between(a: Array, u: Array, b: Array, v: Array) -> Array:
 
 
 def nearest(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
-    """Where segments a + s u and b + t v are nearest to each other.
+    """Find where segments a + s u and b + t v are nearest to each other.
 
     Args:
         a: (..., 3) where the first ones start, m.

@@ -53,7 +53,7 @@ def gap(apart: Vector, u: Vector, v: Vector) -> Vector:
 
 
 def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vector:
-    """What is left of a cable after its projection onto the sector of its corner.
+    """Rest of a cable after its projection onto the sector of its corner.
 
     Args:
         sides: of the sector, as in `interference.Contacts`.

@@ -49,5 +49,5 @@ def prepared(robot: RobotKind) -> tuple[RobotKind, Frame]:
         InputError: a robot that no trajectory moves, as `robots.robot.check_moved` says.
     """
     check_moved(robot)
-    own, frame = centred(robot)
-    return (aligned(own)[0] if isinstance(own, PlatformRobot) else own), frame  # type: ignore[return-value]
+    moved, frame = centred(robot)
+    return (aligned(moved)[0] if isinstance(moved, PlatformRobot) else moved), frame  # type: ignore[return-value]

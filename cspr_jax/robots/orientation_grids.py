@@ -57,7 +57,7 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
         (np.arange(count), np.roll(np.arange(count), -1)),
     ]
     neighbours = np.concatenate([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in steps])
-    # Of bands of tilt around each value.
+    # Each value of the tilt stands for a band of tilt around it, of this area.
     area = np.cos(tilts - 0.5 * step) - np.cos(tilts + 0.5 * step)
     volume = np.repeat(area * step**2 / (8.0 * math.pi**2), count * count)
     cap = (1.0 - math.cos(0.5 * step)) * 2.0 * math.pi * step / (8.0 * math.pi**2)
@@ -150,8 +150,8 @@ def turn_grid(divisions: int, turn: float) -> tuple[np.ndarray, np.ndarray]:
 
 def _near(angles: np.ndarray, angle: float) -> np.ndarray:
     # Both quaternions of an orientation are in the tree; each pair is counted once.
-    own = from_tilt_torsion(angles)
-    tree = cKDTree(np.concatenate([own, -own]))
-    pairs = tree.query_pairs(2.0 * math.sin(0.25 * angle), output_type="ndarray") % len(own)
+    quaternions = from_tilt_torsion(angles)
+    tree = cKDTree(np.concatenate([quaternions, -quaternions]))
+    pairs = tree.query_pairs(2.0 * math.sin(0.25 * angle), output_type="ndarray") % len(quaternions)
     pairs = np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1)
     return np.unique(pairs, axis=0)

@@ -31,12 +31,12 @@ class Pattern:
 
     @property
     def is_planar(self) -> bool:
-        """Whether all lies in the plane y = 0."""
+        """Tell whether all lies in the plane y = 0."""
         return self.forces == (0, 2)
 
     @property
     def is_body(self) -> bool:
-        """Whether the effector is a body that turns, and not a point."""
+        """Tell whether the effector is a body that turns, and not a point."""
         return bool(self.moments) or self.along_line
 
 

@@ -95,7 +95,7 @@ class PlatformRobot:
         return self._balanced(state.rotation, force, moment)
 
     def _balanced(self, rotation: Array, force: Array, moment: Array) -> Array:
-        # Of the forces and moments, (3, ...) each, those that the cables balance.
+        # Keep of the forces and moments, (3, ...) each, the components that the cables balance.
         row = PATTERNS[self.pattern]
         turning = (rotation @ across_line(self)).T @ moment if row.along_line else moment[np.array(row.moments)]
         return jnp.concatenate([force[np.array(row.forces, int)], turning])

@@ -301,7 +301,7 @@ def check_axis(z_axis: str) -> None:
 
 
 def is_planar(robot: PointMassRobot) -> bool:
-    """Whether the robot moves in the plane y = 0.
+    """Tell whether the robot moves in the plane y = 0.
 
     Args:
         robot: the robot.

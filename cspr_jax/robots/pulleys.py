@@ -1,4 +1,4 @@
-"""Where a cable leaves a swivelling pulley, and how much of it is wrapped around.
+"""Find where a cable leaves a swivelling pulley, and how much of it is wrapped around.
 
 A cable reaches the pulley at its entry point A, running along the swivel axis k, about which the pulley turns towards
 the attachment point B. All lies in one plane: with e the unit vector normal to k on the side of B, the centre is
@@ -71,19 +71,19 @@ def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
     if sizes.shape not in ((), (n_cables,)) or not ((sizes >= 0.0) & (sizes <= LARGEST_RADIUS)).all():
         raise InputError("pulley_radius", radius, f"a number >= 0, in m, or {n_cables}: one a cable")
     up = [0.0, 0.0, 1.0 if z_axis == "up" else -1.0]
-    given = np.asarray(up if axes is None else axes, float)
-    if given.shape not in ((3,), (n_cables, 3)) or not np.isfinite(given).all():
+    directions = np.asarray(up if axes is None else axes, float)
+    if directions.shape not in ((3,), (n_cables, 3)) or not np.isfinite(directions).all():
         raise InputError("pulley_axes", axes, f"a vector [x, y, z], or {n_cables}: one a cable")
-    largest = np.abs(given).max(-1, keepdims=True)
+    largest = np.abs(directions).max(-1, keepdims=True)
     if not (largest > 0.0).all():
-        raise InputError("pulley_axes", given.tolist(), "vectors that are not zero")
-    given = given / largest
-    units = given / np.linalg.norm(given, axis=-1, keepdims=True)
+        raise InputError("pulley_axes", directions.tolist(), "vectors that are not zero")
+    directions = directions / largest
+    units = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     return Pulleys(leaf(np.broadcast_to(sizes, (n_cables,))), leaf(np.broadcast_to(units, (n_cables, 3))))
 
 
 def exits(entry: Array, axis: Array, radius: Array, target: Array) -> Exit:
-    """Where cables leave their pulleys.
+    """Find where cables leave their pulleys.
 
     Args:
         entry: (..., 3) entry points, m.
@@ -105,7 +105,7 @@ def exits(entry: Array, axis: Array, radius: Array, target: Array) -> Exit:
 
 
 def exit_lanes(entry: Vector, axis: Vector, radius: Array, target: Vector) -> Exit:
-    """Where cables leave their pulleys, one lane a case: the fast form of `exits`.
+    """Find where cables leave their pulleys, one lane a case: the fast form of `exits`.
 
     Args:
         entry: of the entry point, m.

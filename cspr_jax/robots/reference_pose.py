@@ -135,7 +135,7 @@ def _standing(robot: PlatformRobot, hub: Array) -> tuple[Array, Array]:
 
 
 def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
-    # Of both sides of the platform, the one whose points come nearer to below their spools.
+    # Choose that side of the platform, of both, whose points come nearer to below their spools.
     points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]

@@ -94,5 +94,5 @@ def _of_inverse(translations: Array, rotations: Array, determinant: Array) -> Se
 def _largest(rows: Array) -> Array:
     # Opposite corners give the same length: the last sign stays.
     count = rows.shape[1]
-    signs = np.array([(*some, 1.0) for some in itertools.product((-1.0, 1.0), repeat=count - 1)])
+    signs = np.array([(*corner, 1.0) for corner in itertools.product((-1.0, 1.0), repeat=count - 1)])
     return jnp.max(jnp.linalg.norm(signs @ rows.T, axis=1))

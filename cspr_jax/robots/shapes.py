@@ -10,7 +10,7 @@ from cspr_jax.errors import InputError
 
 # Beyond it squares of lengths lose their meaning; as in `robots.point_mass`, with jax.
 LARGEST_LENGTH = 1e6
-# Of a unit quaternion, as in `arithmetic.rotations`, with jax.
+# The length of a unit quaternion may differ from 1 by this; as in `arithmetic.rotations`, which comes with jax.
 UNIT_TOLERANCE = 1e-6
 # Points nearer to a plane than this part of their extent lie in it.
 FLAT = 1e-9
@@ -185,26 +185,26 @@ def hull(points, *, name: str = "hull") -> Hull:
     """
     from scipy.spatial import ConvexHull
 
-    given = np.asarray(points, float)
-    if given.ndim != 2 or given.shape[1] != 3 or not (np.abs(given) <= LARGEST_LENGTH).all():
+    coordinates = np.asarray(points, float)
+    if coordinates.ndim != 2 or coordinates.shape[1] != 3 or not (np.abs(coordinates) <= LARGEST_LENGTH).all():
         raise InputError("points", points, "points of three coordinates, at most 1e6 m")
-    if is_flat(given):
-        raise InputError("points", given.tolist(), "four points or more that are not all in a plane")
-    found = ConvexHull(given)
-    corners, normals = found.simplices, found.equations[:, :3]
+    if is_flat(coordinates):
+        raise InputError("points", coordinates.tolist(), "four points or more that are not all in a plane")
+    convex = ConvexHull(coordinates)
+    corners, normals = convex.simplices, convex.equations[:, :3]
     # Once more in the corners, whose coordinates it has to fit.
-    offsets = np.einsum("fi,fi->f", normals, given[corners].mean(1))
+    offsets = np.einsum("fi,fi->f", normals, coordinates[corners].mean(1))
     edges, sides = [], []
-    for face, (simplex, others) in enumerate(zip(corners, found.neighbors, strict=True)):
+    for face, (simplex, others) in enumerate(zip(corners, convex.neighbors, strict=True)):
         for k, other in enumerate(others):
             if face < other and normals[face] @ normals[other] < 1.0 - FLAT:
-                edges.append(given[np.delete(simplex, k)])
+                edges.append(coordinates[np.delete(simplex, k)])
                 sides.append(normals[[face, other]])
-    return Hull(normals, offsets, given[corners], np.array(edges), np.array(sides), name)
+    return Hull(normals, offsets, coordinates[corners], np.array(edges), np.array(sides), name)
 
 
 def is_flat(points: np.ndarray) -> bool:
-    """Whether points lie in a plane.
+    """Tell whether points lie in a plane.
 
     Args:
         points: (n, 3) m.
@@ -219,7 +219,7 @@ def is_flat(points: np.ndarray) -> bool:
 
 
 def is_within(shape: Body, points: np.ndarray) -> np.ndarray:
-    """Whether points belong to a shape, its surface included.
+    """Tell whether points belong to a shape, its surface included.
 
     Args:
         shape: the shape.
@@ -268,17 +268,17 @@ def turned(shape: Body, frame: Frame) -> Body:
     return dataclasses.replace(shape, normals=normals, triangles=triangles, edges=edges, sides=sides)
 
 
-def _point(key: str, given) -> np.ndarray:
-    point = np.asarray(given, float)
+def _point(key: str, coordinates) -> np.ndarray:
+    point = np.asarray(coordinates, float)
     if point.shape != (3,) or not (np.abs(point) <= LARGEST_LENGTH).all():
-        raise InputError(key, given, "three numbers, at most 1e6 m")
+        raise InputError(key, coordinates, "three numbers, at most 1e6 m")
     return point
 
 
-def _radius(given: float) -> float:
-    if not 0.0 <= given <= LARGEST_LENGTH:
-        raise InputError("radius", given, "a length, not negative, at most 1e6 m")
-    return float(given)
+def _radius(radius: float) -> float:
+    if not 0.0 <= radius <= LARGEST_LENGTH:
+        raise InputError("radius", radius, "a length, not negative, at most 1e6 m")
+    return float(radius)
 
 
 def rotation_matrix(quaternion) -> np.ndarray:

@@ -5,7 +5,8 @@ import numpy as np
 # Below these ratios points count as lying on a line, and their plane as vertical.
 SMALLEST_AREA_RATIO = 1e-6
 SMALLEST_LEVEL_RATIO = 1e-3
-# Of the size of a robot: points nearer to P0 than this are at rest there, and points nearer to a line through P0 on it.
+# Points nearer to P0 than this part of the size of a robot are at rest there; points as near to a line through P0 are
+# on it.
 AT_P0 = 1e-9
 
 
@@ -22,7 +23,7 @@ def spread(points: np.ndarray) -> np.ndarray:
 
 
 def is_on_line(points: np.ndarray) -> bool:
-    """Whether points lie on one line, or at one place.
+    """Tell whether points lie on one line, or at one place.
 
     Args:
         points: (n, m), n >= 2, m >= 2.
@@ -35,7 +36,7 @@ def is_on_line(points: np.ndarray) -> bool:
 
 
 def is_vertical(points: np.ndarray) -> bool:
-    """Whether the plane of points, of more than three that of least squares, is vertical.
+    """Tell whether the plane of points, of more than three that of least squares, is vertical.
 
     Args:
         points: (n, 3), n >= 3, not on a line.

@@ -1,4 +1,4 @@
-"""Whether a robot on any number of cables can hang still with all of them taut: single poses by a linear program."""
+"""Tell whether a robot on any number of cables can hang still, all of them taut: single poses by a linear program."""
 
 import jax.numpy as jnp
 import numpy as np

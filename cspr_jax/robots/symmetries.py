@@ -9,7 +9,7 @@ from cspr_jax.arithmetic.rotations import about_vertical
 from cspr_jax.robots.platform import PlatformRobot
 
 LARGEST_FOLD = 6
-# Of the robot's size: points nearer than this are the same.
+# Points nearer to each other than this part of the robot's size are the same.
 SAME = 1e-9
 ROUNDING = 1e-9
 KEY_DIGITS = 9
@@ -44,9 +44,9 @@ def symmetries(robot: PlatformRobot) -> Symmetries:
     base = np.asarray(robot.base_points)[:, :2]
     azimuth = np.arctan2(base[:, 1], base[:, 0])
     halves = np.unique(np.round((0.5 * (azimuth[:, None] + azimuth[None, :])) % math.pi, 12))
-    every = sorted({float(x) for h in halves for x in (h, (h + 0.5 * math.pi) % math.pi)})
+    azimuths = sorted({float(x) for h in halves for x in (h, (h + 0.5 * math.pi) % math.pi)})
     mirrors: list[float] = []
-    for x in every:
+    for x in azimuths:
         if _maps(robot, _mirror(x)) and all(abs(math.sin(x - y)) > 1e-6 for y in mirrors):
             mirrors.append(x)
     return Symmetries(fold, tuple(mirrors))
@@ -87,8 +87,8 @@ def alike(symmetry: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.nd
     turns = [f(both[:, i]) for i in (0, 2) for f in (np.cos, np.sin)]
     keys = np.round(np.stack([*turns, both[:, 1], *np.tile(places[mirrored], (2, 1)).T], axis=1), KEY_DIGITS) + 0.0
     same = np.unique(keys, axis=0, return_inverse=True)[1].reshape(2, -1).min(0)
-    _, first, own = np.unique(same, return_index=True, return_inverse=True)
-    stands[mirrored] = mirrored[first[own]]
+    _, first, group = np.unique(same, return_index=True, return_inverse=True)
+    stands[mirrored] = mirrored[first[group]]
     return stands
 
 
@@ -97,12 +97,12 @@ def _mirror(azimuth: float) -> np.ndarray:
 
 
 def _maps(robot: PlatformRobot, change: np.ndarray) -> bool:
-    # Whether the changed robot has the same cables and the same inertia.
+    # Tell whether the changed robot has the same cables and the same inertia.
     base, points = np.asarray(robot.base_points), np.asarray(robot.platform_points)
-    own = np.concatenate([base, points], axis=1)
+    cables = np.concatenate([base, points], axis=1)
     other = np.concatenate([base @ change.T, points @ change.T], axis=1)
-    size = np.abs(own).max()
-    apart = np.linalg.norm(own[:, None] - other[None, :], axis=2)
+    size = np.abs(cables).max()
+    apart = np.linalg.norm(cables[:, None] - other[None, :], axis=2)
     inertia = np.asarray(robot.inertia)
     moved = change @ inertia @ change.T - inertia
     return bool((apart.min(0) <= SAME * size).all() and np.abs(moved).max() <= SAME * np.abs(inertia).max())

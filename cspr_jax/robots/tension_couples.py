@@ -8,7 +8,7 @@ from cspr_jax.robots.point_mass import LEVEL, SPATIAL, PointMassRobot, relative_
 
 
 def is_rectangle(base_points: np.ndarray) -> bool:
-    """Whether spools are the corners of a level rectangle with sides along x and y, in their order around it.
+    """Tell whether spools are the corners of a level rectangle with sides along x and y, in their order around it.
 
     Args:
         base_points: (n_cables, 3) m.
@@ -22,10 +22,10 @@ def is_rectangle(base_points: np.ndarray) -> bool:
     sides = np.roll(points, -1, axis=0) - points
     sizes = np.abs(sides[:2])
     along = 0 if sizes[0, 0] > sizes[0, 1] else 1
-    wanted = np.zeros((2, SPATIAL))
-    wanted[0, along], wanted[1, 1 - along] = sides[0, along], sides[1, 1 - along]
+    expected = np.zeros((2, SPATIAL))
+    expected[0, along], expected[1, 1 - along] = sides[0, along], sides[1, 1 - along]
     small = LEVEL * np.linalg.norm(sizes)
-    is_right = (np.abs(sides - np.concatenate([wanted, -wanted])) <= small).all()
+    is_right = (np.abs(sides - np.concatenate([expected, -expected])) <= small).all()
     return bool(is_right and sizes[0, along] > small and sizes[1, 1 - along] > small)
 
 

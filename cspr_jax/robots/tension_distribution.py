@@ -25,7 +25,7 @@ from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning, wrench_faces
 
 # Over the largest tension: a limit counts as kept within this; of the points that are compared, within the other.
 WITHIN, ROUNDING = 1e-9, 1e-11
-# Of a unit vector: what is left of it beside others, below which it depends on them.
+# A unit vector depends on others if less than this is left of it beside them.
 DEPENDENT = 1e-10
 # Steps of the search for the limits that are reached, over the number of cables; random cases take fewer than two.
 LONGEST = 10
@@ -87,9 +87,9 @@ def least_norm(matrix: Array, wrench: Array, tension_min: Array, tension_max: Ar
     Raises:
         InputError: fewer cables than components.
     """
-    every = all_tensions(matrix, wrench)
-    tensions = every.tensions(_shortest(every, tension_min, tension_max))
-    return checked(matrix, wrench, tension_min, tension_max, every, tensions)
+    solutions = all_tensions(matrix, wrench)
+    tensions = solutions.tensions(_shortest(solutions, tension_min, tension_max))
+    return checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
 
 
 @jax.jit
@@ -111,12 +111,12 @@ def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array
     Raises:
         InputError: fewer cables than components.
     """
-    every = all_tensions(matrix, wrench)
-    largest = _largest_distance(matrix, wrench, tension_min, tension_max, every)
+    solutions = all_tensions(matrix, wrench)
+    largest = _largest_distance(matrix, wrench, tension_min, tension_max, solutions)
     inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
-    tensions = every.tensions(_shortest(every, tension_min + inwards, tension_max - inwards))
-    found = checked(matrix, wrench, tension_min, tension_max, every, tensions)
-    return found, jnp.where(every.is_regular, largest, -jnp.inf)
+    tensions = solutions.tensions(_shortest(solutions, tension_min + inwards, tension_max - inwards))
+    answer = checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
+    return answer, jnp.where(solutions.is_regular, largest, -jnp.inf)
 
 
 def checked(matrix: Array, wrench: Array, low: Array, high: Array, every: AllTensions, tensions: Array) -> Distribution:
@@ -140,7 +140,7 @@ def checked(matrix: Array, wrench: Array, low: Array, high: Array, every: AllTen
 
 
 def keeps(tensions: Array, low: Array, high: Array) -> Array:
-    """Whether tensions keep their limits, to 1e-9 of the largest.
+    """Tell whether tensions keep their limits, to 1e-9 of the largest.
 
     Args:
         tensions: (n_cables,) N.
@@ -199,7 +199,7 @@ def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
         rest, products, frame, along = carry
         square = jnp.where(is_row == (k < dof), jnp.sum(rest**2, axis=1), -1.0)
         place = jnp.argmax(square)
-        # What it has lost to rounding of the others, it loses here.
+        # The parts along the others that rounding has left in it are taken off here.
         again = frame @ rest[place]
         vector = rest[place] - again @ frame
         length = jnp.linalg.norm(vector)
@@ -215,29 +215,29 @@ def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
     return frame, along, lax.stop_gradient(jnp.sqrt(square))
 
 
-def _shortest(every: AllTensions, low: Array, high: Array) -> Array:
+def _shortest(solutions: AllTensions, low: Array, high: Array) -> Array:
     """The shortest x (r,) within limits; where there is none, one that is not far beyond them."""
-    freedom = every.kernel.shape[0]
+    freedom = solutions.kernel.shape[0]
     if freedom == 0:
         return jnp.zeros(0)
     if freedom > 2:
-        return _at_limits(every, low, high, _limits_reached(every, low, high))
-    points, is_point = _candidates(every, low, high)
-    tensions = every.least[None] + points @ every.kernel
+        return _at_limits(solutions, low, high, _limits_reached(solutions, low, high))
+    points, is_point = _candidates(solutions, low, high)
+    tensions = solutions.least[None] + points @ solutions.kernel
     excess = jnp.max(jnp.abs(beyond(tensions, low[None], high[None])), axis=1)
     is_within = is_point & (excess <= ROUNDING * jnp.max(jnp.abs(tensions), axis=1))
-    # Where the limits leave but one point, rounding can leave none.
+    # If the limits leave but one point, rounding can leave none.
     worse = jnp.where(is_within.any(), jnp.where(is_within, jnp.sum(points**2, axis=1), jnp.inf), excess)
     return points[jnp.argmin(jnp.where(is_point, worse, jnp.inf))]
 
 
-def _candidates(every: AllTensions, low: Array, high: Array) -> tuple[Array, Array]:
-    """Where the shortest of one or two components can be, (k, r), and whether each is a point."""
-    freedom, count = every.kernel.shape
-    rows = jnp.concatenate([every.kernel.T, every.kernel.T])
+def _candidates(solutions: AllTensions, low: Array, high: Array) -> tuple[Array, Array]:
+    """Points where the shortest of one or two components can be, (k, r), and whether each is a point."""
+    freedom, count = solutions.kernel.shape
+    rows = jnp.concatenate([solutions.kernel.T, solutions.kernel.T])
     limits = jnp.concatenate([low, high])
     is_limit = jnp.isfinite(limits)
-    offsets = jnp.where(is_limit, limits, 0.0) - jnp.concatenate([every.least, every.least])
+    offsets = jnp.where(is_limit, limits, 0.0) - jnp.concatenate([solutions.least, solutions.least])
     square = jnp.sum(rows**2, axis=1)
     is_line = is_limit & (square > FLAT**2)
     feet = rows * (offsets / jnp.where(is_line, square, 1.0))[:, None]
@@ -255,7 +255,7 @@ def _candidates(every: AllTensions, low: Array, high: Array) -> tuple[Array, Arr
 
 @functools.cache
 def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
-    # Of 2n limits, the smallest tensions first: pairs of two cables.
+    # Return the pairs of limits of two different cables, among 2n limits, the smallest tensions first.
     pairs = [pair for pair in itertools.combinations(range(2 * count), 2) if (pair[1] - pair[0]) % count]
     return np.array(pairs)[:, 0], np.array(pairs)[:, 1]
 
@@ -271,32 +271,32 @@ class _ActiveSet(NamedTuple):
     steps: Array  # ()
 
 
-def _limits_reached(every: AllTensions, low: Array, high: Array) -> Array:
+def _limits_reached(solutions: AllTensions, low: Array, high: Array) -> Array:
     """Limits that the shortest x reaches, (n,): 1 the smallest tension, -1 the largest, 0 none."""
-    every, low, high = lax.stop_gradient((every, low, high))
-    freedom, count = every.kernel.shape
+    solutions, low, high = lax.stop_gradient((solutions, low, high))
+    freedom, count = solutions.kernel.shape
 
     def is_open(search):
-        tensions = every.tensions(search.point)
+        tensions = solutions.tensions(search.point)
         worst = jnp.max(jnp.abs(beyond(tensions, low, high)))
         is_beyond = worst > ROUNDING * jnp.max(jnp.abs(tensions))
         return (search.is_seeking | is_beyond) & ~search.is_stuck & (search.steps < LONGEST * count)
 
     none, no = jnp.zeros(count), jnp.asarray(False)
-    # What is not finite is never within limits.
-    is_lost = ~(jnp.isfinite(every.least).all() & jnp.isfinite(every.kernel).all())
+    # Tensions that are not finite are never within limits.
+    is_lost = ~(jnp.isfinite(solutions.least).all() & jnp.isfinite(solutions.kernel).all())
     start = _ActiveSet(jnp.zeros(freedom), none, none, jnp.asarray(0), no, is_lost, jnp.asarray(0))
-    return lax.while_loop(is_open, lambda search: _step(every, low, high, search), start).sides
+    return lax.while_loop(is_open, lambda search: _step(solutions, low, high, search), start).sides
 
 
-def _step(every: AllTensions, low: Array, high: Array, search: _ActiveSet) -> _ActiveSet:
-    """Towards the limit that is sought, until it is reached or one that is held is in the way, and let go."""
-    excess = beyond(every.tensions(search.point), low, high)
+def _step(solutions: AllTensions, low: Array, high: Array, search: _ActiveSet) -> _ActiveSet:
+    """Step towards the limit that is sought, until it is reached or one that is held is in the way, and let go."""
+    excess = beyond(solutions.tensions(search.point), low, high)
     sought = jnp.where(search.is_seeking, search.sought, jnp.argmax(jnp.abs(excess)))
     is_sought = jnp.arange(excess.size) == sought
     side, distance = jnp.sign(excess[sought]), jnp.abs(excess[sought])
     is_held = search.sides != 0.0
-    way, loss = projected(every.kernel, is_held, side * every.kernel[:, sought], jnp.zeros_like(excess))
+    way, loss = projected(solutions.kernel, is_held, side * solutions.kernel[:, sought], jnp.zeros_like(excess))
     square = jnp.dot(way, way)
     is_blocked = (is_held.sum() >= way.size) | (square <= DEPENDENT**2)
     whole = jnp.where(is_blocked, jnp.inf, distance / jnp.where(is_blocked, 1.0, square))
@@ -320,11 +320,11 @@ def _step(every: AllTensions, low: Array, high: Array, search: _ActiveSet) -> _A
     )
 
 
-def _at_limits(every: AllTensions, low: Array, high: Array, sides: Array) -> Array:
-    # The shortest x with so many tensions at their limits.
+def _at_limits(solutions: AllTensions, low: Array, high: Array, sides: Array) -> Array:
+    # Return the shortest x with so many tensions at their limits.
     limits = jnp.where(sides > 0.0, low, jnp.where(sides < 0.0, high, 0.0))
-    wanted = jnp.where(sides == 0.0, 0.0, limits - every.least)
-    return projected(every.kernel, sides != 0.0, jnp.zeros(every.kernel.shape[0]), wanted)[0]
+    offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.least)
+    return projected(solutions.kernel, sides != 0.0, jnp.zeros(solutions.kernel.shape[0]), offsets)[0]
 
 
 def projected(kernel: Array, is_held: Array, vector: Array, wanted: Array) -> tuple[Array, Array]:
@@ -344,21 +344,21 @@ def projected(kernel: Array, is_held: Array, vector: Array, wanted: Array) -> tu
     above = jnp.concatenate([jnp.eye(freedom), held], axis=1)
     below = jnp.concatenate([held.T, jnp.diag(jnp.where(is_held, 0.0, 1.0))], axis=1)
     right = jnp.concatenate([vector, jnp.where(is_held, wanted, 0.0)])
-    found = solved(jnp.concatenate([above, below]), right[:, None])[0][:, 0]
-    return found[:freedom], found[freedom:]
+    solution = solved(jnp.concatenate([above, below]), right[:, None])[0][:, 0]
+    return solution[:freedom], solution[freedom:]
 
 
-def _largest_distance(matrix: Array, wrench: Array, low: Array, high: Array, every: AllTensions) -> Array:
+def _largest_distance(matrix: Array, wrench: Array, low: Array, high: Array, solutions: AllTensions) -> Array:
     """Largest r, () N: half of a cable's range, or a face's slack over its way inwards for each newton of r."""
     dof, count = matrix.shape
     if count == dof:
-        return jnp.min(jnp.minimum(every.least - low, high - every.least))
+        return jnp.min(jnp.minimum(solutions.least - low, high - solutions.least))
     faces = wrench_faces(*lax.stop_gradient((matrix, low, high)))
     moves = jnp.sum(jnp.abs(faces.normals @ lax.stop_gradient(matrix)), axis=1)
     is_face = jnp.isfinite(faces.offsets) & (moves > 0.0)
     each = jnp.where(is_face, faces.slacks(lax.stop_gradient(wrench)) / jnp.where(is_face, moves, 1.0), jnp.inf)
     nearest = jnp.argmin(each)
-    # Of that face alone once more, now differentiable: infinite limits have no place in it.
+    # Compute the distance from that face alone once more, now differentiable: infinite limits have no place in it.
     half = each.size // 2
     normal = normals_to(matrix)[nearest % half] * jnp.where(nearest < half, 1.0, -1.0)
     normal = normal / lax.stop_gradient(jnp.max(jnp.abs(normal)))
@@ -367,5 +367,5 @@ def _largest_distance(matrix: Array, wrench: Array, low: Array, high: Array, eve
     along = jnp.where(is_own | (jnp.abs(along) <= FLAT), 0.0, along)
     reached = jnp.where(along > 0.0, low, jnp.where((along < 0.0) & jnp.isfinite(high), high, 0.0))
     slack = jnp.dot(normal, wrench) - jnp.dot(along, reached)
-    found = jnp.where(is_face[nearest], slack / jnp.sum(jnp.abs(along)), jnp.inf)
-    return jnp.minimum(found, 0.5 * jnp.min(high - low))
+    distance = jnp.where(is_face[nearest], slack / jnp.sum(jnp.abs(along)), jnp.inf)
+    return jnp.minimum(distance, 0.5 * jnp.min(high - low))

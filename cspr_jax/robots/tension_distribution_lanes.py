@@ -25,7 +25,7 @@ Lanes = Sequence[Array]
 FREE = (1, 2)
 # Poses of a batch on a CPU, whose some hundred arrays fit a cache.
 BATCH = 4096
-# Of the rows of a wrench matrix: what others leave of one, over the largest, below which the slow form decides.
+# The slow form decides if other rows of a wrench matrix leave less than this of one, over the largest.
 UNCERTAIN = 1e-5
 
 
@@ -37,7 +37,7 @@ def _dot(a: Lanes, b: Lanes) -> Array:
 
 
 def _apart(vector: Lanes, units: Sequence[Lanes], one: Array) -> tuple[Lanes, Lanes]:
-    """What is left of a vector beside unit vectors, and its products with them; twice, against rounding."""
+    """Rest of a vector beside unit vectors, and its products with them; twice, against rounding."""
     total: Lanes = [jnp.zeros_like(vector[0])] * len(units)
     for _ in range(2):
         products = stored([_dot(vector, unit) for unit in units], one)
@@ -88,7 +88,7 @@ def _interval(values: Lanes, rates: Lanes, low: Lanes, high: Lanes, rounding: Ar
         inverse = 1.0 / jnp.where(moves, rate, 1.0)
         to_least, to_most = (least - rounding - value) * inverse, (most + rounding - value) * inverse
         near, far = lesser(to_least, to_most), jnp.where(to_least > to_most, to_least, to_most)
-        # What does not move keeps its limits everywhere or nowhere.
+        # A tension that does not move keeps its limits everywhere or nowhere.
         is_kept = (value >= least - rounding) & (value <= most + rounding)
         near, far = jnp.where(moves, near, -jnp.inf), jnp.where(moves | is_kept, far, -jnp.inf)
         far = jnp.where(moves | ~is_kept, far, jnp.inf)
@@ -190,8 +190,8 @@ def _of_batch(batch: tuple[np.ndarray, ...]) -> tuple[tuple[Array, ...], Array, 
         # Each cable in turn is the first: one program for all.
         points = []
         for k in range(len(lows)):
-            given = [[x[k], *x[:k], *x[k + 1 :]] for x in (least, *kernel, lows, highs)]
-            points.append(_on_line(given[0], given[1:3], *given[3:], size))
+            rolled = [[x[k], *x[:k], *x[k + 1 :]] for x in (least, *kernel, lows, highs)]
+            points.append(_on_line(rolled[0], rolled[1:3], *rolled[3:], size))
     point = _shortest(least, lows, highs, size, points)
     tensions = _tensions(least, kernel, point)
     return tuple(tensions), _residual(matrix, wrench, tensions), _verdict(tensions, lows, highs, point), share
@@ -214,8 +214,8 @@ def least_norms(
     """
 
     def one(part: slice):
-        given = tuple(x[part] for x in (matrices, wrenches, low, high))
-        tensions, *others = in_batches(_of_batch, given, size=BATCH)
+        arrays = tuple(x[part] for x in (matrices, wrenches, low, high))
+        tensions, *others = in_batches(_of_batch, arrays, size=BATCH)
         return np.stack(tensions, 1), *others
 
     parts = in_parts(one, len(matrices), 4 * room(BATCH))

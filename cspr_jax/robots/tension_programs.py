@@ -2,12 +2,12 @@
 
 import numpy as np
 
-# Of what is wanted: what a residual may be off.
+# A residual may be off by this part of the right-hand side.
 CLOSE = 1e-6
 
 
 def by_program(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, high: np.ndarray | None) -> bool:
-    """Whether tensions supply a wrench, by a linear program (HiGHS): the largest s with low + s <= t <= high - s.
+    """Tell whether tensions supply a wrench, by a linear program (HiGHS): the largest s with low + s <= t <= high - s.
 
     Args:
         matrix: (dof, n_cables) wrench matrix, moments over a length.
@@ -27,7 +27,7 @@ def by_program(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
     keeps = [np.c_[-np.eye(count), np.ones(count)], np.c_[np.eye(count), np.ones(count)]]
     limits = np.r_[-low, high]
     is_finite = np.isfinite(limits)
-    found = linprog(
+    program = linprog(
         np.r_[np.zeros(count), -1.0],
         A_ub=np.vstack(keeps)[is_finite],
         b_ub=limits[is_finite],
@@ -36,11 +36,11 @@ def by_program(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
         # Without largest tensions s may have no bound of its own.
         bounds=[*[(None, None)] * count, (None, np.abs(wrench).max() + 1.0)],
     )
-    return bool(found.status == 0 and found.x[-1] > 0.0)
+    return bool(program.status == 0 and program.x[-1] > 0.0)
 
 
 def by_squares(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, high: np.ndarray | None) -> bool:
-    """Whether tensions supply a wrench, by least squares with none negative (NNLS).
+    """Tell whether tensions supply a wrench, by least squares with none negative (NNLS).
 
     Args:
         matrix: (dof, n_cables) wrench matrix, moments over a length.
@@ -58,10 +58,10 @@ def by_squares(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
     if low is None or high is None:
         low, high, wrench = np.ones(count), np.full(count, np.inf), np.zeros(dof)
     bounded = np.flatnonzero(np.isfinite(high))
-    # What is left to each largest tension is one more unknown.
-    given = np.zeros((dof + len(bounded), count + len(bounded)))
-    given[:dof, :count] = matrix
-    given[dof + np.arange(len(bounded)), bounded] = 1.0
-    given[dof:, count:] = np.eye(len(bounded))
-    wanted = np.r_[wrench - matrix @ low, (high - low)[bounded]]
-    return bool(nnls(given, wanted)[1] <= CLOSE * np.linalg.norm(wanted))
+    # The slack that is left to each largest tension is one more unknown.
+    system = np.zeros((dof + len(bounded), count + len(bounded)))
+    system[:dof, :count] = matrix
+    system[dof + np.arange(len(bounded)), bounded] = 1.0
+    system[dof:, count:] = np.eye(len(bounded))
+    right_side = np.r_[wrench - matrix @ low, (high - low)[bounded]]
+    return bool(nnls(system, right_side)[1] <= CLOSE * np.linalg.norm(right_side))

@@ -33,11 +33,12 @@ from cspr_jax.robots.tension_distribution_lanes import FREE, least_norms
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 
 BATCH = 4096
-# Of the p-norm: steps of Newton's method, over which the weight of the limits falls from first to last; lengths of
-# each that are compared; what is kept of the way to the nearest limit.
+# The p-norm takes so many steps of Newton's method, over which the weight of the limits falls from first to last;
+# compares so many lengths of each; and goes no farther than this part of the way to the nearest limit.
 STEPS, LENGTHS, KEPT = 60, 24, 0.99
 FIRST_WEIGHT, LAST_WEIGHT, LAST_STEPS = 1e-1, 1e-14, 12
-# Of the largest distance from the reference: nearer ones are taken as far, where a second derivative would be infinite.
+# Tensions nearer to the reference than this part of the largest distance are taken as that far from it: a second
+# derivative would be infinite there.
 NEAR = 1e-9
 # Cables without a largest tension: over the largest tension in sight, where the search may begin.
 FAR = 10.0
@@ -64,9 +65,10 @@ def closed_form(matrix: Array, wrench: Array, tension_min: Array, tension_max: A
     """
     middle = 0.5 * (tension_min + tension_max)
     rest = all_tensions(matrix, wrench - matrix @ middle)
-    every = all_tensions(matrix, wrench)
-    found = middle + rest.least
-    return _as_found(checked(matrix, wrench, tension_min, tension_max, every, found), found, tension_min, tension_max)
+    solutions = all_tensions(matrix, wrench)
+    tensions = middle + rest.least
+    answer = checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
+    return _as_found(answer, tensions, tension_min, tension_max)
 
 
 @jax.jit
@@ -87,31 +89,32 @@ def improved_closed_form(matrix: Array, wrench: Array, tension_min: Array, tensi
     Raises:
         InputError: fewer cables than components.
     """
-    every = all_tensions(matrix, wrench)
+    solutions = all_tensions(matrix, wrench)
     middle = 0.5 * (tension_min + tension_max)
-    aim = every.kernel @ (middle - every.least)
-    freedom, count = every.kernel.shape
+    aim = solutions.kernel @ (middle - solutions.least)
+    freedom, count = solutions.kernel.shape
 
     def hold(_, state):
         point, sides = state
-        excess = beyond(every.tensions(point), tension_min, tension_max)
+        excess = beyond(solutions.tensions(point), tension_min, tension_max)
         free = jnp.where(sides == 0.0, jnp.abs(excess), 0.0)
         worst = jnp.argmax(free)
         is_worst = (jnp.arange(count) == worst) & (free[worst] > ROUNDING * jnp.max(tension_max))
         sides = jnp.where(is_worst, jnp.sign(excess), sides)
         limits = jnp.where(sides > 0.0, tension_min, tension_max)
-        wanted = jnp.where(sides == 0.0, 0.0, limits - every.least)
-        found = projected(every.kernel, sides != 0.0, aim, wanted)[0]
-        return jnp.where(is_worst.any(), found, point), sides
+        offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.least)
+        nearest = projected(solutions.kernel, sides != 0.0, aim, offsets)[0]
+        return jnp.where(is_worst.any(), nearest, point), sides
 
     point, _ = lax.fori_loop(0, freedom, hold, (aim, jnp.zeros(count)))
-    found = every.tensions(point)
-    return _as_found(checked(matrix, wrench, tension_min, tension_max, every, found), found, tension_min, tension_max)
+    tensions = solutions.tensions(point)
+    answer = checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
+    return _as_found(answer, tensions, tension_min, tension_max)
 
 
-def _as_found(answer: Distribution, found: Array, low: Array, high: Array) -> Distribution:
-    # Those of least norm stand in for what a rule misses: if they keep the limits, the rule has missed them still.
-    return answer._replace(is_within=answer.is_within & keeps(found, low, high))
+def _as_found(answer: Distribution, tensions: Array, low: Array, high: Array) -> Distribution:
+    # Tensions of least norm stand in for what a rule misses: if they keep the limits, the rule has missed them still.
+    return answer._replace(is_within=answer.is_within & keeps(tensions, low, high))
 
 
 @jax.jit
@@ -137,20 +140,22 @@ def p_norm(
     Raises:
         InputError: fewer cables than components.
     """
-    every = all_tensions(matrix, wrench)
-    size = jnp.max(jnp.abs(every.least)) + jnp.max(jnp.abs(tension_min)) + jnp.max(jnp.abs(reference))
+    solutions = all_tensions(matrix, wrench)
+    size = jnp.max(jnp.abs(solutions.least)) + jnp.max(jnp.abs(tension_min)) + jnp.max(jnp.abs(reference))
     largest = jnp.where(jnp.isfinite(tension_max), tension_max, FAR * size)
     start, room = centred(matrix, wrench, tension_min, largest)
-    # Where the limits leave a point, that is it.
+    # If the limits leave but one point, that point is the answer.
     is_open = room > ROUNDING * size
     tensions = jnp.where(
-        is_open, _along_barriers(every, start.tensions, tension_min, tension_max, reference, exponent), start.tensions
+        is_open,
+        _along_barriers(solutions, start.tensions, tension_min, tension_max, reference, exponent),
+        start.tensions,
     )
-    return checked(matrix, wrench, tension_min, tension_max, every, tensions)
+    return checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
 
 
-def _along_barriers(every: AllTensions, start: Array, low: Array, high: Array, reference: Array, p: Array) -> Array:
-    freedom = every.kernel.shape[0]
+def _along_barriers(solutions: AllTensions, start: Array, low: Array, high: Array, reference: Array, p: Array) -> Array:
+    freedom = solutions.kernel.shape[0]
     if freedom == 0:
         return start
     scale = jnp.max(jnp.abs(start - reference))
@@ -178,9 +183,9 @@ def _along_barriers(every: AllTensions, start: Array, low: Array, high: Array, r
         above, below = rooms(tensions)
         slope = bend * away + weight * (jnp.where(has_largest, 1.0 / below, 0.0) - 1.0 / above)
         bends = (p - 1.0) * bend + weight * (jnp.where(has_largest, 1.0 / below**2, 0.0) + 1.0 / above**2)
-        hessian = (every.kernel * bends[None]) @ every.kernel.T
+        hessian = (solutions.kernel * bends[None]) @ solutions.kernel.T
         hessian = hessian + jnp.eye(freedom) * (1e-15 * jnp.trace(hessian) + 1e-300)
-        way = -solved(hessian, (every.kernel @ slope)[:, None])[0][:, 0] @ every.kernel
+        way = -solved(hessian, (solutions.kernel @ slope)[:, None])[0][:, 0] @ solutions.kernel
         # No farther than to a limit.
         up, down = (
             jnp.where(has_largest, below / jnp.where(way > 0.0, way, 1.0), jnp.inf),
@@ -291,7 +296,7 @@ def distributions(
         )
     count, _, cables = matrix.shape
     low, high = (_each(*x, (count, cables)) for x in (("tension_min", tension_min), ("tension_max", tension_max)))
-    given = [matrix, wrench, low, high]
+    arguments = [matrix, wrench, low, high]
     if RULES[rule].is_bounded and not np.isfinite(high).all():
         raise InputError(
             "tension_max", None, f"must be finite with rule {rule}", fault="a cable without a largest tension"
@@ -302,32 +307,32 @@ def distributions(
         with double_precision():
             middle = np.asarray(middles(jnp.asarray(low), jnp.asarray(high)))
         about = middle if reference is None else _each("reference", reference, (count, cables))
-        given += [about, np.full(count, float(exponent))]
+        arguments += [about, np.full(count, float(exponent))]
     with double_precision():
         if not count:
             return Distribution(*map(jnp.asarray, (np.zeros((0, cables)), np.zeros(0), np.zeros(0, bool))))
         if rule == "least-norm" and cables - matrix.shape[1] in FREE:
-            return _least_norms(*given)
-        return in_batches(lambda batch: _COMPILED[rule](*batch), tuple(given), size=BATCH)
+            return _least_norms(*arguments)
+        return in_batches(lambda batch: _COMPILED[rule](*batch), tuple(arguments), size=BATCH)
 
 
 _COMPILED = {name: jax.jit(jax.vmap(rule.function)) for name, rule in RULES.items()}
 
 
 def _least_norms(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.ndarray) -> Distribution:
-    # By lanes, and where these cannot tell once more.
-    found, is_open = least_norms(matrix, wrench, low, high)
+    # Compute by lanes, and the poses that these cannot decide once more by the slow form.
+    answer, is_open = least_norms(matrix, wrench, low, high)
     again = np.flatnonzero(is_open)
     if len(again):
-        some = tuple(x[again] for x in (matrix, wrench, low, high))
-        slow = in_batches(lambda batch: _COMPILED["least-norm"](*batch), some, size=BATCH)
-        for old, new in zip(found, slow, strict=True):
+        open_cases = tuple(x[again] for x in (matrix, wrench, low, high))
+        slow = in_batches(lambda batch: _COMPILED["least-norm"](*batch), open_cases, size=BATCH)
+        for old, new in zip(answer, slow, strict=True):
             old[again] = new
-    return found
+    return answer
 
 
-def _each(name: str, given, shape: tuple[int, int]) -> np.ndarray:
-    array = np.asarray(given, float)
+def _each(name: str, values, shape: tuple[int, int]) -> np.ndarray:
+    array = np.asarray(values, float)
     if array.shape not in ((), shape[1:], shape):
         raise InputError(name, None, f"must be {shape[1:]} or {shape}", fault=f"an array of shape {array.shape}")
     return np.ascontiguousarray(np.broadcast_to(array, shape))

@@ -66,7 +66,7 @@ def normalised_determinant(robot: PlatformRobot, position: Array, rotation: Arra
 
 
 def is_regular(determinant):
-    """Whether cables can carry every wrench: the rule of what is singular.
+    """Tell whether cables can carry every wrench: the rule that decides which poses are singular.
 
     Args:
         determinant: (...) of `normalised_determinant`, or over that of a pose from which no singularity may part it;

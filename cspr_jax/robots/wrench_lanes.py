@@ -80,8 +80,8 @@ def inertial_wrench(
     inertia = robot.inertia / robot.mass
 
     def weighted(vector):
-        own = turned_back(turn, vector)
-        return turned(turn, [dot([inertia[i, j] for j in range(3)], own) for i in range(3)])
+        own_axes = turned_back(turn, vector)
+        return turned(turn, [dot([inertia[i, j] for j in range(3)], own_axes) for i in range(3)])
 
     x, y = weighted(spin), cross(omega, weighted(omega))
     force = (acceleration[0], acceleration[1], acceleration[2] - robot.gravity)

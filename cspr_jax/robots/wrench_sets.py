@@ -21,7 +21,7 @@ from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_accelera
 from cspr_jax.robots.robot import Robot
 from cspr_jax.robots.state import State
 
-# Of unit columns: volumes of d - 1 of them below this span nothing; a column nearer to a plane lies in it.
+# Columns are unit vectors: d - 1 of them with a volume below this span nothing; a column nearer to a plane lies in it.
 FLAT = 1e-12
 # Rounding of a slack, over the size of what it is a difference of; divided by the volume of the face's columns.
 ROUNDING = 1e-14
@@ -171,14 +171,14 @@ def wrench_faces(matrix: Array, tension_min: Array, tension_max: Array) -> Faces
     spans = volumes > FLAT
     units = products / jnp.where(spans, volumes, 1.0)[:, None]
     along = units @ matrix
-    own = np.zeros(along.shape, bool)
-    np.put_along_axis(own, spanning(count, dof), True, axis=1)
-    along = jnp.where(own | (jnp.abs(along) <= FLAT), 0.0, along)
+    is_own = np.zeros(along.shape, bool)
+    np.put_along_axis(is_own, spanning(count, dof), True, axis=1)
+    along = jnp.where(is_own | (jnp.abs(along) <= FLAT), 0.0, along)
     is_regular = has_directions & (spans & (along != 0.0).any(1)).any()
     both = jnp.concatenate([along, -along])
     offsets = _offset(both, tension_min, tension_max)
     bounds = jnp.concatenate([spans, spans]) & jnp.isfinite(offsets)
-    farthest = jnp.max(jnp.where(np.concatenate([own, own]), -jnp.inf, both), axis=1)
+    farthest = jnp.max(jnp.where(np.concatenate([is_own, is_own]), -jnp.inf, both), axis=1)
     emptier = jnp.min(jnp.where(jnp.concatenate([spans, spans]), farthest, jnp.inf))
     return Faces(
         normals=jnp.where(bounds[:, None], jnp.concatenate([units, -units]), 0.0),
@@ -217,7 +217,7 @@ def acceleration_faces(robot: PointMassRobot, position: Array, tension_min: Arra
     else:
         normals, apex = faces.normals, faces.apex
     falling = -relative_acceleration(robot, still)
-    # Of a face that bounds nothing, -inf stays.
+    # A face that bounds nothing keeps its -inf.
     return dataclasses.replace(faces, normals=normals, apex=apex + falling, offsets=faces.offsets + normals @ falling)
 
 

@@ -18,8 +18,8 @@ from cspr_jax.workspaces.worst_cocircuits import worst_cocircuits
 
 # Cells that are proved at a time, whose arrays fit a cache, and poses whose cocircuits are compared at a time.
 PART, BATCH = 256, 1024
-# Of the margin at the centre: how far the tensions there keep from their limits. At all of it nothing but one point is
-# left, which rounding can miss.
+# Tensions at the centre keep this part of the margin there from their limits. At the whole margin nothing but one
+# point is left, which rounding can miss.
 KEPT = 0.98
 
 
@@ -27,11 +27,11 @@ class CellProofs:
     """Proofs of cells at one orientation, without halving."""
 
     def __init__(self, robot: AnyRobot, asked: Requirement, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
-        """Of a robot without pulleys, and the search of the same question."""
+        """Prepare the proofs for a robot without pulleys and the search of the same question."""
         self._asked, self._is_closure = asked, asked.condition == CLOSURE
         self._unbounded = tuple(np.isinf(asked.high).tolist())
         self._exits, self._forces = _geometry(robot, quaternion, search.unit)
-        # The same at every place, for the robot does not turn.
+        # The required wrenches are the same at every place, for the robot does not turn.
         required = search.required(np.zeros(3), quaternion)
         self._wrenches, self._is_finite = required.corners, not required.ellipsoids
         self._subsets = spanning(robot.n_cables, robot.dof)
@@ -67,21 +67,21 @@ class CellProofs:
         low, high, loads = self._asked.low, self._asked.high, self._wrenches
         if self._is_closure:  # by any tensions that pull on nothing
             low, high, loads = np.zeros(count), np.full(count, np.inf), np.zeros((1, units.shape[1]))
-            kept = np.ones((1, 1))
+            room = np.ones((1, 1))
         else:
             size = (np.abs(loads).max() + np.abs(low).max()) or 1.0
-            kept = KEPT * np.where(np.isfinite(margin), margin, size)[:, None]
-        found = [_tensions(units, load, low + kept, high - kept) for load in loads]
+            room = KEPT * np.where(np.isfinite(margin), margin, size)[:, None]
+        tensions = [_tensions(units, load, low + room, high - room) for load in loads]
 
         def part(chosen):
             cells = self._cells(positions[chosen], half[chosen])
-            each = zip(found, loads, strict=True)
+            each = zip(tensions, loads, strict=True)
             return np.min([least_margins(cells, x[chosen], load, low, high) for x, load in each], axis=0)
 
         return np.concatenate(in_parts(part, len(positions), PART))
 
     def outside(self, positions: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Whether cells lie wholly outside.
+        """Tell whether cells lie wholly outside.
 
         Args:
             positions: (n, 3) centres, m.
@@ -105,10 +105,10 @@ class CellProofs:
             return are_beyond(cells, normals, held, loads[chosen], low, high)
 
         def part(chosen):
-            found = proved(chosen, worst.inner[chosen], None)
-            left = np.arange(chosen.start, chosen.stop)[~found]
-            found[~found] = proved(left, worst.normal[left], held[left])
-            return found
+            is_outside = proved(chosen, worst.inner[chosen], None)
+            left = np.arange(chosen.start, chosen.stop)[~is_outside]
+            is_outside[~is_outside] = proved(left, worst.normal[left], held[left])
+            return is_outside
 
         return np.concatenate(in_parts(part, len(positions), PART))
 
@@ -132,5 +132,5 @@ def _geometry(robot: AnyRobot, quaternion: np.ndarray, unit: np.ndarray) -> tupl
     turn = np.array([[float(x) for x in line] for line in lanes.rotation(tuple(quaternion))])
     arms = np.asarray(robot.platform_points) @ turn.T
     moments = np.cross(arms, axes[:, None])  # (3, n_cables, 3)
-    kept = turn @ np.asarray(across_line(robot)) if row.along_line else axes[:, list(row.moments)]
-    return base - arms, np.concatenate([forces, (moments @ kept).transpose(0, 2, 1)], axis=1) / unit[:, None]
+    directions = turn @ np.asarray(across_line(robot)) if row.along_line else axes[:, list(row.moments)]
+    return base - arms, np.concatenate([forces, (moments @ directions).transpose(0, 2, 1)], axis=1) / unit[:, None]

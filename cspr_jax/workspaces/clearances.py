@@ -15,7 +15,7 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces import geometry
 
 BATCH = 4096
-# Numbers of `schema.meanings.NEAREST_BODIES`; of a pose that has nothing to meet the last.
+# Numbers of `schema.meanings.NEAREST_BODIES`; a pose that has nothing to meet takes the last one.
 KINDS = dict(zip(get_args(Kind), range(1, 5), strict=True))
 
 
@@ -32,8 +32,8 @@ def surroundings(robot: AnyRobot, frame: Frame, obstacles: Sequence[Obstacle] = 
         the scene in the kernels' coordinates.
     """
     diameter = 0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter)
-    own = None if body is None else turned(body, frame)
-    return scene(robot, diameter=diameter, obstacles=[inward(one, frame) for one in obstacles], body=own)
+    kernel_body = None if body is None else turned(body, frame)
+    return scene(robot, diameter=diameter, obstacles=[inward(one, frame) for one in obstacles], body=kernel_body)
 
 
 def at_rest(robot: AnyRobot, around: Scene, positions: np.ndarray, quaternions: np.ndarray) -> Clearances:
@@ -76,7 +76,7 @@ def flags(found: Clearances) -> np.ndarray:
 
 
 def nearest_bodies(around: Scene, found: Clearances) -> np.ndarray:
-    """What is nearest at each pose.
+    """Kind of the nearest bodies at each pose.
 
     Args:
         around: of `surroundings`.

@@ -23,7 +23,7 @@ from cspr_jax.robots.wrench_sets import spanning
 CABLES = 6  # of a base block, in two groups of three
 # Further cables beside a base block.
 MOST_OTHERS = 2
-# Of unit columns: a cocircuit that is shorter at every pose that was tried is none.
+# Columns are unit vectors: a cocircuit that is shorter than this at every pose that was tried is none.
 NOTHING = 1e-12
 
 Column = Sequence[Array]
@@ -98,14 +98,14 @@ def normal(columns: Sequence[Column]) -> Column:
 def _minors(columns: Sequence[Column]) -> dict[tuple[int, ...], Array]:
     # Determinants of all choices of as many rows as columns.
     dof = len(columns[0])
-    found: dict[tuple[int, ...], Array] = {(row,): columns[0][row] for row in range(dof)}
+    minors: dict[tuple[int, ...], Array] = {(row,): columns[0][row] for row in range(dof)}
     for size, column in enumerate(columns[1:], 2):
         larger = {}
         for rows in itertools.combinations(range(dof), size):
-            terms = [column[row] * found[rows[:i] + rows[i + 1 :]] for i, row in enumerate(rows)]
+            terms = [column[row] * minors[rows[:i] + rows[i + 1 :]] for i, row in enumerate(rows)]
             larger[rows] = _signed_sum(terms, [(-1) ** (i + size - 1) for i in range(size)])
-        found = larger
-    return found
+        minors = larger
+    return minors
 
 
 def _laplace(head: dict, tail: dict, rows: Sequence[int], sign: int) -> Array:
@@ -189,19 +189,19 @@ def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
     volume = dot(a[0], adjugate[0])
 
     def reduced(six):
-        # What the first three give to cancel the force, times the volume, and the moment that is then left.
-        given = [dot(row, six[:3]) for row in adjugate]
-        left = tuple(volume * six[3 + i] - sum(c[j][i] * given[j] for j in range(3)) for i in range(3))
-        return given, left
+        # Return the pulls of the first three cables that cancel the force, times the volume, and the moment then left.
+        pulls_on_force = [dot(row, six[:3]) for row in adjugate]
+        left = tuple(volume * six[3 + i] - sum(c[j][i] * pulls_on_force[j] for j in range(3)) for i in range(3))
+        return pulls_on_force, left
 
     pulls, lefts = zip(*[reduced(column) for column in columns[3:]], strict=True)
     inner = (cross(lefts[1], lefts[2]), cross(lefts[2], lefts[0]), cross(lefts[0], lefts[1]))
     determinant = dot(lefts[0], inner[0])
     tensions = []
     for wrench in wrenches:
-        given, left = reduced(wrench)
+        pulls_on_force, left = reduced(wrench)
         last = [dot(row, left) for row in inner]
-        first = [given[j] * determinant - sum(pulls[n][j] * last[n] for n in range(3)) for j in range(3)]
+        first = [pulls_on_force[j] * determinant - sum(pulls[n][j] * last[n] for n in range(3)) for j in range(3)]
         tensions.append([*first, *(volume * x for x in last)])
     # All are products of two of what is left of columns, and of more that is not above 1.
     most = largest([jnp.abs(x) for left in lefts for x in left])

@@ -8,11 +8,11 @@ import numpy as np
 from cspr_jax.workspaces.cocircuits import CableSubsets
 from cspr_jax.workspaces.required import RequiredWrenches
 
-# Of unit columns: smaller singular values, of the largest and at all, are zero.
+# Columns are unit vectors: smaller singular values, over the largest one and at all, count as zero.
 RANK, NOTHING = 1e-9, 1e-13
-# Of the largest component of a cocircuit: smaller ones are zero.
+# Components of a cocircuit below this part of the largest one count as zero.
 ZERO = 1e-10
-# Of a wrench: what may lie outside of the span of the cables.
+# A wrench may lie outside of the span of the cables by this part of its length.
 OUTSIDE = 1e-9
 
 
@@ -37,13 +37,13 @@ def cocircuits(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         chosen = np.array(list(itertools.combinations(range(matrix.shape[1]), rank - 1)))
         _, values, vectors = np.linalg.svd(rows.T[chosen])
         normals = vectors[values[:, -1] > RANK, -1]
-    found = normals @ rows
-    found[np.abs(found) < ZERO * np.abs(found).max(1, keepdims=True)] = 0.0
-    return found, (normals / sizes[:rank]) @ left[:, :rank].T, left[:, :rank]
+    components = normals @ rows
+    components[np.abs(components) < ZERO * np.abs(components).max(1, keepdims=True)] = 0.0
+    return components, (normals / sizes[:rank]) @ left[:, :rank].T, left[:, :rank]
 
 
 class Planes(NamedTuple):
-    """What bounds the margin of a wrench w: offsets - normals @ w, and half of the narrowest range of tensions.
+    """Bounds of the margin of a wrench w: offsets - normals @ w, and half of the narrowest range of tensions.
 
     Fields:
         offsets: (k,) N.
@@ -69,8 +69,8 @@ def margin_planes(matrix: np.ndarray, low: np.ndarray, high: np.ndarray) -> Plan
     Returns:
         the planes.
     """
-    found, normals, basis = cocircuits(matrix)
-    rows, normals = np.concatenate([found, -found]), np.concatenate([normals, -normals])
+    components, normals, basis = cocircuits(matrix)
+    rows, normals = np.concatenate([components, -components]), np.concatenate([normals, -normals])
     finite = np.where(np.isfinite(high), high, 0.0)
     bounds = ~((rows > 0.0) & np.isinf(high)).any(1)
     rows, normals = rows[bounds], normals[bounds]
@@ -100,7 +100,7 @@ def wrench_margin(
         N; inf where nothing bounds it, -inf where a wrench is outside of the span of the cables.
     """
     planes = margin_planes(matrix, low, high)
-    if any(is_outside(some, planes.basis) for some in wrenches.spanning):
+    if any(is_outside(loads, planes.basis) for loads in wrenches.spanning):
         return -np.inf
     slacks = planes.offsets - wrenches.supports(planes.normals)
     if measure is not None:
@@ -109,7 +109,7 @@ def wrench_margin(
 
 
 def is_outside(wrenches: np.ndarray, basis: np.ndarray) -> bool:
-    """Whether some wrench is outside of what the cables span.
+    """Tell whether some wrench is outside of the span of the cables.
 
     Args:
         wrenches: (n, dof).
@@ -132,25 +132,25 @@ def closure_margin(matrix: np.ndarray, choices: CableSubsets) -> float:
     Returns:
         the margin, in [-1, 1]; -1 where the cables do not span all components.
     """
-    found, _, basis = cocircuits(matrix)
+    components, _, basis = cocircuits(matrix)
     if basis.shape[1] < len(matrix):
         return -1.0
-    other = found != 0.0
-    most, least = found.max(1, initial=-np.inf, where=other), found.min(1, initial=np.inf, where=other)
-    rarer = np.minimum(most, -least) / np.abs(found).max(1)
+    other = components != 0.0
+    most, least = components.max(1, initial=-np.inf, where=other), components.min(1, initial=np.inf, where=other)
+    rarer = np.minimum(most, -least) / np.abs(components).max(1)
     # A component that is zero here and not everywhere may have either sign.
-    always = len(matrix) - 1 + _always_zero(found, choices)
+    always = len(matrix) - 1 + _always_zero(components, choices)
     has_more = (~other).sum(1) > always
     return float(np.where(has_more, np.maximum(rarer, 0.0), rarer).min())
 
 
-def _always_zero(found: np.ndarray, choices: CableSubsets) -> np.ndarray:
+def _always_zero(components: np.ndarray, choices: CableSubsets) -> np.ndarray:
     # How many components more than those of a hyperplane's columns are zero at every pose of the robot.
     if choices.counts is None:
-        return np.zeros(len(found), int)
-    size = found.shape[1] - choices.counts.shape[1]
+        return np.zeros(len(components), int)
+    size = components.shape[1] - choices.counts.shape[1]
     more: dict[tuple[int, ...], int] = {}
     for row, counts in zip(choices.table, choices.counts, strict=True):
         support = tuple(sorted(row[size:][counts > 0.0].tolist()))
         more[support] = int((counts == 0.0).sum())
-    return np.array([more.get(tuple(np.flatnonzero(row).tolist()), 0) for row in found])
+    return np.array([more.get(tuple(np.flatnonzero(row).tolist()), 0) for row in components])

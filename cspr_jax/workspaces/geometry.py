@@ -85,7 +85,7 @@ def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> tupl
 
 
 def _rays(robot: AnyRobot, position: Vector, arms: Vector | None) -> tuple[Vector, Vector]:
-    # Where cables are attached, and from there to the base points.
+    # Return the attachment points of the cables, and the rays from there to the base points.
     shape = robot.n_cables, len(position[0])
     if arms is None and isinstance(robot, PlatformRobot):
         arms = _down(robot.platform_points, shape)
@@ -175,7 +175,7 @@ def wrench_matrices(robot: AnyRobot, positions: Array, quaternions: Array) -> Ar
 
 @jax.jit
 def exit_points(robot: AnyRobot, pulleys: Pulleys, positions: Array, quaternions: Array) -> Array:
-    """Where cables leave their pulleys.
+    """Points at which cables leave their pulleys.
 
     Args:
         robot: z down.
@@ -211,7 +211,7 @@ def cable_lengths(robot: AnyRobot, positions: Array, quaternions: Array) -> Arra
 
 @jax.jit
 def attachments(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
-    """Where the cables are attached.
+    """Points at which the cables are attached.
 
     Args:
         robot: z down.

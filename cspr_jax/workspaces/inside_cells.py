@@ -91,15 +91,15 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     turns = (changes * weights[:, None, None]) @ back[:, None]  # T_k
     first = (changes @ densities[:, None, :, None])[..., 0]  # j_k
     second = (turns[:, :, None] @ first[:, None, ..., None])[..., 0]  # T_k j_l
-    # What rounding has left, or may have hidden, of C^-1 Z0 D U^T - I and of C^-1 (Z0 f0 - w).
+    # Rounding has left, or may have hidden, so much of C^-1 Z0 D U^T - I and of C^-1 (Z0 f0 - w).
     size = np.linalg.norm(inverse, axis=(1, 2))
     parts = np.linalg.norm(weighted, axis=(1, 2)) + norm_reach(cells.changes * weights[:, None, None])
     lost = size * np.linalg.norm(rows, axis=(1, 2)) * (ROUNDING * parts + _length(cells.rounding * weights))
     defect = np.linalg.norm(rows @ back - np.eye(rows.shape[1]), axis=(1, 2)) + lost
-    given = (cells.matrices @ densities[..., None])[..., 0]
+    supplied = (cells.matrices @ densities[..., None])[..., 0]
     sizes = np.abs(cells.matrices) @ np.abs(densities)[..., None]
     hidden = ROUNDING * (_length(sizes[..., 0]) + _length(wrench)) + (cells.rounding * np.abs(densities)).sum(1)
-    residual = _length((inverse @ (given - wrench)[..., None])[..., 0]) + size * hidden
+    residual = _length((inverse @ (supplied - wrench)[..., None])[..., 0]) + size * hidden
     turn, start = norm_reach(turns) + defect, norm_reach(first)
     after = np.where(turn < 1.0, 1.0 / (1.0 - turn), np.inf)
     late = np.minimum(pair_norm(second), norm_reach(turns) * start) + defect * start

@@ -61,15 +61,17 @@ def by_normals(
     Returns:
         (...) lower bound + i upper bound.
     """
-    dof, like = len(every), every[0][0]
-    lanes = wrenches._replace(points=[[jnp.broadcast_to(x, like.shape) for x in point] for point in wrenches.points])
-    noise = jnp.asarray(ROUNDING * jnp.finfo(like.dtype).eps, like.dtype) * loss
+    dof, template = len(every), every[0][0]
+    lanes = wrenches._replace(
+        points=[[jnp.broadcast_to(x, template.shape) for x in point] for point in wrenches.points]
+    )
+    noise = jnp.asarray(ROUNDING * jnp.finfo(template.dtype).eps, template.dtype) * loss
     reach = jnp.where(jnp.isinf(asked.high), 0.0, jnp.abs(asked.high)) + jnp.abs(asked.low)
     size = _size(wrenches)
 
     def pull(row, limits):
         chosen = [[_row(component, row[i]) for component in every] for i in range(dof - 1)]
-        across = normal(chosen) if chosen else [jnp.ones_like(like)]
+        across = normal(chosen) if chosen else [jnp.ones_like(template)]
         rest = [[_row(component, k) for component in every] for k in row[dof - 1 :]]
         entries = [product(across, column) for column in rest]
         low, high, counts, scale = limits
@@ -81,7 +83,7 @@ def by_normals(
 
     rest = choices.table[:, dof - 1 :]
     limits = asked.low[rest], asked.high[rest], choices.counts, jnp.sum(reach[rest], axis=1)
-    return _least(pull, choices.table, limits, like, asked, measure=measure, is_bounded=is_bounded)
+    return _least(pull, choices.table, limits, template, asked, measure=measure, is_bounded=is_bounded)
 
 
 def _pull(entries: Sequence[Array], low, high, counts, size: Array, noise: Array, error: Array) -> CocircuitLimits:
@@ -103,23 +105,23 @@ def _row(array: Array, k: Array) -> Array:
 
 
 def _least(
-    pull, table: np.ndarray, limits, like: Array, asked: TensionLimits, *, measure: str, is_bounded: bool
+    pull, table: np.ndarray, limits, template: Array, tension_limits: TensionLimits, *, measure: str, is_bounded: bool
 ) -> Array:
-    # The least of all cocircuits.
+    # Return the least margin of all cocircuits.
     judged = margins.bounded_margin if is_bounded else margins.free_margin
 
-    def step(found, each):
+    def step(bounds, each):
         cocircuit, asking = pull(*each)
         if measure == "closure":
             lower, upper = margins.closure_margin(cocircuit)
         else:
             lower, upper = judged(cocircuit, *asking)
-        least = jnp.minimum(jnp.real(found), lower), jnp.minimum(jnp.imag(found), upper)
+        least = jnp.minimum(jnp.real(bounds), lower), jnp.minimum(jnp.imag(bounds), upper)
         return lax.complex(*least), None
 
-    largest_one = jnp.inf * jnp.ones_like(like)
+    largest_one = jnp.inf * jnp.ones_like(template)
     if measure == "tensions":  # no margin is larger than half of what a cable has
-        largest_one = jnp.minimum(largest_one, 0.5 * jnp.min(asked.high - asked.low))
+        largest_one = jnp.minimum(largest_one, 0.5 * jnp.min(tension_limits.high - tension_limits.low))
     count = len(table)
     start = lax.complex(largest_one, largest_one)
     return lax.scan(step, start, (table, limits), unroll=count if count <= UNROLLED else 1)[0]
@@ -144,7 +146,7 @@ class NullSpace(NamedTuple):
 
 
 def null_space(every: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]) -> NullSpace:
-    """What pulls on nothing, and what supplies one wrench, of robots on six to eight cables in space.
+    """Tensions that pull on nothing, and those that supply one wrench, of robots on six to eight cables in space.
 
     Args:
         every: columns of the wrench matrix, of `geometry.wrench_columns`.
@@ -159,21 +161,23 @@ def null_space(every: Sequence[Array], loss: Array, wrench: Column, *, order: tu
 
 
 @partial(jax.jit, static_argnames=("order",))
-def _by_block(every: Sequence[Array], wrench: Column, *, order: tuple[int, ...]) -> tuple[list[list[Array]], Array]:
+def _by_block(
+    components: Sequence[Array], wrench: Column, *, order: tuple[int, ...]
+) -> tuple[list[list[Array]], Array]:
     # Tensions of the six for each cable beyond them and for the wrench, two by two as complex numbers, which halves
     # what XLA computes again for each result; and what they are multiplied by, with the scale of their last digits.
-    like = every[0][0]
-    cables = [[component[k] for component in every] for k in order]
-    given = [jnp.broadcast_to(x, like.shape) for x in wrench]
-    found = block(cables[:CABLES], [*cables[CABLES:], given])
-    pairs = [[lax.complex(six[i], six[i + 1]) for i in range(0, CABLES, 2)] for six in found.tensions]
-    return pairs, lax.complex(found.common, found.scale)
+    template = components[0][0]
+    cables = [[component[k] for component in components] for k in order]
+    load = [jnp.broadcast_to(x, template.shape) for x in wrench]
+    base = block(cables[:CABLES], [*cables[CABLES:], load])
+    pairs = [[lax.complex(six[i], six[i + 1]) for i in range(0, CABLES, 2)] for six in base.tensions]
+    return pairs, lax.complex(base.common, base.scale)
 
 
 @jax.jit
-def _joined(found: tuple[list[list[Array]], Array], wrench: Column, loss: Array) -> NullSpace:
-    *others, last = [[part for pair in six for part in (jnp.real(pair), jnp.imag(pair))] for six in found[0]]
-    common, scale = jnp.real(found[1]), jnp.imag(found[1])
+def _joined(tensions: tuple[list[list[Array]], Array], wrench: Column, loss: Array) -> NullSpace:
+    *others, last = [[part for pair in six for part in (jnp.real(pair), jnp.imag(pair))] for six in tensions[0]]
+    common, scale = jnp.real(tensions[1]), jnp.imag(tensions[1])
     zero, count = jnp.zeros_like(common), len(others)
     rows = [[*others[j], *(-common if i == j else zero for i in range(count))] for j in range(count)]
     inverse = 1.0 / common
@@ -205,13 +209,13 @@ def by_null_space(
     Returns:
         (...) lower bound + i upper bound.
     """
-    like = space.loss
+    template = space.loss
     finite = jnp.where(jnp.isinf(asked.high), 0.0, jnp.abs(asked.high)) + jnp.abs(asked.low)
     reach = jnp.sum(finite) + space.largest
 
     def pull(row, limits):
         rows = [[_row(part, k) for part in space.rows] for k in row]
-        entries = relation(rows) if space.rows else [jnp.ones_like(like)]
+        entries = relation(rows) if space.rows else [jnp.ones_like(template)]
         low, high, counts = limits
         size = one_norm(entries)
         asking = product(entries, [_row(space.held, k) for k in row])
@@ -220,4 +224,4 @@ def by_null_space(
 
     table = choices.table
     limits = asked.low[table], asked.high[table], choices.counts
-    return _least(pull, table, limits, like, asked, measure=measure, is_bounded=is_bounded)
+    return _least(pull, table, limits, template, asked, measure=measure, is_bounded=is_bounded)

@@ -33,7 +33,7 @@ INTERFERENCE = "interference-free"
 TENSIONS = ("tension_min", "tension_max")
 SPEED = "cable_speed_max"
 HELD = (*TENSIONS, "floor", "cable_length_max", SPEED)
-# Of pi, of sets of orientations where the file does not say.
+# Sets of orientations divide pi into this many parts where the file does not say.
 DIVISIONS = 12
 
 
@@ -82,72 +82,76 @@ class WorkspaceMap(GridMap):
                 raise ConfigError(self._file, f"limits.{limit.name}: {allowed}")
 
     def _surroundings(self, robot_file: RobotFile) -> Scene | None:
-        asked, row = self._asked, self._row
-        if INTERFERENCE not in asked.conditions:
+        workspace, row = self._asked, self._row
+        if INTERFERENCE not in workspace.conditions:
             return None
         for name in ("platform_box", "platform_hull"):
-            if getattr(asked, name) is not None and not row.is_body:
+            if getattr(workspace, name) is not None and not row.is_body:
                 raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} has no shape")
         # Shapes are from where the arms of the kernels are: the mass centre, or a joint.
         centre = None if row.is_jointed else robot_file.centre_of_mass
         try:
-            body = asked.body(centre or (0.0, 0.0, 0.0), robot_file.platform_points or ())
+            body = workspace.body(centre or (0.0, 0.0, 0.0), robot_file.platform_points or ())
         except InputError as error:
             allowed = "must be points: those where the cables are attached lie in a plane"
             raise ConfigError(self._file, f"workspace.platform_hull = true: {allowed}") from error
-        return surroundings(self._robot, self._frame, [table.shape() for table in asked.obstacle or ()], body)
+        return surroundings(self._robot, self._frame, [table.shape() for table in workspace.obstacle or ()], body)
 
     def _speeds(self, robot_file: RobotFile) -> CableSpeeds | None:
-        asked, most = self._asked, self._limits.cable_speed_max
-        given = [name for name in ("speed", "angular_speed") if getattr(asked, name) is not None]
-        if not given:
+        workspace, most = self._asked, self._limits.cable_speed_max
+        speed_keys = [name for name in ("speed", "angular_speed") if getattr(workspace, name) is not None]
+        if not speed_keys:
             if getattr(self._keys.limits, SPEED) is not None:
                 allowed = "must be absent without workspace.speed and workspace.angular_speed: cells are at rest"
                 raise ConfigError(self._file, f"limits.cable_speed_max: {allowed}")
             return None
         for name, has in (("speed", not self._row.is_jointed), ("angular_speed", self._row.is_body)):
-            if name in given and not has:
+            if name in speed_keys and not has:
                 why = "turns about its joint alone" if self._row.is_jointed else "does not turn"
                 raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} {why}")
         if most is None:
-            raise ConfigError(self._file, f"workspace.{given[0]}: must be absent without limits.cable_speed_max")
-        values = {"speed": asked.speed or 0.0, "angular_speed": asked.angular_speed or 0.0}
+            raise ConfigError(self._file, f"workspace.{speed_keys[0]}: must be absent without limits.cable_speed_max")
+        values = {"speed": workspace.speed or 0.0, "angular_speed": workspace.angular_speed or 0.0}
         return cable_speeds(self._robot, np.asarray(most), **values)
 
     def _given_turns(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
         # (k, 4) in the kernels' axes.
-        given = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
-        if self._row.is_planar and given[:, [1, 3]].any():
+        turns = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
+        if self._row.is_planar and turns[:, [1, 3]].any():
             raise ConfigError(self._file, f"{key}: must turn about y: that of a planar robot")
-        return self._frame.turned_quaternions(given)
+        return self._frame.turned_quaternions(turns)
 
     def _orientation_set(self) -> tuple[np.ndarray | None, np.ndarray]:
         # (k, 4) orientations and the part of the set that each stands for; None: there is no set.
-        asked = self._asked
-        if asked.orientations is None:
+        workspace = self._asked
+        if workspace.orientations is None:
             return None, np.ones(1)
-        if asked.quaternions is not None:
-            every = self._given_turns(asked.quaternions, "workspace.quaternions")
-            return products(every, self._turn), np.full(len(every), 1.0 / len(every))
-        divisions = asked.divisions or DIVISIONS
-        tilt = math.pi if asked.tilt_max is None else asked.tilt_max
+        if workspace.quaternions is not None:
+            turns = self._given_turns(workspace.quaternions, "workspace.quaternions")
+            return products(turns, self._turn), np.full(len(turns), 1.0 / len(turns))
+        divisions = workspace.divisions or DIVISIONS
+        tilt = math.pi if workspace.tilt_max is None else workspace.tilt_max
         if self._row.is_planar:
-            if asked.torsion_max is not None:
+            if workspace.torsion_max is not None:
                 raise ConfigError(self._file, "workspace.torsion_max: must be absent for a planar robot")
             angles, volume = turn_grid(divisions, tilt)
-        elif asked.tilt_max is None:
+        elif workspace.tilt_max is None:
             grid = equal_volume_grid(divisions)
             angles, volume = grid.angles, grid.volume
         else:
-            angles, volume = cone_grid(divisions, tilt, asked.torsion_max or 0.0)
+            angles, volume = cone_grid(divisions, tilt, workspace.torsion_max or 0.0)
         return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._turn), volume
 
     def _search(self, name: str, capacity_length: float | None = None) -> WorkspaceSearch:
         loads = None
         if name == FEASIBLE:
-            asked = self._asked
-            given = {"points": asked.wrenches, "box": asked.wrench_box, "ellipsoid": asked.wrench_ellipsoid}
-            loads = required_wrenches(self._robot, self._frame, **given, acceleration=asked.acceleration)
+            workspace = self._asked
+            shapes = {
+                "points": workspace.wrenches,
+                "box": workspace.wrench_box,
+                "ellipsoid": workspace.wrench_ellipsoid,
+            }
+            loads = required_wrenches(self._robot, self._frame, **shapes, acceleration=workspace.acceleration)
         return WorkspaceSearch(self._robot, requirement(self._robot, name, self._limits, loads, capacity_length))
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -155,8 +159,8 @@ class WorkspaceMap(GridMap):
         places = self._targets(cells)
         if self._samples is not None:
             kind: OrientationSet = "total" if self._asked.orientations in ("total", "dextrous") else "inclusion"
-            found = over_orientations(self._poses, places, self._samples, self._volume, kind)
-            return found | {"cell_side": np.zeros(len(places), np.int16)}
+            set_answers = over_orientations(self._poses, places, self._samples, self._volume, kind)
+            return set_answers | {"cell_side": np.zeros(len(places), np.int16)}
         turns = np.repeat(self._turn, len(places), axis=0)
         if any(name in cells for name in TILT_TORSION):
             angles = np.stack([cells.get(name, np.zeros(len(places))) for name in TILT_TORSION], axis=1)
@@ -171,13 +175,13 @@ class WorkspaceMap(GridMap):
 
     def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # (n, 3) of the cells: half of the way to the farther neighbour along each axis.
-        found = []
+        half_sizes = []
         for name in "xyz":
             points = np.sort(axis_points(getattr(self._keys.axes, name)))
             gaps = np.diff(points)
             farther = np.maximum(np.append(gaps, 0.0), np.append(0.0, gaps))
-            found.append(0.5 * farther[np.searchsorted(points, cells[name])])
-        return np.stack(found, axis=1)
+            half_sizes.append(0.5 * farther[np.searchsorted(points, cells[name])])
+        return np.stack(half_sizes, axis=1)
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""
@@ -199,5 +203,5 @@ class WorkspaceMap(GridMap):
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         inside = answers["verdict"] == 0
         side = answers["cell_side"]
-        found = {f"a cell inside with a {name} below zero": inside & (answers[name] < 0.0) for name in MARGINS}
-        return found | {"a cell proved to be on the other side": (side == 1) & ~inside | (side == 2) & inside}
+        claims = {f"a cell inside with a {name} below zero": inside & (answers[name] < 0.0) for name in MARGINS}
+        return claims | {"a cell proved to be on the other side": (side == 1) & ~inside | (side == 2) & inside}

@@ -143,8 +143,8 @@ def free_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
         lower and upper bound, N; inf where a cable without a largest tension frees the cocircuit.
     """
     lower, upper = list[Array](), list[Array]()
-    for sign, asked in ((1.0, most), (-1.0, least)):
-        sure = possible = -asked
+    for sign, demand in ((1.0, most), (-1.0, least)):
+        sure = possible = -demand
         for entry, noise, low, high in zip(pull.entries, pull.noises, pull.low, pull.high, strict=True):
             y = sign * entry
             sure = sure + jnp.where(y > noise, y * high, y * low)

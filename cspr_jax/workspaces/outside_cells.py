@@ -55,7 +55,7 @@ class Products(NamedTuple):
 def are_beyond(
     cells: Cells, normals: np.ndarray, held: np.ndarray | None, wrenches: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """Whether a wrench is beyond what tensions can give at every position of cells.
+    """Tell whether a wrench is beyond what tensions can give at every position of cells.
 
     Args:
         cells: the cells.
@@ -71,7 +71,7 @@ def are_beyond(
     with np.errstate(all="ignore"):
         products, others = products_of(cells, normals, held, wrenches), _others(cells, held)
         least, most = (side[:, :-1] for side in products.ends)
-        # Of each other cable the limit that counts at the centre, and what it costs if the other one counts elsewhere.
+        # Each other cable has a limit that counts at the centre, and a cost if the other limit counts elsewhere.
         is_positive = products.value[:, :-1] > 0.0
         is_bounded = np.isfinite(high)
         limits = np.where(others, np.where(is_positive & is_bounded, high, low), 0.0)
@@ -85,7 +85,7 @@ def are_beyond(
 
 
 def are_one_sided(cells: Cells, normals: np.ndarray, held: np.ndarray | None) -> np.ndarray:
-    """Whether cables fail to resist every wrench at every position of cells.
+    """Tell whether cables fail to resist every wrench at every position of cells.
 
     Args:
         cells: the cells.
@@ -134,7 +134,7 @@ def products_of(cells: Cells, normals: np.ndarray, held: np.ndarray | None, wren
 
 
 def _still(normals: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray) -> Products:
-    # Of c that does not move: affine.
+    # A normal c that does not move has affine products.
     value, linear = (normals[:, None] @ units)[:, 0], -(normals[:, None, None] @ changes)[:, :, 0]
     nothing = np.zeros((*value.shape, 3, 3))
     return Products(value, linear.transpose(0, 2, 1), nothing, rounding + ROUNDING * np.abs(linear).sum(1))
@@ -143,7 +143,7 @@ def _still(normals: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding
 def _moving(
     normals: np.ndarray, held: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray
 ) -> Products:
-    # Of c that stays normal to the cables that are held.
+    # The normal c moves so that it stays normal to the cables that are held.
     frame = np.concatenate([np.take_along_axis(units, held[:, None], axis=2), normals[..., None]], axis=2)
     inverse = inverse_factor(frame.transpose(0, 2, 1) @ frame).transpose(0, 2, 1)  # C^-T
     rows = (frame @ inverse).transpose(0, 2, 1)  # Q^T
@@ -164,7 +164,7 @@ def _moving(
 
 
 def _norms(vectors: np.ndarray) -> np.ndarray:
-    # Of (n, 3, m, k), linear functions of x, bounds of the norms over the cells, (n, k).
+    # Bound the norms of linear functions of x, (n, 3, m, k), over the cells, (n, k).
     columns = vectors.transpose(0, 3, 1, 2)
     return np.sqrt(np.abs(columns @ columns.transpose(0, 1, 3, 2)).sum((2, 3)))
 
@@ -189,8 +189,8 @@ def least_slacks(cells: Cells, products: Products, limits: np.ndarray) -> np.nda
     bends = products.quadratic[:, -1] - (limits[..., None, None] * bent).sum(1)
     shift, radius = reach(steps), cells.radius[:, None]
     curved = radius**2 * cells.lengths / cells.shortest**3
-    own = products.rest[:, :-1]
-    most = np.abs(value) + reach(linear) + second + own
-    rest = own * (1.0 + shift) + second * shift + most * curved
+    cable_rests = products.rest[:, :-1]
+    most = np.abs(value) + reach(linear) + second + cable_rests
+    rest = cable_rests * (1.0 + shift) + second * shift + most * curved
     rest = products.rest[:, -1] + (np.abs(limits) * rest).sum(1)
     return middle - reach(along) + least_quadratic(bends) - rest

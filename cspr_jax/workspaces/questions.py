@@ -18,13 +18,13 @@ from cspr_jax.workspaces.required import RequiredWrenches
 
 STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
 CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
-# Of dof - 1 cables each: seconds of a pose, and as many megabytes.
+# A choice has dof - 1 cables: with so many choices a pose takes seconds, and as many megabytes.
 MOST_CHOICES = 100_000
 
 
 @dataclasses.dataclass(frozen=True)
 class Requirement:
-    """What is asked of each pose.
+    """Requirement that each pose has to meet.
 
     Fields:
         condition: one of `CONDITIONS`.
@@ -83,7 +83,7 @@ def requirement(
 
 
 def _weight(robot: AnyRobot) -> RequiredWrenches:
-    # Of a body on a joint it turns with the body.
+    # The weight of a body on a joint turns with the body.
     if PATTERNS[robot.pattern].is_jointed:
         return RequiredWrenches(None)
     return RequiredWrenches(np.asarray(geometry.weights(robot, np.zeros((1, 3)), np.array([IDENTITY]))))
@@ -116,11 +116,11 @@ def required_wrenches(
             acceleration of a robot on a joint.
     """
     row, ellipsoids = PATTERNS[robot.pattern], list[np.ndarray]()
-    asked = _weight(robot)
+    required = _weight(robot)
     if points is not None:
         signs = np.ones(robot.dof)  # moments of a rod are 0
         signs[: len(row.forces) + len(row.moments)] = [frame.signs[i] for i in (*row.forces, *row.moments)]
-        asked = RequiredWrenches(_finite(robot, "wrenches", points, 2) * signs)
+        required = RequiredWrenches(_finite(robot, "wrenches", points, 2) * signs)
     half = None if box is None else _not_negative("wrench_box", _finite(robot, "wrench_box", box, 1))
     if ellipsoid is not None:
         ellipsoids.append(_not_negative("wrench_ellipsoid", _finite(robot, "wrench_ellipsoid", ellipsoid, 1)))
@@ -132,12 +132,12 @@ def required_wrenches(
             raise InputError("acceleration", acceleration, "a number >= 0, in m/s^2")
         radius = float(robot.mass) * radius
         ellipsoids.append(np.where(geometry.scales(robot), 0.0, radius))
-    return dataclasses.replace(asked, box=half, ellipsoids=tuple(ellipsoids))
+    return dataclasses.replace(required, box=half, ellipsoids=tuple(ellipsoids))
 
 
-def _finite(robot: AnyRobot, key: str, given: Any, ndim: int) -> np.ndarray:
+def _finite(robot: AnyRobot, key: str, entries: Any, ndim: int) -> np.ndarray:
     allowed = "finite numbers of shape " + (f"({robot.dof},)" if ndim == 1 else f"(k, {robot.dof}), k >= 1")
-    values = numbers(key, given, allowed)
+    values = numbers(key, entries, allowed)
     if values.ndim != ndim or not values.size or values.shape[-1] != robot.dof:
         raise InputError(key, None, f"must be {allowed}", fault=f"an array of shape {values.shape}")
     if not np.isfinite(values).all():

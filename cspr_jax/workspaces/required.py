@@ -70,10 +70,10 @@ class RequiredWrenches:
         """
         if self.points is None:
             raise TypeError(NO_POINTS)
-        found = (self.points @ normals.T).max(0)
+        products = (self.points @ normals.T).max(0)
         if self.box is not None:
-            found = found + np.abs(normals) @ self.box
-        return found + sum(np.linalg.norm(normals * axes, axis=1) for axes in self.ellipsoids)
+            products = products + np.abs(normals) @ self.box
+        return products + sum(np.linalg.norm(normals * axes, axis=1) for axes in self.ellipsoids)
 
     @property
     def spanning(self) -> list[np.ndarray]:
@@ -83,7 +83,7 @@ class RequiredWrenches:
 
     @property
     def is_one(self) -> bool:
-        """Whether it is a single wrench at each pose."""
+        """Tell whether a single wrench is required at each pose."""
         return (self.points is None or len(self.points) == 1) and self.box is None and not self.ellipsoids
 
     @property

@@ -57,7 +57,7 @@ class RestPoses:
     capacity: WorkspaceSearch | None = None
 
     def __call__(self, origins: np.ndarray, quaternions: np.ndarray) -> PoseColumns:
-        """Whether poses meet all conditions.
+        """Tell whether poses meet all conditions.
 
         Args:
             origins: (n, 3) of the platform frame, kernels' coordinates, m.
@@ -67,28 +67,28 @@ class RestPoses:
             (n,) verdict, each of `MARGINS`, NaN where nobody asks, and `NEAREST`.
         """
         places, count = mass_centres(self.robot, origins, quaternions), len(origins)
-        found: PoseColumns = {name: np.full(count, np.nan) for name in MARGINS}
+        columns: PoseColumns = {name: np.full(count, np.nan) for name in MARGINS}
         verdict = np.zeros(count, FLAGS)
-        for condition, asked in self.searches.items():
-            answers = asked(places, quaternions)
+        for condition, search in self.searches.items():
+            answers = search(places, quaternions)
             verdict |= answers.verdict
             name = "closure_margin" if condition == CLOSURE else "wrench_margin"
-            found[name] = np.fmin(found[name], answers.margin)
+            columns[name] = np.fmin(columns[name], answers.margin)
         if self.capacity is not None:
-            found["capacity_margin"] = self.capacity(places, quaternions).margin
-        found[NEAREST] = np.zeros(count, np.int16)
+            columns["capacity_margin"] = self.capacity(places, quaternions).margin
+        columns[NEAREST] = np.zeros(count, np.int16)
         if self.around is not None:
-            every = at_rest(self.robot, self.around, places, quaternions)
-            found |= {"clearance": every.clearance, NEAREST: nearest_bodies(self.around, every)}
-            found |= {name: getattr(every, of) for name, of in CLEARANCES.items()}
-            verdict |= flags(every)
+            distances = at_rest(self.robot, self.around, places, quaternions)
+            columns |= {"clearance": distances.clearance, NEAREST: nearest_bodies(self.around, distances)}
+            columns |= {name: getattr(distances, of) for name, of in CLEARANCES.items()}
+            verdict |= flags(distances)
         for name, flag, slack in self._limited(origins, quaternions):
             verdict |= np.where((slack < 0.0).any(1), flag, 0).astype(FLAGS)
-            found[name] = slack.min(1)
-        return {"verdict": conjunction(verdict), **found}
+            columns[name] = slack.min(1)
+        return {"verdict": conjunction(verdict), **columns}
 
     def sides(self, origins: np.ndarray, half: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
-        """Which cells, at one orientation, are proved to lie wholly on one side of the workspace.
+        """Tell which cells, at one orientation, are proved to lie wholly on one side of the workspace.
 
         While a robot moves by a distance without a turn, its heights and the lengths of its cables change by no more
         than that; distances and speeds of cables change as `workspaces.shifts` says.
@@ -104,19 +104,19 @@ class RestPoses:
         turns = np.repeat(quaternion[None], len(origins), axis=0)
         places, reach = mass_centres(self.robot, origins, turns), np.linalg.norm(half, axis=1)
         inside, outside = np.ones(len(origins), bool), np.zeros(len(origins), bool)
-        for asked in self.searches.values():
-            kept, lost = WorkspaceCells(self.robot, asked.asked)(places, half, quaternion, asked(places, turns))
-            inside, outside = inside & kept, outside | lost
+        for search in self.searches.values():
+            held, lost = WorkspaceCells(self.robot, search.asked)(places, half, quaternion, search(places, turns))
+            inside, outside = inside & held, outside | lost
         moved = shifts(self.robot, places, turns, reach)
         if self.robot.pulleys is not None:
             # A platform within a pulley has no cable there.
             inside &= (moved.free > 0.0).all(1)
         slacks = list[tuple[np.ndarray, np.ndarray]]()
         if self.around is not None:
-            every = at_rest(self.robot, self.around, places, turns)
-            slacks += [(getattr(every, of)[:, None], getattr(moved, of)[:, None]) for of in ("cables", "obstacles")]
-            inside &= (every.platform > moved.near_platform(self.around) + CLOSE) & ~every.is_open
-            outside |= every.platform < -moved.platform - CLOSE
+            distances = at_rest(self.robot, self.around, places, turns)
+            slacks += [(getattr(distances, of)[:, None], getattr(moved, of)[:, None]) for of in ("cables", "obstacles")]
+            inside &= (distances.platform > moved.near_platform(self.around) + CLOSE) & ~distances.is_open
+            outside |= distances.platform < -moved.platform - CLOSE
         changes = {} if self.speeds is None else {"speed_margin": self.speeds.changes(moved)}
         slacks += [(slack, changes.get(name, reach[:, None])) for name, _, slack in self._limited(origins, turns)]
         for slack, change in slacks:
@@ -129,7 +129,7 @@ class RestPoses:
         return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
 
     def _limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
-        # Of each limit its quantity, its flag, and (n, k) what is left of it.
+        # Yield for each limit its quantity, its flag, and (n, k) the slack that is left.
         places = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
             yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - places[:, 2:]
@@ -147,7 +147,7 @@ def over_orientations(
     volume: np.ndarray,
     kind: OrientationSet,
 ) -> PoseColumns:
-    """Whether places belong to the workspace of a set of orientations.
+    """Tell whether places belong to the workspace of a set of orientations.
 
     Args:
         ask: of poses, as `RestPoses` is.
@@ -163,15 +163,15 @@ def over_orientations(
     parts, count = list[PoseColumns](), len(orientations)
     step = max(1, AT_ONCE // count)
     for start in range(0, len(origins), step):
-        some = origins[start : start + step]
-        found = ask(np.repeat(some, count, axis=0), np.tile(orientations, (len(some), 1)))
-        parts.append(_of_places({name: values.reshape(-1, count) for name, values in found.items()}, volume, kind))
+        places = origins[start : start + step]
+        columns = ask(np.repeat(places, count, axis=0), np.tile(orientations, (len(places), 1)))
+        parts.append(_of_places({name: values.reshape(-1, count) for name, values in columns.items()}, volume, kind))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _of_places(every: PoseColumns, volume: np.ndarray, kind: OrientationSet) -> PoseColumns:
+def _of_places(columns: PoseColumns, volume: np.ndarray, kind: OrientationSet) -> PoseColumns:
     # (n_places, n_orientations) each.
-    verdict = every["verdict"]
+    verdict = columns["verdict"]
     inside = verdict == 0
     is_open = ~inside & ((verdict & ~FLAGS(OPEN.value)) == 0)
     if kind == "inclusion":
@@ -182,14 +182,14 @@ def _of_places(every: PoseColumns, volume: np.ndarray, kind: OrientationSet) -> 
         may_be = ~is_met & (inside | is_open).all(1)
     # A set that is refuted is so for the orientations that are refuted, however many others are open.
     reasons = np.where(is_met, 0, _most_frequent(np.where(is_open == may_be[:, None], verdict, 0)))
-    found = {name: best(every[name], axis=1) for name in MARGINS}
-    at = (every["clearance"] == found["clearance"][:, None]).argmax(1)
-    found[NEAREST] = every[NEAREST][np.arange(len(at)), at]
-    return {"verdict": reasons.astype(FLAGS), **found, "orientation_fraction": inside @ volume}
+    best_values = {name: best(columns[name], axis=1) for name in MARGINS}
+    at = (columns["clearance"] == best_values["clearance"][:, None]).argmax(1)
+    best_values[NEAREST] = columns[NEAREST][np.arange(len(at)), at]
+    return {"verdict": reasons.astype(FLAGS), **best_values, "orientation_fraction": inside @ volume}
 
 
 def _most_frequent(verdict: np.ndarray) -> np.ndarray:
-    # Of each row the flags that most of those have that are not 0.
+    # Return for each row its most frequent flags among the entries that are not 0.
     values = np.unique(verdict[verdict != 0])
     if len(values) == 0:
         return np.zeros(len(verdict), FLAGS)

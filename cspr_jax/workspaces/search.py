@@ -26,15 +26,16 @@ from cspr_jax.workspaces.margins import Wrenches
 from cspr_jax.workspaces.questions import CLOSURE, Requirement
 from cspr_jax.workspaces.required import RequiredWrenches
 
-# Of the largest limit of the tensions, or of the wrench: a margin nearer to zero is that of the boundary.
+# A margin nearer to zero than this part of the largest limit of the tensions, or of the wrench, is on the boundary.
 BOUNDARY = 1e-9
-# Likewise: how far apart single precision may leave the bounds of a margin.
+# Single precision may leave the bounds of a margin this far apart, likewise over the largest limit.
 TOLD = 1e-3
 PART = 1 << 18
 # Poses of a batch where few are asked about, and of what is only prepared here.
 BATCH = 1024
 MOST_SHORT = 8  # short batches
-# Of the wrench matrices of a batch where many are: what starts a call is then short beside it, and caches hold most.
+# Bytes of the wrench matrices of a batch where poses are many: the start of a call is then short beside it, and caches
+# hold most.
 BYTES = 6_400_000
 # Poses by which the base block is chosen, and those by which cocircuits that are none are left out.
 TRIALS, FEW_TRIALS = 200, 8
@@ -99,7 +100,7 @@ class WorkspaceSearch:
     """
 
     def __init__(self, robot: AnyRobot, asked: Requirement, *, precision: str = "float64") -> None:
-        """Of a robot, centred, z down.
+        """Prepare the search for a robot, centred, z down.
 
         With precision "float32" that decides the poses of which it can, and float64 the others; margins of the former
         are good to 1e-3 of the limits.
@@ -126,7 +127,7 @@ class WorkspaceSearch:
     def __call__(
         self, positions: np.ndarray, quaternions: np.ndarray | None, wrenches: np.ndarray | None = None
     ) -> WorkspaceAnswers:
-        """Whether poses belong to the workspace.
+        """Tell whether poses belong to the workspace.
 
         Args:
             positions: (n, 3) of the mass centre, or of the joint, m.
@@ -156,7 +157,7 @@ class WorkspaceSearch:
         rng, base, row = np.random.default_rng(1), np.asarray(self._robot.base_points), PATTERNS[self._robot.pattern]
         low, high = base.min(0), base.max(0)
         middle, half = 0.5 * (low + high), 0.4 * (high - low)
-        # Where all spools have one x, what vanishes in their plane does so nowhere else.
+        # If all spools have one x, components that vanish in their plane vanish nowhere else.
         moves = np.isin(range(3), row.forces or range(3))
         half = np.where(moves, np.maximum(half, 0.2 * half.max() or 1.0), half)
         regular = np.zeros((0, self._robot.dof, self._robot.n_cables))
@@ -175,8 +176,8 @@ class WorkspaceSearch:
     def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Wrench matrices, moments over the length.
         poses = positions, quaternions
-        found = in_batches(lambda x: geometry.wrench_matrices(self._robot, *x), poses, size=TRIALS)
-        return found / self.unit[:, None]
+        matrices = in_batches(lambda x: geometry.wrench_matrices(self._robot, *x), poses, size=TRIALS)
+        return matrices / self.unit[:, None]
 
     def _part(self, poses: Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         count = len(poses.positions)
@@ -185,9 +186,9 @@ class WorkspaceSearch:
             places = np.flatnonzero(is_open)
             if len(places) == 0 or len(places) < min(FEW, count):
                 break
-            found = stage(poses.some(places))
-            is_known = accepts(found)
-            known = found[is_known]
+            bounds = stage(poses.some(places))
+            is_known = accepts(bounds)
+            known = bounds[is_known]
             margin[places[is_known]] = 0.5 * (known.real + known.imag)
             is_open[places[is_known]] = False
         is_open |= np.abs(margin) <= self._boundary
@@ -197,13 +198,13 @@ class WorkspaceSearch:
         return margin, is_open, is_outside
 
     def _stages(self):
-        def is_known(found, apart=1.0):
+        def is_known(bounds, apart=1.0):
             with np.errstate(invalid="ignore"):
-                return (found.real == found.imag) | (found.imag - found.real <= apart * self._boundary)
+                return (bounds.real == bounds.imag) | (bounds.imag - bounds.real <= apart * self._boundary)
 
-        def is_told(found):
-            is_clear = (found.real > self._boundary) | (found.imag < -self._boundary)
-            return is_clear & is_known(found, TOLD / BOUNDARY)
+        def is_told(bounds):
+            is_clear = (bounds.real > self._boundary) | (bounds.imag < -self._boundary)
+            return is_clear & is_known(bounds, TOLD / BOUNDARY)
 
         if not len(self._choices.table):  # whatever the pose, the cables do not span all components
             return
@@ -245,7 +246,7 @@ class WorkspaceSearch:
         options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.asked.high).all())}
         robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
         limits = leaf(self.asked.low[ordered]), leaf(self.asked.high[ordered]), leaf(self._normals_unit)
-        asked, length, fixed = cast((kernels.TensionLimits(*limits), leaf(self._length), self._fixed))
+        tension_limits, length, fixed = cast((kernels.TensionLimits(*limits), leaf(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
 
@@ -253,9 +254,9 @@ class WorkspaceSearch:
             columns, loss = geometry.wrench_columns(robot, place, turn, length)
             wrenches = fixed if load is None else fixed._replace(points=[load])
             if not by_null_space:
-                return kernels.by_normals(columns, loss, wrenches, asked, choices, **options)
+                return kernels.by_normals(columns, loss, wrenches, tension_limits, choices, **options)
             space = kernels.null_space(columns, loss, wrenches.points[0], order=self._order)
-            return kernels.by_null_space(space, asked, choices, **options)
+            return kernels.by_null_space(space, tension_limits, choices, **options)
 
         return compiled
 
@@ -285,7 +286,7 @@ class WorkspaceSearch:
         return cocircuits.CableSubsets(np.take_along_axis(places, sorting, 1), ordered)
 
     def required(self, position: np.ndarray, quaternion: np.ndarray) -> RequiredWrenches:
-        """What the cables must supply at a pose.
+        """Wrenches that the cables must supply at a pose.
 
         Args:
             position: (3,) of the mass centre, or of the joint, m.
@@ -298,7 +299,7 @@ class WorkspaceSearch:
         return self._wrenches if load is None else self._wrenches.about(load[0])
 
     def _weights(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray | None:
-        # Of a body on a joint.
+        # Only the weight of a body on a joint depends on the pose.
         if self._wrenches.points is not None:
             return None
         poses = positions, quaternions
@@ -306,10 +307,12 @@ class WorkspaceSearch:
 
     @property
     def _fixed(self) -> Wrenches:
-        # Without the weight of a body on a joint.
-        asked = self._wrenches
-        points = [] if asked.points is None else [[leaf(x) for x in point] for point in asked.points]
-        return Wrenches(points, None if asked.box is None else leaf(asked.box), [leaf(x) for x in asked.ellipsoids])
+        # The weight of a body on a joint is not among them: it depends on the pose.
+        required = self._wrenches
+        points = [] if required.points is None else [[leaf(x) for x in point] for point in required.points]
+        return Wrenches(
+            points, None if required.box is None else leaf(required.box), [leaf(x) for x in required.ellipsoids]
+        )
 
     def _exactly(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
         matrices = self._matrices(poses.positions, poses.quaternions)
@@ -322,8 +325,8 @@ class WorkspaceSearch:
                 margins[i] = exact.closure_margin(columns, self._choices)
                 is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
             else:
-                asked = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
-                margins[i] = exact.wrench_margin(columns, asked, self.asked.low, self.asked.high, measure)
+                required = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
+                margins[i] = exact.wrench_margin(columns, required, self.asked.low, self.asked.high, measure)
                 is_outside[i] = margins[i] == -np.inf
         return margins, is_outside
 

@@ -38,7 +38,7 @@ class CableSpeeds:
     most: np.ndarray
 
     def margins(self, origins: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        """What is left of the largest speeds.
+        """Slack that is left to the largest speeds of the cables.
 
         Args:
             origins: (n, 3) of the platform frame, kernels' coordinates, m.
@@ -62,7 +62,7 @@ class CableSpeeds:
         Returns:
             (n, n_cables) m/s.
         """
-        # Of a robot that moves in all directions in which its cables lie, the first term stays what it is.
+        # The first term does not change for a robot that moves in all directions in which its cables lie.
         speed = self.speed if PATTERNS[self.robot.pattern].forces == (2,) else 0.0
         if not isinstance(self.robot, PlatformRobot):
             return moved.units * speed

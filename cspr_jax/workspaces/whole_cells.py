@@ -26,7 +26,7 @@ class WorkspaceCells:
     """
 
     def __init__(self, robot: AnyRobot, asked: Requirement) -> None:
-        """Of a robot, centred, z down."""
+        """Prepare the question for a robot, centred, z down."""
         self._robot, self._asked, self._search = robot, asked, WorkspaceSearch(robot, asked)
 
     def __call__(
@@ -38,7 +38,7 @@ class WorkspaceCells:
         *,
         depth: int = DEPTH,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Which cells lie wholly inside, and which wholly outside.
+        """Tell which cells lie wholly inside, and which wholly outside.
 
         Args:
             positions: (n, 3) centres of the cells, of the mass centre, or of the joint, m.
@@ -59,23 +59,23 @@ class WorkspaceCells:
             with double_precision():
                 proofs = CellProofs(self._robot, self._asked, self._search, turn)
                 for first in range(0, len(chosen), ROUND):
-                    some = slice(first, first + ROUND)
-                    now = chosen[some]
-                    given = positions[now], sizes[some], side[now], answers.margin[now]
-                    proved[now] = self._proved(proofs, turn, *given, depth)
+                    rows = slice(first, first + ROUND)
+                    numbers = chosen[rows]
+                    cells = positions[numbers], sizes[rows], side[numbers], answers.margin[numbers]
+                    proved[numbers] = self._proved(proofs, turn, *cells, depth)
         return proved & (side > 0), proved & (side < 0)
 
     def _proved(self, proofs, turn, centres, half, side, margin, depth) -> np.ndarray:
-        """Whether cells lie wholly on the side of their centres, halved as often as `depth` allows."""
-        found = np.zeros(len(centres), bool)
+        """Tell whether cells lie wholly on the side of their centres, halved as often as `depth` allows."""
+        is_proved = np.zeros(len(centres), bool)
         inside, outside = np.flatnonzero(side > 0), np.flatnonzero(side < 0)
         if len(inside):
-            found[inside] = proofs.least_margins(centres[inside], half[inside], margin[inside]) > 0.0
+            is_proved[inside] = proofs.least_margins(centres[inside], half[inside], margin[inside]) > 0.0
         if len(outside):
-            found[outside] = proofs.outside(centres[outside], half[outside])
-        left = np.flatnonzero(~found)
+            is_proved[outside] = proofs.outside(centres[outside], half[outside])
+        left = np.flatnonzero(~is_proved)
         if depth == 0 or len(left) == 0 or not half.any():
-            return found
+            return is_proved
         corners = np.array(list(itertools.product(*[(-0.5, 0.5) if size else (0.0,) for size in half.max(0)])))
         # Only those can be proved all of whose parts have their centres on the same side.
         inner = centres[left, None] + corners * half[left, None]
@@ -83,13 +83,13 @@ class WorkspaceCells:
         sides, margins = (values.reshape(inner.shape[:2]) for values in (sides, margins))
         agreeing = (sides == side[left, None]).all(1)
         if agreeing.any():
-            kept, count = left[agreeing], len(corners)
-            halves, own = (np.repeat(values[kept], count, axis=0) for values in (0.5 * half, side))
+            halved, count = left[agreeing], len(corners)
+            halves, part_sides = (np.repeat(values[halved], count, axis=0) for values in (0.5 * half, side))
             parts = self._proved(
-                proofs, turn, inner[agreeing].reshape(-1, 3), halves, own, margins[agreeing].ravel(), depth - 1
+                proofs, turn, inner[agreeing].reshape(-1, 3), halves, part_sides, margins[agreeing].ravel(), depth - 1
             )
-            found[kept] = parts.reshape(-1, count).all(1)
-        return found
+            is_proved[halved] = parts.reshape(-1, count).all(1)
+        return is_proved
 
     def _centres(self, positions: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         answers = self._search(positions, np.tile(turn, (len(positions), 1)))

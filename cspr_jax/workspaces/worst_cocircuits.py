@@ -11,9 +11,9 @@ from jax import Array
 
 from cspr_jax.robots.wrench_sets import normals_to, spanning
 
-# Of the largest component of a cocircuit: smaller ones do not make it void.
+# Components of a cocircuit below this part of the largest one do not make it void.
 ZERO = 1e-9
-# Of unit columns: a normal to dof - 1 of them whose products with all others are smaller means nothing.
+# A normal to dof - 1 unit columns whose products with all others are smaller than this means nothing.
 SHORT = 1e-9
 
 
@@ -64,18 +64,18 @@ def worst_cocircuits(
     """
     dof, count = matrices.shape[1:]
     chosen = spanning(count, dof)
-    own = np.zeros((len(chosen), count), bool)
-    np.put_along_axis(own, chosen, True, axis=1)
+    is_own = np.zeros((len(chosen), count), bool)
+    np.put_along_axis(is_own, chosen, True, axis=1)
     free = np.array(unbounded)
 
     def one(matrix):
         normals = jnp.ones((1, 1)) if dof == 1 else normals_to(matrix)
-        along = jnp.where(own, 0.0, normals @ matrix)
+        along = jnp.where(is_own, 0.0, normals @ matrix)
         normals, along = jnp.concatenate([normals, -normals]), jnp.concatenate([along, -along])
         largest = jnp.max(jnp.abs(along), axis=1, keepdims=True)
         products = normals @ wrenches.T
         if condition == "closure":
-            others = jnp.where(np.concatenate([own, own]), jnp.inf, along)
+            others = jnp.where(np.concatenate([is_own, is_own]), jnp.inf, along)
             value = -jnp.min(others, axis=1)
             is_void, load = jnp.zeros(value.shape, bool), jnp.asarray(0)
         else:
