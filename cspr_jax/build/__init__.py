@@ -1,0 +1,1 @@
+"""Robots, orientations, limits and problems that kernels take, built from checked files."""

@@ -1,0 +1,42 @@
+"""Orientations of a file in the axes of the kernels."""
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import IDENTITY, Frame
+from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
+from cspr_jax.errors import ConfigError, shown
+
+
+def orientations(frame: Frame, points: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes.
+
+    Args:
+        frame: of the file, whose axes the angles are of.
+        points: (n, 3) from the centroid of the spools, z down, m.
+        angles: (n, 3) phi, theta, sigma, rad.
+
+    Returns:
+        (n, 4) unit quaternions.
+    """
+    return frame.turned_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.turned(points))))
+
+
+def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> np.ndarray:
+    """An orientation given as a quaternion, which may miss length 1 by rounding.
+
+    Args:
+        quaternion: scalar first; None: the reference orientation.
+        key: named in errors.
+        file: named in errors.
+
+    Returns:
+        (4,) of unit length.
+
+    Raises:
+        ConfigError: not of unit length.
+    """
+    given = np.asarray(IDENTITY if quaternion is None else quaternion)
+    size = float(np.linalg.norm(given))
+    if abs(size - 1.0) > UNIT_TOLERANCE:
+        raise ConfigError(file, f"{key} = {shown(quaternion)}: must have length 1 (it has {size:.7g})")
+    return given / size

@@ -1,0 +1,106 @@
+"""Problems for the kernels, built from checked files: robot, limits, amplitude function."""
+
+from cspr_jax.build.limits import build_limits
+from cspr_jax.build.robots import is_redundant_platform, kernel_robot
+from cspr_jax.config.limits import LimitTable
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
+from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.motions import amplitudes
+from cspr_jax.motions.amplitudes import Amplitude, boundary_errors
+from cspr_jax.motions.given_limits import check_bounded, check_certain
+from cspr_jax.motions.platform_kind import PlatformMotionKind
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.schema.families import FAMILIES
+
+
+def build_amplitude(
+    keys: TrajectoryKeys, file: object, *, epsilon: float | None = None, at: str = "", for_bounds: bool = False
+) -> Amplitude:
+    """The amplitude function, its boundary conditions checked.
+
+    Args:
+        keys: of the plan or sweep.
+        file: named in errors.
+        epsilon: stands in for "best".
+        at: prefix of the key in errors.
+        for_bounds: whether "ideal" will do, which is no motion.
+
+    Returns:
+        the function.
+
+    Raises:
+        ConfigError: it breaks (2.49), of a transition (1.27) or (1.28); epsilon = "best" where a value must be given.
+    """
+    key = keys.amplitude
+    if isinstance(key, PolynomialAmplitude):
+        amplitude, given = amplitudes.from_polynomial(key.polynomial), shown(list(key.polynomial))
+    elif isinstance(key, NamedAmplitude):
+        value = key.epsilon if isinstance(key.epsilon, float) else epsilon
+        if value is None:
+            raise ConfigError(file, f'{at}amplitude.epsilon = "best": must be a number in ]0, 0.5] (a plan can choose)')
+        amplitude, given = amplitudes.named(key.name, value), shown(key.name)
+    else:
+        amplitude, given = amplitudes.named(key), shown(key)
+    free_end = all(FAMILIES[name].free_end for name in keys.families)
+    broken = [] if key == "ideal" and for_bounds else boundary_errors(amplitude, free_end=free_end)
+    if broken:
+        conditions = "(1.27) and (1.28)" if free_end else "(2.49)"
+        raise ConfigError(file, f"{at}amplitude = {given}: must meet {conditions}, but " + "; ".join(broken))
+    return amplitude
+
+
+def build_problem(
+    robot_file: RobotFile,
+    keys: TrajectoryKeys,
+    limits: LimitTable,
+    file: object,
+    *,
+    epsilon: float | None = None,
+    at: str = "",
+    for_bounds: bool = False,
+    any_cables: bool = False,
+) -> Problem:
+    """Robot, limits and amplitude function of a plan or sweep, as the kernels take them.
+
+    Args:
+        robot_file: the robot file's content.
+        keys: of the trajectory.
+        limits: keys of the limits.
+        file: named in errors.
+        epsilon: stands in for an amplitude function's "best".
+        at: prefix of keys of the trajectory in errors.
+        for_bounds: whether the amplitude function may be "ideal", which is no motion.
+        any_cables: whether there may be more cables than degrees of freedom.
+
+    Returns:
+        the problem: its robot is centred; a platform in its reference axes.
+
+    Raises:
+        ConfigError: the robot, the amplitude function or the limits cannot be used.
+    """
+    amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
+    given = build_limits(robot_file, limits, file)
+    robot = kernel_robot(robot_file, keys, file, any_cables=any_cables)
+    try:
+        if not is_redundant_platform(robot):
+            check_bounded(given)
+        check_certain(robot, given, keys.families, in_pairs=robot_file.pairs is not None)
+    except InputError as error:
+        raise ConfigError(file, str(error)) from error
+    return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
+
+
+def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> PlatformMotionKind:
+    """Kind of the motions of a platform.
+
+    Args:
+        keys: of the plan or sweep.
+        from_rest: whether all start at rest in P0.
+
+    Returns:
+        the kind.
+    """
+    return PlatformMotionKind(keys.family == "hypocycloid", keys.beat == "beta_1", from_rest)

@@ -1,0 +1,157 @@
+"""Robots for the kernels, built from checked files."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.build.limits import build_limits
+from cspr_jax.config.limits import LimitKeys
+from cspr_jax.config.robot import RobotFile, resolve_robot
+from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motions.given_limits import check_bounded
+from cspr_jax.robots import point_mass
+from cspr_jax.robots.cables import with_cables
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.platform import PlatformRobot, platform_robot
+from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
+from cspr_jax.robots.reference_pose import reference_pose
+from cspr_jax.robots.robot import MOVED, check_moved
+from cspr_jax.robots.static_equilibrium import slack_at_rest
+
+MAKERS = {"1T": point_mass.guided_robot, "2T": point_mass.planar_robot, "3T": point_mass.point_mass_robot}
+
+
+def gravity_of(robot_file: RobotFile, keys: TrajectoryKeys) -> float:
+    """Gravity: the plan's or sweep's, else the robot's, else 9.81 m/s^2.
+
+    Args:
+        robot_file: the robot.
+        keys: of the plan or sweep.
+
+    Returns:
+        m/s^2.
+    """
+    return keys.gravity or robot_file.gravity or STANDARD_GRAVITY
+
+
+def build_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot | PlatformRobot:
+    """The robot of a file, in its own axes and with its own limits.
+
+    Args:
+        robot_file: the robot file's content.
+        keys: of the plan or sweep.
+        file: named in errors.
+
+    Returns:
+        the robot.
+
+    Raises:
+        ConfigError: its geometry, inertia or limits cannot be used.
+    """
+    given: dict[str, Any] = {"mass": robot_file.mass, "gravity": gravity_of(robot_file, keys), "name": robot_file.name}
+    given |= {"z_axis": robot_file.z_axis, "limits": build_limits(robot_file, LimitKeys(), file)}
+    try:
+        if not robot_file.is_platform:
+            return with_cables(
+                MAKERS[robot_file.own_pattern](robot_file.base_points, **given), **_of_cables(robot_file)
+            )
+        given |= {"inertia": robot_file.inertia, "centre_of_mass": robot_file.centre_of_mass or [0.0, 0.0, 0.0]}
+        robot = platform_robot(
+            robot_file.base_points, robot_file.platform_points, pattern=robot_file.own_pattern, **given
+        )
+        return with_cables(robot, **_of_cables(robot_file))
+    except InputError as error:
+        raise ConfigError(file, robot_file.typed(error)) from error
+
+
+def _of_cables(robot_file: RobotFile) -> dict[str, Any]:
+    return {name: getattr(robot_file, name) for name in ("cable_diameter", "pulley_radius", "pulley_axes")}
+
+
+def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
+    """A robot of the catalogue, or of a file, with its axes and its limits.
+
+    Args:
+        reference: a catalogue name, or the path of a robot file.
+
+    Returns:
+        the robot: a point mass or a platform.
+
+    Raises:
+        ConfigError: no such robot, or a mistake in its file.
+    """
+    robot_file = resolve_robot(str(reference), reference, Path.cwd())
+    return build_robot(robot_file, TrajectoryKeys(), reference)
+
+
+def kernel_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object, *, any_cables: bool = False) -> Any:
+    """The robot of a file, as the kernels take it; a platform's axes are still those of the file.
+
+    Args:
+        robot_file: the robot file's content.
+        keys: of the plan or sweep.
+        file: named in errors.
+        any_cables: whether there may be more cables than degrees of freedom.
+
+    Returns:
+        the robot, centred.
+
+    Raises:
+        ConfigError: its geometry or inertia cannot be used, it has more cables than degrees of freedom, or no
+            trajectory moves such a robot.
+    """
+    robot: Any = build_robot(robot_file, keys, file)
+    place, key = robot_file.placed("base_points", file)
+    try:
+        check_moved(robot)
+        if not is_redundant_platform(robot):
+            check_bounded(robot.limits)
+    except InputError as error:
+        raise ConfigError(place, key.removesuffix("base_points") + str(error)) from error
+    if robot.n_cables != robot.dof and not any_cables:
+        raise ConfigError(
+            place,
+            f'{key}: {robot.n_cables} points: must be {robot.dof} for family "{keys.family}" '
+            "(it does not exist yet for more cables than degrees of freedom)",
+        )
+    return centred(robot)[0]
+
+
+def fault_at_rest(robot_file: RobotFile) -> str | None:
+    """Reason why a robot cannot hang still in its reference orientation, if it cannot.
+
+    Args:
+        robot_file: the robot. A platform is tried as deep below the centroid of its spools as these are away from it,
+            one on more cables at many depths; see `robots.static_equilibrium`.
+
+    Returns:
+        the reason; None if it hangs with every cable taut.
+    """
+    robot_file = robot_file.equivalent() if robot_file.translation_only else robot_file
+    try:
+        if len(robot_file.base_points) > robot_file.dof or robot_file.own_pattern not in MOVED:
+            return slack_at_rest(
+                centred(shared := build_robot(robot_file, TrajectoryKeys(), robot_file.name))[0], shared.limits
+            )
+        if robot_file.is_platform:
+            robot = kernel_robot(robot_file, TrajectoryKeys(), robot_file.name)
+            reference_pose(robot, float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean()))
+        else:
+            build_robot(robot_file, TrajectoryKeys(), robot_file.name)
+    except (ConfigError, InputError) as error:
+        return str(error)
+    return None
+
+
+def is_redundant_platform(robot: PointMassRobot | PlatformRobot) -> bool:
+    """Tell whether margins of tensions judge a robot, which know cables without a largest one.
+
+    Args:
+        robot: of any kind.
+
+    Returns:
+        whether it is a platform on more cables than degrees of freedom.
+    """
+    return isinstance(robot, PlatformRobot) and robot.n_cables > robot.dof
