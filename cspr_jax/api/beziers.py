@@ -41,7 +41,7 @@ class BezierVerdicts(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Whether each segment is proved feasible, (n,)."""
+        """Tell whether each segment is proved feasible, (n,)."""
         return self.verdict == 0
 
 

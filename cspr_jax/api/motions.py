@@ -184,7 +184,7 @@ def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
 
 
 def _is_finite(numbers: Array) -> bool:
-    # What jax traces counts as finite.
+    # Numbers that jax traces count as finite.
     return isinstance(numbers, jax.core.Tracer) or bool(np.isfinite(np.asarray(numbers)).all())
 
 

@@ -148,7 +148,7 @@ def _of_map(
             warnings.append(f"{_words(result, index)}: no motion, its numbers are not finite")
             continue
         place = dict(zip(result.axes, index, strict=True))
-        # Of points that occur twice the first is shown.
+        # If a point occurs twice, the page shows the first.
         same = [_rank(result.axes[name], own, place[name]) for name, own in zip(names, points, strict=True)]
         found[str(int(np.ravel_multi_index(same, content["shape"])))] = len(motions)
         motions.append(planned)

@@ -74,7 +74,7 @@ def _unbalanced(robot_file: RobotFile) -> list[str]:
 
 
 def _distance_to_hull(points: np.ndarray) -> float:
-    # Of the origin from the hull of points (n, axes), whose size is 1. One heavy row holds the sum of the weights.
+    # Return how far the origin is from the hull of points (n, axes), of size 1. One heavy row holds the sum of weights.
     if np.linalg.norm(points.mean(axis=0)) <= ROUNDING:
         return 0.0
     from scipy.optimize import nnls  # takes long to import, and the mean mostly answers
@@ -140,7 +140,7 @@ def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
 
 
 def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure: str = "rest = true") -> str:
-    """Whether a place is P0 but for its last digits.
+    """Tell whether a place is P0 but for its last digits.
 
     Args:
         key: that gives the place.
@@ -165,7 +165,7 @@ def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure
 
 
 def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) -> str:
-    """Whether the z axis seems to point the other way.
+    """Tell whether the z axis seems to point the other way.
 
     Args:
         robot_file: the robot.

@@ -62,7 +62,7 @@ def _one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) 
 
 
 Direction = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
-# Of types that are made here mypy asks nothing.
+# A function makes these types; they are Any to mypy, which does not check them.
 PerCable: Any = _one_or_each(Positive, Positive)
 NotNegativePerCable: Any = _one_or_each(NotNegative, NotNegative)
 TensionPerCable: Any = _one_or_each(Positive, Bound)

@@ -13,7 +13,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.robots import shapes
 
 MOST_OBSTACLES, MOST_CORNERS = 1000, 1000
-# Of a unit quaternion; as in `arithmetic.rotations`, with jax.
+# A unit quaternion may miss the norm 1 by this much; `arithmetic.rotations`, which needs jax, has the same number.
 UNIT_TOLERANCE = 1e-6
 Extent = Annotated[float, Field(ge=0.0, le=shapes.LARGEST_LENGTH)]
 Radius = Annotated[float, Field(gt=0.0, le=shapes.LARGEST_LENGTH)]

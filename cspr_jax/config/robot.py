@@ -89,7 +89,7 @@ class RobotFile(LimitKeys):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out of a file of another program, one line each."""
+        """Items that were left out of a file of another program, one line each."""
         return self._notes
 
     @property
@@ -99,7 +99,7 @@ class RobotFile(LimitKeys):
 
     @property
     def is_platform(self) -> bool:
-        """Whether it is a rigid platform."""
+        """Tell whether the robot is a rigid platform."""
         return self.platform_points is not None
 
     @property
@@ -109,7 +109,7 @@ class RobotFile(LimitKeys):
 
     @property
     def is_planar(self) -> bool:
-        """Whether everything lies in the plane y = 0."""
+        """Tell whether everything lies in the plane y = 0."""
         return PATTERNS[self.own_pattern].is_planar
 
     @property
@@ -187,7 +187,7 @@ class RobotFile(LimitKeys):
 
     @property
     def pairs(self) -> ParallelPairs | None:
-        """Of an equivalent the pairs that its cables stand for; its limits are still those of the six cables."""
+        """Pairs that the cables of an equivalent stand for; its limits are still those of the six cables."""
         return None if self._platform is None else self._platform.parallel_pairs()
 
     @property

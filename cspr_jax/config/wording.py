@@ -108,7 +108,7 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
 
 
 def _question(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> str:
-    # What a string, or a number in place of a list, probably stands for.
+    # The question guesses what a string, or a number in place of a list, stands for.
     value, key = error["input"], str(parts[-1]) if parts else ""
     if not isinstance(value, str):
         is_single = error["loc"][-1:] == ("~values",) and isinstance(value, int | float) and not isinstance(value, bool)

@@ -30,7 +30,7 @@ MAX_SIZE = "JAX_COMPILATION_CACHE_MAX_SIZE"
 _ENTRY, _USED = "-cache", "-atime"
 _OWN, _MARK = "run", "~"
 _TROUBLE = re.compile(r"Error (reading|writing) persistent compilation cache entry")
-# What hands over the entries of this process, once.
+# The list holds the callable that hands over the entries of this process, once.
 _pending: list[Callable[[], None]] = []
 # Whatever the umask says, others write into none of our folders.
 PRIVATE = 0o700
@@ -250,7 +250,7 @@ def _is_whole_zstd(zstd, data: bytes) -> bool:
 
 
 def _sweep(folder: Path) -> None:
-    # What runs of this machine that were killed have left.
+    # Runs of this machine that were killed have left these folders behind.
     for place in folder.glob(f"{_OWN}-{socket.gethostname()}-*"):
         process = place.name.rpartition("-")[2]
         if process.isdigit() and _is_gone(int(process)):

@@ -180,7 +180,7 @@ def tell_compiling() -> None:
 
 
 def _readable(name: str) -> str:
-    # Of jit(_first_look), or jit__first_look.
+    # The name comes as jit(_first_look), or jit__first_look.
     return re.sub(r"^jit[(_]|\)$", "", name).replace("_", " ").strip()
 
 
@@ -194,7 +194,7 @@ def _few_arenas() -> None:
 
 
 def _folder(given: str | Path | None, warn: Callable[[str], None]) -> Path | None:
-    # Of this processor, this jaxlib and this Python: code compiled for another one must not run here.
+    # The folder belongs to this processor, this jaxlib and this Python: code compiled for another one must not run here.
     given = os.environ.get("CSPR_CACHE_DIR") if given is None else given
     if given == "":
         return None
@@ -219,7 +219,7 @@ def _folder(given: str | Path | None, warn: Callable[[str], None]) -> Path | Non
 
 
 def _versions() -> tuple[str, str]:
-    # Of jaxlib as it says itself: what an installer has noted may be of another one, or missing.
+    # jaxlib is asked for its version itself: an installer may have noted that of another jaxlib, or none.
     import jaxlib.version
 
     try:
@@ -240,8 +240,8 @@ def _flags(folder: Path, given: str, *, quick: bool = False) -> str:
     # XLA reads what does not begin with a dash as the name of a file of flags: there is no place for ours.
     if given.strip() and not given.lstrip().startswith("-"):
         return given
-    # Of two settings of one flag XLA takes the last: those of the user. They are not set twice, since all of the words
-    # are part of what compiled code is known by.
+    # If a flag is set twice, XLA takes the last setting: the user's. Ours is then left out, since compiled code is known
+    # by all of the words.
     ours = [WIDE] if NEEDS in _processor() else []
     named = [word.partition("=")[0] for word in given.split()]
     ours = [flag for flag in (*ours, *(QUICK if quick else ())) if flag.partition("=")[0] not in named]

@@ -16,7 +16,7 @@ from cspr_jax.schema.quantities import EVERY, flag_attributes
 if TYPE_CHECKING:
     import xarray
 
-# Of answers with a value at either end of a segment.
+# Answers with a value at either end of a segment have an axis of these two points.
 ENDS = ("start", "target")
 CONTROL_POINTS = ("start", "middle", "end")
 

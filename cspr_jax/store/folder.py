@@ -17,7 +17,7 @@ from cspr_jax.store.disk import Disk, check_plain, open_plain
 from cspr_jax.store.publishing import PART, make_folders, refusal
 
 _SHARD = re.compile(r"(\d{5,})\.h5")
-# What a lock says; empty when it is new.
+# A lock names its holder; it is empty when it is new.
 _HOLDER = re.compile(rb"(?:process \d+ on [^\n]*\n)?")
 _NO_LOCKS = (
     "network disks and FUSE may have no locks: choose -o on another disk; other programs read a result that is copied "
@@ -138,7 +138,7 @@ class RunFolder:
             )
 
     def leftovers(self) -> list[Path]:
-        """What processes have begun to write and not finished.
+        """Files that processes have begun to write and not finished.
 
         Returns:
             the files; what is no file, such as a link, is none of ours.

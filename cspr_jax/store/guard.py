@@ -25,7 +25,7 @@ MOST_ROWS = 1000  # of an attribute with a row a cable
 DENSEST = 1100
 _PLENTY = 64 << 20
 _PER_CHUNK = 256
-# Of a dataset, by this program and by HDF5's dimension scales.
+# A dataset gets these attributes from this program and from HDF5's dimension scales.
 _ATTRIBUTES = (
     *("units", "long_name", "description", "flag_masks", "flag_values", "flag_meanings"),
     *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS"),
@@ -73,7 +73,7 @@ class ReadableDataset(NamedTuple):
 
 
 def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, ReadableDataset]:
-    """Those of some datasets that a file holds; nothing else of it is looked at.
+    """Open the named datasets that a file holds; nothing else of the file is looked at.
 
     Args:
         file: open.

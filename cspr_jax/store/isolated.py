@@ -44,8 +44,8 @@ del sys.path[0]
 from cspr_jax.store.reader import serve
 serve()
 """
-# What a file can do to the process that reads it. Other signals come from people, batch systems or the system's lack of
-# memory, and say nothing about the file.
+# A file can end the process that reads it by these signals. Other signals come from people, batch systems or the
+# system's lack of memory, and say nothing about the file.
 _ENDS = {
     signal.SIGXCPU: "HDF5 finds no end in it",
     **dict.fromkeys((signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL), "HDF5 fails on it"),

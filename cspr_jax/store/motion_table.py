@@ -14,7 +14,7 @@ from cspr_jax.schema.motion_quantities import ACROSS, PARTS, TRAJECTORY
 from cspr_jax.store.netcdf import file_size
 from cspr_jax.store.seal import DamagedError, unreadable
 
-# Of text; numbers take a third of it in memory. The header has some hundred names.
+# Both are sizes of text; numbers take a third of it in memory. The header has some hundred names.
 LARGEST_TABLE, LARGEST_HEADER = 2 << 30, 1 << 16
 FEASIBLE = "feasible"
 

@@ -67,7 +67,7 @@ class Result:
 
     @property
     def is_map(self) -> bool:
-        """Whether it is a map, not a motion over time."""
+        """Tell whether the result is a map, not a motion over time."""
         return "map" in self.attributes
 
     def best(self, *axes: str) -> "Result":
@@ -203,7 +203,7 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:
-    # What a sweep file says, with its robot and the order of the axes.
+    # Settings are the keys of a sweep file, with its robot and the order of the axes.
     settings = _json(attributes, "settings")
     checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, path, at="settings")
     robot = checked(RobotFile, settings["robot"], path, at="settings.robot")
@@ -217,7 +217,7 @@ def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:
 
 
 def _check_robot(attributes: dict[str, Any], path: Path) -> None:
-    # What pictures say of it. Motions of earlier versions have no more than its name.
+    # Pictures show these attributes of the robot. Motions of earlier versions have no more than its name.
     name, z_axis, points = attributes.get("robot"), attributes.get("z_axis", "down"), attributes.get("base_points")
     if not isinstance(name, str) or not 0 < len(name) <= 200:
         raise DamagedError(f"robot = {shown(name)}: must be a name of at most 200 characters")

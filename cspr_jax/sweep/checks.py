@@ -84,7 +84,7 @@ def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
 
 
 def is_given(keys: SweepFile, name: str) -> bool:
-    """Whether a sweep has a key.
+    """Tell whether a sweep has a key.
 
     Args:
         keys: the sweep.
@@ -97,7 +97,7 @@ def is_given(keys: SweepFile, name: str) -> bool:
 
 
 def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
-    """Whether a sweep, or its robot, asks for what a key stands for.
+    """Tell whether a sweep, or its robot, asks for what a key stands for.
 
     Args:
         keys: the sweep.
@@ -141,7 +141,7 @@ def _as_written(name: str) -> str:
 
 
 def _missing(keys: SweepFile, name: str) -> str | None:
-    # What to say of a dotted key that is not given; None: it is.
+    # Return the words for a dotted key that is not given; None: it is.
     table: Table = keys
     for part in name.split("."):
         inner = getattr(table, part)

@@ -125,7 +125,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     axes = {name: axis_points(getattr(keys.axes, name)) for name in data["axes"]}
     check_points(axes, path)
     axes |= own
-    # What is not given decides nothing: a key that a later version adds leaves old identities as they are.
+    # Keys that are not given decide nothing: a key that a later version adds leaves old identities as they are.
     settings = keys.model_dump(mode="json", by_alias=True, exclude_none=True)
     settings |= {"robot": robot.settings, "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
@@ -134,7 +134,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
 
 
 def _usual(kind: MapKind, keys: SweepFile, robot: RobotFile) -> list[str]:
-    # What is stored where the file does not say.
+    # These quantities are stored where the file does not name any.
     more = [names for key, names in kind.stored_with if is_given(keys, key)]
     names = dict.fromkeys((*kind.stored, *itertools.chain(*more)))
     needed = {name: kind.keys_of(name) for name in names}

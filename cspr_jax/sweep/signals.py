@@ -15,9 +15,9 @@ from types import FrameType
 from cspr_jax.errors import ExitCode
 
 CODES = {signal.SIGINT: ExitCode.INTERRUPTED, signal.SIGTERM: ExitCode.TERMINATED}
-# Where nothing must be finished, the main thread has so long to leave by itself; it cannot while it compiles.
+# If nothing must be finished, the main thread has so long to leave by itself; it cannot while it compiles.
 GRACE_SECONDS = 1.2
-# What a tile in progress has after SIGTERM.
+# A tile in progress has so long after SIGTERM.
 TILE_SECONDS = 8.0
 FINISHING = "finishing the tile in progress; Ctrl-C again ends at once"
 STOPPING = "stopping; Ctrl-C again ends at once"

@@ -73,7 +73,7 @@ def _near_zero(answers: dict[str, np.ndarray]) -> int:
 
 
 def _refuse(index: int, contradictions: dict[str, np.ndarray]) -> None:
-    # Of a broken processor, driver or compiler.
+    # Contradictions come from a broken processor, driver or compiler.
     for fault, cells in contradictions.items():
         if cells.any():
             raise SelfCheckError(

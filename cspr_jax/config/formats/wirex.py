@@ -117,7 +117,7 @@ def _replace_defaults(body: Body) -> None:
 
 
 def _limit(root: Element, body: Body, file: Path) -> None:
-    # Of several applications all are to be possible. Zero stands for a largest load that is not known.
+    # The limits allow every application of the file. Zero stands for a largest load that is not known.
     applications = list(root.iter("application"))
     cables = [(one, "minimum_load", "cable") for one in root.findall("cable")]
     least = [_load(*one, file) for one in [*((one, "min_cable_load", "application") for one in applications), *cables]]

@@ -58,7 +58,7 @@ def read_xml(path: Path) -> Element:
 
 
 def _encoding(data: bytes) -> tuple[str | None, str]:
-    # What the first bytes say outweighs what is declared; None: the parser is to take the name that is declared.
+    # The first bytes outweigh the declaration; None: the parser is to take the name that is declared.
     if data[:2] in _UTF16:
         return _UTF16[data[:2]], ""
     declared = _DECLARED.match(data)
