@@ -121,15 +121,15 @@ def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
     Returns:
         one line each.
     """
-    lines, start, asked = list[str](), keys.trajectory.start, keys.workspace
+    lines, start, workspace = list[str](), keys.trajectory.start, keys.workspace
     if start is not None and start.position is not None and not start.rest and keys.axes.z0 is not None:
-        every = (
+        depth_hints = (
             almost_at_rest("trajectory.from.position", start.position, z0, robot_file)
             for z0 in axis_points(keys.axes.z0)
         )
-        lines += [line for line in every if line][:1]
-    if asked is not None and "interference-free" in asked.conditions and not robot_file.cable_diameter:
-        shapes = (asked.obstacle, asked.platform_box, asked.platform_hull)
+        lines += [line for line in depth_hints if line][:1]
+    if workspace is not None and "interference-free" in workspace.conditions and not robot_file.cable_diameter:
+        shapes = (workspace.obstacle, workspace.platform_box, workspace.platform_hull)
         if all(shape is None for shape in shapes):
             lines.append(
                 'workspace.conditions: "interference-free" excludes nothing: cables without a thickness hardly ever '

@@ -106,7 +106,7 @@ class UncertaintyTable(_Uncertainties):
     """Uncertainty of the robot, for all of which motions are to be feasible."""
 
     @model_validator(mode="after")
-    def _some(self) -> "UncertaintyTable":
+    def _beyond_least(self) -> "UncertaintyTable":
         if all(getattr(self, row.name) == row.least for row in UNCERTAINTIES):
             raise ValueError("at least one of its keys beyond its smallest value, else nothing is uncertain")
         return self

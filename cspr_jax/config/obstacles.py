@@ -150,8 +150,8 @@ class PlatformShapeKeys(Table):
             low, high = ([x - c for x, c in zip(corner, centre_of_mass, strict=True)] for corner in self.platform_box)
             return shapes.box_between(low, high, name="platform")
         if self.platform_hull is not None:
-            given = self.platform_hull if isinstance(self.platform_hull, list) else platform_points
-            points = [[x - c for x, c in zip(point, centre_of_mass, strict=True)] for point in given]
+            hull_points = self.platform_hull if isinstance(self.platform_hull, list) else platform_points
+            points = [[x - c for x, c in zip(point, centre_of_mass, strict=True)] for point in hull_points]
             return shapes.hull(points, name="platform")
         return None
 

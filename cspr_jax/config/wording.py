@@ -47,8 +47,8 @@ def fault(key: str, value: object, allowed: str) -> PydanticCustomError:
     Returns:
         the error.
     """
-    given = value if isinstance(value, str) else shown(value)
-    return PydanticCustomError(FAULT, "{allowed}", {"key": key, "given": given, "allowed": allowed})
+    text = value if isinstance(value, str) else shown(value)
+    return PydanticCustomError(FAULT, "{allowed}", {"key": key, "given": text, "allowed": allowed})
 
 
 def either(names: Iterable[str]) -> str:
@@ -90,9 +90,9 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
         key, value and what is allowed.
     """
     # The last part of an unknown or missing key is the user's own, whatever it looks like.
-    own = error["loc"][-1:] if error["type"] in ("extra_forbidden", "missing") else ()
-    parts = [part for part in error["loc"][: len(error["loc"]) - len(own)] if not str(part).startswith(VARIANT)]
-    parts += own
+    last_part = error["loc"][-1:] if error["type"] in ("extra_forbidden", "missing") else ()
+    parts = [part for part in error["loc"][: len(error["loc"]) - len(last_part)] if not str(part).startswith(VARIANT)]
+    parts += last_part
     if error["type"] == FAULT:
         context = error.get("ctx", {})
         parts += [context["key"]] if context["key"] else []

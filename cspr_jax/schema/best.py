@@ -135,5 +135,5 @@ def _with_doubt(reduced: dict[str, np.ndarray], verdict: np.ndarray, will_do: np
 
 def _side(sides: np.ndarray, place: int) -> np.ndarray:
     # A whole cell is inside where it is for some point, and outside where it is for every one.
-    some, every = (sides == _INSIDE).any(place), (sides == _OUTSIDE).all(place)
-    return np.where(some, _INSIDE, np.where(every, _OUTSIDE, 0)).astype(sides.dtype)
+    is_inside, is_outside = (sides == _INSIDE).any(place), (sides == _OUTSIDE).all(place)
+    return np.where(is_inside, _INSIDE, np.where(is_outside, _OUTSIDE, 0)).astype(sides.dtype)

@@ -119,9 +119,9 @@ class Numbers:
         return values
 
 
-def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
-    return len(shape) == len(wanted) and all(
-        size >= 1 if length is ANY else size == length for size, length in zip(shape, wanted, strict=True)
+def _fits(shape: tuple[int, ...], lengths: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(lengths) and all(
+        size >= 1 if length is ANY else size == length for size, length in zip(shape, lengths, strict=True)
     )
 
 

@@ -143,9 +143,9 @@ class RunFolder:
         Returns:
             the files; what is no file, such as a link, is none of ours.
         """
-        own = re.compile(rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5){PART}")
+        pattern = re.compile(rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5){PART}")
         parts = [part for folder in (self.path, self.shards) for part in sorted(folder.glob(".*.part"))]
-        return [part for part in parts if own.fullmatch(part.name) and _is_file(part)]
+        return [part for part in parts if pattern.fullmatch(part.name) and _is_file(part)]
 
     def sweep_leftovers(self) -> None:
         """Remove what dead processes left unfinished; only under the lock.
@@ -195,8 +195,8 @@ class RunFolder:
         Raises:
             StoreError: the disk or the folder refuses.
         """
-        now = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())
-        line = json.dumps({"time": now, "event": event, "pid": os.getpid(), **fields})
+        time_stamp = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())
+        line = json.dumps({"time": time_stamp, "event": event, "pid": os.getpid(), **fields})
         try:
             self.disk.append(self.log, (line + "\n").encode())
         except OSError as error:

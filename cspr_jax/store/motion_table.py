@@ -73,13 +73,13 @@ def _places(heads: list[str]) -> dict[str, Any]:
     start = 0
     for name in TRAJECTORY:
         parts = PARTS.get(ACROSS[name], tuple(str(k + 1) for k in range(MOST_CABLES))) if name in ACROSS else ()
-        wanted = [f"{name}_{part}" for part in parts] or [name]
-        count = next((k for k, head in enumerate(names[start:]) if k == len(wanted) or head != wanted[k]), None)
+        columns = [f"{name}_{part}" for part in parts] or [name]
+        count = next((k for k, head in enumerate(names[start:]) if k == len(columns) or head != columns[k]), None)
         count = len(names) - start if count is None else count
         if not count:
             continue
-        if ACROSS.get(name) != "cable" and count != len(wanted):
-            raise DamagedError(f"it has no column {wanted[count]} behind {wanted[count - 1]}")
+        if ACROSS.get(name) != "cable" and count != len(columns):
+            raise DamagedError(f"it has no column {columns[count]} behind {columns[count - 1]}")
         places[name] = slice(start, start + count) if parts else start
         start += count
     if start < len(names):

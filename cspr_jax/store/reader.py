@@ -52,8 +52,8 @@ def serve() -> None:
     channel = socket.socket(fileno=0)
     out = channel.makefile("wb")
     _tell(out, {})  # ready
-    while (asked := _next(channel)) is not None:
-        words, file = asked
+    while (request := _next(channel)) is not None:
+        words, file = request
         _grant(_LOOK, 0)
         answer(Path(f"/dev/fd/{file}"), words, out)
         os.close(file)
@@ -173,9 +173,9 @@ def _send(out: BinaryIO, values: np.ndarray) -> None:
 
 
 def _grant_for(datasets: Iterable[guard.ReadableDataset]) -> None:
-    every = list(datasets)
-    seconds = sum(one.size * _PER_BYTE + one.chunks * _PER_CHUNK for one in every)
-    _grant(_LOOK + seconds, 2 * max((one.size for one in every), default=0))
+    readable = list(datasets)
+    seconds = sum(one.size * _PER_BYTE + one.chunks * _PER_CHUNK for one in readable)
+    _grant(_LOOK + seconds, 2 * max((one.size for one in readable), default=0))
 
 
 def _grant(seconds: float, memory: int) -> None:

@@ -210,8 +210,8 @@ def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:
     order = settings.get("dimensions")
     if not isinstance(order, list) or not order or not all(isinstance(name, str) and name in AXES for name in order):
         raise DamagedError(f"settings.dimensions = {shown(order)}: must be a list of axes")
-    for name, wanted in (("map", settings["map"]), ("robot", robot.name), ("z_axis", robot.z_axis)):
-        if attributes.get(name) != wanted:
+    for name, setting in (("map", settings["map"]), ("robot", robot.name), ("z_axis", robot.z_axis)):
+        if attributes.get(name) != setting:
             raise DamagedError(f"its {name} = {shown(attributes.get(name))} and its settings do not fit")
     return settings
 
@@ -282,16 +282,16 @@ def _motion(
     }
     segments = {name: array for name, array in arrays.items() if name in SEGMENTS}
     for name, array in arrays.items():
-        wanted: tuple[int, ...] = (len(time), widths.get(name, 3))
+        shape: tuple[int, ...] = (len(time), widths.get(name, 3))
         if name in ("t", "tension_residual"):
-            wanted = (len(time),)
+            shape = (len(time),)
         elif name in FLIGHT_DIMS:
             first, *rest = FLIGHT_DIMS[name]
-            wanted = (arrays[first].size if first in arrays else -1, *(len(PARTS[part]) for part in rest))
+            shape = (arrays[first].size if first in arrays else -1, *(len(PARTS[part]) for part in rest))
         elif name in segments:
-            wanted = (segments["segment"].size if "segment" in segments else -1,)
+            shape = (segments["segment"].size if "segment" in segments else -1,)
         kinds = EVERY[name].readable
-        if array.shape != wanted or array.dtype.name not in (kinds[:1] if kinds[0] == "float64" else kinds):
+        if array.shape != shape or array.dtype.name not in (kinds[:1] if kinds[0] == "float64" else kinds):
             raise DamagedError(f"{name} has another shape or type than in a motion")
         # The best candidate of a motion that is not feasible may pass a singularity.
         _check_numbers(name, array, LARGEST_NUMBER, finite=name not in _OPEN)

@@ -63,9 +63,11 @@ class TileMap:
         _refuse(index, self._cells.contradictions(answers))
         # Counts and flags fit their small types: max_arcs is at most 1000.
         values = {n: answers[n].astype(kind).reshape(tiling.extent(index)) for n, kind in self._sweep.types.items()}
-        now = environment()
+        this_environment = environment()
         undecided = self._cells.undecided(answers)
-        return Computed(Shard(index, digest(now), _near_zero(answers), values, undecided), now)
+        return Computed(
+            Shard(index, digest(this_environment), _near_zero(answers), values, undecided), this_environment
+        )
 
 
 def _near_zero(answers: dict[str, np.ndarray]) -> int:

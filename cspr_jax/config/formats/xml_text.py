@@ -82,10 +82,10 @@ def child(parent: Element, tag: str, file: object, place: str = "") -> Element:
     Raises:
         ConfigError: none, or several.
     """
-    found = parent.findall(tag)
-    if len(found) != 1:
-        raise ConfigError(file, f"{place or parent.tag}: {len(found)} elements <{tag}>: must be one")
-    return found[0]
+    elements = parent.findall(tag)
+    if len(elements) != 1:
+        raise ConfigError(file, f"{place or parent.tag}: {len(elements)} elements <{tag}>: must be one")
+    return elements[0]
 
 
 def text_of(element: Element) -> str:
