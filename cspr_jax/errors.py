@@ -126,7 +126,7 @@ DEEPEST, LONGEST = 3, 12
 
 
 def demand(allowed: str) -> str:
-    """What a message asks for.
+    """Phrase what a message demands of a value.
 
     Args:
         allowed: what would be right, or, from "cannot" on, what is wrong.

@@ -73,13 +73,13 @@ class AvailableAccelerations:
         return self._judged(accelerations)[1].astype(FLAGS)
 
     def _judged(self, accelerations) -> tuple[np.ndarray, np.ndarray]:
-        given = np.asarray(accelerations, float)
-        if given.shape not in ((3,), self.positions.shape):
+        vectors = np.asarray(accelerations, float)
+        if vectors.shape not in ((3,), self.positions.shape):
             allowed = f"finite numbers of shape (3,) or {self.positions.shape}"
-            raise InputError("accelerations", f"shape {given.shape}", allowed)
-        if self._robot.dof == 2 and given[..., 1].any():
+            raise InputError("accelerations", f"shape {vectors.shape}", allowed)
+        if self._robot.dof == 2 and vectors[..., 1].any():
             raise InputError("accelerations", "y not 0", "y = 0: the plane of a planar robot")
-        turned = np.asarray(self._frame.turned(np.broadcast_to(given, self.positions.shape)))
+        turned = np.asarray(self._frame.turned(np.broadcast_to(vectors, self.positions.shape)))
         with double_precision():
             return search.judged(self._robot, self._faces, self._frame.inward(self.positions), turned)
 
@@ -110,8 +110,8 @@ def available_accelerations(
         raise InputError("positions", "y not 0", "y = 0: the plane of a planar robot")
     with double_precision():
         limits = limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max))
-        own, frame = prepared(robot)
-        faces = search.faces_of(own, limits, frame.inward(places))
+        prepared_robot, frame = prepared(robot)
+        faces = search.faces_of(prepared_robot, limits, frame.inward(places))
     cables = np.tile(spanning(robot.n_cables, robot.dof), (2, 1))
     normals, offsets, of_largest = map(np.asarray, (frame.turned(faces.normals), faces.offsets, faces.of_largest))
-    return AvailableAccelerations(places, normals, offsets, cables, of_largest, own, faces, frame)
+    return AvailableAccelerations(places, normals, offsets, cables, of_largest, prepared_robot, faces, frame)

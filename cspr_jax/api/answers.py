@@ -19,7 +19,7 @@ from cspr_jax.swings.oscillations import OscillationAnswers
 
 @dataclasses.dataclass(frozen=True)
 class _WithMotions:
-    # Of a module and with its arguments, so that answers can be pickled and copied.
+    # The callable is a function of a module, bound to its arguments, so that answers can be pickled and copied.
     make: Callable[[Any], Placed] = dataclasses.field(kw_only=True, repr=False, compare=False)
     problem: Problem = dataclasses.field(kw_only=True, repr=False, compare=False)
 
@@ -32,10 +32,10 @@ class _WithMotions:
         return self.make(self)
 
     def causes(self: Any) -> list[tuple[Cause, ...]]:
-        """What stands between motions and feasible, in numbers.
+        """Find what keeps motions from being feasible, in numbers.
 
         Returns:
-            of each of the n motions its causes, the worst one first; none of a feasible one.
+            the causes for each of the n motions, the worst one first; a feasible motion has none.
         """
         with double_precision():
             placed, count = self.make(self), len(self.verdict)

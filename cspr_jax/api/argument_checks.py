@@ -205,7 +205,7 @@ ARGUMENTS: dict[str, Rule] = {
     "z0": real(f"{_DEPTH_WORDS}, or (n,) of them", (), (ANY,), **_DEPTH),
     "z_axis": _TEXT,
 }
-# Where a function has another argument of that name.
+# These rules hold for functions whose argument differs from the usual one of the same name.
 _ONE_DEPTH = real(_DEPTH_WORDS, (), traced=True, **_DEPTH)
 OF_FUNCTIONS: dict[str, Rule] = {
     "AvailableAccelerations.margin.accelerations": real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),

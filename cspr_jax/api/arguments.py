@@ -109,8 +109,8 @@ def kernel_problem(
     """
     function = amplitude_of(amplitude, free_end=free_end)
     check_determined(robot)
-    own, frame = prepared(robot)
-    return Problem(own, limits_over(robot, limits, families=families), function), frame
+    prepared_robot, frame = prepared(robot)
+    return Problem(prepared_robot, limits_over(robot, limits, families=families), function), frame
 
 
 def batched(kind, segments, problem: Problem, answers: Answers, frame: Frame, *more) -> Any:

@@ -41,7 +41,7 @@ class BezierVerdicts(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Whether each segment is proved feasible, (n,)."""
+        """Tell whether each segment is proved feasible, (n,)."""
         return self.verdict == 0
 
 
@@ -63,9 +63,11 @@ def bezier(robot: PointMassRobot, start, control_point, end, *, duration) -> Pla
         InputError: another kind of robot.
     """
     check_point_mass(robot)
-    own, frame = prepared(robot)
+    prepared_robot, frame = prepared(robot)
     first, middle, last = (jnp.asarray(frame.inward(point), float) for point in (start, control_point, end))
-    return Placed(Bezier(first, middle, last, jnp.asarray(duration, float), plane_normal(own) @ first), frame)
+    return Placed(
+        Bezier(first, middle, last, jnp.asarray(duration, float), plane_normal(prepared_robot) @ first), frame
+    )
 
 
 @checked
@@ -98,8 +100,8 @@ def bezier_verdicts(
     with double_precision():
         problem, frame = kernel_problem(robot, "quintic", limits, free_end=None)
         first, middle, last = (np.asarray(frame.inward(x)) for x in points)
-        own = verdicts(problem, Bezier(first, middle, last, times, depths_of(problem.robot, first)))
-        return BezierVerdicts(own.verdict, own.margin, own.bound, own.room)
+        answers = verdicts(problem, Bezier(first, middle, last, times, depths_of(problem.robot, first)))
+        return BezierVerdicts(answers.verdict, answers.margin, answers.bound, answers.room)
 
 
 @checked
@@ -127,23 +129,23 @@ def bezier_durations(
     check_determined(robot)
     if control_points is not None and accelerations is not None:
         raise InputError("accelerations", "given", "cannot be combined with control_points")
-    given = {"starts": starts, "ends": ends}
-    given |= {} if control_points is None else {"control_points": control_points}
-    given |= {} if accelerations is None else {"accelerations": accelerations}
-    points = dict(zip(given, _points(robot, given), strict=True))
+    arguments = {"starts": starts, "ends": ends}
+    arguments |= {} if control_points is None else {"control_points": control_points}
+    arguments |= {} if accelerations is None else {"accelerations": accelerations}
+    points = dict(zip(arguments, _points(robot, arguments), strict=True))
     with double_precision():
-        own, frame = prepared(robot)
+        prepared_robot, frame = prepared(robot)
         first, last = (np.asarray(frame.inward(points[name])) for name in ("starts", "ends"))
         middle = first if control_points is None else np.asarray(frame.inward(points["control_points"]))
         turn = np.zeros_like(first) if accelerations is None else np.asarray(frame.turned(points["accelerations"]))
-        return feasible_durations(own, Ends(first, last, middle, turn), depths_of(own, first))
+        return feasible_durations(prepared_robot, Ends(first, last, middle, turn), depths_of(prepared_robot, first))
 
 
-def _points(robot: PointMassRobot, given: dict[str, object]) -> list[np.ndarray]:
-    found = [points_of(name, points) for name, points in given.items()]
-    for name, points in zip(given, found, strict=True):
-        if points.shape != found[0].shape:
-            raise InputError(name, f"shape {points.shape}", f"finite numbers of shape {found[0].shape}")
+def _points(robot: PointMassRobot, arguments: dict[str, object]) -> list[np.ndarray]:
+    arrays = [points_of(name, points) for name, points in arguments.items()]
+    for name, points in zip(arguments, arrays, strict=True):
+        if points.shape != arrays[0].shape:
+            raise InputError(name, f"shape {points.shape}", f"finite numbers of shape {arrays[0].shape}")
         if robot.dof == 2 and points[:, 1].any():
             raise InputError(name, "y not 0", "y = 0: the plane of a planar robot")
-    return found
+    return arrays

@@ -82,8 +82,8 @@ def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobo
         raise ConfigError(file, f"must end in {', '.join(ENDINGS)}")
     if not file.is_file():
         raise ConfigError(file, f"no such file{other_case(file)}")
-    robot_file, found = read_foreign(file, cable_set)
-    return ImportedRobot(_built(robot_file, file), found.keys, tuple(robot_hints(robot_file)), found)
+    robot_file, imported = read_foreign(file, cable_set)
+    return ImportedRobot(_built(robot_file, file), imported.keys, tuple(robot_hints(robot_file)), imported)
 
 
 def _built(robot_file: RobotFile, file: Path) -> PointMassRobot | PlatformRobot:

@@ -83,7 +83,7 @@ def least_time(
         raise InputError("targets", "y not 0", "y = 0: the plane of a planar robot")
     largest = np.inf if max_acceleration is None else max_acceleration
     with double_precision():
-        own, frame = prepared(robot)
+        prepared_robot, frame = prepared(robot)
         first = np.broadcast_to(frame.inward(starts), ends.shape).copy()
-        problem = Problem(own, limits_over(robot, limits), named("quintic"))
+        problem = Problem(prepared_robot, limits_over(robot, limits), named("quintic"))
         return least_times(problem, first, frame.inward(ends), max_acceleration=largest)

@@ -82,10 +82,10 @@ def hypocycloid(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (2.49).
     """
-    own, frame = _prepared(robot, ("3T",), "a point mass on three cables")
+    prepared_robot, frame = _prepared(robot, ("3T",), "a point mass on three cables")
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     first, last = _places(robot, frame, start, end, z0)
-    geometry = segment(own, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
+    geometry = segment(prepared_robot, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
     return Placed(Hypocycloid(geometry, function, p), frame)
 
 
@@ -108,10 +108,10 @@ def transition(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (1.27) or (1.28).
     """
-    own, frame = _prepared(robot, ("2T", "3T"), "a point mass")
+    prepared_robot, frame = _prepared(robot, ("2T", "3T"), "a point mass")
     function = amplitude_of(amplitude, free_end=True)
     end = jnp.asarray(frame.inward(target), float)
-    geometry = transitions.transition(own, function, end, jnp.asarray(z0, float))
+    geometry = transitions.transition(prepared_robot, function, end, jnp.asarray(z0, float))
     return Placed(Hypocycloid(geometry, function, 2.0 * jnp.asarray(oscillations, float)), frame)
 
 
@@ -147,13 +147,13 @@ def platform_motion(
     Raises:
         InputError: another kind of robot, or an amplitude function that breaks (2.49).
     """
-    own, frame = _prepared(robot, ("3R3T",), "a platform on six cables or more", any_cables=True)
+    prepared_robot, frame = _prepared(robot, ("3R3T",), "a platform on six cables or more", any_cables=True)
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     places = _places(robot, frame, start, end, z0)
     turns = [jnp.asarray(frame.turned_quaternions(leaf(turn)), float) for turn in orientations]
     beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
     first, last = zip(places, turns, strict=True)
-    geometry = pose_segment(own, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
+    geometry = pose_segment(prepared_robot, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
     return Placed(PlatformMotion(geometry, function, p, PlatformMotionKind(variable)), frame)
 
 
@@ -174,17 +174,17 @@ def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
     Raises:
         InputError: an unknown rule, or one that needs a largest tension of every cable, without it.
     """
-    own, frame = prepared(robot)
+    prepared_robot, frame = prepared(robot)
     if rule not in TENSION_RULES:
         raise InputError("rule", rule, f"one of {', '.join(TENSION_RULES)}")
     high = robot.limits.tension_max
     if TENSION_RULES[rule].is_bounded and robot.n_cables > robot.dof and (high is None or not _is_finite(high)):
         raise InputError("rule", rule, "another one without a largest tension of every cable")
-    return cables.tensions(own, inward(frame, state), robot.limits, rule)
+    return cables.tensions(prepared_robot, inward(frame, state), robot.limits, rule)
 
 
 def _is_finite(numbers: Array) -> bool:
-    # What jax traces counts as finite.
+    # Numbers that jax traces count as finite.
     return isinstance(numbers, jax.core.Tracer) or bool(np.isfinite(np.asarray(numbers)).all())
 
 

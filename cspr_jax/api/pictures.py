@@ -64,12 +64,12 @@ def plot(  # noqa: PLR0913
         StoreError: a file cannot be read, or the picture cannot be written.
         ConfigError: no such quantity or axis, nothing to draw, a size out of bounds, or an unknown picture format.
     """
-    given = [results] if isinstance(results, str | Path | Result) else list(results)
-    if not given:
+    sources = [results] if isinstance(results, str | Path | Result) else list(results)
+    if not sources:
         raise ConfigError("results", "[]: must be one result, or more")
     style = style_of(size, dpi, font_size, preset, title=title)
     stage("reading")
-    files = [one if isinstance(one, Result) else result_at(Path(one)) for one in given]
+    files = [one if isinstance(one, Result) else result_at(Path(one)) for one in sources]
     loaded = [one if isinstance(one, Result) else open_result(one) for one in files]
     names = [f"result {i + 1}" if isinstance(one, Result) else str(one) for i, one in enumerate(files)]
     if plan is not None:

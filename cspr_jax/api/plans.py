@@ -25,7 +25,7 @@ from cspr_jax.store.publishing import publish
 if TYPE_CHECKING:
     import xarray
 
-# What errors name where there is no file; paths are relative to the current folder.
+# Errors name this in place of a file where there is none; paths are relative to the current folder.
 NAME = Path("plan")
 
 

@@ -76,5 +76,5 @@ def replay(given: str | Path | Mapping[str, Any] | Plan, *, step: float = STEP, 
     if not (planned.feasible or anyway):
         raise ConfigError(NAME, "not played, since a segment is not proved feasible (anyway=True plays it)")
     with double_precision():
-        found = replays.replay(planned, step)
-    return Replay(**{field.name: getattr(found, field.name) for field in dataclasses.fields(found)})
+        played = replays.replay(planned, step)
+    return Replay(**{field.name: getattr(played, field.name) for field in dataclasses.fields(played)})

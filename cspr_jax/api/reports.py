@@ -93,24 +93,24 @@ def report(
     return warnings
 
 
-def _loaded(given: str | Path | Result | Plan) -> Result | Plan:
-    if isinstance(given, Result | Plan):
-        return given
-    path = Path(given)
+def _loaded(source: str | Path | Result | Plan) -> Result | Plan:
+    if isinstance(source, Result | Plan):
+        return source
+    path = Path(source)
     if path.suffix == ".toml":
         return plans.plan(path)
     stage("reading")
     return open_result(result_at(path))
 
 
-def _of_motion(given: Result | Plan, name: str) -> tuple[str, dict[str, Any], list[str]]:
-    if isinstance(given, Plan):
-        robot, content, feasible = shortened(given.robot_file.name), _planned(given, "motion"), given.feasible
+def _of_motion(motion: Result | Plan, name: str) -> tuple[str, dict[str, Any], list[str]]:
+    if isinstance(motion, Plan):
+        robot, content, feasible = shortened(motion.robot_file.name), _planned(motion, "motion"), motion.feasible
     else:
-        robot_file, keys = kept(given, name, "report") if keeps_plan(given) else (None, None)
-        robot, columns = robot_name(given), given.axes | given.data
-        content = motion_content("motion", columns, given.data, robot_file, keys)
-        feasible = bool(given.attributes.get("feasible", 1))
+        robot_file, keys = kept(motion, name, "report") if keeps_plan(motion) else (None, None)
+        robot, columns = robot_name(motion), motion.axes | motion.data
+        content = motion_content("motion", columns, motion.data, robot_file, keys)
+        feasible = bool(motion.attributes.get("feasible", 1))
     doubt = "" if feasible else "not proved feasible"
     page: dict[str, Any] = {
         "title": f"Motion of {robot}",
@@ -134,28 +134,36 @@ def _of_map(
     result: Result, count: int, cells: Sequence[Mapping[str, float]], quantity: str | None
 ) -> tuple[str, dict[str, Any], list[str]]:
     content, left = map_content(result, quantity)
-    wanted = [tuple(nearest(result, axis, own)[0] for axis, own in _places(result, cell).items()) for cell in cells]
+    indices = [
+        tuple(nearest(result, axis, chosen)[0] for axis, chosen in _places(result, cell).items()) for cell in cells
+    ]
     warnings = [f"left out, for a page of all would be too large: {', '.join(left)}"] if left else []
     if MAP_KINDS[result.attributes["map"]].planned and "verdict" in result.data:
-        wanted += telling(result.data, result.data["verdict"], count)
+        indices += telling(result.data, result.data["verdict"], count)
     elif cells:
         raise InputError("--cell", "given", f'absent with map = "{result.attributes["map"]}", whose cells do not move')
     names, points = order_of(result)
-    motions, found = list[dict[str, Any]](), dict[str, int]()
-    for index in dict.fromkeys(wanted):
+    motions, motion_of_cell = list[dict[str, Any]](), dict[str, int]()
+    for index in dict.fromkeys(indices):
         planned = _cell(result, index)
         if planned is None:
             warnings.append(f"{_words(result, index)}: no motion, its numbers are not finite")
             continue
         place = dict(zip(result.axes, index, strict=True))
-        # Of points that occur twice the first is shown.
-        same = [_rank(result.axes[name], own, place[name]) for name, own in zip(names, points, strict=True)]
-        found[str(int(np.ravel_multi_index(same, content["shape"])))] = len(motions)
+        # If a point occurs twice, the page shows the first.
+        same = [_rank(result.axes[name], chosen, place[name]) for name, chosen in zip(names, points, strict=True)]
+        motion_of_cell[str(int(np.ravel_multi_index(same, content["shape"])))] = len(motions)
         motions.append(planned)
-    first = next(iter(found), None)
+    first = next(iter(motion_of_cell), None)
     content["first"] = _first(content["shape"], first)
     title = heading(result, quantity or content["quantities"][0]["name"])
-    page = {"title": title, "map": content, "motions": motions, "cells": found, "shown": found.get(first or "", 0)}
+    page = {
+        "title": title,
+        "map": content,
+        "motions": motions,
+        "cells": motion_of_cell,
+        "shown": motion_of_cell.get(first or "", 0),
+    }
     return title, page, warnings
 
 
@@ -170,15 +178,15 @@ def _rank(points: np.ndarray, chosen: np.ndarray, place: int) -> int:
 
 
 def _places(result: Result, cell: Mapping[str, float]) -> dict[str, float]:
-    for axis, own in cell.items():
-        nearest(result, axis, own, "--cell")  # refuses axes that there are not
+    for axis, coordinate in cell.items():
+        nearest(result, axis, coordinate, "--cell")  # refuses axes that there are not
     return {axis: float(cell.get(axis, points[0])) for axis, points in result.axes.items()}
 
 
 def _words(result: Result, index: tuple[int, ...]) -> str:
     points = result.axes | {axis: choice.points for axis, choice in result.choices.items()}
     place = result.place(index)
-    return ", ".join(value(result, axis, place[axis]) for axis, every in points.items() if len(every) > 1)
+    return ", ".join(value(result, axis, place[axis]) for axis, coordinates in points.items() if len(coordinates) > 1)
 
 
 def _cell(result: Result, index: tuple[int, ...]) -> dict[str, Any] | None:

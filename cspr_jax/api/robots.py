@@ -49,11 +49,11 @@ def point_mass(
     Raises:
         InputError: what a robot file with these numbers would be refused for.
     """
-    wanted = pattern or ("2T" if planar else "3T")
-    if wanted not in MAKERS or (planar and wanted != "2T"):
+    pattern_name = pattern or ("2T" if planar else "3T")
+    if pattern_name not in MAKERS or (planar and pattern_name != "2T"):
         allowed = '"2T", or None, beside planar' if planar else '"1T", "2T" or "3T"'
         raise InputError("pattern", pattern, allowed)
-    return MAKERS[wanted](base_points, mass=mass, gravity=gravity, name=name, z_axis=z_axis, limits=limits)
+    return MAKERS[pattern_name](base_points, mass=mass, gravity=gravity, name=name, z_axis=z_axis, limits=limits)
 
 
 @checked

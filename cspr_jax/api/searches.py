@@ -62,12 +62,14 @@ def minimum_arcs(
         raise InputError("robot", getattr(robot, "name", robot), "a point mass on three cables")
     ends = points_of("targets", targets)
     depth = depths(z0, len(ends))
-    given = None if start is None else np.asarray(start, float)
-    if given is not None and given.shape not in ((3,), ends.shape):
-        raise InputError("start", f"shape {given.shape}", f"finite numbers of shape (3,) or {ends.shape}")
+    start_points = None if start is None else np.asarray(start, float)
+    if start_points is not None and start_points.shape not in ((3,), ends.shape):
+        raise InputError("start", f"shape {start_points.shape}", f"finite numbers of shape (3,) or {ends.shape}")
     with double_precision():
         problem, frame = kernel_problem(robot, amplitude or "quintic", limits, families=("hypocycloid-standard",))
-        starts = rest_point(depth) if given is None else frame.inward(points_of("start", np.atleast_2d(given)))
+        starts = (
+            rest_point(depth) if start_points is None else frame.inward(points_of("start", np.atleast_2d(start_points)))
+        )
         given_points = (np.broadcast_to(starts, ends.shape).copy(), frame.inward(ends), depth)
         answers = search_arcs(problem, *given_points, max_arcs=max_arcs)
     make = partial(_motions_between, problem, frame, given_points)

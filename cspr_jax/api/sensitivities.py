@@ -74,12 +74,12 @@ def sensitivity(robot: PointMassRobot | PlatformRobot, positions, orientations=N
     if orientations is not None and isinstance(robot, PointMassRobot):
         raise InputError("orientations", None, "must be None", fault="a point mass has none")
     with double_precision():
-        own, frame = centred(robot)
+        centred_robot, frame = centred(robot)
         turns = None
         if orientations is not None:
             turns = frame.turned_quaternions(quaternions("orientations", orientations, len(places)))
-        found = SensitivitySearch(own)(frame.inward(places), turns)
-    return Sensitivity(places, np.asarray(found.sigma_p), np.asarray(found.sigma_r))
+        answers = SensitivitySearch(centred_robot)(frame.inward(places), turns)
+    return Sensitivity(places, np.asarray(answers.sigma_p), np.asarray(answers.sigma_r))
 
 
 @checked

@@ -24,7 +24,7 @@ from cspr_jax.sweep.work import Executor
 if TYPE_CHECKING:
     import xarray
 
-# What errors and files are named after where there is no sweep file; paths are relative to the current folder.
+# Errors and files are named after this where there is no sweep file; paths are relative to the current folder.
 NAME = Path("sweep")
 
 

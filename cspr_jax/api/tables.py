@@ -53,9 +53,9 @@ def table(
     if name not in tables.TABLES:
         raise ConfigError("table", f"{shown(name)}: must be one of {', '.join(tables.TABLES)}")
     check_count(workers)
-    given: dict[str, Any] = {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None}
-    given |= {"--max-arcs": max_arcs, "--values": values}
-    choice = tables.chosen(name, given | {"--workers": None if workers == 1 else workers})
+    options: dict[str, Any] = {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None}
+    options |= {"--max-arcs": max_arcs, "--values": values}
+    choice = tables.chosen(name, options | {"--workers": None if workers == 1 else workers})
     if workers is None:
         workers = usual_count(LARGEST) if tables.TABLES[name].by_processes else 1
     with double_precision():

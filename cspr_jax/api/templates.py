@@ -6,7 +6,7 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import templates
 
-# What there are templates of.
+# There is a template for each of these kinds of file.
 KINDS = ("robot", "sweep", "plan")
 
 

@@ -78,21 +78,21 @@ def workspace(  # noqa: PLR0913
         raise InputError("condition", condition, " or ".join(f'"{name}"' for name in CONDITIONS))
     if precision not in PRECISIONS:
         raise InputError("precision", precision, " or ".join(f'"{name}"' for name in PRECISIONS))
-    asked = {"wrench_box": wrench_box, "wrench_ellipsoid": wrench_ellipsoid, "acceleration": acceleration}
-    asked |= {"tension_min": tension_min, "tension_max": tension_max, "wrenches": wrenches}
-    for key, value in (*asked.items(), ("capacity_length", capacity_length)):
+    requirements = {"wrench_box": wrench_box, "wrench_ellipsoid": wrench_ellipsoid, "acceleration": acceleration}
+    requirements |= {"tension_min": tension_min, "tension_max": tension_max, "wrenches": wrenches}
+    for key, value in (*requirements.items(), ("capacity_length", capacity_length)):
         if value is not None and condition != FEASIBLE:
             raise InputError(key, value, f'None with condition "{condition}"')
     places = _places(robot, positions)
     with double_precision():
-        own, frame = centred(robot)
+        centred_robot, frame = centred(robot)
         limits = _limits(robot, tension_min, tension_max)
         loads = required_wrenches(
-            own, frame, points=wrenches, box=wrench_box, ellipsoid=wrench_ellipsoid, acceleration=acceleration
+            centred_robot, frame, points=wrenches, box=wrench_box, ellipsoid=wrench_ellipsoid, acceleration=acceleration
         )
-        inner, turns = _poses(own, frame, places, orientations)
-        posed = requirement(own, condition, limits, loads, capacity_length)
-        return WorkspaceSearch(own, posed, precision=precision)(inner, turns)
+        inner, turns = _poses(centred_robot, frame, places, orientations)
+        posed = requirement(centred_robot, condition, limits, loads, capacity_length)
+        return WorkspaceSearch(centred_robot, posed, precision=precision)(inner, turns)
 
 
 def _places(robot, positions) -> np.ndarray:
@@ -110,14 +110,14 @@ def _limits(robot, tension_min, tension_max) -> Limits:
     return limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max), any_tensions=True)
 
 
-def _poses(own, frame: Frame, places: np.ndarray, orientations) -> tuple[np.ndarray, np.ndarray | None]:
-    row = PATTERNS[own.pattern]
+def _poses(robot, frame: Frame, places: np.ndarray, orientations) -> tuple[np.ndarray, np.ndarray | None]:
+    row = PATTERNS[robot.pattern]
     inner, turns = np.asarray(frame.inward(places)), None
     if orientations is not None:
         if not row.is_body:
             raise InputError("orientations", None, "must be None", fault="a point mass has none")
-        given = quaternions("orientations", orientations, len(places))
-        if row.is_planar and given[:, [1, 3]].any():
+        unit_quaternions = quaternions("orientations", orientations, len(places))
+        if row.is_planar and unit_quaternions[:, [1, 3]].any():
             raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
-        turns = frame.turned_quaternions(given)
-    return mass_centres(own, inner, turns), turns
+        turns = frame.turned_quaternions(unit_quaternions)
+    return mass_centres(robot, inner, turns), turns

@@ -116,18 +116,18 @@ def _pointers(*arrays: np.ndarray) -> list[ctypes.c_void_p]:
 
 def _three_cables(kernel: Callable, work: three_cables.ThreeCableWork) -> float:
     tau = (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
-    calls, kept = [], []
+    calls, buffers = [], []
     for first, segments in ((0, work.segments[1]), (1, work.segments[0])):
         arcs = np.arange(1, three_cables.MAX_ARCS + 1)[first::2]
         s = jax.tree.map(np.asarray, segments)
         fields = [s.start_radius, s.end_radius - s.start_radius, s.precession, s.sense, *s.tilt.T]
         fields += [*s.pull.reshape(-1, 6).T, *s.twist.T]
         table = sieve.sample_table(work.problem.amplitude, arcs, tau, np.float32)
-        given = [_lined(x) for x in (np.stack(fields), table, arcs, tau)]
+        inputs = [_lined(x) for x in (np.stack(fields), table, arcs, tau)]
         out = _lined(np.zeros((len(arcs), len(s.rate))))
         sizes = ctypes.c_size_t(len(s.rate)), ctypes.c_int(len(arcs)), ctypes.c_int(len(tau))
-        calls.append(partial(kernel, *_pointers(*given), *sizes, *_pointers(out)))
-        kept.append((given, out))
+        calls.append(partial(kernel, *_pointers(*inputs), *sizes, *_pointers(out)))
+        buffers.append((inputs, out))
         few = jax.tree.map(lambda x: x[: sieve.BATCH], s)
         _compare("three_cables.cpp", out, calls[-1], sieve.smallest_sampled(work.problem.amplitude, few, arcs, tau))
     return three_cables.checks(len(work.ends)) / best(lambda: [call() for call in calls])
@@ -139,21 +139,21 @@ def _six_cables(kernel: Callable, work: six_cables.SixCableWork) -> float:
     points = np.asarray(robot.platform_points)[corners]
     joint = np.array([corners.index(k) for k in robot.joints], np.int32)
     constants = [_lined(np.asarray(robot.base_points)), _lined(points)]
-    calls, kept, count = [], [], 0
+    calls, buffers, count = [], [], 0
     for batch in six_cables.batches(work):
-        which = swings(batch.segments)
-        inertia = np.asarray(robot.inertia / robot.mass) @ _stacked(which.axis)
-        fields = [_stacked(which.reach), _stacked(which.axis), inertia, np.stack([which.angle, which.end_beta_hat])]
+        swing = swings(batch.segments)
+        inertia = np.asarray(robot.inertia / robot.mass) @ _stacked(swing.axis)
+        fields = [_stacked(swing.reach), _stacked(swing.axis), inertia, np.stack([swing.angle, swing.end_beta_hat])]
         table = rest_table(six_cables.QUINTIC, jnp.asarray(float(batch.arcs)), jnp.asarray(tau), six_cables.FROM_REST)
-        given = [_lined(np.concatenate(fields)), _lined(table)]
+        inputs = [_lined(np.concatenate(fields)), _lined(table)]
         out = _lined(np.zeros(six_cables.LANES))
         numbers = ctypes.c_float(six_cables.PLACE[2]), ctypes.c_float(float(robot.gravity))
         sizes = ctypes.c_size_t(six_cables.LANES), ctypes.c_int(len(tau))
-        calls.append(partial(kernel, *_pointers(*given, *constants, joint), *numbers, *sizes, *_pointers(out)))
-        kept.append((given, out))
+        calls.append(partial(kernel, *_pointers(*inputs, *constants, joint), *numbers, *sizes, *_pointers(out)))
+        buffers.append((inputs, out))
         count += batch.real
-        wanted = six_cables.tensions(robot, batch, single_precision=False) * float(batch.segments.rate[0]) / 6.0
-        _compare("six_cables.cpp", out, calls[-1], wanted)
+        expected = six_cables.tensions(robot, batch, single_precision=False) * float(batch.segments.rate[0]) / 6.0
+        _compare("six_cables.cpp", out, calls[-1], expected)
     return count * six_cables.SAMPLES / best(lambda: [call() for call in calls])
 
 
@@ -161,12 +161,12 @@ def _stacked(vector: Vector) -> np.ndarray:
     return np.stack([np.asarray(x) for x in vector])
 
 
-def _compare(name: str, out: np.ndarray, call: Callable, wanted) -> None:
+def _compare(name: str, out: np.ndarray, call: Callable, expected) -> None:
     # A kernel that computes something else has no rate. Beside singularities float32 has no digits.
     call()
-    wanted = np.asarray(wanted, float)
-    mine = out[..., : wanted.shape[-1]]
-    is_far = (mine < -1e20) | (wanted < -1e20)
-    agrees = np.where(is_far, (mine < 0.0) & (wanted < 0.0), np.isclose(mine, wanted, rtol=0.01, atol=0.01))
+    expected = np.asarray(expected, float)
+    computed = out[..., : expected.shape[-1]]
+    is_far = (computed < -1e20) | (expected < -1e20)
+    agrees = np.where(is_far, (computed < 0.0) & (expected < 0.0), np.isclose(computed, expected, rtol=0.01, atol=0.01))
     if agrees.mean() < AGREES:
         raise ConfigError(name, f"must agree with the package, but differs in {1.0 - agrees.mean():.1%} of the cases")

@@ -94,12 +94,12 @@ def batches(given: SixCableWork) -> list[Batch]:
     quaternions = np.concatenate([np.cos(half), np.sin(half) * given.axis], axis=1)
     portions, lanes = [], room(LANES)
     for arcs in np.unique(given.arcs):
-        which = np.flatnonzero(given.arcs == arcs)
+        cases = np.flatnonzero(given.arcs == arcs)
         kernel = partial(_segments, given.robot, np.asarray(arcs % 2 == 1))
-        every = in_batches(kernel, (quaternions[which], given.beta_hat[which]), size=LANES)
-        for start in range(0, len(which), lanes):
-            some = jax.tree.map(lambda x, s=start: x[s : s + lanes], every)
-            portions.append(Batch(int(arcs), len(some.rate), jax.device_put(padded(some, lanes))))
+        segments = in_batches(kernel, (quaternions[cases], given.beta_hat[cases]), size=LANES)
+        for start in range(0, len(cases), lanes):
+            portion = jax.tree.map(lambda x, s=start: x[s : s + lanes], segments)
+            portions.append(Batch(int(arcs), len(portion.rate), jax.device_put(padded(portion, lanes))))
     return portions
 
 
@@ -177,35 +177,35 @@ def numpy_rate(given: SixCableWork) -> float:
     Returns:
         the rate.
     """
-    some = SixCableWork(given.robot, *(x[:NUMPY_TRAJECTORIES] for x in given[1:]))
-    return len(some.arcs) * SAMPLES / best(partial(_numpy_checks, some))
+    first_cases = SixCableWork(given.robot, *(x[:NUMPY_TRAJECTORIES] for x in given[1:]))
+    return len(first_cases.arcs) * SAMPLES / best(partial(_numpy_checks, first_cases))
 
 
-def _numpy_checks(given: SixCableWork) -> np.ndarray:
+def _numpy_checks(task: SixCableWork) -> np.ndarray:
     # Smallest tension per mass and length of each trajectory: (n,); -inf where the determinant changes its sign.
-    tau, theta = np.linspace(0.0, 1.0, SAMPLES), math.pi * given.arcs[:, None]
+    tau, theta = np.linspace(0.0, 1.0, SAMPLES), math.pi * task.arcs[:, None]
     a, a1 = 10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4
     a2, a3 = 60 * tau - 180 * tau**2 + 120 * tau**3, 60 - 360 * tau + 360 * tau**2
-    gravity, sign = float(given.robot.gravity), (-1.0) ** given.arcs[:, None]
+    gravity, sign = float(task.robot.gravity), (-1.0) ** task.arcs[:, None]
     squared = theta**2 * PLACE[2] / gravity
     c, s, c3, s3 = np.cos(theta * tau), np.sin(theta * tau), np.cos(3 * theta * tau), np.sin(3 * theta * tau)
-    h = given.beta_hat[:, None]
+    h = task.beta_hat[:, None]
     beat = ((9 + h) * c - (1 + h) * c3) / 8
     beat1, beat2 = theta * (3 * (1 + h) * s3 - (9 + h) * s) / 8, theta**2 * (9 * (1 + h) * c3 - (9 + h) * c) / 8
-    turn = (sign * given.angle[:, None])[..., None]
+    turn = (sign * task.angle[:, None])[..., None]
     angle = turn * (a * beat)[..., None]
     speed, spin = turn * (a1 * beat + a * beat1)[..., None], turn * (a2 * beat + 2 * a1 * beat1 + a * beat2)[..., None]
     reach = (sign * (a * c - a1 * s / theta))[..., None]
     pull = (-sign * ((a * theta**2 + a2) * c + (a1 * theta + a3 / theta) * s) / squared)[..., None]
     rest, far = rest_point(PLACE[2]), np.array([*PLACE[:2], 0.0])
     position, acceleration = rest + reach * far, pull * far - np.array([0.0, 0.0, gravity])
-    e = given.axis[:, None, :]
-    skew = np.cross(np.eye(3), given.axis[:, None, :])[:, None]
+    e = task.axis[:, None, :]
+    skew = np.cross(np.eye(3), task.axis[:, None, :])[:, None]
     rotation = np.eye(3) + np.sin(angle)[..., None] * skew + (1 - np.cos(angle))[..., None] * skew @ skew
-    weight = np.einsum("ntij,jk,nlk->nti", rotation, np.asarray(given.robot.inertia / given.robot.mass), e)
+    weight = np.einsum("ntij,jk,nlk->nti", rotation, np.asarray(task.robot.inertia / task.robot.mass), e)
     moment = (spin * weight + speed**2 * np.cross(e, weight)) / squared[..., None]
-    arms = np.einsum("ntij,kj->ntki", rotation, np.asarray(given.robot.platform_points))
-    rays = position[:, :, None] + arms - np.asarray(given.robot.base_points)
+    arms = np.einsum("ntij,kj->ntki", rotation, np.asarray(task.robot.platform_points))
+    rays = position[:, :, None] + arms - np.asarray(task.robot.base_points)
     matrix = -np.concatenate([rays, np.cross(arms, rays)], axis=3).swapaxes(2, 3)
     tensions = np.linalg.solve(matrix, np.concatenate([acceleration, moment], axis=2)[..., None])[..., 0]
     is_same = np.linalg.det(matrix) * np.linalg.det(matrix[:, :1]) > 0.0

@@ -87,13 +87,13 @@ def margin_rate(
     Returns:
         the rate; s that the first batch takes, mostly of compiling.
     """
-    own = centred(robot)[0]
+    centred_robot = centred(robot)[0]
     start = time.perf_counter()
-    search = WorkspaceSearch(own, requirement(own, condition, robot.limits))
+    search = WorkspaceSearch(centred_robot, requirement(centred_robot, condition, robot.limits))
     numbers = np.dtype(dtype).type
     kernel, size = search.kernel(numbers, by_null_space=by_null_space), room(search.batch(numbers))
-    every = _poses(own, batches * size, dtype)
-    parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::batches], every)) for i in range(batches)]
+    all_poses = _poses(centred_robot, batches * size, dtype)
+    parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::batches], all_poses)) for i in range(batches)]
 
     def one(poses):
         return jax.block_until_ready(kernel(poses.place, poses.turn, None))
@@ -119,12 +119,12 @@ def clearance_rate(dtype: str) -> float:
     of_robot = clearance_kernels.Points(*map(leaf, (among.base_points, among.platform_points, among.diameters)))
     points = jax.tree.map(lambda x: np.asarray(x, dtype), of_robot)
     size, pairs = room(PAIRS_BATCH), np.array(among.pairs, np.int32)
-    every = _poses(robot, 4 * size, dtype)
-    parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::4], every)) for i in range(4)]
+    all_poses = _poses(robot, 4 * size, dtype)
+    parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::4], all_poses)) for i in range(4)]
 
     def one(poses):
-        given = clearance_kernels.PoseLanes(poses.place, poses.turn, None)
-        return jax.block_until_ready(clearance_kernels.of_cables(points, given, pairs))
+        lanes = clearance_kernels.PoseLanes(poses.place, poses.turn, None)
+        return jax.block_until_ready(clearance_kernels.of_cables(points, lanes, pairs))
 
     return 4 * size / best(partial(in_threads, one, parts))
 
@@ -139,13 +139,13 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
         the rate.
     """
     count = TENSIONS
-    own = centred(robot)[0]
-    search = WorkspaceSearch(own, requirement(own, FEASIBLE, robot.limits))
-    poses = _poses(own, count, "float64")
+    centred_robot = centred(robot)[0]
+    search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
+    poses = _poses(centred_robot, count, "float64")
     places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
-    matrices = np.asarray(geometry.wrench_matrices(own, places, turns)) / search.unit[:, None]
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, turns)) / search.unit[:, None]
     wrenches = np.repeat(search.required(places[0], turns[0]).corners, count, axis=0)
-    limits = [np.broadcast_to(x, (count, own.n_cables)) for x in (search.asked.low, search.asked.high)]
+    limits = [np.broadcast_to(x, (count, centred_robot.n_cables)) for x in (search.asked.low, search.asked.high)]
     return count / best(lambda: least_norms(matrices, wrenches, *limits))
 
 
@@ -156,7 +156,7 @@ def rates() -> dict[str, Any]:
         poses a second by what is asked and by type of numbers; "first_s", what compiling and the first batch take.
     """
     eight, four, twelve = load_robot("cogiro"), _four_cables(), _twelve_cables()
-    found: dict[str, Any] = {}
+    rows: dict[str, Any] = {}
     for name, robot, condition, by_null_space, batches in (
         ("4 cables, point mass", four, FEASIBLE, False, BATCHES),
         ("8 cables", eight, FEASIBLE, True, BATCHES),
@@ -168,19 +168,19 @@ def rates() -> dict[str, Any]:
             dtype: margin_rate(robot, condition, dtype, by_null_space=by_null_space, batches=batches)
             for dtype in ("float32", "float64")
         }
-        found[name] = {dtype: rate for dtype, (rate, _) in measured.items()} | {"first_s": measured["float32"][1]}
-    found["28 pairs of cables"] = {dtype: clearance_rate(dtype) for dtype in ("float32", "float64")}
-    found["least tensions, 8 cables"] = {"float64": tension_rate(eight)}
-    return found | {"8 cables, others": _others(eight)}
+        rows[name] = {dtype: rate for dtype, (rate, _) in measured.items()} | {"first_s": measured["float32"][1]}
+    rows["28 pairs of cables"] = {dtype: clearance_rate(dtype) for dtype in ("float32", "float64")}
+    rows["least tensions, 8 cables"] = {"float64": tension_rate(eight)}
+    return rows | {"8 cables, others": _others(eight)}
 
 
 def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
     # Poses a second of linear programs and of least squares.
-    own = centred(robot)[0]
-    search = WorkspaceSearch(own, requirement(own, FEASIBLE, robot.limits))
-    poses = _poses(own, SAMPLE, "float64")
+    centred_robot = centred(robot)[0]
+    search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
+    poses = _poses(centred_robot, SAMPLE, "float64")
     places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
-    matrices = np.asarray(geometry.wrench_matrices(own, places, turns)) / search.unit[:, None]
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, turns)) / search.unit[:, None]
     wrench = search.required(places[0], turns[0]).corners[0]
 
     def rate(way) -> float:

@@ -90,8 +90,8 @@ def limits_over(
         InputError: numbers of another count, or no limits at all: not finite, a length or speed that is not positive,
             a smallest tension that is not below the largest.
     """
-    found = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
+    merged = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
     if not any_tensions:
-        check_bounded(found)
-    check_certain(robot, found, families)
-    return found
+        check_bounded(merged)
+    check_certain(robot, merged, families)
+    return merged

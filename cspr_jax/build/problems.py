@@ -36,19 +36,19 @@ def build_amplitude(
     """
     key = keys.amplitude
     if isinstance(key, PolynomialAmplitude):
-        amplitude, given = amplitudes.from_polynomial(key.polynomial), shown(list(key.polynomial))
+        amplitude, text = amplitudes.from_polynomial(key.polynomial), shown(list(key.polynomial))
     elif isinstance(key, NamedAmplitude):
         value = key.epsilon if isinstance(key.epsilon, float) else epsilon
         if value is None:
             raise ConfigError(file, f'{at}amplitude.epsilon = "best": must be a number in ]0, 0.5] (a plan can choose)')
-        amplitude, given = amplitudes.named(key.name, value), shown(key.name)
+        amplitude, text = amplitudes.named(key.name, value), shown(key.name)
     else:
-        amplitude, given = amplitudes.named(key), shown(key)
+        amplitude, text = amplitudes.named(key), shown(key)
     free_end = all(FAMILIES[name].free_end for name in keys.families)
     broken = [] if key == "ideal" and for_bounds else boundary_errors(amplitude, free_end=free_end)
     if broken:
         conditions = "(1.27) and (1.28)" if free_end else "(2.49)"
-        raise ConfigError(file, f"{at}amplitude = {given}: must meet {conditions}, but " + "; ".join(broken))
+        raise ConfigError(file, f"{at}amplitude = {text}: must meet {conditions}, but " + "; ".join(broken))
     return amplitude
 
 
@@ -82,15 +82,15 @@ def build_problem(
         ConfigError: the robot, the amplitude function or the limits cannot be used.
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
-    given = build_limits(robot_file, limits, file)
+    limit_values = build_limits(robot_file, limits, file)
     robot = kernel_robot(robot_file, keys, file, any_cables=any_cables)
     try:
         if not is_redundant_platform(robot):
-            check_bounded(given)
-        check_certain(robot, given, keys.families, in_pairs=robot_file.pairs is not None)
+            check_bounded(limit_values)
+        check_certain(robot, limit_values, keys.families, in_pairs=robot_file.pairs is not None)
     except InputError as error:
         raise ConfigError(file, str(error)) from error
-    return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, given, amplitude)
+    return Problem(aligned(robot)[0] if isinstance(robot, PlatformRobot) else robot, limit_values, amplitude)
 
 
 def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> PlatformMotionKind:

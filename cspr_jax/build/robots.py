@@ -50,16 +50,20 @@ def build_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object) -> Po
     Raises:
         ConfigError: its geometry, inertia or limits cannot be used.
     """
-    given: dict[str, Any] = {"mass": robot_file.mass, "gravity": gravity_of(robot_file, keys), "name": robot_file.name}
-    given |= {"z_axis": robot_file.z_axis, "limits": build_limits(robot_file, LimitKeys(), file)}
+    settings: dict[str, Any] = {
+        "mass": robot_file.mass,
+        "gravity": gravity_of(robot_file, keys),
+        "name": robot_file.name,
+    }
+    settings |= {"z_axis": robot_file.z_axis, "limits": build_limits(robot_file, LimitKeys(), file)}
     try:
         if not robot_file.is_platform:
             return with_cables(
-                MAKERS[robot_file.own_pattern](robot_file.base_points, **given), **_of_cables(robot_file)
+                MAKERS[robot_file.own_pattern](robot_file.base_points, **settings), **_of_cables(robot_file)
             )
-        given |= {"inertia": robot_file.inertia, "centre_of_mass": robot_file.centre_of_mass or [0.0, 0.0, 0.0]}
+        settings |= {"inertia": robot_file.inertia, "centre_of_mass": robot_file.centre_of_mass or [0.0, 0.0, 0.0]}
         robot = platform_robot(
-            robot_file.base_points, robot_file.platform_points, pattern=robot_file.own_pattern, **given
+            robot_file.base_points, robot_file.platform_points, pattern=robot_file.own_pattern, **settings
         )
         return with_cables(robot, **_of_cables(robot_file))
     except InputError as error:

@@ -21,7 +21,7 @@ def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> Robo
     """
     if not robot_file.is_platform:
         return robot_file
-    if not robot_file.translation_only and all(PLATFORM in some for some in patterns):
+    if not robot_file.translation_only and all(PLATFORM in allowed for allowed in patterns):
         return robot_file
     try:
         return robot_file.equivalent()

@@ -74,7 +74,7 @@ def _unbalanced(robot_file: RobotFile) -> list[str]:
 
 
 def _distance_to_hull(points: np.ndarray) -> float:
-    # Of the origin from the hull of points (n, axes), whose size is 1. One heavy row holds the sum of the weights.
+    # Return how far the origin is from the hull of points (n, axes), of size 1. One heavy row holds the sum of weights.
     if np.linalg.norm(points.mean(axis=0)) <= ROUNDING:
         return 0.0
     from scipy.optimize import nnls  # takes long to import, and the mean mostly answers
@@ -121,15 +121,15 @@ def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
     Returns:
         one line each.
     """
-    lines, start, asked = list[str](), keys.trajectory.start, keys.workspace
+    lines, start, workspace = list[str](), keys.trajectory.start, keys.workspace
     if start is not None and start.position is not None and not start.rest and keys.axes.z0 is not None:
-        every = (
+        depth_hints = (
             almost_at_rest("trajectory.from.position", start.position, z0, robot_file)
             for z0 in axis_points(keys.axes.z0)
         )
-        lines += [line for line in every if line][:1]
-    if asked is not None and "interference-free" in asked.conditions and not robot_file.cable_diameter:
-        shapes = (asked.obstacle, asked.platform_box, asked.platform_hull)
+        lines += [line for line in depth_hints if line][:1]
+    if workspace is not None and "interference-free" in workspace.conditions and not robot_file.cable_diameter:
+        shapes = (workspace.obstacle, workspace.platform_box, workspace.platform_hull)
         if all(shape is None for shape in shapes):
             lines.append(
                 'workspace.conditions: "interference-free" excludes nothing: cables without a thickness hardly ever '
@@ -140,7 +140,7 @@ def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
 
 
 def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure: str = "rest = true") -> str:
-    """Whether a place is P0 but for its last digits.
+    """Tell whether a place is P0 but for its last digits.
 
     Args:
         key: that gives the place.
@@ -165,7 +165,7 @@ def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure
 
 
 def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) -> str:
-    """Whether the z axis seems to point the other way.
+    """Tell whether the z axis seems to point the other way.
 
     Args:
         robot_file: the robot.

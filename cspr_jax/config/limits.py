@@ -62,7 +62,7 @@ def _one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) 
 
 
 Direction = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
-# Of types that are made here mypy asks nothing.
+# A function makes these types; they are Any to mypy, which does not check them.
 PerCable: Any = _one_or_each(Positive, Positive)
 NotNegativePerCable: Any = _one_or_each(NotNegative, NotNegative)
 TensionPerCable: Any = _one_or_each(Positive, Bound)
@@ -106,7 +106,7 @@ class UncertaintyTable(_Uncertainties):
     """Uncertainty of the robot, for all of which motions are to be feasible."""
 
     @model_validator(mode="after")
-    def _some(self) -> "UncertaintyTable":
+    def _beyond_least(self) -> "UncertaintyTable":
         if all(getattr(self, row.name) == row.least for row in UNCERTAINTIES):
             raise ValueError("at least one of its keys beyond its smallest value, else nothing is uncertain")
         return self

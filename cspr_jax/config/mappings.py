@@ -38,7 +38,7 @@ def plain(value: Any, depth: int = DEEPEST) -> Any:
 
 
 def text_of(data: dict[str, Any]) -> str:
-    """What is kept in place of a file's text.
+    """Return the JSON that is kept in place of a file's text.
 
     Args:
         data: as `plain` gives it.

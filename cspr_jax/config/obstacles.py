@@ -13,7 +13,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.robots import shapes
 
 MOST_OBSTACLES, MOST_CORNERS = 1000, 1000
-# Of a unit quaternion; as in `arithmetic.rotations`, with jax.
+# A unit quaternion may miss the norm 1 by this much; `arithmetic.rotations`, which needs jax, has the same number.
 UNIT_TOLERANCE = 1e-6
 Extent = Annotated[float, Field(ge=0.0, le=shapes.LARGEST_LENGTH)]
 Radius = Annotated[float, Field(gt=0.0, le=shapes.LARGEST_LENGTH)]
@@ -150,8 +150,8 @@ class PlatformShapeKeys(Table):
             low, high = ([x - c for x, c in zip(corner, centre_of_mass, strict=True)] for corner in self.platform_box)
             return shapes.box_between(low, high, name="platform")
         if self.platform_hull is not None:
-            given = self.platform_hull if isinstance(self.platform_hull, list) else platform_points
-            points = [[x - c for x, c in zip(point, centre_of_mass, strict=True)] for point in given]
+            hull_points = self.platform_hull if isinstance(self.platform_hull, list) else platform_points
+            points = [[x - c for x, c in zip(point, centre_of_mass, strict=True)] for point in hull_points]
             return shapes.hull(points, name="platform")
         return None
 

@@ -155,12 +155,12 @@ class PlanFile(TrajectoryKeys, LimitTable):
     def _one_place(self) -> "PlanFile":
         if self.limits is None:
             return self
-        given = {name: getattr(self.limits, name) for name in sorted(self.limits.model_fields_set)}
-        for name, value in given.items():
+        limits = {name: getattr(self.limits, name) for name in sorted(self.limits.model_fields_set)}
+        for name, value in limits.items():
             if getattr(self, name) is not None:
                 raise fault(f"limits.{name}", value, f"cannot be combined with {name} = {shown(getattr(self, name))}")
         # The rest of the program finds limits in one place.
-        return self.model_copy(update={"limits": None, **given})
+        return self.model_copy(update={"limits": None, **limits})
 
 
 def read_plan(text: str, path: Path) -> PlanFile:

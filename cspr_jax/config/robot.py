@@ -89,7 +89,7 @@ class RobotFile(LimitKeys):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was left out of a file of another program, one line each."""
+        """Items that were left out of a file of another program, one line each."""
         return self._notes
 
     @property
@@ -99,7 +99,7 @@ class RobotFile(LimitKeys):
 
     @property
     def is_platform(self) -> bool:
-        """Whether it is a rigid platform."""
+        """Tell whether the robot is a rigid platform."""
         return self.platform_points is not None
 
     @property
@@ -109,7 +109,7 @@ class RobotFile(LimitKeys):
 
     @property
     def is_planar(self) -> bool:
-        """Whether everything lies in the plane y = 0."""
+        """Tell whether everything lies in the plane y = 0."""
         return PATTERNS[self.own_pattern].is_planar
 
     @property
@@ -132,24 +132,24 @@ class RobotFile(LimitKeys):
             raise fault(missing, None, f"a rigid platform has it beside {other}, a point mass has neither")
         if self.centre_of_mass is not None and not self.is_platform:
             raise fault("centre_of_mass", self.centre_of_mass, "absent without platform_points and inertia")
-        own, count = self.own_pattern, len(self.base_points)
-        row = PATTERNS[own]
+        pattern, count = self.own_pattern, len(self.base_points)
+        row = PATTERNS[pattern]
         if row.is_body != self.is_platform:
             raise fault(
-                "pattern", shown(own), f"{BODIES if self.is_platform else POINTS}, or absent: as the other keys say"
+                "pattern", shown(pattern), f"{BODIES if self.is_platform else POINTS}, or absent: as the other keys say"
             )
         if self.planar and not row.is_planar:
             if self.is_platform:
                 allowed = "false, or absent, for a rigid platform (platform_points, inertia)"
                 raise fault("planar", True, f'{allowed}; a planar one has pattern = "1R2T"')
-            raise fault("pattern", shown(own), '"2T", or absent: as the other keys say')
+            raise fault("pattern", shown(pattern), '"2T", or absent: as the other keys say')
         if count < row.dof:
             allowed = f"at least {row.dof} ({row.description}), as the other keys say; {LEAST}"
             raise fault("base_points", f"{count} points", allowed)
         if self.platform_points is not None and len(self.platform_points) != count:
             allowed = f"{count}, as many as base_points"
             raise fault("platform_points", f"{len(self.platform_points)} points", allowed)
-        if own == "2T" and count == row.dof:
+        if pattern == "2T" and count == row.dof:
             _check_level(self.base_points)
         return self
 
@@ -187,7 +187,7 @@ class RobotFile(LimitKeys):
 
     @property
     def pairs(self) -> ParallelPairs | None:
-        """Of an equivalent the pairs that its cables stand for; its limits are still those of the six cables."""
+        """Pairs that the cables of an equivalent stand for; its limits are still those of the six cables."""
         return None if self._platform is None else self._platform.parallel_pairs()
 
     @property
@@ -207,9 +207,9 @@ class RobotFile(LimitKeys):
         exits = self.parallel_pairs().exit_points.tolist()
         others = ("inertia", "centre_of_mass", "pattern", "translation_only")
         absent = dict.fromkeys(("platform_points", *others))
-        found = self.model_copy(update={"base_points": exits, **absent})
-        found._platform = self.model_copy(update={"translation_only": True})
-        return found
+        robot_file = self.model_copy(update={"base_points": exits, **absent})
+        robot_file._platform = self.model_copy(update={"translation_only": True})
+        return robot_file
 
     @model_validator(mode="after")
     def _one_a_cable(self) -> "RobotFile":
@@ -318,10 +318,10 @@ def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, I
     Raises:
         ConfigError: a mistake in it, or what no robot file can say.
     """
-    found = read(path, cable_set)
-    robot_file = checked(RobotFile, found.keys, path)
-    robot_file._file, robot_file._notes = path, found.warnings
-    return robot_file, found
+    imported = read(path, cable_set)
+    robot_file = checked(RobotFile, imported.keys, path)
+    robot_file._file, robot_file._notes = path, imported.warnings
+    return robot_file, imported
 
 
 def read_robot(path: Path) -> RobotFile:

@@ -99,7 +99,7 @@ class From(Table):
 
     @property
     def is_pose(self) -> bool:
-        """Whether it says more than a place."""
+        """Tell whether the table says more than a place."""
         return any(key is not None for key in (self.tilt_torsion, self.quaternion, self.beta_hat))
 
     @model_validator(mode="after")

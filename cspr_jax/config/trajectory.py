@@ -109,5 +109,5 @@ class TrajectoryKeys(Table):
 
     @property
     def takes_amplitude(self) -> bool:
-        """Whether a family in use has an amplitude function, and not a law of its own."""
+        """Tell whether a family in use has an amplitude function, and not a law of its own."""
         return not all(FAMILIES[name].rests_anywhere for name in self.families)

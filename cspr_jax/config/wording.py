@@ -47,8 +47,8 @@ def fault(key: str, value: object, allowed: str) -> PydanticCustomError:
     Returns:
         the error.
     """
-    given = value if isinstance(value, str) else shown(value)
-    return PydanticCustomError(FAULT, "{allowed}", {"key": key, "given": given, "allowed": allowed})
+    text = value if isinstance(value, str) else shown(value)
+    return PydanticCustomError(FAULT, "{allowed}", {"key": key, "given": text, "allowed": allowed})
 
 
 def either(names: Iterable[str]) -> str:
@@ -90,9 +90,9 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
         key, value and what is allowed.
     """
     # The last part of an unknown or missing key is the user's own, whatever it looks like.
-    own = error["loc"][-1:] if error["type"] in ("extra_forbidden", "missing") else ()
-    parts = [part for part in error["loc"][: len(error["loc"]) - len(own)] if not str(part).startswith(VARIANT)]
-    parts += own
+    last_part = error["loc"][-1:] if error["type"] in ("extra_forbidden", "missing") else ()
+    parts = [part for part in error["loc"][: len(error["loc"]) - len(last_part)] if not str(part).startswith(VARIANT)]
+    parts += last_part
     if error["type"] == FAULT:
         context = error.get("ctx", {})
         parts += [context["key"]] if context["key"] else []
@@ -108,7 +108,7 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
 
 
 def _question(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> str:
-    # What a string, or a number in place of a list, probably stands for.
+    # The question guesses what a string, or a number in place of a list, stands for.
     value, key = error["input"], str(parts[-1]) if parts else ""
     if not isinstance(value, str):
         is_single = error["loc"][-1:] == ("~values",) and isinstance(value, int | float) and not isinstance(value, bool)

@@ -129,6 +129,6 @@ class WorkspaceTable(PlatformShapeKeys, PoseConditions):
     def _interference_asks(self) -> "WorkspaceTable":
         for name in ("obstacle", "platform_box", "platform_hull"):
             if getattr(self, name) is not None and "interference-free" not in self.conditions:
-                given = self.model_dump(include={name}, exclude_none=True)[name]
-                raise fault(name, given, 'absent: "interference-free" is not among the conditions')
+                value = self.model_dump(include={name}, exclude_none=True)[name]
+                raise fault(name, value, 'absent: "interference-free" is not among the conditions')
         return self

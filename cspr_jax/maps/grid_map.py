@@ -49,8 +49,8 @@ class GridMap(abc.ABC):
         """Build what all tiles share."""
         self._keys, self._file = keys, file
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
-        some: dict[str, Any] = {"at": "trajectory.", "for_bounds": for_bounds, "any_cables": self.any_cables}
-        self._problem = build_problem(robot_file, keys.trajectory, keys.limits, file, **some)
+        options: dict[str, Any] = {"at": "trajectory.", "for_bounds": for_bounds, "any_cables": self.any_cables}
+        self._problem = build_problem(robot_file, keys.trajectory, keys.limits, file, **options)
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -30,7 +30,7 @@ MAX_SIZE = "JAX_COMPILATION_CACHE_MAX_SIZE"
 _ENTRY, _USED = "-cache", "-atime"
 _OWN, _MARK = "run", "~"
 _TROUBLE = re.compile(r"Error (reading|writing) persistent compilation cache entry")
-# What hands over the entries of this process, once.
+# The list holds the callable that hands over the entries of this process, once.
 _pending: list[Callable[[], None]] = []
 # Whatever the umask says, others write into none of our folders.
 PRIVATE = 0o700
@@ -51,14 +51,14 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
     """
     if largest_size() >= 0 and importlib.util.find_spec("filelock") is None:
         raise OSError(errno.ENOTSUP, f"jax needs filelock for {MAX_SIZE}: pip install filelock")
-    whole, own = folder / "whole", folder / f"{_OWN}-{socket.gethostname()}-{os.getpid()}"
+    whole, run_folder = folder / "whole", folder / f"{_OWN}-{socket.gethostname()}-{os.getpid()}"
     check_owner(folder)
     whole.mkdir(mode=PRIVATE, exist_ok=True)
     check_owner(whole)
     _sweep(folder)
-    shutil.rmtree(own, ignore_errors=True)  # of a process of the same number
-    own.mkdir(mode=PRIVATE)
-    damaged = _take(whole, own)
+    shutil.rmtree(run_folder, ignore_errors=True)  # of a process of the same number
+    run_folder.mkdir(mode=PRIVATE)
+    damaged = _take(whole, run_folder)
     if damaged:
         entries = "a damaged entry" if damaged == 1 else f"{damaged} damaged entries"
         warn(f"{folder}: {entries} of compiled code removed; it is compiled again")
@@ -66,11 +66,11 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
 
     def at_end() -> None:
         if os.getpid() == process:  # not in a forked child
-            _hand_over(whole, own)
+            _hand_over(whole, run_folder)
 
     _pending.append(at_end)
     _quiet(folder, warn)
-    return own
+    return run_folder
 
 
 def check_owner(folder: Path, *, may_be_shared: bool = False) -> None:
@@ -133,7 +133,7 @@ def largest_size() -> int:
         return -1
 
 
-def _take(whole: Path, own: Path) -> int:
+def _take(whole: Path, run_folder: Path) -> int:
     # Entries into the folder of this run; the number of damaged ones, which are removed.
     damaged, is_bounded = 0, largest_size() >= 0
     for entry in whole.iterdir():
@@ -151,9 +151,9 @@ def _take(whole: Path, own: Path) -> int:
                 entry.unlink()
                 damaged += 1
             else:
-                _place(entry, data, own / name)
+                _place(entry, data, run_folder / name)
                 if is_bounded:
-                    used = own / f"{name.removesuffix(_ENTRY)}{_USED}"
+                    used = run_folder / f"{name.removesuffix(_ENTRY)}{_USED}"
                     used.write_bytes(entry.stat().st_mtime_ns.to_bytes(8, "little"))
     return damaged
 
@@ -178,7 +178,7 @@ def hand_over() -> None:
 
 def _quiet(folder: Path, warn: Callable[[str], None]) -> None:
     # jax warns of every single entry that it cannot read or write: the first one is told in our words, the others not.
-    usual, told = warnings.showwarning, threading.Event()
+    usual, warned = warnings.showwarning, threading.Event()
 
     def show(message, category, filename, lineno, file=None, line=None):
         match = _TROUBLE.match(str(message))
@@ -187,8 +187,8 @@ def _quiet(folder: Path, warn: Callable[[str], None]) -> None:
             return
         if match[1] == "writing":
             _write_no_more()
-        if not told.is_set():
-            told.set()
+        if not warned.is_set():
+            warned.set()
             action = "kept" if match[1] == "writing" else "read"
             reason = str(message).partition("': ")[2]
             warn(f"{folder}: compiled code cannot be {action}: {reason}; what is missing is compiled each time")
@@ -202,10 +202,10 @@ def _write_no_more() -> None:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 1e9)
 
 
-def _hand_over(whole: Path, own: Path) -> None:
+def _hand_over(whole: Path, run_folder: Path) -> None:
     with contextlib.suppress(OSError):
         known = {entry.name.rpartition(_MARK)[0] for entry in whole.iterdir()}
-        for entry in own.iterdir():
+        for entry in run_folder.iterdir():
             is_ours = not entry.name.endswith(_USED) and not entry.name.startswith(".")  # jax's times, and its lock
             if is_ours and entry.name not in known and _is_whole(data := plain_bytes(entry)):
                 entry.replace(whole / f"{entry.name}{_MARK}{_checksum(data)}")
@@ -215,7 +215,7 @@ def _hand_over(whole: Path, own: Path) -> None:
             size += entry.lstat().st_size
             if i >= LARGEST or 0 <= most < size:
                 entry.unlink(missing_ok=True)
-    shutil.rmtree(own, ignore_errors=True)
+    shutil.rmtree(run_folder, ignore_errors=True)
 
 
 def _checksum(data: bytes) -> str:
@@ -250,7 +250,7 @@ def _is_whole_zstd(zstd, data: bytes) -> bool:
 
 
 def _sweep(folder: Path) -> None:
-    # What runs of this machine that were killed have left.
+    # Runs of this machine that were killed have left these folders behind.
     for place in folder.glob(f"{_OWN}-{socket.gethostname()}-*"):
         process = place.name.rpartition("-")[2]
         if process.isdigit() and _is_gone(int(process)):

@@ -152,14 +152,14 @@ class Spread:
         groups = balanced(sizes, GROUPS * self._count)
         try:
             futures = [self._workers.submit(function, [items[k] for k in group]) for group in groups]
-            found = {
+            results = {
                 k: one
-                for group, own in zip(groups, futures, strict=True)
-                for k, one in zip(group, own.result(), strict=True)
+                for group, future in zip(groups, futures, strict=True)
+                for k, one in zip(group, future.result(), strict=True)
             }
         except BrokenProcessPool as error:
             raise ResourceError("a worker died, perhaps for want of memory: --workers must be smaller") from error
-        return [found[k] for k in range(len(items))]
+        return [results[k] for k in range(len(items))]
 
 
 def balanced(sizes: Sequence[float], count: int) -> list[list[int]]:
@@ -181,7 +181,7 @@ def balanced(sizes: Sequence[float], count: int) -> list[list[int]]:
     return [groups[k] for k in sorted(range(len(groups)), key=lambda k: -whole[k])]
 
 
-def _start(parent: int, begin: Callable[..., None] | None, given: tuple) -> None:
+def _start(parent: int, begin: Callable[..., None] | None, arguments: tuple) -> None:
     for number in _SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
@@ -192,7 +192,7 @@ def _start(parent: int, begin: Callable[..., None] | None, given: tuple) -> None
 
     threading.Thread(target=watch, daemon=True).start()
     if begin is not None:
-        begin(*given)
+        begin(*arguments)
 
 
 @contextlib.contextmanager

@@ -39,17 +39,17 @@ class Pace:
             done: cells done.
             total: all cells.
         """
-        now = self._clock()
+        instant = self._clock()
         self._tiles += 1
         if self._tiles == 0:
-            self._begin = (done, now)
+            self._begin = (done, instant)
             return
         if self._tiles == 1:
-            self._first = (done, now)
+            self._first = (done, instant)
         # The first tile holds the time of compiling: once there are others, they are counted alone.
         cells, since = self._begin if self._tiles == 1 else self._first
-        self.rate = (done - cells) / max(now - since, 1e-9)
-        self.ends = now + (total - done) / self.rate if self.rate > 0.0 else None
+        self.rate = (done - cells) / max(instant - since, 1e-9)
+        self.ends = instant + (total - done) / self.rate if self.rate > 0.0 else None
 
     def left(self) -> str:
         """Time that is left, in words.

@@ -8,7 +8,7 @@ Listener = Callable[[str], None]
 
 
 class _Board:
-    # What is being done: its parts from the outside in, and what each thread compiles.
+    # The board shows the work in progress: its parts from the outside in, and the function that each thread compiles.
 
     def __init__(self) -> None:
         self.listener: Listener | None = None

@@ -1,4 +1,4 @@
-"""What surrounds a process of the command line: settings of other libraries, and how many threads it may have."""
+"""Surroundings of a process of the command line: settings of other libraries, and how many threads it may have."""
 
 import contextlib
 import errno
@@ -104,7 +104,7 @@ def check_threads_of_jax(processes: int = 0) -> None:
 
 
 def shortage(error: Exception) -> str | None:
-    """What the machine lacks, where that is why something failed.
+    """Name what the machine lacks, if that is why something failed.
 
     Args:
         error: what was raised.

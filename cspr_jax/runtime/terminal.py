@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 _PLAINER = "cspr_jax.plainer"
-# What is written for signs that units, tables and progress use, where the encoding lacks them.
+# These stand in for signs that units, tables and progress use, where the encoding lacks them.
 _PLAIN = {
     **{"→": "->", "∞": "inf", "±": "+-", "−": "-", "–": "-", "—": "-", "·": "*", "×": "x", "≤": "<=", "≥": ">="},
     **{"²": "^2", "³": "^3", "°": " deg", "Δ": "d", "…": "...", "’": "'", "‘": "'", "“": '"', "”": '"'},

@@ -43,7 +43,7 @@ _PROBE = "import jax; jax.jit(lambda x: x + 1.0)(1.0).block_until_ready()"
 # jax tells when it has lowered a function, which it then compiles, and when that is done.
 _LOWERED = "/jax/core/compile/jaxpr_to_mlir_module_duration"
 _COMPILED = "/jax/core/compile/backend_compile_duration"
-_told: list[Any] = []
+_listeners: list[Any] = []
 # XLA complains of slow compiling, with advice to file a bug, as an error in its log; errors that stop something come as
 # exceptions, or are fatal and shown still.
 _ONLY_FATAL = ("TF_CPP_MIN_LOG_LEVEL", "3")
@@ -108,15 +108,15 @@ def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
     if place is None or CACHE in os.environ or (loaded is not None and loaded.config.jax_compilation_cache_dir):
         return None
     before = set(os.environ)
-    own = _keep(place, _warn_of_python)
-    if own is not None and loaded is not None:
+    run_folder = _keep(place, _warn_of_python)
+    if run_folder is not None and loaded is not None:
         # It has read the environment when it was imported.
         for name in {CACHE, *_KEPT} - before:
             loaded.config.update(name.lower(), _VALUES.get(name, os.environ[name]))
         from jax.experimental.compilation_cache import compilation_cache
 
         compilation_cache.reset_cache()  # else who has compiled without one goes on without
-    return own
+    return run_folder
 
 
 def _warn_of_python(line: str) -> None:
@@ -125,14 +125,14 @@ def _warn_of_python(line: str) -> None:
 
 def _keep(folder: Path, warn: Callable[[str], None]) -> Path | None:
     try:
-        own = compile_cache.opened(folder, warn)
+        run_folder = compile_cache.opened(folder, warn)
     except OSError as error:
         warn(f"{folder}: compiled code cannot be kept: {error.strerror or error}")
         return None
-    os.environ[CACHE] = str(own)
+    os.environ[CACHE] = str(run_folder)
     for name, value in _KEPT.items():
         os.environ.setdefault(name, value)
-    return own
+    return run_folder
 
 
 def check_device(device: str | None) -> None:
@@ -167,20 +167,20 @@ def tell_compiling() -> None:
     """Let those who wait know which function is compiled; imports jax."""
     import jax
 
-    def told(event: str, duration_secs: float, **keywords: str | int) -> None:
+    def listen(event: str, duration_secs: float, **keywords: str | int) -> None:
         del duration_secs
         if event == _LOWERED:
             stages.compiling(_readable(str(keywords.get("fun_name", ""))))
         elif event == _COMPILED:
             stages.compiling(None)
 
-    if not _told:
-        _told.append(told)
-        jax.monitoring.register_event_duration_secs_listener(told)
+    if not _listeners:
+        _listeners.append(listen)
+        jax.monitoring.register_event_duration_secs_listener(listen)
 
 
 def _readable(name: str) -> str:
-    # Of jit(_first_look), or jit__first_look.
+    # The name comes as jit(_first_look), or jit__first_look.
     return re.sub(r"^jit[(_]|\)$", "", name).replace("_", " ").strip()
 
 
@@ -193,17 +193,17 @@ def _few_arenas() -> None:
     ctypes.CDLL(None).mallopt(_ARENA_MAX, _FEW)
 
 
-def _folder(given: str | Path | None, warn: Callable[[str], None]) -> Path | None:
-    # Of this processor, this jaxlib and this Python: code compiled for another one must not run here.
-    given = os.environ.get("CSPR_CACHE_DIR") if given is None else given
-    if given == "":
+def _folder(setting: str | Path | None, warn: Callable[[str], None]) -> Path | None:
+    # The folder belongs to this processor, this jaxlib and this Python: code for another one must not run here.
+    setting = os.environ.get("CSPR_CACHE_DIR") if setting is None else setting
+    if setting == "":
         return None
     try:
         home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     except RuntimeError:  # a user without a name, as in a container
         home = os.devnull
     here = (*_versions(), sys.version, *_processor())
-    shared = Path(given or Path(home) / "cspr_jax")
+    shared = Path(setting or Path(home) / "cspr_jax")
     folder = shared / hashlib.sha256(repr(here).encode()).hexdigest()[:16]
     try:
         shared.parent.mkdir(parents=True, exist_ok=True)
@@ -219,7 +219,7 @@ def _folder(given: str | Path | None, warn: Callable[[str], None]) -> Path | Non
 
 
 def _versions() -> tuple[str, str]:
-    # Of jaxlib as it says itself: what an installer has noted may be of another one, or missing.
+    # jaxlib is asked for its version itself: an installer may have noted that of another jaxlib, or none.
     import jaxlib.version
 
     try:
@@ -236,17 +236,17 @@ def _processor() -> tuple[str, ...]:
     return tuple(sorted(next((line for line in lines if line.startswith(("flags", "Features"))), "").split()))
 
 
-def _flags(folder: Path, given: str, *, quick: bool = False) -> str:
+def _flags(folder: Path, settings: str, *, quick: bool = False) -> str:
     # XLA reads what does not begin with a dash as the name of a file of flags: there is no place for ours.
-    if given.strip() and not given.lstrip().startswith("-"):
-        return given
-    # Of two settings of one flag XLA takes the last: those of the user. They are not set twice, since all of the words
+    if settings.strip() and not settings.lstrip().startswith("-"):
+        return settings
+    # If a flag is set twice, XLA takes the last setting: the user's. Ours is then left out, since all of the words
     # are part of what compiled code is known by.
     ours = [WIDE] if NEEDS in _processor() else []
-    named = [word.partition("=")[0] for word in given.split()]
+    named = [word.partition("=")[0] for word in settings.split()]
     ours = [flag for flag in (*ours, *(QUICK if quick else ())) if flag.partition("=")[0] not in named]
-    wanted = " ".join(ours)
-    return f"{wanted} {given}".strip() if ours and _is_known(folder, wanted) else given
+    our_flags = " ".join(ours)
+    return f"{our_flags} {settings}".strip() if ours and _is_known(folder, our_flags) else settings
 
 
 def _check_flags(folder: Path | None, flags: str) -> None:

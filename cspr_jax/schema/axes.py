@@ -50,7 +50,7 @@ def best_name(axis: str) -> str:
     return f"best_{axis}"
 
 
-# What a map holds besides once the best point of an axis has been chosen for each cell of the others; no file has them.
+# A map holds these too once the best point of an axis is chosen for each cell of the other axes; no file has them.
 BEST = {
     q.name: q
     for q in (

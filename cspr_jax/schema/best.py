@@ -16,16 +16,16 @@ from cspr_jax.schema.meanings import CELL_SIDES
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# What tells first which of two points is better where a kind of map says nothing; then whatever else can tell.
+# These quantities tell first which of two points is better, if the kind of map does not say; then any other that can.
 FIRST = ("arcs", "oscillations", "release_speed", "margin")
-# Of these 0 stands for none, and fewer may be possible where a point is undecided.
+# In these counts 0 stands for none, and fewer may be possible where a point is undecided.
 COUNTS = ("arcs", "oscillations")
 _DOUBT = Verdict.UNDECIDED.value | Verdict.FEWER_ARCS_UNDECIDED.value
 _INSIDE, _OUTSIDE = CELL_SIDES.index("inside"), CELL_SIDES.index("outside")
 
 
 class Best(NamedTuple):
-    """What remains of arrays without one of their axes.
+    """Arrays reduced over one of their axes, and the places of the best points in it.
 
     Fields:
         data: by name; that of `schema.quantities.best_name` is the best point itself, NaN where no point will do.
@@ -124,7 +124,7 @@ def _taken(values: np.ndarray, places: np.ndarray, place: int) -> np.ndarray:
 
 
 def _with_doubt(reduced: dict[str, np.ndarray], verdict: np.ndarray, will_do: np.ndarray, place: int) -> np.ndarray:
-    # Where some point is undecided, it may be feasible with fewer arcs than the best of those that are.
+    # An undecided point may be feasible with fewer arcs than the best of the feasible points.
     count = next((reduced[name] for name in COUNTS if name in reduced), None)
     if count is None:
         return reduced["verdict"]
@@ -135,5 +135,5 @@ def _with_doubt(reduced: dict[str, np.ndarray], verdict: np.ndarray, will_do: np
 
 def _side(sides: np.ndarray, place: int) -> np.ndarray:
     # A whole cell is inside where it is for some point, and outside where it is for every one.
-    some, every = (sides == _INSIDE).any(place), (sides == _OUTSIDE).all(place)
-    return np.where(some, _INSIDE, np.where(every, _OUTSIDE, 0)).astype(sides.dtype)
+    is_inside, is_outside = (sides == _INSIDE).any(place), (sides == _OUTSIDE).all(place)
+    return np.where(is_inside, _INSIDE, np.where(is_outside, _OUTSIDE, 0)).astype(sides.dtype)

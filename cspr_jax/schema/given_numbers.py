@@ -10,7 +10,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 
-# What a shape has in place of a length that may be any from 1 on.
+# A shape has this in place of a length that may be any from 1 on.
 ANY = None
 
 
@@ -71,7 +71,7 @@ def whole(key: str, given: Any, least: int, largest: int) -> int:
 
 @dataclasses.dataclass(frozen=True)
 class Numbers:
-    """What an argument of real numbers may be.
+    """Rule that an argument of real numbers must satisfy.
 
     Fields:
         allowed: in words, for errors.
@@ -119,9 +119,9 @@ class Numbers:
         return values
 
 
-def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
-    return len(shape) == len(wanted) and all(
-        size >= 1 if length is ANY else size == length for size, length in zip(shape, wanted, strict=True)
+def _fits(shape: tuple[int, ...], lengths: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(lengths) and all(
+        size >= 1 if length is ANY else size == length for size, length in zip(shape, lengths, strict=True)
     )
 
 

@@ -55,11 +55,11 @@ def differences(here: dict[str, Any], there: dict[str, Any]) -> list[str]:
     Returns:
         "key = value here, value there", sorted by key.
     """
-    now, before = _flat(here), _flat(there)
+    values, before = _flat(here), _flat(there)
     return [
-        f"{key} = {shown(now.get(key))} here, {shown(before.get(key))} there"
-        for key in sorted(before.keys() | now.keys())
-        if before.get(key) != now.get(key)
+        f"{key} = {shown(values.get(key))} here, {shown(before.get(key))} there"
+        for key in sorted(before.keys() | values.keys())
+        if before.get(key) != values.get(key)
     ]
 
 

@@ -16,7 +16,7 @@ from cspr_jax.schema.quantities import EVERY, flag_attributes
 if TYPE_CHECKING:
     import xarray
 
-# Of answers with a value at either end of a segment.
+# Answers with a value at either end of a segment have an axis of these two points.
 ENDS = ("start", "target")
 CONTROL_POINTS = ("start", "middle", "end")
 
@@ -82,9 +82,9 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
     for part in PARTS.keys() - used:
         del axes[part]
     axes |= {name: arrays[name] for name in ("segment", "flight_t", "throw") if name in arrays}
-    own = dict.fromkeys(SEGMENTS, ("segment",)) | FLIGHT_DIMS
+    dims_of = dict.fromkeys(SEGMENTS, ("segment",)) | FLIGHT_DIMS
     variables = {
-        name: (own[name] if name in own else ("t", ACROSS[name]) if name in ACROSS else ("t",), values)
+        name: (dims_of[name] if name in dims_of else ("t", ACROSS[name]) if name in ACROSS else ("t",), values)
         for name, values in arrays.items()
         if name not in axes
     }
@@ -112,9 +112,9 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
     both = {"end": ENDS} if any(values.ndim == 2 for values in numbers.values()) else {}
     controls = {"control_point": CONTROL_POINTS, "axis": PARTS["axis"]}
     third = controls if any(values.ndim == 3 for values in numbers.values()) else {}
-    own: dict[int, dict[str, Any]] = {1: {}, 2: both, 3: third}
+    further_dims: dict[int, dict[str, Any]] = {1: {}, 2: both, 3: third}
     variables = {
-        name: ((*axes, *own[values.ndim]), values.reshape(*shape, *values.shape[1:]))
+        name: ((*axes, *further_dims[values.ndim]), values.reshape(*shape, *values.shape[1:]))
         for name, values in numbers.items()
     }
     data = dataset(variables, axes | both | third)
@@ -127,8 +127,8 @@ def _shape(dims: Mapping[str, Any], count: int) -> tuple[dict[str, np.ndarray], 
     axes = {name: np.asarray(points) for name, points in dims.items()}
     shape = tuple(points.size for points in axes.values())
     if any(points.ndim != 1 for points in axes.values()) or math.prod(shape) != count:
-        given = {name: list(points.shape) for name, points in axes.items()}
-        raise InputError("dims", given, f"lists of coordinates whose product has {count} points")
+        shapes = {name: list(points.shape) for name, points in axes.items()}
+        raise InputError("dims", shapes, f"lists of coordinates whose product has {count} points")
     return axes, shape
 
 

@@ -332,8 +332,8 @@ def quantity_of(kind: object, name: str) -> Quantity:
     Returns:
         the row.
     """
-    own = MAP_KINDS[kind].own if isinstance(kind, str) and kind in MAP_KINDS else ()
-    return next((row for row in own if row.name == name), EVERY[name])
+    quantities = MAP_KINDS[kind].own if isinstance(kind, str) and kind in MAP_KINDS else ()
+    return next((row for row in quantities if row.name == name), EVERY[name])
 
 
 def register(kind: MapKind, *own: Quantity) -> None:

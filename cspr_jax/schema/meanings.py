@@ -22,9 +22,9 @@ def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
     robot, limits = settings["robot"], settings.get("limits") or {}
     count = 3 if robot.get("translation_only") else len(robot["base_points"])
     chosen = itertools.combinations(range(1, count + 1), 1 if robot.get("planar") else 2)
-    given = {row.name: limits.get(row.name, robot.get(row.name)) for row in LIMITS if row.of_motion}
+    limit_values = {row.name: limits.get(row.name, robot.get(row.name)) for row in LIMITS if row.of_motion}
     # A smallest tension of zero is what taut cables ask for anyway.
-    moving = [name for name, value in given.items() if value is not None and np.any(value)]
+    moving = [name for name, value in limit_values.items() if value is not None and np.any(value)]
     return ("none", *("cables " + ", ".join(map(str, row)) for row in chosen), "max_acceleration", *moving)
 
 

@@ -2,7 +2,7 @@
 
 from cspr_jax.schema.quantity import Quantity
 
-# What verdicts rest on, and what they are about.
+# These texts say what verdicts rest on, and what the margin is.
 HOW = ", proved, but sampled for platforms on more than six cables"
 MARGIN = (
     "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
@@ -57,7 +57,7 @@ TRAJECTORY = {
         ),
     )
 }
-# What a motion file holds of each segment of its plan.
+# A motion file holds these quantities for each segment of its plan.
 SEGMENTS = {
     q.name: q
     for q in (
@@ -91,7 +91,7 @@ SEGMENTS = {
         Quantity("segment_allowed", "1", "allowed", "The most, or the least, that is allowed, in the same unit."),
     )
 }
-# What it holds of an object that the plan releases, and the dimensions of each.
+# It holds these for an object that the plan releases; the dimensions of each follow.
 FLIGHT = {
     q.name: q
     for q in (

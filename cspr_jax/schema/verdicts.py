@@ -4,7 +4,7 @@ import enum
 
 import numpy as np
 
-# Of arrays of flags, in memory and in files.
+# Arrays of flags have this type, in memory and in files.
 FLAGS = np.uint32
 
 

@@ -142,7 +142,7 @@ def content_of(path: Path, begun: Callable[[Iterable[ReadableDataset]], None] = 
             if identity(settings) != _text(file, "identity"):
                 raise DamagedError("its settings and its identity do not fit")
             tile, store, axes = settings["run"]["tile"], settings["run"]["store"], settings["dimensions"]
-            datasets = _found(file, axes, store)
+            datasets = _stored_datasets(file, axes, store)
             grid = Grid({name: datasets[name].values().reshape(-1) for name in axes}, tuple(tile))
             _check_shapes(datasets, grid, store)
             begun(datasets.values())
@@ -164,7 +164,7 @@ def _text(file: h5py.File, name: str) -> str:
     return text
 
 
-def _found(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, ReadableDataset]:
+def _stored_datasets(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, ReadableDataset]:
     # All datasets that the settings name, and no others; each looked at before anything is read.
     names = [*axes, *store]
     if len({*names}) < len(names) or not {*axes} <= AXES.keys() or not {*store} <= QUANTITIES.keys():

@@ -136,7 +136,7 @@ class Settings(Document):
 
 
 class Source(Document):
-    """Where a run comes from; no decision uses it.
+    """Origin of a run; no decision uses it.
 
     Fields:
         file: name of the sweep file.

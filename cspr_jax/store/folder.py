@@ -17,7 +17,7 @@ from cspr_jax.store.disk import Disk, check_plain, open_plain
 from cspr_jax.store.publishing import PART, make_folders, refusal
 
 _SHARD = re.compile(r"(\d{5,})\.h5")
-# What a lock says; empty when it is new.
+# A lock names its holder; it is empty when it is new.
 _HOLDER = re.compile(rb"(?:process \d+ on [^\n]*\n)?")
 _NO_LOCKS = (
     "network disks and FUSE may have no locks: choose -o on another disk; other programs read a result that is copied "
@@ -138,14 +138,14 @@ class RunFolder:
             )
 
     def leftovers(self) -> list[Path]:
-        """What processes have begun to write and not finished.
+        """Files that processes have begun to write and not finished.
 
         Returns:
             the files; what is no file, such as a link, is none of ours.
         """
-        own = re.compile(rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5){PART}")
+        pattern = re.compile(rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5){PART}")
         parts = [part for folder in (self.path, self.shards) for part in sorted(folder.glob(".*.part"))]
-        return [part for part in parts if own.fullmatch(part.name) and _is_file(part)]
+        return [part for part in parts if pattern.fullmatch(part.name) and _is_file(part)]
 
     def sweep_leftovers(self) -> None:
         """Remove what dead processes left unfinished; only under the lock.
@@ -195,8 +195,8 @@ class RunFolder:
         Raises:
             StoreError: the disk or the folder refuses.
         """
-        now = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())
-        line = json.dumps({"time": now, "event": event, "pid": os.getpid(), **fields})
+        time_stamp = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())
+        line = json.dumps({"time": time_stamp, "event": event, "pid": os.getpid(), **fields})
         try:
             self.disk.append(self.log, (line + "\n").encode())
         except OSError as error:

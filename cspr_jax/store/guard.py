@@ -25,7 +25,7 @@ MOST_ROWS = 1000  # of an attribute with a row a cable
 DENSEST = 1100
 _PLENTY = 64 << 20
 _PER_CHUNK = 256
-# Of a dataset, by this program and by HDF5's dimension scales.
+# A dataset gets these attributes from this program and from HDF5's dimension scales.
 _ATTRIBUTES = (
     *("units", "long_name", "description", "flag_masks", "flag_values", "flag_meanings"),
     *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS"),
@@ -73,7 +73,7 @@ class ReadableDataset(NamedTuple):
 
 
 def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, ReadableDataset]:
-    """Those of some datasets that a file holds; nothing else of it is looked at.
+    """Open the named datasets that a file holds; nothing else of the file is looked at.
 
     Args:
         file: open.
@@ -99,13 +99,13 @@ def refuse_dense(wanted: Iterable[ReadableDataset], size: int, *, densest: int =
     Raises:
         DamagedError: they do.
     """
-    every = list(wanted)
-    total, most = sum(one.size for one in every), _PLENTY + densest * size
+    readable = list(wanted)
+    total, most = sum(one.size for one in readable), _PLENTY + densest * size
     if total > most:
         raise DamagedError(
             f"it says it holds {total / 1e9:.3g} GB: must be at most {most / 1e9:.3g} GB in a file of its size"
         )
-    stored = sum(one.stored + _PER_CHUNK * one.chunks for one in every)
+    stored = sum(one.stored + _PER_CHUNK * one.chunks for one in readable)
     if size > _PLENTY + 1.2 * stored:
         raise DamagedError(f"{(size - stored) / 1e9:.3g} GB of it are none of its quantities")
 
@@ -178,12 +178,12 @@ def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None,
         return None
     attribute = h5a.open(item.id, name.encode())
     space = attribute.get_space()
-    given = () if space.get_simple_extent_type() == h5s.NULL else tuple(int(n) for n in space.get_simple_extent_dims())
-    fits = len(given) == len(shape) and space.get_simple_extent_type() != h5s.NULL
-    fits = fits and all(1 <= n <= MOST_ROWS if m is None else n == m for n, m in zip(given, shape, strict=True))
+    extent = () if space.get_simple_extent_type() == h5s.NULL else tuple(int(n) for n in space.get_simple_extent_dims())
+    fits = len(extent) == len(shape) and space.get_simple_extent_type() != h5s.NULL
+    fits = fits and all(1 <= n <= MOST_ROWS if m is None else n == m for n, m in zip(extent, shape, strict=True))
     if not fits or _dtype(attribute.get_type()) != dtype:
         raise DamagedError(f"its {name} has another type or shape than cspr writes")
-    array = np.empty(given, dtype)
+    array = np.empty(extent, dtype)
     attribute.read(array)
     return array
 

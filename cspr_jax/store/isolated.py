@@ -44,8 +44,8 @@ del sys.path[0]
 from cspr_jax.store.reader import serve
 serve()
 """
-# What a file can do to the process that reads it. Other signals come from people, batch systems or the system's lack of
-# memory, and say nothing about the file.
+# A file can end the process that reads it by these signals. Other signals come from people, batch systems or the
+# system's lack of memory, and say nothing about the file.
 _ENDS = {
     signal.SIGXCPU: "HDF5 finds no end in it",
     **dict.fromkeys((signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGFPE, signal.SIGILL), "HDF5 fails on it"),
@@ -97,7 +97,7 @@ class Reader:
             DamagedError: it is no file, is damaged, or holds what no file of this program does.
             StoreError: the system refuses to read anything at the moment.
         """
-        with self._opened(path, follow=True) as opened, self._asked(opened, {"what": "result"}) as (answer, pipe):
+        with self._opened(path, follow=True) as opened, self._answered(opened, {"what": "result"}) as (answer, pipe):
             arrays = {}
             for name, dtype, shape in answer["arrays"]:
                 self._header(pipe, patience=None)
@@ -118,7 +118,7 @@ class Reader:
             DamagedError: it is no file, or damaged.
             StoreError: the system refuses to read anything at the moment.
         """
-        with self._opened(path, follow=follow) as opened, self._asked(opened, {"what": "content"}) as (answer, pipe):
+        with self._opened(path, follow=follow) as opened, self._answered(opened, {"what": "content"}) as (answer, pipe):
             return None if "motion" in answer else Content(**self._header(pipe, patience=None)["content"])
 
     def shard(self, path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -> Shard:
@@ -142,7 +142,7 @@ class Reader:
             if opened.seal in self.known:
                 with os.fdopen(os.dup(opened.file), "rb") as data:
                     return decode(io.BytesIO(data.read()), layout, index, shape)
-            with self._asked(opened, words) as (answer, pipe):
+            with self._answered(opened, words) as (answer, pipe):
                 values = {name: _array(pipe, dtype, shape) for name, dtype in answer["arrays"]}
             if opened.seal is not None:
                 self.known.add(opened.seal)
@@ -163,7 +163,7 @@ class Reader:
         """
         with (
             self._opened(path, most=LARGEST_SHARD) as opened,
-            self._asked(opened, {"what": "header"}) as (answer, _),
+            self._answered(opened, {"what": "header"}) as (answer, _),
         ):
             return Header(**answer["header"])
 
@@ -180,7 +180,7 @@ class Reader:
             os.close(file)
 
     @contextlib.contextmanager
-    def _asked(self, opened: "_Opened", words: dict[str, Any]) -> Iterator[tuple[dict[str, Any], RawIOBase]]:
+    def _answered(self, opened: "_Opened", words: dict[str, Any]) -> Iterator[tuple[dict[str, Any], RawIOBase]]:
         path, file, seal = opened
         try:
             pipe = self._sent(path, file, words)

@@ -14,7 +14,7 @@ from cspr_jax.schema.motion_quantities import ACROSS, PARTS, TRAJECTORY
 from cspr_jax.store.netcdf import file_size
 from cspr_jax.store.seal import DamagedError, unreadable
 
-# Of text; numbers take a third of it in memory. The header has some hundred names.
+# Both are sizes of text; numbers take a third of it in memory. The header has some hundred names.
 LARGEST_TABLE, LARGEST_HEADER = 2 << 30, 1 << 16
 FEASIBLE = "feasible"
 
@@ -73,13 +73,13 @@ def _places(heads: list[str]) -> dict[str, Any]:
     start = 0
     for name in TRAJECTORY:
         parts = PARTS.get(ACROSS[name], tuple(str(k + 1) for k in range(MOST_CABLES))) if name in ACROSS else ()
-        wanted = [f"{name}_{part}" for part in parts] or [name]
-        count = next((k for k, head in enumerate(names[start:]) if k == len(wanted) or head != wanted[k]), None)
+        columns = [f"{name}_{part}" for part in parts] or [name]
+        count = next((k for k, head in enumerate(names[start:]) if k == len(columns) or head != columns[k]), None)
         count = len(names) - start if count is None else count
         if not count:
             continue
-        if ACROSS.get(name) != "cable" and count != len(wanted):
-            raise DamagedError(f"it has no column {wanted[count]} behind {wanted[count - 1]}")
+        if ACROSS.get(name) != "cable" and count != len(columns):
+            raise DamagedError(f"it has no column {columns[count]} behind {columns[count - 1]}")
         places[name] = slice(start, start + count) if parts else start
         start += count
     if start < len(names):

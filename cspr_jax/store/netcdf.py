@@ -21,7 +21,7 @@ from cspr_jax.store.stream import DiskFile
 
 # The format whose metadata carry checksums.
 LAYOUT = ("v110", "v110")
-# What h5py raises on a file that is damaged or not HDF5.
+# h5py raises these on a file that is damaged or not HDF5.
 UNREADABLE = (OSError, KeyError, ValueError, RuntimeError, IndexError, TypeError, AttributeError, ArithmeticError)
 
 

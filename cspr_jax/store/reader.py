@@ -52,8 +52,8 @@ def serve() -> None:
     channel = socket.socket(fileno=0)
     out = channel.makefile("wb")
     _tell(out, {})  # ready
-    while (asked := _next(channel)) is not None:
-        words, file = asked
+    while (request := _next(channel)) is not None:
+        words, file = request
         _grant(_LOOK, 0)
         answer(Path(f"/dev/fd/{file}"), words, out)
         os.close(file)
@@ -149,7 +149,7 @@ _ANSWERS = {"result": _result, "content": _content, "shard": _shard, "header": _
 
 
 def _attributes(file: h5py.File) -> dict[str, Any]:
-    # Those that this program writes; whatever else there is stays where it is.
+    # Only attributes that this program writes are read; all others stay where they are.
     attributes: dict[str, Any] = {name: guard.text(file, name) for name in _LONG}
     attributes |= {name: guard.text(file, name, largest=1 << 16) for name in _TEXTS}
     for names, dtype in ((_INTEGERS, "int64"), (_NUMBERS, "float64")):
@@ -173,9 +173,9 @@ def _send(out: BinaryIO, values: np.ndarray) -> None:
 
 
 def _grant_for(datasets: Iterable[guard.ReadableDataset]) -> None:
-    every = list(datasets)
-    seconds = sum(one.size * _PER_BYTE + one.chunks * _PER_CHUNK for one in every)
-    _grant(_LOOK + seconds, 2 * max((one.size for one in every), default=0))
+    readable = list(datasets)
+    seconds = sum(one.size * _PER_BYTE + one.chunks * _PER_CHUNK for one in readable)
+    _grant(_LOOK + seconds, 2 * max((one.size for one in readable), default=0))
 
 
 def _grant(seconds: float, memory: int) -> None:
@@ -190,7 +190,7 @@ def _grant(seconds: float, memory: int) -> None:
 
 
 class _Limits:
-    # Whether somebody else has set narrower ones, so that what fails at them is no fault of the file.
+    # The flag is set where somebody else's limits are narrower: a failure at them is no fault of the file.
     are_foreign = False
 
 

@@ -67,7 +67,7 @@ class Result:
 
     @property
     def is_map(self) -> bool:
-        """Whether it is a map, not a motion over time."""
+        """Tell whether the result is a map, not a motion over time."""
         return "map" in self.attributes
 
     def best(self, *axes: str) -> "Result":
@@ -203,21 +203,21 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _settings(attributes: dict[str, Any], path: Path) -> dict[str, Any]:
-    # What a sweep file says, with its robot and the order of the axes.
+    # Settings are the keys of a sweep file, with its robot and the order of the axes.
     settings = _json(attributes, "settings")
     checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, path, at="settings")
     robot = checked(RobotFile, settings["robot"], path, at="settings.robot")
     order = settings.get("dimensions")
     if not isinstance(order, list) or not order or not all(isinstance(name, str) and name in AXES for name in order):
         raise DamagedError(f"settings.dimensions = {shown(order)}: must be a list of axes")
-    for name, wanted in (("map", settings["map"]), ("robot", robot.name), ("z_axis", robot.z_axis)):
-        if attributes.get(name) != wanted:
+    for name, setting in (("map", settings["map"]), ("robot", robot.name), ("z_axis", robot.z_axis)):
+        if attributes.get(name) != setting:
             raise DamagedError(f"its {name} = {shown(attributes.get(name))} and its settings do not fit")
     return settings
 
 
 def _check_robot(attributes: dict[str, Any], path: Path) -> None:
-    # What pictures say of it. Motions of earlier versions have no more than its name.
+    # Pictures show these attributes of the robot. Motions of earlier versions have no more than its name.
     name, z_axis, points = attributes.get("robot"), attributes.get("z_axis", "down"), attributes.get("base_points")
     if not isinstance(name, str) or not 0 < len(name) <= 200:
         raise DamagedError(f"robot = {shown(name)}: must be a name of at most 200 characters")
@@ -282,16 +282,16 @@ def _motion(
     }
     segments = {name: array for name, array in arrays.items() if name in SEGMENTS}
     for name, array in arrays.items():
-        wanted: tuple[int, ...] = (len(time), widths.get(name, 3))
+        shape: tuple[int, ...] = (len(time), widths.get(name, 3))
         if name in ("t", "tension_residual"):
-            wanted = (len(time),)
+            shape = (len(time),)
         elif name in FLIGHT_DIMS:
             first, *rest = FLIGHT_DIMS[name]
-            wanted = (arrays[first].size if first in arrays else -1, *(len(PARTS[part]) for part in rest))
+            shape = (arrays[first].size if first in arrays else -1, *(len(PARTS[part]) for part in rest))
         elif name in segments:
-            wanted = (segments["segment"].size if "segment" in segments else -1,)
+            shape = (segments["segment"].size if "segment" in segments else -1,)
         kinds = EVERY[name].readable
-        if array.shape != wanted or array.dtype.name not in (kinds[:1] if kinds[0] == "float64" else kinds):
+        if array.shape != shape or array.dtype.name not in (kinds[:1] if kinds[0] == "float64" else kinds):
             raise DamagedError(f"{name} has another shape or type than in a motion")
         # The best candidate of a motion that is not feasible may pass a singularity.
         _check_numbers(name, array, LARGEST_NUMBER, finite=name not in _OPEN)

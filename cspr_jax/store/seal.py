@@ -19,8 +19,8 @@ _STEP = 1 << 20
 _NONE = "it is not whole, or not of cspr"
 
 
-# What is not there, or is no file. Every other refusal comes from the system or the disk, and says nothing about the
-# file.
+# These errors mean that nothing is there, or that it is no file. Every other refusal comes from the system or the disk,
+# and says nothing about the file.
 _NO_FILE = {errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.ENAMETOOLONG}
 
 

@@ -147,7 +147,7 @@ def decode(
             written = file.attrs["content_sha256"]
     except UNREADABLE as error:
         raise DamagedError(printable(f"HDF5 cannot read it: {reason(error)}")) from error
-    # Of the types in which it was written.
+    # The digest is taken of the values in the types in which they were written.
     if not isinstance(written, str) or digest_of(values) != written:
         raise DamagedError("its content has changed")
     if max(header.near_zero, header.undecided or 0) > math.prod(shape):

@@ -37,9 +37,9 @@ def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
     Raises:
         ConfigError: which key, and what it must be.
     """
-    given = tuple(name for name in _TARGETS[:-1] if getattr(keys.axes, name) is not None)
-    if given not in (("x", "y"), ("radius", "azimuth")):
-        raise ConfigError(path, f"axes: {', '.join(given) or 'no targets'}: must be x and y, or radius and azimuth")
+    targets = tuple(name for name in _TARGETS[:-1] if getattr(keys.axes, name) is not None)
+    if targets not in (("x", "y"), ("radius", "azimuth")):
+        raise ConfigError(path, f"axes: {', '.join(targets) or 'no targets'}: must be x and y, or radius and azimuth")
     if kind.families:
         if "trajectory" not in keys.model_fields_set:
             raise ConfigError(path, f"trajectory is missing: {SweepFile.model_fields['trajectory'].description}")
@@ -84,7 +84,7 @@ def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
 
 
 def is_given(keys: SweepFile, name: str) -> bool:
-    """Whether a sweep has a key.
+    """Tell whether a sweep has a key.
 
     Args:
         keys: the sweep.
@@ -97,7 +97,7 @@ def is_given(keys: SweepFile, name: str) -> bool:
 
 
 def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
-    """Whether a sweep, or its robot, asks for what a key stands for.
+    """Tell whether a sweep, or its robot, asks for what a key stands for.
 
     Args:
         keys: the sweep.
@@ -141,7 +141,7 @@ def _as_written(name: str) -> str:
 
 
 def _missing(keys: SweepFile, name: str) -> str | None:
-    # What to say of a dotted key that is not given; None: it is.
+    # Return the words for a dotted key that is not given; None: it is.
     table: Table = keys
     for part in name.split("."):
         inner = getattr(table, part)
@@ -167,11 +167,11 @@ def _check_start(kind: MapKind, keys: SweepFile, path: Path) -> None:
     if kind.start != "pose" and start is not None and start.is_pose:
         poses = either(other.name for other in MAP_KINDS.values() if other.start == "pose")
         raise ConfigError(path, f"trajectory.from: must be without orientation and beta_hat but for map = {poses}")
-    given = [name for name in _START if getattr(keys.axes, name) is not None]
-    if kind.start == "point" and start is None and len(given) < len(_START):
+    start_axes = [name for name in _START if getattr(keys.axes, name) is not None]
+    if kind.start == "point" and start is None and len(start_axes) < len(_START):
         raise ConfigError(
             path,
             "trajectory.from is missing: { position = [x, y, z] }, { rest = true }, or axes from_x, from_y, from_z",
         )
-    if start is not None and start.rest and given:
-        raise ConfigError(path, f"axes.{given[0]}: must be absent where trajectory.from.rest = true")
+    if start is not None and start.rest and start_axes:
+        raise ConfigError(path, f"axes.{start_axes[0]}: must be absent where trajectory.from.rest = true")

@@ -113,9 +113,9 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     kind = MAP_KINDS[keys.map]
     check_map(kind, keys, path)
     robot = as_moved(robot, [kind.patterns]) if kind.patterns else robot
-    own = _orientation_axes(keys) if kind.is_over_orientations else {}
+    orientation_axes = _orientation_axes(keys) if kind.is_over_orientations else {}
     counts = {name: _count(getattr(keys.axes, name)) for name in data["axes"]}
-    counts |= {name: len(points) for name, points in own.items()}
+    counts |= {name: len(points) for name, points in orientation_axes.items()}
     check_store(kind, keys, robot, path)
     store = list(keys.run.store or _usual(kind, keys, robot))
     shape = tuple(counts.values())
@@ -124,8 +124,8 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     _check_size(counts, tile, usual, bytes_needed(shape, store, keys.run.dtype), path)
     axes = {name: axis_points(getattr(keys.axes, name)) for name in data["axes"]}
     check_points(axes, path)
-    axes |= own
-    # What is not given decides nothing: a key that a later version adds leaves old identities as they are.
+    axes |= orientation_axes
+    # Keys that are not given decide nothing: a key that a later version adds leaves old identities as they are.
     settings = keys.model_dump(mode="json", by_alias=True, exclude_none=True)
     settings |= {"robot": robot.settings, "dimensions": list(axes)}
     settings["run"] |= {"tile": list(tile), "store": store}
@@ -134,7 +134,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
 
 
 def _usual(kind: MapKind, keys: SweepFile, robot: RobotFile) -> list[str]:
-    # What is stored where the file does not say.
+    # These quantities are stored where the file does not name any.
     more = [names for key, names in kind.stored_with if is_given(keys, key)]
     names = dict.fromkeys((*kind.stored, *itertools.chain(*more)))
     needed = {name: kind.keys_of(name) for name in names}

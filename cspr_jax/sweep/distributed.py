@@ -80,17 +80,17 @@ class Scheduler:
         self._sweep = self._client.submit(bytes, pickle.dumps(sweep), pure=False)
 
     def _wait_for_workers(self, stop: Stop) -> None:
-        begin, told = time.monotonic(), False
+        begin, has_warned = time.monotonic(), False
         while not self._client.nthreads():
             waited = time.monotonic() - begin
             if stop.code is not None:
                 raise StoppedError("stopped: no worker came; nothing was computed", stop.code)
             if waited > SECONDS_FOR_WORKERS[1]:
                 raise ResourceError(f"--scheduler {self._address}: has no workers: start some")
-            if waited > SECONDS_FOR_WORKERS[0] and not told:
+            if waited > SECONDS_FOR_WORKERS[0] and not has_warned:
                 minutes = SECONDS_FOR_WORKERS[1] // 60
                 self._warn(f"--scheduler {self._address}: has no workers yet; waiting for {minutes} minutes")
-                told = True
+                has_warned = True
             time.sleep(POLL_SECONDS)
 
     def environment(self) -> dict[str, Any]:
@@ -139,16 +139,16 @@ class Scheduler:
         """
         from distributed import KilledWorker, wait
 
-        waiting, running, told = collections.deque(indices), set[Any](), False
+        waiting, running, has_warned = collections.deque(indices), set[Any](), False
         try:
             while running or (waiting and not stop):
                 # Workers come and go: as many as there are now decide how much is in flight.
                 threads = sum(self._client.nthreads().values())
                 if not threads and stop:
                     return
-                if not threads and not told:
+                if not threads and not has_warned:
                     self._warn(f"--scheduler {self._address}: has lost its workers; waiting for others")
-                told = not threads
+                has_warned = not threads
                 while waiting and not stop and len(running) < AHEAD * threads:
                     running.add(self._client.submit(compute_tile, self._sweep, waiting.popleft(), pure=False))
                 if not running:

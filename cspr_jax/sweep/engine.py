@@ -159,14 +159,14 @@ class Run:
                     self._prune()
                 return Outcome(self._folder.result, 0, len(self._tiling))
             make_folders(self._disk, self._folder.shards)
-            kept = self._verified(digest(environment))
-            self._folder.note("started", command=list(self._options.command), kept=len(kept))
-            computed = self._compute(executor, kept, record)
+            whole_tiles = self._verified(digest(environment))
+            self._folder.note("started", command=list(self._options.command), kept=len(whole_tiles))
+            computed = self._compute(executor, whole_tiles, record)
             self._consolidate(record)
             self._folder.note("finished", computed=computed)
             if self._options.prune:
                 self._prune()
-        return Outcome(self._folder.result, computed, len(kept))
+        return Outcome(self._folder.result, computed, len(whole_tiles))
 
     # -- tiles -----------------------------------------------------------------------------------
 
@@ -180,7 +180,7 @@ class Run:
 
     def _verified(self, environment: str) -> list[int]:
         # Tiles whose shard is there and is what was written; anything else under their names is set aside.
-        kept = []
+        whole_tiles = []
         for path, index in self._folder.shard_names().items():
             try:
                 if index >= len(self._tiling) or path != self._folder.shard(index):
@@ -191,13 +191,13 @@ class Run:
                 continue
             if shard.environment != environment and not self._options.accept_environment_change:
                 raise RefusedError(f"{path}: was computed in another environment: --accept-environment-change keeps it")
-            kept.append(index)
-        return kept
+            whole_tiles.append(index)
+        return whole_tiles
 
-    def _compute(self, executor: Executor, kept: list[int], record: Record) -> int:
-        done = sum(self._cells(index) for index in kept)
+    def _compute(self, executor: Executor, whole_tiles: list[int], record: Record) -> int:
+        done = sum(self._cells(index) for index in whole_tiles)
         self._hooks.on_tile(done, self._sweep.grid.size)
-        finished = set(kept)
+        finished = set(whole_tiles)
         self._hooks.stop.busy = True
         missing = [index for index in range(len(self._tiling)) if index not in finished]
         with contextlib.closing(_as_generator(executor.tiles(missing, self._hooks.stop))) as tiles:

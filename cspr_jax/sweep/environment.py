@@ -60,7 +60,7 @@ def package_hash() -> str:
 
 
 def _git() -> dict[str, Any]:
-    # Of the checkout that holds the package, if it is one.
+    # Git is asked about the checkout that holds the package, if there is one.
     def ask(*words: str) -> str | None:
         try:
             done = subprocess.run(("git", "-C", str(PACKAGE), *words), capture_output=True, timeout=60)

@@ -18,7 +18,7 @@ from cspr_jax.sweep.work import Computed
 
 # Times that the workers may die, one after another, without a tile between.
 DEATHS = 3
-# Where nobody says how many workers, each is for so many tiles or more, since it compiles for itself.
+# If nobody says how many workers, each gets at least so many tiles, since it compiles for itself.
 TILES_EACH = 4
 
 

@@ -101,7 +101,7 @@ def verify(path: Path) -> dict[str, Any]:
 
 
 def _is_read(report: dict[str, Any], path: Path, read: Callable[[], object]) -> bool:
-    # What is damaged is a fault; what the system or the disk refuses to read may be whole.
+    # A damaged file is a fault; a file that the system or the disk refuses to read may be whole.
     try:
         read()
     except DamagedError as error:

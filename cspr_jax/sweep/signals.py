@@ -15,9 +15,9 @@ from types import FrameType
 from cspr_jax.errors import ExitCode
 
 CODES = {signal.SIGINT: ExitCode.INTERRUPTED, signal.SIGTERM: ExitCode.TERMINATED}
-# Where nothing must be finished, the main thread has so long to leave by itself; it cannot while it compiles.
+# If nothing must be finished, the main thread has so long to leave by itself; it cannot while it compiles.
 GRACE_SECONDS = 1.2
-# What a tile in progress has after SIGTERM.
+# A tile in progress has so long after SIGTERM.
 TILE_SECONDS = 8.0
 FINISHING = "finishing the tile in progress; Ctrl-C again ends at once"
 STOPPING = "stopping; Ctrl-C again ends at once"
@@ -96,13 +96,13 @@ def stop_signals(tell: Callable[[str], None] = lambda line: None) -> Iterator[St
             return
         stop.end(stop.code)
 
-    def asked(number: int) -> None:
+    def on_signal(number: int) -> None:
         stop.ask(number)
         threading.Thread(target=end_unless_over, daemon=True).start()
 
     before = {number: signal.signal(number, lambda number, frame: None) for number in CODES}
     try:
-        with _watched(CODES, asked):
+        with _watched(CODES, on_signal):
             yield stop
     finally:
         over.set()
@@ -152,7 +152,7 @@ def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
         if not over.wait(GRACE_SECONDS):
             _end(ExitCode.INTERRUPTED)
 
-    def asked(number: int) -> None:
+    def on_signal(number: int) -> None:
         del number
         if pressed.is_set():
             _end(ExitCode.INTERRUPTED)
@@ -161,7 +161,7 @@ def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
         threading.Thread(target=end_unless_over, daemon=True).start()
 
     try:
-        with _watched((signal.SIGINT,), asked):
+        with _watched((signal.SIGINT,), on_signal):
             yield prompt
     finally:
         if last is not None and pressed.is_set():
@@ -174,7 +174,7 @@ def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
 
 
 @contextlib.contextmanager
-def _watched(numbers: Collection[int], asked: Callable[[int], None]) -> Iterator[None]:
+def _watched(numbers: Collection[int], handle: Callable[[int], None]) -> Iterator[None]:
     # Python runs handlers when the main thread is back from what it has called, which may be a minute of compiling.
     # It writes the number of a signal to this pipe at once, where another thread reads it.
     reading, writing = os.pipe()
@@ -183,7 +183,7 @@ def _watched(numbers: Collection[int], asked: Callable[[int], None]) -> Iterator
     def watch() -> None:
         while number := os.read(reading, 1):
             if number[0] in numbers:
-                asked(number[0])
+                handle(number[0])
 
     thread = threading.Thread(target=watch, daemon=True)
     thread.start()

@@ -63,9 +63,11 @@ class TileMap:
         _refuse(index, self._cells.contradictions(answers))
         # Counts and flags fit their small types: max_arcs is at most 1000.
         values = {n: answers[n].astype(kind).reshape(tiling.extent(index)) for n, kind in self._sweep.types.items()}
-        now = environment()
+        this_environment = environment()
         undecided = self._cells.undecided(answers)
-        return Computed(Shard(index, digest(now), _near_zero(answers), values, undecided), now)
+        return Computed(
+            Shard(index, digest(this_environment), _near_zero(answers), values, undecided), this_environment
+        )
 
 
 def _near_zero(answers: dict[str, np.ndarray]) -> int:
@@ -73,7 +75,7 @@ def _near_zero(answers: dict[str, np.ndarray]) -> int:
 
 
 def _refuse(index: int, contradictions: dict[str, np.ndarray]) -> None:
-    # Of a broken processor, driver or compiler.
+    # Contradictions come from a broken processor, driver or compiler.
     for fault, cells in contradictions.items():
         if cells.any():
             raise SelfCheckError(

@@ -45,12 +45,12 @@ def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
     limits = sum(
         LIMIT_SECONDS.get(name, max(LIMIT_SECONDS.values())) for name in names if is_given(keys, f"limits.{name}")
     )
-    asked = sum(cost for name, cost in WORKSPACE_SECONDS.items() if is_given(keys, f"workspace.{name}"))
+    conditions = sum(cost for name, cost in WORKSPACE_SECONDS.items() if is_given(keys, f"workspace.{name}"))
     divisions = (keys.orientations or Orientations()).divisions
     motion = (kind.cost.seconds + kind.cost.limits * limits) * (
         keys.trajectory.max_arcs / ARCS if kind.families else 1.0
     )
-    return motion + asked + kind.cost.orientation * 4 * divisions**3
+    return motion + conditions + kind.cost.orientation * 4 * divisions**3
 
 
 def tile_cells(kind: MapKind, keys: SweepFile, cells: int) -> int:

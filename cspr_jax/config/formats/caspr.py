@@ -94,12 +94,12 @@ def _root(file: Path, tag: str) -> Element:
 
 def _link(file: Path) -> Element:
     links = child(_root(file, "bodies_system"), "links", file)
-    found = [element for element in links if isinstance(element.tag, str)]
-    if len(found) != 1:
-        raise ConfigError(file, f"links: {len(found)} links: must be one, which the cables move")
-    if found[0].tag != "link_rigid":
-        raise ConfigError(file, f"<{found[0].tag}>: must be <link_rigid>")
-    return found[0]
+    elements = [element for element in links if isinstance(element.tag, str)]
+    if len(elements) != 1:
+        raise ConfigError(file, f"links: {len(elements)} links: must be one, which the cables move")
+    if elements[0].tag != "link_rigid":
+        raise ConfigError(file, f"<{elements[0].tag}>: must be <link_rigid>")
+    return elements[0]
 
 
 def _joint_of(link: Element, file: Path) -> _Joint:
@@ -124,8 +124,8 @@ def _body(file: Path) -> tuple[_Joint, Body]:
         raise ConfigError(file, f'inertia.ref = {shown(reference)}: must be "com" or "joint"')
     if reference == "joint":
         tensor = model.about_centre(tensor, mass, centre)
-    given = tensor if tensor.any() else None
-    body = Body(file, "", joint.pattern, [], "", mass or None, centre, given, joint.axes, joint.is_level)
+    body_inertia = tensor if tensor.any() else None
+    body = Body(file, "", joint.pattern, [], "", mass or None, centre, body_inertia, joint.axes, joint.is_level)
     return joint, body
 
 
@@ -144,12 +144,12 @@ def _joint_place(file: Path, joint: _Joint) -> list[float]:
     return (normal * float(normal @ place)).tolist()
 
 
-def _cable_set(file: Path, wanted: str | None) -> Element:
+def _cable_set(file: Path, set_name: str | None) -> Element:
     root = _root(file, "cables")
     sets = {element.get("id", ""): element for element in root.findall("cable_set")}
-    name = root.get("default_cable_set", "") if wanted is None else wanted
+    name = root.get("default_cable_set", "") if set_name is None else set_name
     if name not in sets:
-        key = "default_cable_set" if wanted is None else "--set"
+        key = "default_cable_set" if set_name is None else "--set"
         known = either(sets) if sets else "absent: the file has no cable_set"
         raise ConfigError(file, f"{key} = {shown(name)}: {did_you_mean(name, list(sets))}must be {known}")
     return sets[name]

@@ -113,39 +113,39 @@ class _Table:
         return self.data.get(key) is not None
 
     def table(self, key: str) -> "_Table":
-        return _Table(self._given(key), self.place + key, self.file)
+        return _Table(self._required(key), self.place + key, self.file)
 
     def tables(self, key: str) -> list["_Table"]:
-        found = self._given(key)
-        if not isinstance(found, list) or not 1 <= len(found) <= MOST_CABLES:
+        rows = self._required(key)
+        if not isinstance(rows, list) or not 1 <= len(rows) <= MOST_CABLES:
             raise ConfigError(self.file, f"{self.place}{key}: must be a list of 1 to {MOST_CABLES} tables")
-        return [_Table(one, f"{self.place}{key}[{k}]", self.file) for k, one in enumerate(found)]
+        return [_Table(one, f"{self.place}{key}[{k}]", self.file) for k, one in enumerate(rows)]
 
     def numbers(self, key: str, *shape: int, missing: Any = None) -> np.ndarray | None:
         """Finite numbers of a shape; None where the key is absent, or what is missing is infinite."""
         if not self.has(key):
             return None if missing is None else np.asarray(missing, float)
         try:
-            found = np.array(self.data[key], float)
+            values = np.array(self.data[key], float)
         except (ValueError, TypeError, OverflowError):
-            found = np.full(1, np.nan)
-        if found.shape == shape and np.isposinf(np.abs(found)).any():
+            values = np.full(1, np.nan)
+        if values.shape == shape and np.isposinf(np.abs(values)).any():
             return None
-        if found.shape != shape or not (np.abs(found) <= model.LARGEST_NUMBER).all():
+        if values.shape != shape or not (np.abs(values) <= model.LARGEST_NUMBER).all():
             words = f"{' x '.join(map(str, shape))} finite numbers" if shape else "a finite number"
-            words += f" up to {model.LARGEST_NUMBER:g}" * bool(found.shape == shape and np.isfinite(found).all())
+            words += f" up to {model.LARGEST_NUMBER:g}" * bool(values.shape == shape and np.isfinite(values).all())
             value = shown(self.data[key])
             raise ConfigError(self.file, f"{self.place}{key} = {value}: must be {words}{look_alike(value)}")
-        return found
+        return values
 
     def index(self, key: str, count: int, missing: int | None = None) -> int:
-        found = self.data.get(key, missing)
-        if isinstance(found, bool) or not isinstance(found, int) or not 0 <= found < count:
-            words = f"must be a number from 0 to {count - 1}{look_alike(shown(found))}"
-            raise ConfigError(self.file, f"{self.place}{key} = {shown(found)}: {words}")
-        return found
+        number = self.data.get(key, missing)
+        if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < count:
+            words = f"must be a number from 0 to {count - 1}{look_alike(shown(number))}"
+            raise ConfigError(self.file, f"{self.place}{key} = {shown(number)}: {words}")
+        return number
 
-    def _given(self, key: str) -> Any:
+    def _required(self, key: str) -> Any:
         if not self.has(key):
             raise ConfigError(self.file, f"{self.place}{key} is missing: a robot of cdpyr has it")
         return self.data[key]
@@ -177,15 +177,15 @@ def _name(robot: _Table, path: Path) -> str:
 
 
 def _pattern(platform: _Table) -> str:
-    given = platform.data.get("motion_pattern")
-    if isinstance(given, dict):
-        counts = given.get("rotation") or 0, given.get("translation") or 0
-        given = PATTERNS.get(counts, given) if all(isinstance(count, int) for count in counts) else given
-    if not isinstance(given, str) or given not in PATTERNS.values():
+    pattern = platform.data.get("motion_pattern")
+    if isinstance(pattern, dict):
+        counts = pattern.get("rotation") or 0, pattern.get("translation") or 0
+        pattern = PATTERNS.get(counts, pattern) if all(isinstance(count, int) for count in counts) else pattern
+    if not isinstance(pattern, str) or pattern not in PATTERNS.values():
         key = f"{platform.place}motion_pattern"
-        allowed = f"{either(PATTERNS.values())}{look_alike(shown(given))}"
-        raise ConfigError(platform.file, f"{key} = {shown(given)}: must be {allowed}")
-    return given
+        allowed = f"{either(PATTERNS.values())}{look_alike(shown(pattern))}"
+        raise ConfigError(platform.file, f"{key} = {shown(pattern)}: must be {allowed}")
+    return pattern
 
 
 def _cables(robot: _Table, platform: _Table) -> list[Cable]:
@@ -209,8 +209,8 @@ def _cables(robot: _Table, platform: _Table) -> list[Cable]:
 
 
 def _turn(anchor: _Table) -> np.ndarray:
-    found = anchor.numbers("dcm", 3, 3)
-    return np.eye(3) if found is None else found
+    matrix = anchor.numbers("dcm", 3, 3)
+    return np.eye(3) if matrix is None else matrix
 
 
 def _thickness(robot: _Table, body: Body) -> None:

@@ -1,4 +1,4 @@
-"""What all formats read: one body on cables; and the keys of a robot file that it becomes."""
+"""Model that all formats are read into, one body on cables, and the keys of a robot file that it becomes."""
 
 import dataclasses
 import math
@@ -214,5 +214,5 @@ def _one(values: list[float]) -> Any:
 
 
 def _rounded(values: np.ndarray) -> Any:
-    # Of sums and turned axes: without the last digit, and without a negative zero.
+    # Sums and turned axes are written without the last digit, and without a negative zero.
     return [_rounded(row) for row in values] if values.ndim > 1 else [float(f"{x:.{DIGITS}g}") + 0.0 for x in values]

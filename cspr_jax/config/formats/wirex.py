@@ -49,12 +49,12 @@ def read(path: Path) -> Body:
     platforms = robot.findall("platform")
     number_of = used.pop()
     platform = next((one for one in platforms if one.get("id") == number_of), platforms[0] if platforms else None)
-    given = (None if platform is None else platform.get("motionpattern")) or robot.get("motionpattern") or ""
-    if given not in cdpyr.PATTERNS.values():
-        raise ConfigError(path, f"motionpattern = {shown(given)}: must be {either(cdpyr.PATTERNS.values())}")
+    pattern = (None if platform is None else platform.get("motionpattern")) or robot.get("motionpattern") or ""
+    if pattern not in cdpyr.PATTERNS.values():
+        raise ConfigError(path, f"motionpattern = {shown(pattern)}: must be {either(cdpyr.PATTERNS.values())}")
     cables = [_cable(chain, k, path) for k, chain in enumerate(chains)]
-    body = Body(path, robot.get("name") or path.stem, given, cables, f"WireX robot {path.name}")
-    body.axes = cdpyr.AXES.get(given, UPRIGHT)
+    body = Body(path, robot.get("name") or path.stem, pattern, cables, f"WireX robot {path.name}")
+    body.axes = cdpyr.AXES.get(pattern, UPRIGHT)
     if root.get("version") not in (None, *VERSIONS):
         body.warnings.append(f"version = {shown(root.get('version'))}: read as {either(VERSIONS)}")
     if platform is not None:
@@ -69,8 +69,8 @@ def read(path: Path) -> Body:
 
 
 def _of(element: Element, key: str, file: Path, place: str, missing: float = 0.0) -> float:
-    given = element.get(key)
-    return missing if given is None else number(given, file, f"{place}.{key}")
+    text = element.get(key)
+    return missing if text is None else number(text, file, f"{place}.{key}")
 
 
 def _cable(chain: Element, k: int, file: Path) -> Cable:
@@ -93,8 +93,8 @@ def _weigh(platform: Element, body: Body, file: Path) -> None:
             [number(tensor.get(f"I{a}{b}", "0"), file, f"inertiatensor.I{a}{b}", infinite=True) for b in "xyz"]
             for a in "xyz"
         ]
-        found = np.array(parts)
-        body.inertia = found if (np.abs(found) <= LARGEST_NUMBER).all() and found.any() else None
+        matrix = np.array(parts)
+        body.inertia = matrix if (np.abs(matrix) <= LARGEST_NUMBER).all() and matrix.any() else None
 
 
 def _replace_defaults(body: Body) -> None:
@@ -117,7 +117,7 @@ def _replace_defaults(body: Body) -> None:
 
 
 def _limit(root: Element, body: Body, file: Path) -> None:
-    # Of several applications all are to be possible. Zero stands for a largest load that is not known.
+    # The limits allow every application of the file. Zero stands for a largest load that is not known.
     applications = list(root.iter("application"))
     cables = [(one, "minimum_load", "cable") for one in root.findall("cable")]
     least = [_load(*one, file) for one in [*((one, "min_cable_load", "application") for one in applications), *cables]]

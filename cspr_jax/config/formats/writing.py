@@ -34,7 +34,7 @@ def value_text(value: Any) -> str:
         TOML; tables inline.
     """
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {value_text(own)}" for key, own in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {value_text(item)}" for key, item in value.items()) + " }"
     if isinstance(value, list) and value and isinstance(value[0], list):
         return "[\n" + "".join(f"    {value_text(row)},\n" for row in value) + "]"
     if isinstance(value, list):

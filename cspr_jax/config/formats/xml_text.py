@@ -58,7 +58,7 @@ def read_xml(path: Path) -> Element:
 
 
 def _encoding(data: bytes) -> tuple[str | None, str]:
-    # What the first bytes say outweighs what is declared; None: the parser is to take the name that is declared.
+    # The first bytes outweigh the declaration; None: the parser is to take the name that is declared.
     if data[:2] in _UTF16:
         return _UTF16[data[:2]], ""
     declared = _DECLARED.match(data)
@@ -82,10 +82,10 @@ def child(parent: Element, tag: str, file: object, place: str = "") -> Element:
     Raises:
         ConfigError: none, or several.
     """
-    found = parent.findall(tag)
-    if len(found) != 1:
-        raise ConfigError(file, f"{place or parent.tag}: {len(found)} elements <{tag}>: must be one")
-    return found[0]
+    elements = parent.findall(tag)
+    if len(elements) != 1:
+        raise ConfigError(file, f"{place or parent.tag}: {len(elements)} elements <{tag}>: must be one")
+    return elements[0]
 
 
 def text_of(element: Element) -> str:
