@@ -8,8 +8,8 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.build.limits import limits_over
 from cspr_jax.errors import InputError
+from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot

@@ -14,8 +14,8 @@ import numpy as np
 
 from cspr_jax.api import argument_rules
 from cspr_jax.api.argument_rules import Rule, choice, integer, kind_of, many, real
-from cspr_jax.config.trajectory import LARGEST_MAX_ARCS
 from cspr_jax.schema.given_numbers import ANY
+from cspr_jax.schema.limits import LARGEST_MAX_ARCS
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

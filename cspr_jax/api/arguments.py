@@ -8,11 +8,11 @@ import numpy as np
 
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
-from cspr_jax.build.limits import limits_over
-from cspr_jax.config.hints import almost_at_rest
+from cspr_jax.config.near_rest import almost_at_rest
 from cspr_jax.errors import InputError
 from cspr_jax.motions.amplitudes import NAMES, Amplitude, boundary_errors, named
 from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.kernel_axes import prepared

@@ -19,7 +19,7 @@ from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
 from cspr_jax.robots.robot import check_determined
-from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.columns import Columns
 
 
 @dataclasses.dataclass(frozen=True)

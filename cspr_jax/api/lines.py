@@ -6,11 +6,11 @@ import numpy as np
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_point_mass, points_of
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.build.limits import limits_over
 from cspr_jax.errors import InputError
 from cspr_jax.lines.least_time import LeastTimes, least_times
 from cspr_jax.lines.motion import LAWS, TimedLine, fixed_law, s_curve
 from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.kernel_axes import prepared

@@ -3,10 +3,10 @@
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.build.limits import pair_limits
 from cspr_jax.build.robots import MAKERS
 from cspr_jax.build.robots import load_robot as _load_robot
 from cspr_jax.errors import InputError
+from cspr_jax.motions.given_limits import pair_limits
 from cspr_jax.robots.cables import with_cables as _with_cables
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.parallel_pairs import parallel_pairs

@@ -24,7 +24,7 @@ from cspr_jax.beziers.verdicts import BATCH, verdicts
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.point_mass import spool_radius
-from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS
 
 UNKNOWNS, POPULATION = 6, 64

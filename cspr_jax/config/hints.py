@@ -1,16 +1,16 @@
 """Hints of likely mistakes in files that can be computed; they change neither results nor exit codes."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.config.near_rest import almost_at_rest
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import shown
-from cspr_jax.robots.spool_plane import AT_P0, in_plane, size
+from cspr_jax.robots.spool_plane import in_plane
 
 # Cameras over stadiums hang from spools up to 250 m apart; what is larger, such as the cabin of a radio telescope,
 # weighs tonnes.
@@ -19,9 +19,6 @@ LARGEST_SPAN, LARGEST_MASS = 300.0, 1000.0  # m, kg
 INERTIA_RATIOS = (1e-5, 1e3)
 # Part of the distances between the points of a platform; tables of points are rounded.
 ROUNDING = 1e-3
-
-# Places nearer to P0 than this, m or of z0, are hardly meant to be other places.
-NEAR_P0 = 1e-3
 
 
 def robot_hints(robot_file: RobotFile) -> list[str]:
@@ -137,31 +134,6 @@ def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
                 "cable_diameter?"
             )
     return lines
-
-
-def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure: str = "rest = true") -> str:
-    """Tell whether a place is P0 but for its last digits.
-
-    Args:
-        key: that gives the place.
-        place: (3,) in the robot's axes, m; not said to be at rest.
-        z0: depth of P0 below the centroid of the spools, m.
-        robot: its `base_points` and `z_axis`.
-        cure: what would say that it is at rest.
-
-    Returns:
-        what to look at, if it is so near to P0 and not at rest there; else nothing.
-    """
-    spools = np.asarray(robot.base_points)
-    rest = frame_of(spools, robot.z_axis).outward(np.array([0.0, 0.0, z0]))
-    apart = float(np.linalg.norm(np.asarray(place) - rest))
-    if not AT_P0 * size(spools) < apart <= NEAR_P0 * max(1.0, z0):
-        return ""
-    written = ", ".join(f"{value:.12g}" for value in (np.round(rest, 12) + 0.0).tolist())
-    return (
-        f"{key} = {shown(np.asarray(place).tolist())}: {apart:.2g} m from P0 = [{written}], and not at rest there: the "
-        f"direction of so short a way decides the motion; if P0 is meant: {cure}"
-    )
 
 
 def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) -> str:

@@ -8,9 +8,7 @@ from cspr_jax.config.limits import Positive
 from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import Table
 from cspr_jax.schema.families import FAMILIES
-
-LARGEST_MAX_ARCS = 1000
-
+from cspr_jax.schema.limits import LARGEST_MAX_ARCS
 
 Angle = Annotated[float, Field(ge=-100.0, le=100.0)]
 Component = Annotated[float, Field(ge=-1.1, le=1.1)]

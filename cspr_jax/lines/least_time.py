@@ -12,7 +12,7 @@ import numpy as np
 from cspr_jax.lines.durations import Rule, names_of
 from cspr_jax.lines.fastest import fastest
 from cspr_jax.motions.problem import Problem
-from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import Verdict
 
 

@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.columns import Columns
 
 AnyAnswers = TypeVar("AnyAnswers", bound="Answers")
 

@@ -1,5 +1,6 @@
 """Limits as somebody gives them, checked, in the kernels' axes."""
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,7 +10,8 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.errors import InputError
-from cspr_jax.robots.limits import Limits, Uncertainty
+from cspr_jax.robots.limits import NO_LIMITS, Limits, Uncertainty
+from cspr_jax.robots.parallel_pairs import ParallelPairs
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.families import FAMILIES
@@ -117,3 +119,61 @@ def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
     if values.shape not in shapes or not ((values >= least) & is_number).all():
         raise InputError(f"{at}{row.name}", value, allowed)
     return leaf(np.broadcast_to(values, (n_cables,) if row.per_cable else ()))
+
+
+def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
+    """Limits of the three cables that stand for pairs of six.
+
+    Args:
+        limits: of the six cables; the floor is that of the effector.
+        pairs: the pairs.
+
+    Returns:
+        the limits, (3,) each.
+
+    Raises:
+        InputError: of some pair no tension is within the limits of both cables.
+    """
+    values: dict[str, Any] = {
+        row.name: leaf(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
+        for row in LIMITS
+        if row.per_cable and (value := getattr(limits, row.name)) is not None
+    }
+    low, high = values.get("tension_min"), values.get("tension_max")
+    if low is not None and high is not None and not (low < high).all():
+        pair = int(np.argmin(high - low))
+        allowed = "must be below tension_max, each over the cable's share of it"
+        first, second = (pairs.cables[pair] + 1).tolist()
+        raise InputError(
+            "tension_min", None, allowed, fault=f"{low[pair]:.6g} N of the pair of cables {first} and {second}"
+        )
+    return dataclasses.replace(limits, **values)
+
+
+def limits_over(
+    robot: PointMassRobot | PlatformRobot,
+    limits: Limits | None,
+    *,
+    any_tensions: bool = False,
+    families: tuple[str, ...] = (),
+) -> Limits:
+    """Limits that are given over those of a robot, as the kernels take them.
+
+    Args:
+        robot: in its own axes.
+        limits: one number or one a cable each, in the robot's axes; None: those of the robot.
+        any_tensions: whether some of the largest tensions may be infinite.
+        families: of the trajectories that are judged by all of an uncertainty; none: there may be none.
+
+    Returns:
+        the limits.
+
+    Raises:
+        InputError: numbers of another count, or no limits at all: not finite, a length or speed that is not positive,
+            a smallest tension that is not below the largest.
+    """
+    merged = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
+    if not any_tensions:
+        check_bounded(merged)
+    check_certain(robot, merged, families)
+    return merged

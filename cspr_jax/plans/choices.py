@@ -6,7 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.build.problems import build_amplitude
-from cspr_jax.config.hints import almost_at_rest, plan_hints
+from cspr_jax.config.hints import plan_hints
+from cspr_jax.config.near_rest import almost_at_rest
 from cspr_jax.config.plan import DepthRule
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motions.amplitudes import Amplitude

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.schema.best import best_of, check_axis
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
 from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT_DIMS, PARTS, SEGMENTS
@@ -107,7 +106,7 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
         ConfigError: xarray is not installed.
     """
     count = len(next(iter(arrays.values())))
-    axes, shape = _shape({"target": range(count)} if dims is None else dims, count)
+    axes, shape = axes_of({"target": range(count)} if dims is None else dims, count)
     numbers = {name: values for name, values in arrays.items() if values.dtype != object}
     both = {"end": ENDS} if any(values.ndim == 2 for values in numbers.values()) else {}
     controls = {"control_point": CONTROL_POINTS, "axis": PARTS["axis"]}
@@ -123,61 +122,25 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
     return data
 
 
-def _shape(dims: Mapping[str, Any], count: int) -> tuple[dict[str, np.ndarray], tuple[int, ...]]:
+def axes_of(dims: Mapping[str, Any], count: int) -> tuple[dict[str, np.ndarray], tuple[int, ...]]:
+    """Return the dimensions whose product some answers are.
+
+    Args:
+        dims: coordinates by name, the last one varying fastest.
+        count: number of answers.
+
+    Returns:
+        (n,) coordinates by name; the shape of the product.
+
+    Raises:
+        InputError: dimensions of another number of points.
+    """
     axes = {name: np.asarray(points) for name, points in dims.items()}
     shape = tuple(points.size for points in axes.values())
     if any(points.ndim != 1 for points in axes.values()) or math.prod(shape) != count:
         shapes = {name: list(points.shape) for name, points in axes.items()}
         raise InputError("dims", shapes, f"lists of coordinates whose product has {count} points")
     return axes, shape
-
-
-class Columns:
-    """Answers whose fields are columns: arrays with a value for each of n cases."""
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """The fields that are arrays.
-
-        Returns:
-            (n, ...) each, by name.
-        """
-        return {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
-
-    def to_xarray(self, dims: Mapping[str, Any] | None = None) -> "xarray.Dataset":
-        """The answers for xarray, with units and long names.
-
-        Args:
-            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
-                None: one dimension "target".
-
-        Returns:
-            the fields over these dimensions; those of both ends of a segment over "end", too.
-
-        Raises:
-            InputError: dimensions of another number of points.
-            ConfigError: xarray is not installed.
-        """
-        return over(self.arrays(), dims)
-
-    def best(self, axis: str, dims: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """The answers at the best point of one of the dimensions whose product they are, as of a map.
-
-        Args:
-            axis: of `dims`, such as "z0".
-            dims: as for `to_xarray`.
-
-        Returns:
-            the fields over the other dimensions by name, and as "best_z0" the point chosen, NaN where none is feasible;
-            `store.result.Result.best` says which one that is.
-
-        Raises:
-            InputError: dimensions of another number of points, or an axis that is none of them.
-        """
-        arrays = self.arrays()
-        axes, shape = _shape(dims, len(next(iter(arrays.values()))))
-        check_axis(axis, tuple(axes))
-        whole = {name: values.reshape(*shape, *values.shape[1:]) for name, values in arrays.items()}
-        return best_of(whole, axis, axes[axis], list(axes).index(axis)).data
 
 
 def _described(name: str, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:

@@ -5,6 +5,8 @@ from typing import Literal
 
 from cspr_jax.schema.verdicts import Verdict
 
+# Numbers of arcs that files and arguments may ask for.
+LARGEST_MAX_ARCS = 1000
 # Multiples of an uncertainty are not followed further.
 LARGEST_MULTIPLE = 1000.0
 

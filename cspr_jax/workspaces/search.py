@@ -19,7 +19,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces import cocircuits, exact, geometry, kernels
 from cspr_jax.workspaces.margins import Wrenches

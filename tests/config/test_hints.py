@@ -11,7 +11,7 @@ import pytest
 import cspr_jax
 from config.test_wording import BODY, RING, SPOOLS, spec_of
 from cspr_jax.cli import main
-from cspr_jax.config import hints
+from cspr_jax.config import hints, near_rest
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.sweep import SweepFile, SweepTrajectory
@@ -35,7 +35,7 @@ from cspr_jax.errors import shown
 def test_hints_about_a_rounded_p0(z_axis, z0, place, told):
     robot_file = spec_of(z_axis=z_axis, base_points=[[x + 5.0, y, 3.0] for x, y, _ in SPOOLS])
     centre = np.mean(robot_file.base_points, axis=0)
-    text = hints.almost_at_rest("pose[1].position", (centre + place).tolist(), z0, robot_file)
+    text = near_rest.almost_at_rest("pose[1].position", (centre + place).tolist(), z0, robot_file)
     if not told:
         assert text == ""
         return

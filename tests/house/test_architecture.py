@@ -193,6 +193,16 @@ print("found:", found)
     assert done.stdout.splitlines()[-1] == "found: []"
 
 
+@pytest.mark.parametrize(("name", "most"), [("workspace", 64), ("minimum_arcs", 120), ("plan", 150)])
+def test_a_function_imports_what_it_is_about(name, most):
+    """So many modules at most, and no proofs of platforms: a program that asks about a point mass starts sooner."""
+    code = f"import sys, cspr_jax; cspr_jax.{name}; print(*(n for n in sys.modules if n.startswith('cspr_jax.')))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = done.stdout.split()
+    assert len(loaded) <= most
+    assert not {f"cspr_jax.platforms.{proof}" for proof in ("tension_blocks", "place_blocks", "proof")} & set(loaded)
+
+
 @pytest.mark.parametrize("name", MODULES)
 def test_sizes(name):
     path = PACKAGE.joinpath(*name.split(".")) if name else PACKAGE

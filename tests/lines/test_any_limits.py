@@ -10,10 +10,10 @@ from oracles import limited_lines as oracle
 
 import cspr_jax
 from cspr_jax import Verdict
-from cspr_jax.build.limits import limits_over
 from cspr_jax.lines.durations import by_formula
 from cspr_jax.lines.timed_lines import motions_of, timed_lines
 from cspr_jax.lines.verdicts import verdicts
+from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.kernel_axes import prepared
 

@@ -15,7 +15,7 @@ from cspr_jax.api.reports import report
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.colours import NONE_COLOUR
 from cspr_jax.schema.best import best_of
-from cspr_jax.schema.labelled import Columns
+from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.quantities import EVERY
 from cspr_jax.schema.verdicts import Verdict
 

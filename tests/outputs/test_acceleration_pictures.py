@@ -11,9 +11,9 @@ from matplotlib.colors import to_hex
 from support.reading import read_here
 
 import cspr_jax
-from cspr_jax.build.limits import limits_over
 from cspr_jax.lines.durations import names_of
 from cspr_jax.lines.map import LeastTimeMap
+from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.outputs.plots.colours import NONE_COLOUR
 from cspr_jax.outputs.plots.half_planes import WINDOW, Plane, Window, section
 from cspr_jax.robots.limits import Limits

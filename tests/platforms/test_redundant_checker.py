@@ -12,11 +12,11 @@ from support.commands import cspr, plan
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.build.limits import limits_over
 from cspr_jax.build.robots import load_robot
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.motions.problem import Problem
 from cspr_jax.outputs import example_files, motion_files
 from cspr_jax.platforms.beta_hat import LARGEST

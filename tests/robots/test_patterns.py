@@ -13,11 +13,11 @@ from scipy.optimize import brentq
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.build.limits import limits_over
 from cspr_jax.build.robots import fault_at_rest
 from cspr_jax.cli import main
 from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import InputError
+from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.robots import pulleys
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits

@@ -1,0 +1,62 @@
+"""Answers whose fields are columns. The tables of quantities are imported only where somebody asks for their words."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class Columns:
+    """Answers whose fields are columns: arrays with a value for each of n cases."""
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The fields that are arrays.
+
+        Returns:
+            (n, ...) each, by name.
+        """
+        return {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
+
+    def to_xarray(self, dims: Mapping[str, Any] | None = None) -> "xarray.Dataset":
+        """The answers for xarray, with units and long names.
+
+        Args:
+            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
+                None: one dimension "target".
+
+        Returns:
+            the fields over these dimensions; those of both ends of a segment over "end", too.
+
+        Raises:
+            InputError: dimensions of another number of points.
+            ConfigError: xarray is not installed.
+        """
+        from cspr_jax.schema import labelled
+
+        return labelled.over(self.arrays(), dims)
+
+    def best(self, axis: str, dims: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """The answers at the best point of one of the dimensions whose product they are, as of a map.
+
+        Args:
+            axis: of `dims`, such as "z0".
+            dims: as for `to_xarray`.
+
+        Returns:
+            the fields over the other dimensions by name, and as "best_z0" the point chosen, NaN where none is feasible;
+            `store.result.Result.best` says which one that is.
+
+        Raises:
+            InputError: dimensions of another number of points, or an axis that is none of them.
+        """
+        from cspr_jax.schema import labelled
+        from cspr_jax.schema.best import best_of, check_axis
+
+        arrays = self.arrays()
+        axes, shape = labelled.axes_of(dims, len(next(iter(arrays.values()))))
+        check_axis(axis, tuple(axes))
+        whole = {name: values.reshape(*shape, *values.shape[1:]) for name, values in arrays.items()}
+        return best_of(whole, axis, axes[axis], list(axes).index(axis)).data
