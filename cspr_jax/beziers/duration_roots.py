@@ -90,14 +90,14 @@ def _of_cables(
         -3.0 * _cross(square, slope),
     ]
     pulled = [first, -slope, -4.0 * square, 0.0 * square]
-    found = []
+    polynomials = []
     for row, arm in zip(rows, arms, strict=True):
         f = [total(_dot(row, p), _dot(arm, t)) for p, t in zip(pulled, turned, strict=True)]
         scale = sum(np.abs(x).max(-1, keepdims=True) for x in f)
         f = [x / np.where(scale > 0.0, scale, 1.0) for x in f]
         even, odd = total(f[0], f[2]), total(f[1], f[3])
-        found += [total(even, odd), total(even, -odd), _discriminant(f)]
-    return found
+        polynomials += [total(even, odd), total(even, -odd), _discriminant(f)]
+    return polynomials
 
 
 def _of_depth(normal: np.ndarray, vectors: list[np.ndarray]) -> list[np.ndarray]:
@@ -106,7 +106,7 @@ def _of_depth(normal: np.ndarray, vectors: list[np.ndarray]) -> list[np.ndarray]
 
 
 def _discriminant(f: list[np.ndarray]) -> np.ndarray:
-    # Of the cubic f0 + f1 c + f2 c^2 + f3 c^3.
+    # Return the discriminant of the cubic f0 + f1 c + f2 c^2 + f3 c^3.
     f0, f1, f2, f3 = f
     pairs = {"02": product(f0, f2), "13": product(f1, f3), "03": product(f0, f3), "11": product(f1, f1)}
     terms = [
@@ -116,10 +116,10 @@ def _discriminant(f: list[np.ndarray]) -> np.ndarray:
         -4.0 * product(pairs["13"], pairs["11"]),
         -27.0 * product(pairs["03"], pairs["03"]),
     ]
-    found = terms[0]
+    discriminant = terms[0]
     for term in terms[1:]:
-        found = total(found, term)
-    return found
+        discriminant = total(discriminant, term)
+    return discriminant
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -134,6 +134,6 @@ def _dot(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
 
 def _positive_roots(tables: list[np.ndarray]) -> np.ndarray:
     # Roots that rounding has moved off the real axis count: what is between roots is tested anyway.
-    found = np.concatenate([np.roots(table[::-1]) for table in tables if np.isfinite(table).all()])
-    near = np.abs(found.imag) <= 1e-3 * np.abs(found)
-    return np.unique(found.real[near & (found.real > 0.0) & np.isfinite(found)])
+    roots = np.concatenate([np.roots(table[::-1]) for table in tables if np.isfinite(table).all()])
+    near = np.abs(roots.imag) <= 1e-3 * np.abs(roots)
+    return np.unique(roots.real[near & (roots.real > 0.0) & np.isfinite(roots)])

@@ -23,7 +23,7 @@ HALVINGS = 60
 # Durations tried in each interval of taut ones where limits count, in geometric progression up to so many times the
 # first.
 TRIED, WIDEST = 129, 100.0
-# Over the time that the largest speed or acceleration of the cables takes for the way.
+# Longest duration over the time that the largest speed or acceleration of the cables takes for the way.
 AMPLE = 20.0
 
 
@@ -50,8 +50,8 @@ def proved_margins(robot: PointMassRobot, ends: Ends, durations: np.ndarray, z0:
         (n,).
     """
     motions = Bezier(ends.start, ends.middles(durations), ends.end, durations, z0)
-    found = in_batches(partial(_proved_margins, robot), motions, size=BATCH)
-    return np.where(np.isfinite(found), found, -np.inf)
+    margins = in_batches(partial(_proved_margins, robot), motions, size=BATCH)
+    return np.where(np.isfinite(margins), margins, -np.inf)
 
 
 def feasible_durations(robot: PointMassRobot, ends: Ends, z0: np.ndarray) -> list[np.ndarray]:
@@ -72,30 +72,30 @@ def feasible_durations(robot: PointMassRobot, ends: Ends, z0: np.ndarray) -> lis
     pick = Ends(*(x[segment] for x in ends))
     is_good = proved_margins(robot, pick, tests, z0[segment]) > 0.0
     changes = np.flatnonzero((segment[1:] == segment[:-1]) & (is_good[1:] != is_good[:-1]))
-    some = Ends(*(x[changes] for x in pick))
+    changed_ends = Ends(*(x[changes] for x in pick))
     good, bad = np.where(is_good[changes], [tests[changes], tests[changes + 1]], [tests[changes + 1], tests[changes]])
     for _ in range(HALVINGS):
         middle = 0.5 * (good + bad)
         if not len(changes) or ((middle == good) | (middle == bad)).all():
             break
-        holds = proved_margins(robot, some, middle, z0[segment[changes]]) > 0.0
+        holds = proved_margins(robot, changed_ends, middle, z0[segment[changes]]) > 0.0
         good, bad = np.where(holds, middle, good), np.where(holds, bad, middle)
     return [_intervals(segment == i, is_good, changes, good) for i in range(len(roots))]
 
 
 def _between(roots: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    # One duration below all roots of a segment, one between any two, one above all; number of its segment for each.
+    # Choose one duration below all roots of a segment, one between any two, one above all; number the segment of each.
     tests = []
-    for own in roots:
-        known = own if len(own) else np.array([1.0])
+    for critical in roots:
+        known = critical if len(critical) else np.array([1.0])
         tests.append(np.concatenate([[0.5 * known[0]], np.sqrt(known[1:] * known[:-1]), [2.0 * known[-1]]]))
     return np.repeat(np.arange(len(roots)), [len(x) for x in tests]), np.concatenate(tests)
 
 
-def _intervals(own: np.ndarray, is_good: np.ndarray, changes: np.ndarray, edges: np.ndarray) -> np.ndarray:
+def _intervals(is_in_segment: np.ndarray, is_good: np.ndarray, changes: np.ndarray, edges: np.ndarray) -> np.ndarray:
     # Each change is one end of an interval; the last test of a segment says whether it is open.
-    places = np.flatnonzero(own)
-    inside = [float(edge) for change, edge in zip(changes, edges, strict=True) if own[change]]
+    places = np.flatnonzero(is_in_segment)
+    inside = [float(edge) for change, edge in zip(changes, edges, strict=True) if is_in_segment[change]]
     starts = [0.0] if is_good[places[0]] else []
     ends = [np.inf] if is_good[places[-1]] else []
     return np.array([*starts, *inside, *ends]).reshape(-1, 2)
@@ -131,22 +131,22 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
         good = np.flatnonzero(judged(times).verdict == 0)
         if len(good):
             return _narrowed(judged, times, int(good[0]))
-    # Nothing is feasible: what comes nearest.
+    # Nothing is feasible, so the duration that comes nearest stands in.
     size = np.abs(np.concatenate([ends.end - ends.start, ends.middle - ends.start])).sum()
     unit = np.sqrt(max(size, np.abs(ends.start).sum() * 1e-3) / float(problem.robot.gravity))
     times = np.concatenate([np.geomspace(0.1, 100.0, 4 * TRIED) * unit, intervals.ravel()])
     times = times[np.isfinite(times)]
-    own = judged(times)
-    return float(
-        times[_nearest(own) if limits_set(problem.limits) else np.argmax(np.nan_to_num(own.margin, nan=-np.inf))]
-    )
+    judgements = judged(times)
+    if limits_set(problem.limits):
+        return float(times[_nearest(judgements)])
+    return float(times[np.argmax(np.nan_to_num(judgements.margin, nan=-np.inf))])
 
 
-def _nearest(own: Verdicts) -> int:
-    # First those that keep cables taut below the spools, then those that break the fewest limits by the least.
-    margin = np.nan_to_num(np.minimum(own.margin, own.room), nan=-np.inf)
-    counts = np.sum([(own.verdict & flag.value) > 0 for flag in Verdict], axis=0)
-    return int(np.lexsort((-margin, counts, ~(own.margin > 0.0)))[0])
+def _nearest(judgements: Verdicts) -> int:
+    # Prefer those that keep cables taut below the spools, then those that break the fewest limits by the least.
+    margin = np.nan_to_num(np.minimum(judgements.margin, judgements.room), nan=-np.inf)
+    counts = np.sum([(judgements.verdict & flag.value) > 0 for flag in Verdict], axis=0)
+    return int(np.lexsort((-margin, counts, ~(judgements.margin > 0.0)))[0])
 
 
 def slowest(problem: Problem, points: np.ndarray) -> float:

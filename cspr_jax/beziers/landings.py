@@ -129,16 +129,16 @@ def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
 
 
 def _placed(robot: PointMassRobot, start: Array, lengths: Array) -> Array:
-    # Where the cables have these lengths, by Newton's method; its last step carries the derivatives.
+    # Find by Newton's method the place where the cables have these lengths; its last step carries the derivatives.
     def step(place, _):
-        own = cable_motion(robot, place, place * 0.0, place * 0.0)[0]
-        return place + _moving(robot, place, lengths - own), None
+        lengths_here = cable_motion(robot, place, place * 0.0, place * 0.0)[0]
+        return place + _moving(robot, place, lengths - lengths_here), None
 
     return jax.lax.scan(step, start, None, length=NEWTON)[0]
 
 
 def _moving(robot: PointMassRobot, place: Array, rates: Array) -> Array:
-    # Velocity at which the lengths have these rates.
+    # Return the velocity at which the lengths have these rates.
     rays = place[None] - robot.base_points
     units = rays / jnp.linalg.norm(rays, axis=1, keepdims=True)
     if not is_planar(robot):
@@ -149,12 +149,12 @@ def _moving(robot: PointMassRobot, place: Array, rates: Array) -> Array:
 
 @jax.jit
 def _landings(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
-    return jax.vmap(lambda own: landing(robot, throw, own))(errors)
+    return jax.vmap(lambda error: landing(robot, throw, error))(errors)
 
 
 @jax.jit
 def _slopes(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
-    return jax.jacfwd(lambda own: landing(robot, throw, own))(errors)
+    return jax.jacfwd(lambda error: landing(robot, throw, error))(errors)
 
 
 def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatter:
@@ -169,16 +169,16 @@ def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatte
         the scatter, in the axes of the kernels.
     """
     count, random = robot.n_cables, np.random.default_rng(errors.seed)
-    # In this order, so that a sample of one kind of error is that of a larger one, scaled.
+    # Errors are drawn in this order, so that a sample of one kind of error is that of a larger one, scaled.
     release = random.normal(size=(errors.throws, 1)) * errors.release
     lengths = random.normal(size=(errors.throws, count)) * errors.cable_length
     rates = random.normal(size=(errors.throws, count)) * errors.cable_speed
     lengths = lengths + random.uniform(-1.0, 1.0, size=(errors.throws, count)) * errors.encoder
     sample = np.concatenate([release, lengths, rates], axis=1)
-    found = in_batches(partial(_landings, robot, throw), sample, size=BATCH)
-    known = found[np.isfinite(found).all(1)]
+    landings = in_batches(partial(_landings, robot, throw), sample, size=BATCH)
+    known = landings[np.isfinite(landings).all(1)]
     sizes = [errors.release**2]
     sizes += [errors.cable_length**2 + errors.encoder**2 / 3.0] * count + [errors.cable_speed**2] * count
     slopes = np.asarray(_slopes(robot, throw, jnp.zeros(1 + 2 * count)))
-    own = np.cov(known.T) if len(known) > 1 else np.full((2, 2), np.nan)
-    return Scatter(found, own, (slopes * np.array(sizes)) @ slopes.T)
+    covariance = np.cov(known.T) if len(known) > 1 else np.full((2, 2), np.nan)
+    return Scatter(landings, covariance, (slopes * np.array(sizes)) @ slopes.T)

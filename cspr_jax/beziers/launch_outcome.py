@@ -11,7 +11,7 @@ from cspr_jax.beziers.launches import Launch
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motions.waypoints import Waypoints
 
-# Of the distance from the target: a place of release counts as on a parabola that it misses by less.
+# A place of release counts as on a parabola that it misses by less than this part of its distance from the target.
 ON_PARABOLA = 1e-6
 
 
@@ -47,7 +47,7 @@ class Released:
         Returns:
             plain values.
         """
-        own = {
+        table = {
             "segment": self.segment,
             "release": {"position": self.position.tolist(), "velocity": self.velocity.tolist(), "time": self.time},
             "control_points": self.control_points.tolist(),
@@ -55,7 +55,7 @@ class Released:
             "flight_time": self.flight_time,
             "tension_min": self.tension_min,
         }
-        return own if self.scatter is None else own | {"scatter": self.scatter.to_dict()}
+        return table if self.scatter is None else table | {"scatter": self.scatter.to_dict()}
 
 
 def question_of(stops: Waypoints, points: np.ndarray, depth: float, gravity: float) -> Launch:
@@ -95,7 +95,7 @@ def question_of(stops: Waypoints, points: np.ndarray, depth: float, gravity: flo
 def _flight_time(
     stops: Waypoints, point: np.ndarray, target: np.ndarray, velocity: np.ndarray, gravity: float
 ) -> float:
-    # Of the parabola through the target: the roots of where it is nearest to the point.
+    # Find the time of flight on the parabola through the target, from the roots at which it is nearest to the point.
     down = 0.5 * gravity * np.array([0.0, 0.0, 1.0])
     way = target - point
     # |way - velocity t + down t^2|^2, by powers of t, the highest first.
@@ -157,11 +157,11 @@ def scattered(plan: Any, errors: LaunchErrors) -> Scatter:
     """
     motion, answers, at = _launching(plan)
     target = np.asarray(plan.frame.inward(plan.keys.launch.target))
-    found = scatter(plan.problem.robot, Throw(motion, np.asarray(answers.release[at]), target), errors)
+    kernel_scatter = scatter(plan.problem.robot, Throw(motion, np.asarray(answers.release[at]), target), errors)
     # Axes of the file are turned against those of the kernels about x.
     signs = np.asarray(plan.frame.turned(np.ones(3)))[:2]
     both = np.outer(signs, signs)
-    return Scatter(found.landings * signs, found.covariance * both, found.first_order * both)
+    return Scatter(kernel_scatter.landings * signs, kernel_scatter.covariance * both, kernel_scatter.first_order * both)
 
 
 def _launching(plan: Any) -> tuple[Any, Any, int]:

@@ -95,7 +95,7 @@ class LaunchRange(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Whether a launch to each place was found, its segment proved feasible, (n,)."""
+        """Tell whether a launch to each place was found, its segment proved feasible, (n,)."""
         return self.verdict == 0
 
     @property
@@ -118,8 +118,8 @@ class LaunchRange(Columns):
 
 def _shot(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> Shot:
     problem, bounds = known
-    own = bounds.low + (bounds.high - bounds.low) * x
-    position, (flight, duration), share = own[:3], jnp.exp(own[3:5]), own[5]
+    unknowns = bounds.low + (bounds.high - bounds.low) * x
+    position, (flight, duration), share = unknowns[:3], jnp.exp(unknowns[3:5]), unknowns[5]
     velocity = aimed(position, question.target, problem.robot.gravity, flight)
     middle, end = through(question.start, position, velocity, share, duration)
     return Shot(position, velocity, flight, share, Bezier(question.start, middle, end, duration, question.z0))
@@ -153,18 +153,20 @@ def launch_range(
         the launches, each the best of a search: those found are proved, that there is no other or no slower one is not.
     """
     question = LaunchRequirement(starts, targets, depths_of(problem.robot, starts))
-    asked = (np.inf, *(SAMPLED if limits_set(problem.limits) else EXACT))
-    places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, asked=asked, population=population)
+    margins = (np.inf, *(SAMPLED if limits_set(problem.limits) else EXACT))
+    places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, asked=margins, population=population)
     parts = [slice(i, i + TOGETHER) for i in range(0, len(starts), TOGETHER)]
-    own = [_answers((problem, bounds), jax.tree.map(lambda x, s=some: x[s], (question, places))) for some in parts]
-    return LaunchRange(**{name: np.concatenate([vars(part)[name] for part in own]) for name in vars(own[0])})
+    answers = [
+        _answers((problem, bounds), jax.tree.map(lambda x, s=chunk: x[s], (question, places))) for chunk in parts
+    ]
+    return LaunchRange(**{name: np.concatenate([vars(part)[name] for part in answers]) for name in vars(answers[0])})
 
 
 def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, np.ndarray]) -> LaunchRange:
-    # Of every place and margin asked for one candidate, in one row: the margins change fastest.
+    # Put one candidate for every place and margin asked for into one row: the margins change fastest.
     count, tracks, _ = cases[1].shape
     question = jax.tree.map(lambda x: np.repeat(x, tracks, axis=0), cases[0])
-    shots = in_batches(lambda some: _shots(known, some), (question, cases[1].reshape(count * tracks, -1)), size=BATCH)
+    shots = in_batches(lambda batch: _shots(known, batch), (question, cases[1].reshape(count * tracks, -1)), size=BATCH)
     verdict, margin = _judged(known[0], shots.motion, (count, tracks))
     speed = np.linalg.norm(shots.velocity, axis=1).reshape(count, tracks)
     slowest = np.where(verdict == 0, speed, np.inf).argmin(1)
@@ -185,10 +187,10 @@ def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequiremen
 
 
 def _judged(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    # So many together as give batches of one length, whatever is asked for.
+    # Motions are judged together in batches of one length, whatever is asked for.
     parts = [slice(i, i + BATCH) for i in range(0, len(motions.time), BATCH)]
-    own = [verdicts(problem, jax.tree.map(lambda x, s=some: x[s], motions)) for some in parts]
-    verdict = np.concatenate([x.verdict for x in own])
-    # Above the spools the room under limits of tensions is not known, and the depth is what misses.
-    margin = np.concatenate([np.where(np.isneginf(x.room), x.margin, np.minimum(x.margin, x.room)) for x in own])
+    judgements = [verdicts(problem, jax.tree.map(lambda x, s=chunk: x[s], motions)) for chunk in parts]
+    verdict = np.concatenate([x.verdict for x in judgements])
+    # Above the spools the room under limits of tensions is not known, and it is the depth that misses.
+    margin = np.concatenate([np.where(np.isneginf(x.room), x.margin, np.minimum(x.margin, x.room)) for x in judgements])
     return verdict.reshape(shape), np.where(np.isnan(margin), -np.inf, margin).reshape(shape)

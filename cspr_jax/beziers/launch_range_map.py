@@ -23,17 +23,17 @@ class LaunchRangeMap(FromPlacesMap):
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse bounds that leave no release."""
         super().__init__(robot_file, keys, file)
-        own = self._search = keys.launch or LaunchSearch()
+        search = self._search = keys.launch or LaunchSearch()
         try:
-            ranges = (own.release_x, own.release_y, own.release_z)
-            self._bounds = bounds_of(self._problem, self._frame, ranges, own.max_duration)
+            ranges = (search.release_x, search.release_y, search.release_z)
+            self._bounds = bounds_of(self._problem, self._frame, ranges, search.max_duration)
         except InputError as error:
             raise ConfigError(file, f"launch.{error}") from error
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        some: Any = (self._starts(cells), self._targets(cells), self._bounds, self._search.population)
-        return vars(launch_range(self._problem, *some).placed(self._frame))
+        arguments: Any = (self._starts(cells), self._targets(cells), self._bounds, self._search.population)
+        return vars(launch_range(self._problem, *arguments).placed(self._frame))
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse starts that are all out of reach, since objects may land anywhere; see `GridMap.refuse_hopeless`.

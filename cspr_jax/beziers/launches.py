@@ -65,7 +65,7 @@ class LaunchSequence(NamedTuple):
 
 
 @jax.jit
-def _found(arguments: Any, x: Array) -> LaunchSequence:
+def _sequence_of(arguments: Any, x: Array) -> LaunchSequence:
     # Unknowns: logarithms of the free durations, then the release, then the logarithm of the flight's time.
     problem, launch, durations, free = arguments
     times = durations.at[free].set(jnp.exp(x[: len(free)])) if len(free) else durations
@@ -82,27 +82,27 @@ def _found(arguments: Any, x: Array) -> LaunchSequence:
     return LaunchSequence(sequence, times, share * times[at], time, position, velocity)
 
 
-def _margins(problem: Problem, found: LaunchSequence) -> Array:
-    share = found.release / found.durations[found.sequence.segment]
-    own = margins_of(problem, segments_of(found.sequence, found.durations))
-    return jnp.append(own, jnp.minimum(share, 1.0 - share))
+def _margins(problem: Problem, launch: LaunchSequence) -> Array:
+    share = launch.release / launch.durations[launch.sequence.segment]
+    margins = margins_of(problem, segments_of(launch.sequence, launch.durations))
+    return jnp.append(margins, jnp.minimum(share, 1.0 - share))
 
 
 def _total(arguments, x: Array) -> tuple[Array, Array]:
-    found = _found(arguments, x)
-    return jnp.sum(found.durations), _margins(arguments[0], found)
+    launch = _sequence_of(arguments, x)
+    return jnp.sum(launch.durations), _margins(arguments[0], launch)
 
 
 def _speed(arguments, x: Array) -> tuple[Array, Array]:
     # Square of the speed at the release, over gravity: kinetic energy over weight, m.
-    found = _found(arguments, x)
-    return 0.5 * jnp.sum(found.velocity**2) / arguments[0].robot.gravity, _margins(arguments[0], found)
+    launch = _sequence_of(arguments, x)
+    return 0.5 * jnp.sum(launch.velocity**2) / arguments[0].robot.gravity, _margins(arguments[0], launch)
 
 
 def _landing(arguments, x: Array) -> tuple[Array, Array]:
-    found, at = _found(arguments, x), arguments[1].segment
-    before = jnp.sum(jnp.where(jnp.arange(len(found.durations)) < at, found.durations, 0.0))
-    return before + found.release + found.time, _margins(arguments[0], found)
+    launch, at = _sequence_of(arguments, x), arguments[1].segment
+    before = jnp.sum(jnp.where(jnp.arange(len(launch.durations)) < at, launch.durations, 0.0))
+    return before + launch.release + launch.time, _margins(arguments[0], launch)
 
 
 def launched(problem: Problem, launch: Launch, durations: list[float | None], choose: str | None) -> LaunchSequence:
@@ -122,10 +122,10 @@ def launched(problem: Problem, launch: Launch, durations: list[float | None], ch
     if choose == "energy":
         launch = launch._replace(time=jnp.asarray(_searched(problem, launch, durations, _speed).time))
     if choose == "time":
-        found, at = _searched(problem, launch, durations, _landing), int(launch.segment)
-        launch = launch._replace(time=jnp.asarray(found.time), release=jnp.asarray(found.release))
-        own = np.asarray(found.durations).tolist()
-        durations = [own[i] if i <= at else time for i, time in enumerate(durations)]
+        best, at = _searched(problem, launch, durations, _landing), int(launch.segment)
+        launch = launch._replace(time=jnp.asarray(best.time), release=jnp.asarray(best.release))
+        best_durations = np.asarray(best.durations).tolist()
+        durations = [best_durations[i] if i <= at else time for i, time in enumerate(durations)]
     return _searched(problem, launch, durations, _total)
 
 
@@ -138,11 +138,11 @@ def _searched(problem: Problem, launch: Launch, durations: list[float | None], p
     bounds += [(EARLIEST, LATEST)] if launch.release is None else []
     bounds += [(shortest, longest)] if launch.time is None else []
     if not bounds:
-        return _found(arguments, jnp.zeros(0))
+        return _sequence_of(arguments, jnp.zeros(0))
 
-    def own(x: np.ndarray):
-        found = _found(arguments, jnp.asarray(x))
-        return judged(problem, segments_of(found.sequence, found.durations))
+    def judge(x: np.ndarray):
+        candidate = _sequence_of(arguments, jnp.asarray(x))
+        return judged(problem, segments_of(candidate.sequence, candidate.durations))
 
     low, high = (np.array(side) for side in zip(*bounds, strict=True))
-    return _found(arguments, jnp.asarray(least(parts, arguments, low, high, own)))
+    return _sequence_of(arguments, jnp.asarray(least(parts, arguments, low, high, judge)))

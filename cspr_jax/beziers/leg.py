@@ -46,13 +46,13 @@ class Beziers(Leg):
         if stops.keys.least == "total" and None not in self._durations:
             raise ConfigError(stops.path, 'least = "total": must be absent where every duration is given')
         launch = stops.keys.launch
-        # Of the segment of the launch, if it is one of these.
+        # Number of the segment of the launch, if it is one of these.
         self._at = None if launch is None or not 0 <= launch.segment - stops.first < len(self) else launch.segment
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the places; see `Leg.join`."""
         points, frame = self._points(problem, z0), self.stops.frame
-        # Of P0, else of the first pose.
+        # The depth is that of P0, else that of the first pose.
         depth = z0 if np.isfinite(z0) else float(depths_of(problem.robot, points[:1])[0])
         chosen = self._chosen(problem, points, depth)
         segments = joined_segments(problem, chosen.points, chosen.durations, chosen.first, depth)
@@ -68,12 +68,12 @@ class Beziers(Leg):
         stops, durations, launch = self.stops, self._durations, self.stops.keys.launch
         if launch is not None and self._at is not None:
             question = question_of(stops, points, depth, float(problem.robot.gravity))
-            found = launched(problem, question, durations, launch.choose)
-            first = segments_of(found.sequence, jnp.asarray(found.durations)).middle[0]
-            places, times, first = jax.tree.map(np.asarray, (found.sequence.points, found.durations, first))
-            return _Chosen(places, times.tolist(), first, float(found.release), float(found.time))
-        given = stops.keys.first_control_point if stops.first == 0 else None
-        first = points[0] if given is None else np.asarray(stops.frame.inward(given))
+            best = launched(problem, question, durations, launch.choose)
+            first = segments_of(best.sequence, jnp.asarray(best.durations)).middle[0]
+            places, times, first = jax.tree.map(np.asarray, (best.sequence.points, best.durations, first))
+            return _Chosen(places, times.tolist(), first, float(best.release), float(best.time))
+        control_point = stops.keys.first_control_point if stops.first == 0 else None
+        first = points[0] if control_point is None else np.asarray(stops.frame.inward(control_point))
         if stops.keys.least == "total":
             sequence = Anchored(points, np.asarray(0), first, np.asarray(depth))
             durations = least_total(problem, sequence, durations).tolist()
@@ -81,8 +81,8 @@ class Beziers(Leg):
 
     @property
     def _durations(self) -> list[float | None]:
-        given = (pose.duration for pose in self.stops.poses[1:])
-        return [time if isinstance(time, float) else None for time in given]
+        durations = (pose.duration for pose in self.stops.poses[1:])
+        return [time if isinstance(time, float) else None for time in durations]
 
     def _points(self, problem: Problem, z0: float) -> np.ndarray:
         points, stops = self.stops.points(z0), self.stops
@@ -90,8 +90,8 @@ class Beziers(Leg):
             points[self._at - stops.first + 1] = np.nan
         near = np.linalg.norm(np.diff(points, axis=0), axis=1) <= AT_P0 * float(spool_radius(problem.robot))
         for i in (np.flatnonzero(near) + 1).tolist():
-            given = stops.keys.first_control_point if stops.first == 0 else None
-            if given is None or given == stops.poses[0].position:
+            control_point = stops.keys.first_control_point if stops.first == 0 else None
+            if control_point is None or control_point == stops.poses[0].position:
                 raise ConfigError(
                     stops.path,
                     f"{stops.name(i)}.position: must be another than that of {stops.name(i - 1)}, for a segment that "

@@ -43,11 +43,11 @@ def limit_slacks(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below:
     whole = MinimumBlocks(np.arange(count), np.zeros(count, int), np.full(count, -1.0), np.full(count, 2.0))
 
     def values(blocks: MinimumBlocks) -> tuple[np.ndarray, np.ndarray]:
-        own = {name: over(x[blocks.case], *_wide(blocks, x.ndim)) for name, x in tables.items()}
-        ends = [{name: x.sum(-1) if end else x[..., 0] for name, x in own.items()} for end in (0, 1)]
-        during = {name: Jet(*map(bounds, derivatives(x, 2))) for name, x in own.items()}
-        found = [_of_limit(slack, ends, during) for slack in slacks]
-        low, attained = (np.stack(x, axis=1) for x in zip(*found, strict=True))
+        block_tables = {name: over(x[blocks.case], *_wide(blocks, x.ndim)) for name, x in tables.items()}
+        ends = [{name: x.sum(-1) if end else x[..., 0] for name, x in block_tables.items()} for end in (0, 1)]
+        during = {name: Jet(*map(bounds, derivatives(x, 2))) for name, x in block_tables.items()}
+        pairs = [_of_limit(slack, ends, during) for slack in slacks]
+        low, attained = (np.stack(x, axis=1) for x in zip(*pairs, strict=True))
         return low, attained
 
     proved = smallest(whole, count, values, np.ones(len(rows)), size=TOGETHER)
@@ -93,7 +93,7 @@ def _tables(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.n
 
 
 def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    # Of vectors (..., 3, d).
+    # Return the scalar products of vectors (..., 3, d).
     return product(first, second).sum(-2)
 
 

@@ -11,7 +11,7 @@ from cspr_jax.errors import InputError, shown
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.point_mass import PLANAR, spool_radius
 
-# Over the size of the robot: to each side of the central vertical, and down from the centroid of the spools.
+# Reach over the size of the robot: to each side of the central vertical, and down from the centroid of the spools.
 ASIDE, DEEP = 2.0, 4.0
 # Parts of the duration of the segment between which a release is looked for.
 EARLIEST, LATEST = 0.01, 0.99
@@ -52,9 +52,9 @@ def bounds_of(
     size = float(spool_radius(problem.robot))
     aside = 0.0 if problem.robot.dof == PLANAR else ASIDE * size
     corners = frame.outward([[-ASIDE * size, -aside, 0.0], [ASIDE * size, aside, DEEP * size]])
-    for i, given in enumerate(releases):
-        if given is not None:
-            corners[:, i] = given
+    for i, ends in enumerate(releases):
+        if ends is not None:
+            corners[:, i] = ends
     inner = np.sort(frame.inward(corners), axis=0)
     if problem.robot.dof == PLANAR and inner[:, 1].any():
         raise InputError("release_y", releases[1], "[0, 0], or absent: a planar robot")

@@ -33,7 +33,7 @@ class BezierAnswers(Answers):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Whether each segment is proved feasible, (n,)."""
+        """Tell whether each segment is proved feasible, (n,)."""
         return self.verdict == 0
 
     def details(self, i: int) -> dict[str, Any]:
@@ -79,19 +79,19 @@ def joined_segments(
     Returns:
         the segments; where no duration is feasible, "least" is the one with the largest margin of those tried.
     """
-    found, intervals, depth = [], [], np.array([z0])
-    # Of the first segment the control point is given, of the next ones the acceleration at the start.
+    motions, intervals, depth = [], [], np.array([z0])
+    # The first segment is given its control point, each of the next ones the acceleration at its start.
     ends = Ends(points[:1], points[1:2], first_control_point[None], np.zeros((1, 3)))
-    for i, wanted in enumerate(durations):
-        own = feasible_durations(problem.robot, ends, depth)[0]
-        time = least_duration(problem, ends, own, z0) if wanted is None else wanted
+    for i, duration in enumerate(durations):
+        taut_durations = feasible_durations(problem.robot, ends, depth)[0]
+        time = least_duration(problem, ends, taut_durations, z0) if duration is None else duration
         middle = ends.middles(np.array([time]))
-        found.append(Bezier(ends.start, middle, ends.end, np.array([time]), depth))
-        intervals.append(own)
+        motions.append(Bezier(ends.start, middle, ends.end, np.array([time]), depth))
+        intervals.append(taut_durations)
         if i + 1 < len(durations):
             turn = end_acceleration(middle, ends.end, time)
             ends = Ends(ends.end, points[i + 2 : i + 3], ends.end, turn)
-    return Joined(jax.tree.map(lambda *rows: np.concatenate(rows), *found), intervals)
+    return Joined(jax.tree.map(lambda *rows: np.concatenate(rows), *motions), intervals)
 
 
 def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
@@ -105,18 +105,18 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
         the answers; control points from the centroid of the spools, z down.
     """
     motions = segments.motions
-    own, count = verdicts(problem, motions), len(motions.time)
+    judgements, count = verdicts(problem, motions), len(motions.time)
     none, nothing = np.zeros(count, int), np.full(count, np.nan)
     intervals = np.empty(count, object)
     intervals[:] = segments.taut_durations
     return BezierAnswers(
         none,
         none,
-        own.verdict,
+        judgements.verdict,
         motions.time,
-        own.margin,
-        own.bound,
-        own.room,
+        judgements.margin,
+        judgements.bound,
+        judgements.room,
         *(nothing, nothing, nothing),
         np.stack([motions.start, motions.middle, motions.end], axis=1),
         intervals,

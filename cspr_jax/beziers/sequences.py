@@ -21,7 +21,7 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.slacks import slacks
 from cspr_jax.robots.point_mass import spool_radius
 
-# Durations looked at, over that of a fall by the robot's size.
+# Shortest and longest duration looked at, over that of a fall by the robot's size.
 SHORTEST, LONGEST = 0.1, 40.0
 # Instants of a segment at which limits are asked for; they are proved afterwards.
 SAMPLES = 65
@@ -77,13 +77,13 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
     """
 
     def one(motion):
-        own = smallest_margins(problem.robot, motion)
-        found = jnp.append(own.taut, own.below)
+        exact = smallest_margins(problem.robot, motion)
+        margins = jnp.append(exact.taut, exact.below)
         if not limits_set(problem.limits):
-            return found
+            return margins
         tau = jnp.linspace(0.0, 1.0, samples)
-        limits = jax.vmap(lambda t: slacks(problem, motion, t)[len(found) :])(tau)
-        return jnp.append(found, jnp.min(limits, axis=0))
+        limits = jax.vmap(lambda t: slacks(problem, motion, t)[len(margins) :])(tau)
+        return jnp.append(margins, jnp.min(limits, axis=0))
 
     return jax.vmap(one)(segments).ravel()
 
@@ -98,9 +98,9 @@ def judged(problem: Problem, segments: Bezier) -> Judged:
     Returns:
         whether all are feasible, and the smallest margin.
     """
-    own = verdicts(problem, jax.tree.map(np.asarray, segments))
-    worst = np.nan_to_num(np.minimum(own.margin, own.room), nan=-np.inf).min()
-    return Judged(bool((own.verdict == 0).all()), float(worst))
+    judgements = verdicts(problem, jax.tree.map(np.asarray, segments))
+    worst = np.nan_to_num(np.minimum(judgements.margin, judgements.room), nan=-np.inf).min()
+    return Judged(bool((judgements.verdict == 0).all()), float(worst))
 
 
 def duration_bounds(problem: Problem, points: np.ndarray) -> tuple[float, float]:
@@ -139,17 +139,17 @@ def least_total(problem: Problem, sequence: Anchored, durations: list[float | No
     free = np.array([i for i, time in enumerate(durations) if time is None])
 
     def times(x: np.ndarray) -> np.ndarray:
-        own = known.copy()
-        own[free] = np.exp(x)
-        return own
+        every_duration = known.copy()
+        every_duration[free] = np.exp(x)
+        return every_duration
 
     bounds = duration_bounds(problem, np.asarray(sequence.points))
     shortest, longest = (np.full(len(free), bound) for bound in bounds)
-    found = least(
+    logarithms = least(
         _parts,
         (problem, sequence, jnp.asarray(known), free),
         shortest,
         longest,
         lambda x: judged(problem, segments_of(sequence, jnp.asarray(times(x)))),
     )
-    return times(found)
+    return times(logarithms)

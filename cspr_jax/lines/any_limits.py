@@ -23,9 +23,10 @@ HALF = 2 * SAMPLES
 # Ratios looked at first, as logits; then so often between the neighbours of the best one, in parts of their distance.
 LOGITS = np.linspace(-6.0, 6.0, 33)
 FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
-# Parts of a duration by which what a search found is made longer, one after the other, until it is proved.
+# Parts by which the duration of a search is made longer, one after the other, until it is proved.
 LONGER = (1e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
-# Where a cable is short its acceleration has a peak: so many distances to both sides of it, on the line, and samples.
+# The acceleration of a cable has a peak where the cable is short: samples lie at so many of its shortest lengths to
+# both sides of that place, on the line; halvings find their instants.
 BESIDE, HALVINGS = np.linspace(-1.5, 1.5, 4 * SAMPLES - 3), 45
 
 
@@ -83,11 +84,11 @@ def gain(line: LineSlacks, law: Amplitude, edges: Array, middle: Array, largest:
     up, down = (numbers.ravel()[jnp.argmin(half)] for half in halves)
     # Samples of s'' miss its peak, which the law knows.
     high = jnp.minimum(jnp.min(above), largest / law.largest[2])
-    found = Gain(high, jnp.max(below), up, down)
+    q_range = Gain(high, jnp.max(below), up, down)
     if "cable_acceleration_max" not in line.largest:
-        return found
+        return q_range
     count = rows[0].shape[-1]
-    return _with_peaks(found, halves, _near_spools(line, law), middle, 3 * count)
+    return _with_peaks(q_range, halves, _near_spools(line, law), middle, 3 * count)
 
 
 def _above(most: Array, needed: Array, is_known: Array) -> Array:
@@ -122,24 +123,24 @@ def _near_spools(line: LineSlacks, law: Amplitude) -> tuple[Array, Array]:
     at = Instants(way, speed**2, bend)
     line = jax.tree.map(lambda x: x[None, None], line)
     rows = jnp.concatenate([slacks(line, name, at) for name in line.names if name in line.largest], axis=-1)
-    # No parabolas here: knots of the law lie between these samples.
+    # Parabolas are not laid here, since knots of the law lie between these samples.
     return _above(jnp.ones_like(rows), 1.0 - rows, jnp.zeros_like(rows, bool)), tau[..., None]
 
 
-def _with_peaks(found: Gain, halves: list[Array], peaks: tuple[Array, Array], middle: Array, first_row: int) -> Gain:
-    # What holds back either half, and how far, with the peaks beside spools.
+def _with_peaks(q_range: Gain, halves: list[Array], peaks: tuple[Array, Array], middle: Array, first_row: int) -> Gain:
+    # Name the row that holds back either half, and how far it does, with the peaks beside spools.
     above, tau = peaks
     numbers = jnp.broadcast_to(jnp.arange(above.shape[-1])[None, None] + first_row, above.shape).ravel()
     sides = [jnp.where(half, above, jnp.inf) for half in (tau <= middle, tau > middle)]
     names = [
-        jnp.where(jnp.min(own) < jnp.min(half), numbers[jnp.argmin(own)], name)
-        for own, half, name in zip(sides, halves, (found.up, found.down), strict=True)
+        jnp.where(jnp.min(side) < jnp.min(half), numbers[jnp.argmin(side)], name)
+        for side, half, name in zip(sides, halves, (q_range.up, q_range.down), strict=True)
     ]
-    return Gain(jnp.minimum(found.high, jnp.min(above)), found.low, *names)
+    return Gain(jnp.minimum(q_range.high, jnp.min(above)), q_range.low, *names)
 
 
 def _numbers(line: LineSlacks, tensions: Array, shape: tuple[int, ...]) -> Array:
-    # Of each sample's rows; a face that is shifted by tensions has another one.
+    # Number the rows of each sample; a face that is shifted by tensions has another number.
     low, high = line.low[line.tightest][..., None, :], line.high[line.tightest][..., None, :]
     pulls = tensions > 0.0
     by_largest = (pulls & (tensions == high) & (low < high)).any(-1)[0]
@@ -164,7 +165,7 @@ def _between(values: Array, is_known: Array) -> Array:
 
 
 def _from_end(values: Array, is_known: Array) -> Array:
-    # Of the three samples at an end, that one first.
+    # Return the peak that the three samples at an end show, that end first; without a peak, the value at the end.
     a, b, c = (values[:, k] for k in range(3))
     slope, curvature = 0.5 * (4.0 * b - 3.0 * a - c), 2.0 * b - a - c
     rises = is_known & (slope > 0.0) & (curvature > slope)
@@ -205,27 +206,27 @@ def least_by_search(line: LineSlacks, largest: Array, law: Amplitude | None) -> 
         return _least(gain_of_law(line, half, largest, law), half)
 
     def cost(logit):
-        found = gain_of_law(line, jax.nn.sigmoid(logit), largest, None)
-        return jnp.where(found.low <= found.high, -found.high, jnp.maximum(found.low, 0.0)), found
+        q_range = gain_of_law(line, jax.nn.sigmoid(logit), largest, None)
+        return jnp.where(q_range.low <= q_range.high, -q_range.high, jnp.maximum(q_range.low, 0.0)), q_range
 
     logits = jnp.asarray(LOGITS)
     place = logits[jnp.argmin(lax.map(cost, logits)[0])]
     width = logits[1] - logits[0]
 
     def finer(_, best):
-        # Between the neighbours of the best one so far.
+        # The points lie between the neighbours of the best one so far.
         place, width, _ = best
         points = place + width * jnp.asarray(FINER)
-        costs, found = lax.map(cost, points)
+        costs, q_range = lax.map(cost, points)
         i = jnp.argmin(costs)
-        return points[i], width * (FINER[1] - FINER[0]), jax.tree.map(lambda x: x[i], found)
+        return points[i], width * (FINER[1] - FINER[0]), jax.tree.map(lambda x: x[i], q_range)
 
     none = Gain(jnp.zeros_like(place), jnp.zeros_like(place), jnp.asarray(0), jnp.asarray(0))
-    logit, _, found = lax.fori_loop(0, ROUNDS, finer, (place, width, none))
-    return _least(found, jax.nn.sigmoid(logit))
+    logit, _, q_range = lax.fori_loop(0, ROUNDS, finer, (place, width, none))
+    return _least(q_range, jax.nn.sigmoid(logit))
 
 
-def _least(found: Gain, ratio: Array) -> Least:
-    is_feasible = (found.high > 0.0) & (found.low <= found.high)
-    duration = jnp.where(is_feasible, 1.0 / jnp.sqrt(jnp.where(is_feasible, found.high, 1.0)), jnp.inf)
-    return Least(ratio, duration, found.up, found.down)
+def _least(q_range: Gain, ratio: Array) -> Least:
+    is_feasible = (q_range.high > 0.0) & (q_range.low <= q_range.high)
+    duration = jnp.where(is_feasible, 1.0 / jnp.sqrt(jnp.where(is_feasible, q_range.high, 1.0)), jnp.inf)
+    return Least(ratio, duration, q_range.up, q_range.down)

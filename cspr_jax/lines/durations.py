@@ -133,7 +133,7 @@ def _lines(problem: Problem, arguments) -> LineSlacks:
 
 
 def lines_of(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> LineSlacks:
-    """What slacks along lines depend on.
+    """Return the coefficients that slacks along lines depend on.
 
     Args:
         problem: robot and limits.
@@ -178,10 +178,12 @@ def by_search(
     Returns:
         what a search gives, the rest as it was.
     """
-    own = problem._replace(limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)}))
+    moving_problem = problem._replace(
+        limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)})
+    )
     largest = np.full(len(starts), float(max_acceleration))
-    least = in_batches(partial(_by_search, own, law=law), (starts, ends, largest), size=BATCH_OF_SEARCH)
-    rows = _bounds_of_rows(own)
+    least = in_batches(partial(_by_search, moving_problem, law=law), (starts, ends, largest), size=BATCH_OF_SEARCH)
+    rows = _bounds_of_rows(moving_problem)
     return dataclasses.replace(
         found, duration=least.duration, ratio=least.ratio, up=rows[least.up], down=rows[least.down]
     )
@@ -227,12 +229,12 @@ def _by_search(problem: Problem, arguments, *, law: str):
 def _bounds_of_rows(problem: Problem) -> np.ndarray:
     # Numbers in `names_of` of what bounds a search, see `any_limits.Gain`; faces are of both sides.
     robot, names = problem.robot, names_of(problem.robot, problem.limits)
-    faces, given = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
+    faces, limit_names = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
     counts = {"tension_min": faces, "tension_max": faces, "cable_speed_max": robot.n_cables}
     counts["cable_acceleration_max"] = 2 * robot.n_cables
     rows = [np.tile(np.arange(faces // 2), 2)]
     for name, count in counts.items():
-        if name in given:
+        if name in limit_names:
             rows.append(np.full(count, names.index(name)))
         elif name.startswith("tension"):
             rows.append(np.full(count, -1))  # none is shifted so

@@ -19,7 +19,7 @@ from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_accelera
 from cspr_jax.robots.spool_plane import spread
 from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning
 
-# Of the size of a robot: spools nearer to a plane than this lie in it.
+# Spools nearer to a plane than this, over the size of the robot, lie in it.
 IN_PLANE = 1e-9
 
 
@@ -54,12 +54,12 @@ class LineFaces:
 
     @property
     def bounds(self) -> Array:
-        """Whether it bounds the accelerations of taut cables anywhere on the line, (..., n_faces)."""
+        """Tell whether each face bounds the accelerations of taut cables anywhere on the line, (..., n_faces)."""
         return self.last > self.first
 
 
 def in_one_plane(robot: PointMassRobot) -> bool:
-    """Whether the spools lie in one plane, those of a planar robot on one line.
+    """Tell whether the spools lie in one plane, those of a planar robot on one line.
 
     Args:
         robot: the robot; NumPy leaves.
@@ -75,7 +75,8 @@ def in_one_plane(robot: PointMassRobot) -> bool:
 
 
 def _normals(robot: PointMassRobot, place: Array) -> tuple[Array, Array]:
-    # Of rays that keep their lengths, (n_choices, 3), and their products with the rays, (n_choices, n_cables).
+    # Return the normals to rays that keep their lengths, (n_choices, 3), and their products with the rays,
+    # (n_choices, n_cables).
     rays = robot.base_points - place[None]
     if robot.dof == PLANAR:
         level = normals_to(rays[:, [0, 2]].T)
@@ -84,9 +85,9 @@ def _normals(robot: PointMassRobot, place: Array) -> tuple[Array, Array]:
         normal = normals_to(rays.T)
     size = jnp.linalg.norm(normal, axis=1)[:, None] * jnp.linalg.norm(rays, axis=1)[None]
     along = normal @ rays.T
-    own = np.zeros(along.shape, bool)
-    np.put_along_axis(own, spanning(robot.n_cables, robot.dof), True, axis=1)
-    return normal, jnp.where(own | (jnp.abs(along) <= FLAT * size), 0.0, along)
+    spans = np.zeros(along.shape, bool)
+    np.put_along_axis(spans, spanning(robot.n_cables, robot.dof), True, axis=1)
+    return normal, jnp.where(spans | (jnp.abs(along) <= FLAT * size), 0.0, along)
 
 
 def line_faces(robot: PointMassRobot, start: Array, end: Array, *, in_plane: bool) -> LineFaces:
@@ -130,7 +131,7 @@ def line_faces(robot: PointMassRobot, start: Array, end: Array, *, in_plane: boo
 
 
 def _bounding(start: Array, end: Array) -> tuple[Array, Array]:
-    # Where no product is negative and some are positive.
+    # Find the part of the line on which no product is negative and some are positive.
     change = start - end
     crossing = start / jnp.where(change != 0.0, change, 1.0)
     first = jnp.max(jnp.where((start < 0.0) & (end > 0.0), crossing, 0.0), axis=1)
@@ -176,8 +177,8 @@ def sides(faces: LineFaces, largest: Array) -> Sides:
     start, change = faces.offset / over, faces.slope / over
     flat = jnp.zeros_like(largest)
 
-    def with_largest(wanted, value, slope):
-        value, slope = jnp.where(wanted, value, jnp.inf), jnp.where(wanted, slope, 0.0)
+    def with_largest(is_bounding, value, slope):
+        value, slope = jnp.where(is_bounding, value, jnp.inf), jnp.where(is_bounding, slope, 0.0)
         return jnp.concatenate([value, largest[None]]), jnp.concatenate([slope, flat[None]])
 
     up, up_slope = with_largest(is_up, start, change)

@@ -22,16 +22,16 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 # Lines that a thread works on at a time, where there is something to search or to prove.
 PART = 256
 Rows = TypeVar("Rows", Durations, Verdicts)
-# Over the size of a robot: ends nearer to each other are one place.
+# Ends nearer to each other than this, over the size of the robot, are one place.
 SAME_PLACE = 1e-12
-# Likewise: lines that pass a spool nearer than this go through it.
+# Lines that pass a spool nearer than this, over the size of the robot, go through it.
 THROUGH = 1e-9
-# What rest at an end already breaks: no motion has it there, or starts there.
+# Flags that rest at an end already raises: no motion avoids the first ones there, and none starts with the second.
 OF_PLACES = sum({row.flag.value for row in LIMITS if not row.of_motion})
 NO_MOTION = (Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.SINGULAR).value
 # Times that a weight takes to fall by the size of a robot, after which a motion counts as standing still.
 STILL = 1e4
-# Parts of a duration below which their digits are lost in what the formulas promise.
+# Parts of a duration below which the formulas lose the digits of these parts.
 SHORT = 1e-6
 
 
@@ -77,8 +77,8 @@ def fastest(
     if len(starts) <= PART or (in_one_plane(problem.robot) and not moving(problem.limits)):
         return _fastest(problem, starts, ends, **how)
     parts = in_parts(lambda part: _fastest(problem, starts[part], ends[part], **how), len(starts), PART)
-    durations, own, moves = zip(*parts, strict=True)
-    return Fastest(_joined(Durations, durations), _joined(Verdicts, own), np.concatenate(moves))
+    durations, judgements, moves = zip(*parts, strict=True)
+    return Fastest(_joined(Durations, durations), _joined(Verdicts, judgements), np.concatenate(moves))
 
 
 def _joined(kind: type[Rows], parts: Sequence[Rows]) -> Rows:
@@ -96,59 +96,59 @@ def _fastest(
     sharp: bool,
 ) -> Fastest:
     robot, in_plane = problem.robot, in_one_plane(problem.robot)
-    found = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
-    own, may_move, in_place = _at_rest(problem, starts, ends, found)
+    timings = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
+    judgements, may_move, in_place = _at_rest(problem, starts, ends, timings)
     judged = partial(verdicts, problem, law=law, max_acceleration=max_acceleration, sharp=sharp)
     if in_plane:
-        # What the formulas promise without limits needs no proof, but where the digits of p or T - p are lost, or the
-        # peak of the acceleration may lie beyond its limit.
-        is_short = (np.minimum(found.ratio, 1.0 - found.ratio) < SHORT) & (law == "s-curve")
-        is_within = acceleration_slack(starts, ends, found, law=law, max_acceleration=max_acceleration) > 0.0
-        some = np.flatnonzero(may_move & (sharp | bool(limits_set(problem.limits)) | is_short | ~is_within))
-        if len(some) > 0:
-            own.replace(some, judged(starts[some], ends[some], found.part(some)))
-    # Where a place breaks a limit, no other motion mends it.
-    some = np.flatnonzero(may_move & in_place & ((own.verdict != 0) | ~in_plane))
-    if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(some) > 0:
-        before, places = found.part(some), (starts[some], ends[some])
+        # The durations that the formulas promise without limits need no proof, but where the digits of p or T - p are
+        # lost, or the peak of the acceleration may lie beyond its limit.
+        is_short = (np.minimum(timings.ratio, 1.0 - timings.ratio) < SHORT) & (law == "s-curve")
+        is_within = acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > 0.0
+        rows = np.flatnonzero(may_move & (sharp | bool(limits_set(problem.limits)) | is_short | ~is_within))
+        if len(rows) > 0:
+            judgements.replace(rows, judged(starts[rows], ends[rows], timings.part(rows)))
+    # If a place breaks a limit, no other motion mends it.
+    rows = np.flatnonzero(may_move & in_place & ((judgements.verdict != 0) | ~in_plane))
+    if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(rows) > 0:
+        before, places = timings.part(rows), (starts[rows], ends[rows])
         searched = by_search(problem, *places, before, law=law, max_acceleration=max_acceleration)
-        reasons = _without_motion(problem, judged, *places, searched, own.verdict[some])
+        reasons = _without_motion(problem, judged, *places, searched, judgements.verdict[rows])
         durations, part = _proved(judged, *places, searched, reasons)
-        own.replace(some, part)
-        found.replace(some, durations)
-    moves = may_move & np.isfinite(found.duration)
-    some = np.flatnonzero(moves & (bool(moving(problem.limits)) | (found.least == 0.0)))
-    if len(some) > 0:
-        cells = by_cells(problem, starts[some], ends[some], max_acceleration)
-        found.least[some] = np.maximum(found.least[some], cells)
-    return Fastest(found, own, moves)
+        judgements.replace(rows, part)
+        timings.replace(rows, durations)
+    moves = may_move & np.isfinite(timings.duration)
+    rows = np.flatnonzero(moves & (bool(moving(problem.limits)) | (timings.least == 0.0)))
+    if len(rows) > 0:
+        cells = by_cells(problem, starts[rows], ends[rows], max_acceleration)
+        timings.least[rows] = np.maximum(timings.least[rows], cells)
+    return Fastest(timings, judgements, moves)
 
 
 def _at_rest(
-    problem: Problem, starts: np.ndarray, ends: np.ndarray, found: Durations
+    problem: Problem, starts: np.ndarray, ends: np.ndarray, timings: Durations
 ) -> tuple[Verdicts, np.ndarray, np.ndarray]:
-    # Why there can be no motion, where there can be one, and where both ends keep the limits on places.
+    # Tell why there can be no motion, where there can be one, and where both ends keep the limits on places.
     doubt = TOLERANCE * float(np.asarray(problem.robot.gravity))
     size = float(np.abs(np.asarray(problem.robot.base_points)).max())
     is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * size
-    above, slack = ~(found.depth > 0.0), found.rest < -doubt
+    above, slack = ~(timings.depth > 0.0), timings.rest < -doubt
     flags = np.where(above, Verdict.ABOVE_SPOOLS.value, 0) | np.where(above | slack, Verdict.SLACK_CABLE.value, 0)
-    # Where cables are slack, limits of their tensions say nothing more.
+    # If cables are slack, limits of their tensions say nothing more.
     flags |= limits_at_rest(problem, starts, ends) & np.where(flags == 0, ~0, OF_PLACES)
     flags |= np.where(_touches(problem, starts, ends), Verdict.SINGULAR.value, 0)
-    rests = (flags == 0) & (found.rest > doubt)
-    open_ended = np.where(found.is_bounded, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value)
+    rests = (flags == 0) & (timings.rest > doubt)
+    open_ended = np.where(timings.is_bounded, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value)
     # With limits on places alone the motion of the formulas is shown all the same.
     no_motion = NO_MOTION if in_one_plane(problem.robot) else ~0
-    may_move = ~above & (found.rest > doubt) & ~is_same & found.is_bounded & ((flags & no_motion) == 0)
+    may_move = ~above & (timings.rest > doubt) & ~is_same & timings.is_bounded & ((flags & no_motion) == 0)
     verdict = np.where(may_move | (rests & is_same), 0, np.where(flags > 0, flags, open_ended)).astype(FLAGS)
     nothing = np.full(len(starts), np.nan)
-    margin = np.minimum(np.where(above, np.nan, found.rest), 0.0)
+    margin = np.minimum(np.where(above, np.nan, timings.rest), 0.0)
     return Verdicts(verdict, margin, nothing.copy(), np.full(len(starts), np.inf)), may_move, flags == 0
 
 
 def _touches(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    # Whether lines pass through a spool, where a cable has no direction.
+    # Tell whether lines pass through a spool, where a cable has no direction.
     spools, way = np.asarray(problem.robot.base_points), (ends - starts)[:, None]
     rays, square = spools[None] - starts[:, None], (way**2).sum(2)
     part = np.clip((rays * way).sum(2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
@@ -161,37 +161,37 @@ def _without_motion(
     judged: Callable[..., Verdicts],
     starts: np.ndarray,
     ends: np.ndarray,
-    found: Durations,
+    timings: Durations,
     before: np.ndarray,
 ) -> np.ndarray:
     # Flags of lines along which a search finds no motion: what one breaks that is as slow as if it stood still, else
     # those of the motion by formulas.
-    flags, some = before.copy(), np.flatnonzero(~np.isfinite(found.duration))
-    if len(some):
+    flags, rows = before.copy(), np.flatnonzero(~np.isfinite(timings.duration))
+    if len(rows):
         long = np.linalg.norm(ends - starts, axis=1) + float(spool_radius(problem.robot))
         still = np.sqrt(long / float(np.asarray(problem.robot.gravity))) * STILL
-        slow = dataclasses.replace(found, duration=still, ratio=np.full(len(still), 0.5)).part(some)
-        slower = judged(starts[some], ends[some], slow).verdict
+        slow = dataclasses.replace(timings, duration=still, ratio=np.full(len(still), 0.5)).part(rows)
+        slower = judged(starts[rows], ends[rows], slow).verdict
         is_telling = (slower != 0) & (slower != Verdict.UNDECIDED.value)
-        flags[some] = np.where(is_telling, slower, flags[some])
+        flags[rows] = np.where(is_telling, slower, flags[rows])
     return flags
 
 
 def _proved(
-    judged: Callable[..., Verdicts], starts: np.ndarray, ends: np.ndarray, found: Durations, before: np.ndarray
+    judged: Callable[..., Verdicts], starts: np.ndarray, ends: np.ndarray, timings: Durations, before: np.ndarray
 ) -> tuple[Durations, Verdicts]:
-    # What a search found is made longer until it is proved; without a motion, the flags from before stand.
+    # Make the durations of a search longer until they are proved; without a motion, the flags from before stand.
     nothing = np.full(len(starts), np.nan)
     flags = np.where(before > 0, before, Verdict.UNDECIDED.value).astype(FLAGS)
-    own = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))
-    durations = found.part(np.arange(len(starts)))
-    durations.duration[~np.isfinite(found.duration)] = np.nan
-    some = np.flatnonzero(np.isfinite(found.duration))
+    judgements = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))
+    durations = timings.part(np.arange(len(starts)))
+    durations.duration[~np.isfinite(timings.duration)] = np.nan
+    rows = np.flatnonzero(np.isfinite(timings.duration))
     for longer in LONGER:
-        if len(some) == 0:
+        if len(rows) == 0:
             break
-        durations.duration[some] = found.duration[some] * (1.0 + longer)
-        part = judged(starts[some], ends[some], durations.part(some))
-        own.replace(some, part)
-        some = some[part.verdict != 0]
-    return durations, own
+        durations.duration[rows] = timings.duration[rows] * (1.0 + longer)
+        part = judged(starts[rows], ends[rows], durations.part(rows))
+        judgements.replace(rows, part)
+        rows = rows[part.verdict != 0]
+    return durations, judgements

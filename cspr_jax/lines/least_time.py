@@ -65,23 +65,23 @@ def least_times(
     Returns:
         the durations.
     """
-    found, own, moves = fastest(
+    timings, judgements, moves = fastest(
         problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=False
     )
-    # No motion that is refuted; 0 s where both ends are one place.
-    moves &= (own.verdict == 0) | (own.verdict == Verdict.UNDECIDED.value)
-    nothing = np.where((own.verdict == 0) & ~moves, 0.0, np.nan)
-    duration, least = (np.where(moves, x, nothing) for x in (found.duration, found.least))
+    # A refuted motion has no duration; the duration is 0 s where both ends are one place.
+    moves &= (judgements.verdict == 0) | (judgements.verdict == Verdict.UNDECIDED.value)
+    nothing = np.where((judgements.verdict == 0) & ~moves, 0.0, np.nan)
+    duration, least = (np.where(moves, x, nothing) for x in (timings.duration, timings.least))
     with np.errstate(invalid="ignore", divide="ignore"):
         relative = np.where(least > 0.0, duration / least, np.nan)
     return LeastTimes(
-        verdict=own.verdict,
+        verdict=judgements.verdict,
         duration=duration,
-        acceleration_time=np.where(moves, found.ratio, 0.5) * duration,
+        acceleration_time=np.where(moves, timings.ratio, 0.5) * duration,
         least_duration=least,
         duration_ratio=relative,
-        rest_margin=np.where(found.depth > 0.0, found.rest, np.nan),
-        active_up=np.where(moves, found.up + 1, 0).astype(np.int16),
-        active_down=np.where(moves, found.down + 1, 0).astype(np.int16),
+        rest_margin=np.where(timings.depth > 0.0, timings.rest, np.nan),
+        active_up=np.where(moves, timings.up + 1, 0).astype(np.int16),
+        active_down=np.where(moves, timings.down + 1, 0).astype(np.int16),
         names=names_of(problem.robot, problem.limits),
     )

@@ -41,7 +41,7 @@ class TimedLines(Leg):
         return self._solved(problem, *self._ends(problem, depths))
 
     def _ends(self, problem: Problem, depths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # Of all lines, (n_depths * n_lines, 3) each.
+        # Return the starts and the ends of all lines, (n_depths * n_lines, 3) each.
         points = np.stack([self.stops.points(float(z0)) for z0 in depths])
         size = float(spool_radius(problem.robot))
         apart = np.linalg.norm(np.diff(points, axis=1), axis=2)

@@ -76,7 +76,7 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
         if "cable_speed_max" in line.largest:
             speed = (line.largest["cable_speed_max"] / least).min(-1)
         if "cable_acceleration_max" in line.largest:
-            # Of a cable that is paid out l'' >= l_s s'', of one that is wound in l'' >= |l_s| (-s'').
+            # A cable that is paid out has l'' >= l_s s'', one that is wound in has l'' >= |l_s| (-s'').
             most = line.largest["cable_acceleration_max"] / least
             up = np.minimum(up, np.where(rates[0] > 0.0, most, np.inf).min(-1))
             down = np.minimum(down, np.where(rates[1] < 0.0, most, np.inf).min(-1))
@@ -84,7 +84,7 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _reach(line: LineSlacks, name: str, s: Jet, shortness: Jet) -> np.ndarray:
-    # What each face leaves to s'' or to -s'' over the cells, (n, CELLS, n_faces): inf if it bounds nothing there.
+    # Bound s'' or -s'' by each face over the cells, (n, CELLS, n_faces): inf if the face bounds nothing there.
     first, last = s.value
     free = [line.offset + line.slope * x for x in (first, last)]
     along = (s.expanded(-1) * line.along_turn + line.along) * shortness.expanded(-2)

@@ -57,13 +57,14 @@ def _first(laws: Amplitude) -> MinimumBlocks:
 def _of_blocks(
     lines: LineSlacks, laws: Amplitude, durations: np.ndarray, blocks: MinimumBlocks
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Of each block a lower bound of each group, and the smaller one of its values at both ends, (n, n_groups) each.
-    own = jax.tree.map(lambda x: x[blocks.case], lines)
+    # Bound each group from below over each block, and find the smaller one of its values at both ends,
+    # (n, n_groups) each.
+    block_lines = jax.tree.map(lambda x: x[blocks.case], lines)
     s = over(np.asarray(laws.coefficients)[blocks.case, blocks.piece], blocks.start, blocks.width)
     per_time = (1.0 / (blocks.width * durations[blocks.case]))[:, None]
     ends, during = [_at_end(s, end, per_time) for end in (0, 1)], _during(s, per_time)
-    found = [_of_group(own, name, ends, during) for name in lines.names]
-    low, attained = (np.stack(x, axis=1) for x in zip(*found, strict=True))
+    groups = [_of_group(block_lines, name, ends, during) for name in lines.names]
+    low, attained = (np.stack(x, axis=1) for x in zip(*groups, strict=True))
     return low, attained
 
 
@@ -75,8 +76,8 @@ def _of_group(line: LineSlacks, name: str, ends: list[Instants], during: Instant
         values = np.stack([slacks(line, name, end, tensions_at(line, name, end.s)) for end in ends])
         tensions, beyond = tensions_over(line, name, ends[0].s, ends[1].s)
         chosen = tensions if tensions.any() else None
-        kept = np.stack([slacks(line, name, end, chosen) for end in ends])
-        low = lowest(kept, slacks(line, name, during, chosen))
+        chosen_slacks = np.stack([slacks(line, name, end, chosen) for end in ends])
+        low = lowest(chosen_slacks, slacks(line, name, during, chosen))
     return np.where(beyond, np.inf, low).min(1), values.min((0, 2))
 
 

@@ -182,7 +182,7 @@ def least_time(sides: Sides, *, everywhere: bool = True) -> Array:
 
 
 def _is_positive(start: Array, slope: Array, nodes: Array) -> Array:
-    # Of each interval whether its bound is finite, and positive at both ends.
+    # Tell for each interval whether its bound is finite, and positive at both ends.
     ends = start + slope * nodes[:-1], start + slope * nodes[1:]
     return jnp.isfinite(start) & ((jnp.minimum(*ends) > 0.0) | (nodes[1:] <= nodes[:-1]))
 
@@ -198,11 +198,11 @@ def _crossings(start: Array, slope: Array) -> Array:
 def _lowest(start: Array, slope: Array, places: Array, holds: Array | None) -> tuple[Array, Array]:
     values = start[None] + slope[None] * places[:, None]
     if holds is None:
-        which = jnp.argmin(values, axis=1)
-        return start[which], slope[which]
+        index = jnp.argmin(values, axis=1)
+        return start[index], slope[index]
     values = jnp.where(holds, values, jnp.inf)
-    which = jnp.argmin(values, axis=1)
-    return jnp.where(jnp.isfinite(values.min(1)), start[which], jnp.inf), slope[which]
+    index = jnp.argmin(values, axis=1)
+    return jnp.where(jnp.isfinite(values.min(1)), start[index], jnp.inf), slope[index]
 
 
 def _time(stops: Array, nodes: Array, energy: Array, start: Array, slope: Array) -> Array:

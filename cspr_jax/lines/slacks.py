@@ -26,7 +26,7 @@ TAUT = "taut"
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class LineSlacks:
-    """What slacks along a line depend on.
+    """Coefficients that slacks along a line depend on.
 
     Fields:
         square: () |D|^2, m^2.
@@ -75,7 +75,7 @@ class LineSlacks:
 
 
 def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
-    """What slacks along a line depend on.
+    """Return the coefficients that slacks along a line depend on.
 
     Args:
         problem: robot and limits.
@@ -135,7 +135,7 @@ def _tensions(problem: Problem) -> tuple[dict[str, Array], dict[str, Array]]:
 
 
 class Instants(NamedTuple):
-    """Where a motion along a line is: arrays, or jets over blocks; their last dimension has length 1.
+    """State of a motion along a line: arrays, or jets over blocks; their last dimension has length 1.
 
     Fields:
         s: path coordinate.
@@ -178,7 +178,7 @@ def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> A
 
 
 def _pulled(line: LineSlacks, s: Any, shortness: Any, tensions: Any) -> Any:
-    # What the cables pull towards the inside of each face, over the mass.
+    # Return the pull of the cables towards the inside of each face, over the mass.
     if isinstance(s, Jet):
         return ((s.expanded(-1) * line.along_turn + line.along) * shortness.expanded(-2) * tensions).summed()
     return ((line.along + line.along_turn * s[..., None]) * tensions * shortness[..., None, :]).sum(-1)

@@ -34,7 +34,7 @@ class LineAnswers(Answers):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Whether each line is proved feasible, (n,)."""
+        """Tell whether each line is proved feasible, (n,)."""
         return self.verdict == 0
 
     def details(self, i: int) -> dict[str, Any]:
@@ -71,23 +71,23 @@ def timed_lines(
     Returns:
         the answers, margins in m/s^2; durations are NaN where there is no motion.
     """
-    found, own, moves = fastest(
+    timings, judgements, moves = fastest(
         problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=True
     )
     none, nothing = np.zeros(len(starts), int), np.full(len(starts), np.nan)
-    duration = np.where(moves, found.duration, np.nan)
+    duration = np.where(moves, timings.duration, np.nan)
     return LineAnswers(
         none,
         none,
-        own.verdict,
+        judgements.verdict,
         duration,
-        own.margin,
-        own.bound,
-        own.room,
+        judgements.margin,
+        judgements.bound,
+        judgements.room,
         *(nothing, nothing, nothing),
-        np.where(moves, found.ratio, 0.5) * duration,
-        np.where(moves, found.least, np.nan),
-        np.stack([np.where(moves, x + 1, 0) for x in (found.up, found.down)], axis=1),
+        np.where(moves, timings.ratio, 0.5) * duration,
+        np.where(moves, timings.least, np.nan),
+        np.stack([np.where(moves, x + 1, 0) for x in (timings.up, timings.down)], axis=1),
         names_of(problem.robot, problem.limits),
     )
 

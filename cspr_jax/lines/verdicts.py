@@ -22,7 +22,7 @@ from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# Over gravity, or the size of a limit: margins nearer to zero are undecided, and rest with a smaller margin is none.
+# Margins nearer to zero, over gravity or a limit's size, are undecided, and rest with a smaller margin is none.
 TOLERANCE = 1e-12
 
 
@@ -118,8 +118,8 @@ def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np
     for row in limits_set(problem.limits):
         if not row.of_motion:
             limit: Any = np.asarray(getattr(problem.limits, row.name))
-            own = np.asarray(slack(row, limit, each[row.quantity], scale)).min((1, 2))
-            room, flags = np.minimum(room, own), flags | np.where(own < -TOLERANCE, row.flag.value, 0)
+            smallest = np.asarray(slack(row, limit, each[row.quantity], scale)).min((1, 2))
+            room, flags = np.minimum(room, smallest), flags | np.where(smallest < -TOLERANCE, row.flag.value, 0)
     return room, flags, ~(room > TOLERANCE)
 
 
@@ -149,9 +149,9 @@ def limits_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np
 
 
 def _fails_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, limits: dict[str, Any]) -> np.ndarray:
-    # Whether rest at either end breaks limits of the tensions, or taut cables, (n,).
-    own = problem._replace(limits=Limits(**limits))
-    margins = [in_batches(partial(_at_rest, own), places, size=BATCH) for places in (starts, ends)]
+    # Tell whether rest at either end breaks limits of the tensions, or taut cables, (n,).
+    limited = problem._replace(limits=Limits(**limits))
+    margins = [in_batches(partial(_at_rest, limited), places, size=BATCH) for places in (starts, ends)]
     return np.min(margins, axis=0) < -TOLERANCE * float(np.asarray(problem.robot.gravity))
 
 

@@ -19,7 +19,7 @@ from cspr_jax.schema.verdicts import Verdict
 
 # Margins nearer to zero than this, over gravity, are undecided.
 TOLERANCE = 1e-9
-# Components of unit normals below this are none.
+# Components of unit normals below this count as zero.
 LEVEL = 1e-12
 
 
@@ -108,7 +108,7 @@ def reach(robot: PointMassRobot, limits: Limits, position: Array) -> Acceleratio
     slack, margin = faces.slacks(still), faces.margin(still)
 
     def until(steepness: Array) -> Array:
-        # How far from rest a direction leads, or all directions that approach the faces so steeply.
+        # Return how far from rest a direction leads, or all directions that approach the faces so steeply.
         distance = jnp.where(steepness > LEVEL, slack / jnp.where(steepness > LEVEL, steepness, 1.0), jnp.inf)
         return jnp.where(margin > 0.0, jnp.maximum(jnp.min(distance), 0.0), 0.0)
 
@@ -132,7 +132,7 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
     a, b = normal[first], normal[second]
     determinant = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     crosses = (jnp.abs(determinant) > LEVEL) & jnp.isfinite(offset[first]) & jnp.isfinite(offset[second])
-    p, q = (jnp.where(crosses, offset[which], 0.0) for which in (first, second))
+    p, q = (jnp.where(crosses, offset[indices], 0.0) for indices in (first, second))
     corner = jnp.stack([p * b[:, 1] - q * a[:, 1], a[:, 0] * q - b[:, 0] * p], 1)
     corner = corner / jnp.where(crosses, determinant, 1.0)[:, None]
     # In a plane corners are points of the line itself.
@@ -142,7 +142,7 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
     points, counts = jnp.concatenate([corner, alone]), jnp.concatenate([crosses, is_line])
     room = TOLERANCE * (1.0 + jnp.linalg.norm(points, axis=1))
     inside = counts & (points @ normal.T - offset[None] >= -room[:, None]).all(1)
-    # A way along the edge of a face that no other face ends.
+    # The section is unbounded if a way along the edge of a face is ended by no other face.
     if planar:
         along = jnp.array([[1.0, 0.0], [-1.0, 0.0]])
     else:

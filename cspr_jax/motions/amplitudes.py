@@ -24,7 +24,7 @@ BOUNDARY_TOLERANCE = 1e-9
 # Shorter ends ask for accelerations that no robot has, and lose the digits of A'' to rounding.
 SMALLEST_EPSILON = 1e-3
 LARGEST_COEFFICIENT = 1e9
-# Tables have at least so many columns: functions of few shapes are compiled once, and zeros change no bit.
+# Tables have at least this many columns: functions of few shapes are compiled once, and zeros change no bit.
 COLUMNS = 6
 # Coefficients below this part of the largest one do not change where a function is stationary.
 NEGLIGIBLE = 1e-100
@@ -241,7 +241,7 @@ def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str
         marks = ("", "'") if free_end and tau == 1 else ("", "'", "''")
         for order, mark in enumerate(marks):
             value = float((curve.deriv(order) if order else curve)(tau - float(origin)))
-            wanted = float(tau if order == 0 else 0)
-            if not abs(value - wanted) <= BOUNDARY_TOLERANCE * float(amplitude.largest[order]):
-                errors.append(f"A{mark}({tau}) = {value:g}, must be {wanted:g}")
+            target = float(tau if order == 0 else 0)
+            if not abs(value - target) <= BOUNDARY_TOLERANCE * float(amplitude.largest[order]):
+                errors.append(f"A{mark}({tau}) = {value:g}, must be {target:g}")
     return errors

@@ -41,7 +41,7 @@ class Answers(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Whether each segment is feasible, (n,): proved, on more than six cables found at samples."""
+        """Tell whether each segment is feasible, (n,): proved, on more than six cables found at samples."""
         return self.arcs > 0
 
     def details(self, i: int) -> dict[str, Any]:

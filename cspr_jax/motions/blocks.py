@@ -8,7 +8,7 @@ import numpy as np
 
 from cspr_jax.motions.amplitudes import Amplitude
 
-# Of a part more that a piece between knots gets as little as this is not worth a block.
+# A piece between knots does not get one more block for a remainder of up to this part of a block.
 SLIVER = 0.3
 INSTANTS = 1025  # at which parts along a motion are told
 
@@ -104,27 +104,27 @@ def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: float | Parts) -> 
     Returns:
         the blocks, those of a motion side by side, in time.
     """
-    numbers, own = np.unique(arcs, return_inverse=True)
+    numbers, group = np.unique(arcs, return_inverse=True)
     edges = [_edges(int(p), [0.0, *knots.tolist(), 1.0], parts) for p in numbers]
     lengths = np.array([len(x) for x in edges], int)
     # All edges in one row: where those of each motion begin, and which of them each block begins with.
-    begins, counts = (np.cumsum(lengths) - lengths)[own], (lengths - 1)[own]
+    begins, counts = (np.cumsum(lengths) - lengths)[group], (lengths - 1)[group]
     row = np.repeat(np.arange(len(arcs)), counts)
     first = np.arange(len(row)) + np.repeat(begins - (np.cumsum(counts) - counts), counts)
-    every = np.concatenate([np.zeros(0), *edges])
-    return Blocks(row, every[first], every[first + 1])
+    all_edges = np.concatenate([np.zeros(0), *edges])
+    return Blocks(row, all_edges[first], all_edges[first + 1])
 
 
 def _edges(arcs: int, knots: list[float], parts: float | Parts) -> np.ndarray:
-    # Of the blocks of a motion, both ends among the knots.
+    # Return the edges of the blocks of a motion; its two ends are among the knots.
     each = parts.of(arcs) if isinstance(parts, Parts) else np.full(2, float(parts))
     tau = np.linspace(0.0, 1.0, len(each))
-    # How many parts lie before an instant.
+    # Count the parts that lie before each instant.
     before = arcs * np.append(0.0, np.cumsum(0.5 * (each[1:] + each[:-1]) * np.diff(tau)))
     inside = []
     for start, stop in itertools.pairwise(knots):
         first, last = np.interp([start, stop], tau, before)
-        # Equal within each piece, so that no sliver is left beside a knot.
+        # Blocks are equal within each piece, so that no sliver is left beside a knot.
         count = max(1, math.ceil(last - first - SLIVER))
         if isinstance(parts, Parts):
             edges = np.interp(np.linspace(first, last, count + 1), before, tau)

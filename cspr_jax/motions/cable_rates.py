@@ -40,19 +40,19 @@ def rates_hold(known: Enclosure, found: Influence, limits: Limits, spools: np.nd
 
 
 def _limits_of_rates(limits: Limits) -> tuple[np.ndarray, np.ndarray] | None:
-    given = limits.cable_speed_max, limits.cable_acceleration_max
-    if all(x is None for x in given):
+    rate_limits = limits.cable_speed_max, limits.cable_acceleration_max
+    if all(x is None for x in rate_limits):
         return None
-    speed, acceleration = (np.array(np.inf) if x is None else np.asarray(x) * (1.0 + TOUCHED) for x in given)
+    speed, acceleration = (np.array(np.inf) if x is None else np.asarray(x) * (1.0 + TOUCHED) for x in rate_limits)
     return speed, acceleration
 
 
 def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # Smallest and largest component of vectors along all rays within a part `ball` of their length of given ones.
+    # Bound the component of vectors along all rays that lie within a part `ball` of their length of the given rays.
     component, size = np.sum(units * vectors, axis=2), np.linalg.norm(vectors, axis=2)
     across = np.sqrt(np.maximum(size**2 - component**2, 0.0))
-    angle, own = np.arcsin(ball), np.arctan2(across, component)
-    return size * np.cos(np.minimum(own + angle, np.pi)), size * np.cos(np.maximum(own - angle, 0.0))
+    angle, inclination = np.arcsin(ball), np.arctan2(across, component)
+    return size * np.cos(np.minimum(inclination + angle, np.pi)), size * np.cos(np.maximum(inclination - angle, 0.0))
 
 
 def rates_fail(known: Enclosure, found: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ from cspr_jax.runtime.stages import stage
 
 # Samples of an arc, at least, and instants computed at a time.
 SAMPLES, BATCH = 64, 512
-# So many samples are held at a time.
+# Largest number of samples that is held at a time.
 ROOM = 200_000
 
 
@@ -107,15 +107,15 @@ def demands(
     table = np.empty((len(motions), len(_NAMES)))
     alike: dict[Any, list[int]] = {}
     for i, (motion, count) in enumerate(zip(motions, samples, strict=True)):
-        # Those of one structure and one number of samples are computed together.
+        # Motions of one structure and one number of samples are computed together.
         shapes = tuple(np.shape(leaf) for leaf in jax.tree.leaves(motion))
         alike.setdefault((jax.tree.structure(motion), shapes, count), []).append(i)
     for (*_, count), members in alike.items():
         size = max(ROOM // count, 1)
         for first in range(0, len(members), size):
             stage(f"demands of {len(motions)} segments")
-            some = members[first : first + size]
-            table[some] = _of_alike(partial(_values, robot, limits, rule=rule), [motions[i] for i in some], count)
+            batch = members[first : first + size]
+            table[batch] = _of_alike(partial(_values, robot, limits, rule=rule), [motions[i] for i in batch], count)
     columns = (table * _SIGNS + 0.0).T  # no -0
     return Demands(**dict(zip(_NAMES, columns, strict=True)), samples=np.array(samples))
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# By this part of them limits may be touched.
+# Part of a limit by which it may be touched.
 TOUCHED = 2e-6
 
 
@@ -36,7 +36,7 @@ class Distances(NamedTuple):
     here_spools: np.ndarray
 
     def hold(self, spools: np.ndarray) -> np.ndarray:
-        """Whether all stay positive within blocks, however spools move: proved.
+        """Tell whether all distances stay positive within blocks, however spools move: proved.
 
         Args:
             spools: (k,) largest displacement, m.
@@ -50,7 +50,7 @@ class Distances(NamedTuple):
         return ((low > self.spools * far) & (far * self.slope < 1.0)).all(1)
 
     def fail(self, spools: np.ndarray) -> np.ndarray:
-        """Whether some are lost in the middles of blocks where spools move as is worst.
+        """Tell whether some distances are lost in the middles of blocks where spools move as is worst.
 
         Args:
             spools: (k,) largest displacement, m.
@@ -78,7 +78,7 @@ class Rates(NamedTuple):
 
 
 class Enclosure(NamedTuple):
-    """What is known of k blocks of motions; "in the middle" is at the middle instant.
+    """Middle states and bounds of k blocks of motions; "in the middle" is at the middle instant.
 
     Fields:
         rays: (k, n_cables, 3) from spool to attachment point in the middle, m.
@@ -121,13 +121,13 @@ class Enclosure(NamedTuple):
             **{name: value[which] for name, value in self.distances._asdict().items() if name != "spools"}
         )
         rates = Rates(*(x[which] for x in self.rates))
-        own = {
+        fields = {
             name: value[which] for name, value in self._asdict().items() if name not in ("arms", "distances", "rates")
         }
-        return self._replace(**own, distances=distances, rates=rates)
+        return self._replace(**fields, distances=distances, rates=rates)
 
     def middle(self, mu: np.ndarray) -> "Enclosure":
-        """What is known of the middles alone: blocks without a length.
+        """Return the enclosure of the middles alone: blocks without a length.
 
         Args:
             mu: (k, n_cables) tensions per mass and length there, 1/s^2.

@@ -43,7 +43,7 @@ def rank(flags: Sequence[Verdict], broken: np.ndarray) -> np.ndarray:
 
 
 class FewestLimits:
-    """Of n motions the candidate that breaks the fewest limits, and the limits that all candidates break.
+    """Candidates of n motions that break the fewest limits, and the limits that all candidates of a motion break.
 
     Args:
         count: of motions.
@@ -72,11 +72,11 @@ class FewestLimits:
 
     @property
     def is_best(self) -> np.ndarray:
-        """Whether one limit at most refuses a candidate, and no other one is better, (n,)."""
+        """Tell whether one limit at most refuses a candidate, and no other one is better, (n,)."""
         return self._least <= 2
 
     def refused(self) -> Refused:
-        """What was found.
+        """Return the candidates that were found, and what refuses them.
 
         Returns:
             the candidates, and what is named.

@@ -53,10 +53,10 @@ def limits_of(
     return Limits(**values, uncertainty=None if uncertain is None else _uncertainty(uncertain, f"{at}uncertainty."))
 
 
-def _uncertainty(given: Any, at: str) -> Uncertainty:
+def _uncertainty(uncertainty: Any, at: str) -> Uncertainty:
     values = {}
     for row in UNCERTAINTIES:
-        value = getattr(given, row.name, None)
+        value = getattr(uncertainty, row.name, None)
         number = numbers(f"{at}{row.name}", value, row.allowed)
         if number.shape != () or not row.least <= number <= row.largest:
             raise InputError(f"{at}{row.name}", value, row.allowed)
@@ -96,8 +96,8 @@ def check_certain(
     Raises:
         InputError: the uncertainty, and why it must be absent.
     """
-    given = limits.uncertainty
-    if given is None:
+    uncertainty = limits.uncertainty
+    if uncertainty is None:
         return
     known = [row.name for row in FAMILIES.values() if row.knows_uncertainty]
     if not families or not set(families) <= set(known):
@@ -106,8 +106,10 @@ def check_certain(
         raise InputError(
             "uncertainty", None, "must be absent on redundant cables and on pairs of cables", fault="given"
         )
-    if not isinstance(robot, PlatformRobot) and float(given.mass_centre) > 0.0:
-        raise InputError("uncertainty.mass_centre", float(given.mass_centre), "absent: a point mass has no other one")
+    if not isinstance(robot, PlatformRobot) and float(uncertainty.mass_centre) > 0.0:
+        raise InputError(
+            "uncertainty.mass_centre", float(uncertainty.mass_centre), "absent: a point mass has no other one"
+        )
 
 
 def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:

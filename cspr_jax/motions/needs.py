@@ -1,4 +1,4 @@
-"""What a motion needs, beside what is allowed: the worst instant of each criterion, in the units of its limit."""
+"""Needs of a motion, beside what is allowed: the worst instant of each criterion, in the units of its limit."""
 
 import dataclasses
 from functools import partial
@@ -27,7 +27,7 @@ BATCH = 512
 
 
 class Need(NamedTuple):
-    """What a motion needs at the instant at which it breaks a criterion by most, or comes nearest to it.
+    """Need of a motion at the instant at which it breaks a criterion by most, or comes nearest to it.
 
     Fields:
         criterion: the flag that says that it is broken.
@@ -103,7 +103,7 @@ def _pairs(robot: AnyRobot) -> tuple[tuple[int, int], ...]:
 
 
 def _criteria(robot: AnyRobot, limits: Limits) -> list[_Criterion]:
-    # In the order of `_values`.
+    # The criteria follow in the order of `_values`.
     each = tuple((k,) for k in range(robot.n_cables))
     criteria = [_Criterion(Verdict.ABOVE_SPOOLS, ((),), np.zeros(1), "m")]
     if isinstance(robot, PlatformRobot) and robot.n_cables == robot.dof:
@@ -121,7 +121,7 @@ def _criteria(robot: AnyRobot, limits: Limits) -> list[_Criterion]:
 def _values(
     structure, moves: bool, pairs: tuple[tuple[int, int], ...], leaves, robot: AnyRobot, limits: Limits, tau: Array
 ) -> tuple[Array, Array]:
-    # What the motion has of each criterion, and slacks, (n, n_values) each.
+    # Return the value that the motion has of each criterion, and its slack, (n, n_values) each.
     motion = jax.tree.unflatten(structure, leaves)
     z0 = motion.z0
 
@@ -142,9 +142,9 @@ def _values(
             apart = jnp.sqrt(jnp.sum(gaps(robot, jnp.asarray(pairs), state.position, state.rotation) ** 2, axis=1))
             reached.append(apart)
             slacks.append((apart - thick) / z0)
-        now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
+        quantities, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
         for row in limits_set(limits):
-            value = jnp.atleast_1d(getattr(now, row.quantity))
+            value = jnp.atleast_1d(getattr(quantities, row.quantity))
             reached.append(value)
             slacks.append(slack(row, jnp.asarray(getattr(limits, row.name)), value, scale))
         return jnp.concatenate(reached), jnp.concatenate(slacks)

@@ -44,11 +44,13 @@ def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400)
 
         least.append(narrowed(at, tau, at(tau[None]))[0])
         duration.append(float(motion.duration()))
-    slack, every = np.array(least), flags(problem)
-    broken = sum((np.where(column <= 0.0, flag.value, 0) for flag, column in _by_flag(every, slack)), np.zeros(1, int))
+    slack, slack_flags = np.array(least), flags(problem)
+    broken = sum(
+        (np.where(column <= 0.0, flag.value, 0) for flag, column in _by_flag(slack_flags, slack)), np.zeros(1, int)
+    )
     verdict = np.where(broken == 0, Verdict.UNDECIDED.value, broken)
     verdict = np.where(np.isfinite(slack).all(1), verdict, Verdict.NOT_FINITE.value)
-    is_limit = np.arange(len(every)) > every.index(Verdict.ABOVE_SPOOLS)
+    is_limit = np.arange(len(slack_flags)) > slack_flags.index(Verdict.ABOVE_SPOOLS)
     none = np.zeros(len(motions), int)
     return Answers(
         arcs=none,
@@ -64,6 +66,9 @@ def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400)
     )
 
 
-def _by_flag(every: tuple[Verdict, ...], slack: np.ndarray) -> list[tuple[Verdict, np.ndarray]]:
+def _by_flag(slack_flags: tuple[Verdict, ...], slack: np.ndarray) -> list[tuple[Verdict, np.ndarray]]:
     # The smallest slack of each flag, so that no flag is counted twice.
-    return [(flag, slack[:, [own is flag for own in every]].min(1)) for flag in dict.fromkeys(every)]
+    return [
+        (flag, slack[:, [slack_flag is flag for slack_flag in slack_flags]].min(1))
+        for flag in dict.fromkeys(slack_flags)
+    ]

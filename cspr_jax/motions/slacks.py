@@ -39,10 +39,10 @@ def slacks(problem: Problem, motion: Motion, tau: Array) -> Array:
     terms = [*balance(robot, state, z0), jnp.atleast_1d(plane_normal(robot) @ state.position / z0)]
     rows = limits_set(problem.limits)
     if rows:
-        now, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
+        quantities, scale = values(robot, state), scales(robot.n_cables, robot.mass * robot.gravity, z0)
         for row in rows:
             limit = jnp.asarray(getattr(problem.limits, row.name))
-            terms.append(jnp.atleast_1d(slack(row, limit, getattr(now, row.quantity), scale)))
+            terms.append(jnp.atleast_1d(slack(row, limit, getattr(quantities, row.quantity), scale)))
     return jnp.concatenate(terms)
 
 

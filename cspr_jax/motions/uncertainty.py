@@ -22,11 +22,11 @@ from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence, inverted,
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.limits import Limits, Uncertainty
 
-# Of the slacks of taut cables, as in other proofs.
+# Tolerance as a part of the slacks of taut cables, as in other proofs.
 TOLERANCE = 1e-6
 # Blocks of which nothing is known have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
-# What solving for a deviation may be wrong by, as a part of it, and of the tensions.
+# Largest error of solving for a deviation, as a part of it, and of the tensions.
 ROUNDING = 1e-9
 # Rounds in which functionals are corrected, and by how much more than is known to be needed.
 ROUNDS, SPARE = 8, 0.01
@@ -34,7 +34,7 @@ ROUNDS, SPARE = 8, 0.01
 
 @dataclasses.dataclass(frozen=True)
 class Requirements:
-    """What is asked of all robots within an uncertainty.
+    """Requirements on all robots within an uncertainty.
 
     Fields:
         mass: kg.
@@ -50,7 +50,7 @@ class Requirements:
 
 
 def requirements_of(problem: Problem, slack: np.ndarray) -> Requirements:
-    """What is asked of all robots within the uncertainty of a problem.
+    """Return the requirements on all robots within the uncertainty of a problem.
 
     Args:
         problem: robot, and limits with the uncertainty.
@@ -75,12 +75,12 @@ class _Share(NamedTuple):
     factor: np.ndarray
 
 
-def _share(asked: Requirements, multiple: np.ndarray) -> _Share:
-    given = asked.uncertainty
+def _share(requirements: Requirements, multiple: np.ndarray) -> _Share:
+    uncertainty = requirements.uncertainty
     return _Share(
-        multiple * float(given.spool_positions),
-        multiple * float(given.mass_centre),
-        float(given.mass_factor) ** multiple,
+        multiple * float(uncertainty.spool_positions),
+        multiple * float(uncertainty.mass_centre),
+        float(uncertainty.mass_factor) ** multiple,
     )
 
 
@@ -92,22 +92,26 @@ class _Reaches(NamedTuple):
     centre: np.ndarray
 
 
-def _reaches(known: Enclosure, found: Influence, spools: np.ndarray, centre: np.ndarray) -> _Reaches:
-    near = found.lengths - known.moved
+def _reaches(known: Enclosure, influence: Influence, spools: np.ndarray, centre: np.ndarray) -> _Reaches:
+    near = influence.lengths - known.moved
     share = spools[:, None] / np.where(near > 0.0, near, np.nan)
-    # A displaced spool as one that is displaced across its ray alone, at the planned length.
+    # A displaced spool counts as one that is displaced across its ray alone, at the planned length.
     off = np.where(share < 1.0, spools[:, None] / np.sqrt(1.0 - share**2), np.nan)
-    own, moment, force = (np.linalg.norm(x, axis=2) for x in (found.centre, found.moments, found.forces))
+    direct_effect, moment, force = (
+        np.linalg.norm(x, axis=2) for x in (influence.centre, influence.moments, influence.forces)
+    )
     whirl, radius = np.linalg.norm(known.whirl, axis=(1, 2)) + known.whirl_change, centre[:, None]
-    rest = own + force * known.whirl_change[:, None] + moment * (known.force_change + centre * whirl)[:, None]
-    return _Reaches(off, np.minimum(known.moved / found.lengths, 1.0), radius * rest)
+    rest = direct_effect + force * known.whirl_change[:, None] + moment * (known.force_change + centre * whirl)[:, None]
+    return _Reaches(off, np.minimum(known.moved / influence.lengths, 1.0), radius * rest)
 
 
-def _changes(known: Enclosure, found: Influence, vectors: np.ndarray, far: _Reaches) -> tuple[np.ndarray, np.ndarray]:
-    # Largest components of what blocks, and displaced spools, do to rays, along vectors (k, ..., n_cables, 3).
+def _changes(
+    known: Enclosure, influence: Influence, vectors: np.ndarray, far: _Reaches
+) -> tuple[np.ndarray, np.ndarray]:
+    # Bound the changes of rays within blocks, and by displaced spools, along vectors (k, ..., n_cables, 3).
     shape = (len(vectors), *(1,) * (vectors.ndim - 3), *known.bent.shape[1:])
     whole = np.linalg.norm(vectors, axis=-1)
-    units = (known.rays / found.lengths[..., None]).reshape(*shape, 3)
+    units = (known.rays / influence.lengths[..., None]).reshape(*shape, 3)
     way, bent, off, turned = (
         known.way.reshape(*shape, 3),
         *(x.reshape(shape) for x in (known.bent, far.off, far.turned)),
@@ -180,31 +184,31 @@ def closer_changes(
     """
     far = _reaches(known, found, spools, centre)
     within, displaced = _changes(known, found, found.spools, far)
-    own = np.eye(displaced.shape[1])[None] * displaced
+    diagonal = np.eye(displaced.shape[1])[None] * displaced
     rest = np.sum(within * off[:, None], axis=2) + far.centre + ROUNDING * known.high
-    down = _largest_sum(known, found, displaced - own, far) + rest + np.sum(own, axis=2) * least
+    down = _largest_sum(known, found, displaced - diagonal, far) + rest + np.sum(diagonal, axis=2) * least
     is_valid = (known.low - down > least).all(1)
     up = _largest_sum(known, found, displaced, far) + rest if upwards else np.full_like(down, np.inf)
     return Changes(*(np.where(is_valid[:, None], x, np.inf) for x in (down, up)))
 
 
-def _largest_sum(known: Enclosure, found: Influence, weights: np.ndarray, far: _Reaches) -> np.ndarray:
-    # Of tensions of any robot, none below 0, times each of rows of weights (k, n_cables, n_cables).
+def _largest_sum(known: Enclosure, influence: Influence, weights: np.ndarray, far: _Reaches) -> np.ndarray:
+    # Bound the sum of tensions of any robot, none below 0, times each of the rows of weights (k, n_cables, n_cables).
     more = np.zeros_like(weights)
     for _ in range(ROUNDS):
-        functional = np.einsum("kij,kjlx->kilx", weights + more, found.spools)
-        moved, shifted = _changes(known, found, functional, far)
+        functional = np.einsum("kij,kjlx->kilx", weights + more, influence.spools)
+        moved, shifted = _changes(known, influence, functional, far)
         more, last = (moved + shifted) * (1.0 + SPARE) + ROUNDING * np.max(weights, axis=2, keepdims=True), more
     # The last one was enough for the functional of the one before; it must be for its own.
-    functional = np.einsum("kij,kjlx->kilx", weights + last, found.spools)
-    moved, shifted = _changes(known, found, functional, far)
+    functional = np.einsum("kij,kjlx->kilx", weights + last, influence.spools)
+    moved, shifted = _changes(known, influence, functional, far)
     total = np.sum((weights + last) * (known.high + far.centre)[:, None] + moved * known.high[:, None], axis=2)
     is_valid = (moved + shifted <= last).all(2)
     return np.where(is_valid, total, np.inf)
 
 
 def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    # x with x >= matrix x + rest, all of them positive, which proves the spectral radius of the matrix below 1.
+    # Find x with x >= matrix x + rest, all of them positive, which proves the spectral radius of the matrix below 1.
     is_finite = np.isfinite(matrix).all((1, 2)) & np.isfinite(rest).all(1)
     count = matrix.shape[1]
     system = np.where(is_finite[:, None, None], np.eye(count) - matrix, np.eye(count))
@@ -228,48 +232,53 @@ def holds(known: Enclosure, found: Influence, asked: Requirements, multiple: np.
     Returns:
         (k,).
     """
-    some = _share(asked, multiple)
+    share = _share(asked, multiple)
     is_met = np.ones(len(multiple), bool)
     if float(asked.uncertainty.spool_positions) > 0.0:
-        is_met &= known.distances.hold(some.spools)
-        is_met &= rates_hold(known, found, asked.limits, some.spools)
-    off = deviations(known, found, some.spools, some.centre)
-    is_taut = _tensions_hold(known, found, asked, some, Changes(off, off))
+        is_met &= known.distances.hold(share.spools)
+        is_met &= rates_hold(known, found, asked.limits, share.spools)
+    off = deviations(known, found, share.spools, share.centre)
+    is_taut = _tensions_hold(known, found, asked, share, Changes(off, off))
     again = np.flatnonzero(is_met & ~is_taut & np.isfinite(off).all(1))
     if len(again):
         part = known.some(again), found.some(again)
-        own, less = _Share(*(x[again] for x in some)), dataclasses.replace(asked, slack=asked.slack[again])
+        part_share, less = _Share(*(x[again] for x in share)), dataclasses.replace(asked, slack=asked.slack[again])
         upwards = asked.limits.tension_max is not None
-        closer = closer_changes(*part, own.spools, own.centre, off[again], _least(*part, less, own), upwards=upwards)
-        is_taut[again] = _tensions_hold(*part, less, own, closer)
+        closer = closer_changes(
+            *part, part_share.spools, part_share.centre, off[again], _least(*part, less, part_share), upwards=upwards
+        )
+        is_taut[again] = _tensions_hold(*part, less, part_share, closer)
     return is_met & is_taut
 
 
-def _least(known: Enclosure, found: Influence, asked: Requirements, some: _Share) -> np.ndarray:
-    # Smallest tensions per mass and length that are allowed within blocks.
-    least = np.repeat(TOLERANCE * asked.slack[:, None], found.lengths.shape[1], axis=1)
-    limit = asked.limits.tension_min
+def _least(known: Enclosure, influence: Influence, requirements: Requirements, share: _Share) -> np.ndarray:
+    # Return the smallest tensions per mass and length that are allowed within blocks.
+    least = np.repeat(TOLERANCE * requirements.slack[:, None], influence.lengths.shape[1], axis=1)
+    limit = requirements.limits.tension_min
     if limit is None:
         return least
-    near = found.lengths - known.moved
-    return np.maximum(least, (limit - _unit(asked)[:, None]) / (near * (asked.mass / some.factor)[:, None]))
+    near = influence.lengths - known.moved
+    return np.maximum(
+        least, (limit - _unit(requirements)[:, None]) / (near * (requirements.mass / share.factor)[:, None])
+    )
 
 
 def _tensions_hold(
-    known: Enclosure, found: Influence, asked: Requirements, some: _Share, changes: Changes
+    known: Enclosure, influence: Influence, requirements: Requirements, share: _Share, changes: Changes
 ) -> np.ndarray:
-    is_met, limit = (known.low - changes.down > _least(known, found, asked, some)).all(1), asked.limits.tension_max
+    is_met = (known.low - changes.down > _least(known, influence, requirements, share)).all(1)
+    limit = requirements.limits.tension_max
     if limit is None:
         return is_met
-    near, far = found.lengths - known.moved, found.lengths + known.moved
-    longest = far / np.sqrt(1.0 - np.minimum(some.spools[:, None] / near, 1.0) ** 2)
-    most = (known.high + changes.up) * longest * (asked.mass * some.factor)[:, None]
-    return is_met & (most <= limit + _unit(asked)[:, None]).all(1)
+    near, far = influence.lengths - known.moved, influence.lengths + known.moved
+    longest = far / np.sqrt(1.0 - np.minimum(share.spools[:, None] / near, 1.0) ** 2)
+    most = (known.high + changes.up) * longest * (requirements.mass * share.factor)[:, None]
+    return is_met & (most <= limit + _unit(requirements)[:, None]).all(1)
 
 
-def _unit(asked: Requirements) -> np.ndarray:
-    # Of tensions, by which limits may be missed: as in proofs of the planned motion.
-    return TOUCHED * asked.mass * asked.slack
+def _unit(requirements: Requirements) -> np.ndarray:
+    # Return the tension by which limits may be missed, as in proofs of the planned motion.
+    return TOUCHED * requirements.mass * requirements.slack
 
 
 class WorstDisplacements(NamedTuple):
@@ -292,15 +301,15 @@ def worst(known: Enclosure, found: Influence, asked: Requirements) -> WorstDispl
     Args:
         known: of k blocks.
         found: of their middles.
-        asked: what of.
+        asked: the requirements.
 
     Returns:
         the displacements.
     """
-    given, every = asked.uncertainty, np.arange(len(found.mu))
+    uncertainty, rows = asked.uncertainty, np.arange(len(found.mu))
     size = np.sum(np.linalg.norm(found.across, axis=3) * np.abs(found.mu)[:, None], axis=2)
-    change = float(given.spool_positions) * size
-    change += float(given.mass_centre) * np.linalg.norm(found.centre, axis=2)
+    change = float(uncertainty.spool_positions) * size
+    change += float(uncertainty.mass_centre) * np.linalg.norm(found.centre, axis=2)
     limits, pull = asked.limits, asked.mass * found.lengths
     low = 0.0 if limits.tension_min is None else limits.tension_min / pull
     rooms = [(found.mu - low, 1.0)]
@@ -309,8 +318,8 @@ def worst(known: Enclosure, found: Influence, asked: Requirements) -> WorstDispl
     spools, centre = [], []
     for room, sign in rooms:
         cable = np.argmin(np.nan_to_num(room / change, nan=np.inf), axis=1)
-        spools.append(sign * unit_vectors(found.across[every, cable] * np.sign(found.mu)[..., None]))
-        centre.append(-sign * unit_vectors(found.centre[every, cable]))
+        spools.append(sign * unit_vectors(found.across[rows, cable] * np.sign(found.mu)[..., None]))
+        centre.append(-sign * unit_vectors(found.centre[rows, cable]))
     return WorstDisplacements(np.stack(spools), np.stack(centre))
 
 
@@ -330,19 +339,19 @@ def fails(
     Returns:
         (k,).
     """
-    some, limits = _share(asked, multiple), asked.limits
+    share, limits = _share(asked, multiple), asked.limits
     broken = np.zeros(len(multiple), bool)
     for spools, centre in zip(*worst, strict=True):
-        mu, lengths = tensions(known, some.spools[:, None, None] * spools, some.centre[:, None] * centre)
+        mu, lengths = tensions(known, share.spools[:, None, None] * spools, share.centre[:, None] * centre)
         broken |= (mu < -TOLERANCE * asked.slack[:, None]).any(1)
         pull, unit = asked.mass * mu * lengths, _unit(asked)[:, None]
         if limits.tension_min is not None:
-            broken |= (pull / some.factor[:, None] < limits.tension_min - unit).any(1)
+            broken |= (pull / share.factor[:, None] < limits.tension_min - unit).any(1)
         if limits.tension_max is not None:
-            broken |= (pull * some.factor[:, None] > limits.tension_max * (1.0 + TOUCHED) + unit).any(1)
+            broken |= (pull * share.factor[:, None] > limits.tension_max * (1.0 + TOUCHED) + unit).any(1)
     if float(asked.uncertainty.spool_positions) > 0.0:
-        broken |= known.distances.fail(some.spools)
-        broken |= rates_fail(known, found, limits, some.spools)
+        broken |= known.distances.fail(share.spools)
+        broken |= rates_fail(known, found, limits, share.spools)
     return broken
 
 

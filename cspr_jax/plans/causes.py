@@ -60,10 +60,10 @@ class Cause:
         Returns:
             plain values.
         """
-        own: dict[str, Any] = {"criterion": self.criterion, "cable": self.cables[0] if self.cables else None}
+        table: dict[str, Any] = {"criterion": self.criterion, "cable": self.cables[0] if self.cables else None}
         if len(self.cables) > 1:
-            own["cables"] = list(self.cables)
-        return own | {"t": self.t, "needed": self.needed, "allowed": self.allowed, "unit": self.unit or None}
+            table["cables"] = list(self.cables)
+        return table | {"t": self.t, "needed": self.needed, "allowed": self.allowed, "unit": self.unit or None}
 
     @property
     def text(self) -> str:
@@ -91,7 +91,7 @@ def cause_columns(each: Sequence[tuple[Cause, ...]]) -> dict[str, np.ndarray]:
     Returns:
         (n,) by the names of `schema.motion_quantities.SEGMENTS`.
     """
-    worst = [own[0] if own else Cause("feasible") for own in each]
+    worst = [segment_causes[0] if segment_causes else Cause("feasible") for segment_causes in each]
     return {
         "segment_cause": np.array([Verdict[cause.criterion.upper()].value for cause in worst]),
         "segment_cause_cable": np.array([cause.cables[0] + 1 if len(cause.cables) == 1 else 0 for cause in worst]),
@@ -120,7 +120,7 @@ def cause_text(columns: Mapping[str, np.ndarray], i: int) -> str:
 
 
 def _told_apart(first: float, second: float) -> tuple[str, str]:
-    # Two numbers, with so many digits that they differ.
+    # Write two numbers with so many digits that they differ.
     for digits in range(DIGITS, MOST_DIGITS + 1):
         texts = tuple(f"{value:.{digits}g}" for value in (first, second))
         if texts[0] != texts[1]:
@@ -171,7 +171,7 @@ def _of_need(need: Need, frame: Frame, duration: float) -> Cause:
 
 
 def _of_flag(flag: Verdict, problem: Problem, answers: Answers, i: int) -> Cause:
-    # What no instant says, or a choice of tensions.
+    # Return the cause of a flag that no instant of the motion raises, or that a choice of tensions does.
     if flag == Verdict.UNCERTAINTY:
         stands = np.fmin(answers.tolerated[i], answers.not_tolerated[i])
         return Cause(flag.text, needed=1.0, allowed=float(stands), unit=UNITS[flag])

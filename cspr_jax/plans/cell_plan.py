@@ -36,10 +36,10 @@ def cell_plan(
         return None
     shared = TrajectoryKeys.model_fields.keys() & PlanFile.model_fields.keys()
     trajectory = settings.get("trajectory", {})
-    given = {name: value for name, value in trajectory.items() if name in shared}
+    trajectory_keys = {name: value for name, value in trajectory.items() if name in shared}
     depth = {name: place[name] for name in ("z0", "inclination") if name in place}
     used = float(values.get("used_inclination", np.nan))
-    if given.get("inclination") == "best" and np.isfinite(used):
+    if trajectory_keys.get("inclination") == "best" and np.isfinite(used):
         depth["inclination"] = used
     if kind.is_over_orientations and not depth:
         robot = settings["robot"]
@@ -53,7 +53,7 @@ def cell_plan(
     count = next((int(values[name]) * arcs for name, arcs in COUNTS.items() if int(values.get(name, 0)) > 0), 0)
     if count:
         target["arcs"] = count
-    plan = {"schema": 1, "robot": settings["robot"], "samples": samples, **given, **depth}
+    plan = {"schema": 1, "robot": settings["robot"], "samples": samples, **trajectory_keys, **depth}
     plan["pose"] = [_start(settings, place), target]
     if settings.get("limits"):
         plan["limits"] = settings["limits"]
@@ -69,7 +69,7 @@ def _start(settings: Mapping[str, Any], place: Mapping[str, float]) -> dict[str,
 def _target(settings: Mapping[str, Any], place: Mapping[str, float]) -> list[float]:
     if "radius" not in place:
         return [float(place[name]) for name in "xyz"]
-    # About the vertical through the centroid of the spools.
+    # The azimuth turns about the vertical through the centroid of the spools.
     centre = np.mean(np.asarray(settings["robot"]["base_points"], float), axis=0)
     radius, azimuth = place["radius"], place["azimuth"]
     x, y = centre[:2] + radius * np.array([np.cos(azimuth), np.sin(azimuth)])

@@ -73,7 +73,7 @@ def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
 
 
 def _needs_depth(stops: Waypoints) -> bool:
-    # Rests elsewhere than in P0 need none.
+    # Rests elsewhere than in P0 need no depth of P0.
     keys = stops.keys
     anywhere = all(FAMILIES[name].rests_anywhere for name in keys.families)
     return (

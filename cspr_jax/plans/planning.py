@@ -31,9 +31,9 @@ from cspr_jax.robots.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.families import FAMILIES
 
-# Where a search for z0 takes "best" epsilon to be, until it is chosen.
+# Value that a search for z0 takes for a "best" epsilon, until that is chosen.
 FIRST_EPSILON = 0.2
-# Where families change, positions may differ by so much of the robot's size, accelerations of gravity.
+# Positions may differ by this part of the robot's size where families change, accelerations by this part of gravity.
 CONTINUOUS = 1e-9
 
 
@@ -112,12 +112,12 @@ class PlannedMotions:
 
     @property
     def feasible(self) -> bool:
-        """Whether every segment is feasible: proved, on more than six cables found at samples."""
+        """Tell whether every segment is feasible: proved, on more than six cables found at samples."""
         return bool(self.is_feasible.all())
 
     @property
     def is_feasible(self) -> np.ndarray:
-        """Whether each of the n segments is."""
+        """Tell whether each of the n segments is feasible."""
         return np.concatenate([leg.answers.feasible for leg in self.legs])
 
 
@@ -166,8 +166,8 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     _refuse_jumps(problem, sequence, legs)
     frame = sequence.stops.frame
     why = [causes(problem, frame, leg.answers, leg.motions, _counts(leg, keys)) for leg in legs]
-    asked = _demands(problem, legs, keys)
-    asked = dataclasses.replace(asked, lowest=frame.height(asked.lowest))
+    extremes = _demands(problem, legs, keys)
+    extremes = dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
     points = np.array(frame.outward(sequence.stops.points(z0)))
     if keys.launch is not None:  # whose segment ends where it follows from the launch
         motions = [motion for leg in legs for motion in leg.motions]
@@ -175,9 +175,11 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
         points[keys.launch.segment + 1] = frame.outward(np.asarray(end))
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
     lines += nearly_resting(sequence.stops, z0)
-    lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), asked)
-    every = tuple(itertools.chain.from_iterable(why))
-    return PlannedMotions(robot_file, keys, problem, z0, frame, points, legs, asked, every, tuple(dict.fromkeys(lines)))
+    lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
+    all_causes = tuple(itertools.chain.from_iterable(why))
+    return PlannedMotions(
+        robot_file, keys, problem, z0, frame, points, legs, extremes, all_causes, tuple(dict.fromkeys(lines))
+    )
 
 
 def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:
@@ -195,11 +197,11 @@ def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:
         raise ConfigError(path, f'tensions = "{rule}": must be {others} without tension_max of every cable')
 
 
-def _missed(keys: PlanFile, is_feasible: np.ndarray, asked: Demands) -> list[str]:
+def _missed(keys: PlanFile, is_feasible: np.ndarray, extremes: Demands) -> list[str]:
     # A rule that is not exact can find no tensions within the limits where there are some.
     if TENSION_RULES[keys.tension_rule].is_exact:
         return []
-    missed = np.flatnonzero(is_feasible & (asked.are_found == 0.0)) + 1
+    missed = np.flatnonzero(is_feasible & (extremes.are_found == 0.0)) + 1
     if not len(missed):
         return []
     names = ", ".join(f"pose[{i}]" for i in missed.tolist())
@@ -212,14 +214,14 @@ def _missed(keys: PlanFile, is_feasible: np.ndarray, asked: Demands) -> list[str
 def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile) -> Demands:
     motions = [motion for leg in legs for motion in leg.motions]
     counts = np.concatenate([_counts(leg, keys) for leg in legs]).tolist()
-    # Of redundant cables alone the tensions depend on limits, and what is compiled on which are given.
+    # The tensions of redundant cables alone depend on limits, and the compiled function on which of them are given.
     is_redundant = problem.robot.n_cables > problem.robot.dof
     limits = problem.limits if is_redundant else NO_LIMITS
     return demands(problem.robot, motions, counts, limits, keys.tension_rule)
 
 
 def _counts(leg: JoinedLeg, keys: PlanFile) -> np.ndarray:
-    # Of instants to begin with, where extremes are looked for.
+    # Count the instants at which a search for extremes begins.
     return np.maximum(SAMPLES * leg.answers.tried_arcs, keys.samples) + 1
 
 
@@ -229,7 +231,7 @@ def _ends(before: Motion, after: Motion):
 
 
 def _refuse_jumps(problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...]) -> None:
-    # Where another family goes on, positions, velocities and accelerations must meet.
+    # Positions, velocities and accelerations must meet where another family goes on.
     size, gravity = float(spool_radius(problem.robot)), float(problem.robot.gravity)
     scales = {"position": size, "velocity": np.sqrt(size * gravity), "acceleration": gravity}
     for leg, (before, after) in zip(sequence.legs[1:], itertools.pairwise(legs), strict=True):

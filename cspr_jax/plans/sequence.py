@@ -60,17 +60,17 @@ class PlanLegs:
         """
         answers = [leg.answers(problem, depths) for leg in self.legs]
         return {
-            name: np.hstack([getattr(own, name).reshape(len(depths), -1) for own in answers])
+            name: np.hstack([getattr(leg_answers, name).reshape(len(depths), -1) for leg_answers in answers])
             for name in ("feasible", "duration", "margin")
         }
 
 
 def _check_families(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
     for i in range(len(keys.pose) - 1):
-        family, own = keys.family_of(i), keys.pose[i + 1].family
+        family, pose_family = keys.family_of(i), keys.pose[i + 1].family
         if robot_file.own_pattern in FAMILIES[family].legs:
             continue
-        key = "family" if own is None else f"pose[{i + 1}].family"
+        key = "family" if pose_family is None else f"pose[{i + 1}].family"
         names = " or ".join(f'"{name}"' for name in moving(robot_file.own_pattern))
         if not names:
             known = "it moves robots of the patterns " + ", ".join(FAMILIES[family].legs)
@@ -112,9 +112,9 @@ def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
 
 
 def _check_plane(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
-    given = {"first_control_point": keys.first_control_point}
+    vectors = {"first_control_point": keys.first_control_point}
     if keys.launch is not None:
-        given |= {f"launch.{name}": getattr(keys.launch, name) for name in ("point", "target", "velocity")}
-    for key, value in given.items():
+        vectors |= {f"launch.{name}": getattr(keys.launch, name) for name in ("point", "target", "velocity")}
+    for key, value in vectors.items():
         if robot_file.is_planar and value is not None and value[1] != 0.0:
             raise ConfigError(path, f"{key} = {shown(value)}: must have y = 0: a planar robot")

@@ -20,7 +20,7 @@ from cspr_jax.swings import hypocycloid, sieve
 from cspr_jax.swings.decide import decided, end_slacks
 from cspr_jax.swings.hypocycloid import Segment
 
-# So many segments are held at a time by each thread.
+# Largest number of segments that each thread holds at a time.
 PART = 16 * sieve.BATCH
 
 
@@ -83,12 +83,12 @@ def minimum_arcs(
     """
     check_numbers(problem.robot, z0, max_arcs)
 
-    def part(which: slice) -> Answers:
-        fixed = None if arcs is None else np.asarray(arcs)[which]
-        points = (starts[which], ends[which], z0[which])
+    def part(rows: slice) -> Answers:
+        fixed = None if arcs is None else np.asarray(arcs)[rows]
+        points = (starts[rows], ends[rows], z0[rows])
         return arcs_and_segments(problem, *points, max_arcs=max_arcs, arcs=fixed, dtype=dtype)[0]
 
-    # Not two batches where one has room for all.
+    # Two batches are not made where one has room for all.
     return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(sieve.BATCH) else part(slice(None))
 
 

@@ -32,8 +32,8 @@ def blocks(amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int 
     n_rows = _rounded(max_arcs + 1)
     rows = []
     for arcs in range(n_rows):
-        wanted = max(density * (arcs + 4), least)
-        cuts = [np.linspace(a, b, 1 + math.ceil(wanted * (b - a) - 1e-9))[:-1] for a, b in pieces]
+        n_blocks = max(density * (arcs + 4), least)
+        cuts = [np.linspace(a, b, 1 + math.ceil(n_blocks * (b - a) - 1e-9))[:-1] for a, b in pieces]
         rows.append(np.concatenate([*cuts, [1.0]]))
     counts = np.array([len(row) - 1 for row in rows], np.int32)
     table = np.ones((n_rows, _rounded(int(counts.max()) + 1)))

@@ -59,9 +59,9 @@ def smooth_slacks(
     Returns:
         numbers (), as many as `counts` adds up to, criterion by criterion.
     """
-    now = instant(segment, amplitude, arcs, tau)
-    terms = [*now.kappa, now.eta]
-    for slack in limit_slacks(robot, limits, segment, arcs, tau, now):
+    state = instant(segment, amplitude, arcs, tau)
+    terms = [*state.kappa, state.eta]
+    for slack in limit_slacks(robot, limits, segment, arcs, tau, state):
         terms += slack
     return tuple(terms)
 
@@ -82,8 +82,8 @@ def slacks(
     Returns:
         n_criteria numbers ().
     """
-    every = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
-    return tuple(functools.reduce(jnp.minimum, itertools.islice(every, n)) for n in counts(robot, limits))
+    values = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
+    return tuple(functools.reduce(jnp.minimum, itertools.islice(values, n)) for n in counts(robot, limits))
 
 
 def curvatures(

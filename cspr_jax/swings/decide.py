@@ -78,11 +78,11 @@ def decided(
         the answers; the segments that durations and margins belong to, leaves (n, ...).
     """
     known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
-    every = only(np.minimum(upper, at_ends.min(1)[:, None] + SMALLEST_MARGIN), arcs)
+    with_limits = only(np.minimum(upper, at_ends.min(1)[:, None] + SMALLEST_MARGIN), arcs)
     basic = only(np.minimum(upper, at_ends[:, :BASIC].min(1)[:, None] + SMALLEST_MARGIN), arcs)
-    search = _search(problem, parities, every, known)
+    search = _search(problem, parities, with_limits, known)
     smallest, bound = search.smallest, search.bound
-    tried, slack, broken = _shown(problem, parities, search, every, basic, measure)
+    tried, slack, broken = _shown(problem, parities, search, with_limits, basic, measure)
     chosen = pick(parities, np.arange(len(smallest)), tried)
     duration = in_batches(_durations, (chosen, tried.astype(float)), size=BATCH)
     none = np.flatnonzero(smallest == 0)
@@ -172,9 +172,11 @@ def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, k
         is_feasible, is_refuted = proof.feasible.copy(), proof.infeasible.copy()
         is_planned[rows] |= is_feasible
         if problem.limits.uncertainty is not None:
-            some = np.flatnonzero(is_feasible)
-            found = tolerated_by_point_masses(problem, pick(parities, rows[some], arcs[some]), arcs[some], whole=False)
-            is_feasible[some], is_refuted[some] = found.proved >= 1.0, found.refuted <= 1.0
+            indices = np.flatnonzero(is_feasible)
+            multiples = tolerated_by_point_masses(
+                problem, pick(parities, rows[indices], arcs[indices]), arcs[indices], whole=False
+            )
+            is_feasible[indices], is_refuted[indices] = multiples.proved >= 1.0, multiples.refuted <= 1.0
         smallest[rows[is_feasible]] = arcs[is_feasible]
         bound[rows] = proof.bound[:, :2].min(1)
         doubtful[rows[~is_feasible & ~is_refuted]] = True
@@ -192,22 +194,22 @@ def _shown(
     problem: Problem,
     parities: dict[int, Segment],
     search: _Search,
-    every: np.ndarray,
+    with_limits: np.ndarray,
     basic: np.ndarray,
     measure: Callable,
 ) -> _Shown:
     # Upper bounds (n, max_arcs) of all criteria, and of those that are no limits.
-    fixed, by_cables = search.smallest.copy(), np.zeros(len(every), bool)
+    fixed, by_cables = search.smallest.copy(), np.zeros(len(with_limits), bool)
     # Without limits, or near to zero, the largest margin says enough.
     is_refused = (fixed == 0) & ~search.doubtful & ~search.is_planned
     refused = np.flatnonzero(is_refused & bool(limits_set(problem.limits)))
     why = refusals(problem, rows_of(parities, refused), basic[refused])
     fixed[refused], by_cables[refused] = why.arcs, why.arcs == 0
-    upper = np.where(by_cables[:, None], basic, every)
+    upper = np.where(by_cables[:, None], basic, with_limits)
     tried, slack = _best(problem, parities, upper, fixed, by_cables, measure)
     broken = slack <= 0.0
     broken[refused] = why.broken
-    # Where no candidate is taut: a cable or the spools, and limits that no number of arcs keeps.
+    # If no candidate is taut, name a cable or the spools, and the limits that no number of arcs keeps.
     rows, is_limit = np.flatnonzero(by_cables), np.arange(slack.shape[1]) >= BASIC
     broken[rows] = slack[rows] <= 0.0
     suspects = broken[rows] & is_limit
@@ -246,14 +248,14 @@ def _best(
         best[rows[better]] = reached[better]
 
 
-def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, which: np.ndarray) -> Tolerated:
-    # Of all segments, of which some are feasible as they are planned; NaN of the others, and without an uncertainty.
-    every = Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
-    if problem.limits.uncertainty is not None and len(which):
-        some = jax.tree.map(lambda leaf: np.asarray(leaf)[which], segments)
-        for own, found in zip(every, tolerated_by_point_masses(problem, some, arcs[which]), strict=True):
-            own[which] = found
-    return every
+def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, rows: np.ndarray) -> Tolerated:
+    # Return the multiples of all segments: NaN of those that are not feasible as planned, and without an uncertainty.
+    multiples = Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
+    if problem.limits.uncertainty is not None and len(rows):
+        picked = jax.tree.map(lambda leaf: np.asarray(leaf)[rows], segments)
+        for column, values in zip(multiples, tolerated_by_point_masses(problem, picked, arcs[rows]), strict=True):
+            column[rows] = values
+    return multiples
 
 
 def _verdicts(
@@ -264,5 +266,5 @@ def _verdicts(
         flags |= np.where(column, flag.value, 0).astype(FLAGS)
     flags |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(FLAGS)
     none = np.where(search.doubtful, Verdict.UNDECIDED.value, Verdict.NO_ARCS.value | flags)
-    some = np.where(search.doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
-    return np.where(search.smallest > 0, some, none).astype(FLAGS)
+    with_arcs = np.where(search.doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
+    return np.where(search.smallest > 0, with_arcs, none).astype(FLAGS)

@@ -24,7 +24,7 @@ PARTS, BATCH = 4, 1024
 
 
 class _Known(NamedTuple):
-    # Of one block: of the middle, then within it.
+    # Values of one block: of the middle, then within it.
     rays: Array
     velocity: Array
     acceleration: Array
@@ -45,15 +45,15 @@ def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: 
     half, time = 0.5 * (stop - start), duration(segment, arcs)
     over = stretch(segment, amplitude, arcs, start, stop)
     weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
-    now = jax.vmap(lambda tau: instant(segment, amplitude, arcs, tau))(start * (1.0 - weight) + stop * weight)
+    instants = jax.vmap(lambda tau: instant(segment, amplitude, arcs, tau))(start * (1.0 - weight) + stop * weight)
     step = (2.0 * half / INTERVALS) ** 2 / 8.0
-    kappa, taut = jnp.stack(now.kappa, axis=1), taut_bounds(segment, arcs, over).curvature * step
+    kappa, taut = jnp.stack(instants.kappa, axis=1), taut_bounds(segment, arcs, over).curvature * step
     level = row_bounds(segment, arcs, over, segment.tilt).curvature * step
-    eta = jnp.min(now.eta) - level, jnp.max(now.eta) + level
+    eta = jnp.min(instants.eta) - level, jnp.max(instants.eta) + level
     scale = segment.rate / robot.base_points.shape[0]
 
     def share(top, is_low):
-        # Of positive eta; a lower bound below zero is divided by the smallest one.
+        # Bound tensions where eta is positive; a lower bound below zero is divided by the smallest eta.
         bottom = jnp.where((top > 0.0) == is_low, eta[1], eta[0])
         return jnp.where(eta[0] > 0.0, scale * top / bottom, jnp.where(is_low, -jnp.inf, jnp.inf))
 
@@ -77,7 +77,7 @@ def _durations(items) -> Array:
 
 
 def enclosure(problem: Problem, segments: Segment, arcs: np.ndarray, blocks: Blocks) -> Enclosure:
-    """What is known of blocks of motions.
+    """Return the enclosure of blocks of motions.
 
     Args:
         problem: robot, limits and amplitude; the robot has as many cables as degrees of freedom.
@@ -133,5 +133,5 @@ def tolerated_by_point_masses(
     """
     blocks = parts_of_arcs(arcs, np.asarray(problem.amplitude.knots), PARTS)
     rates: Any = np.asarray(segments.rate)
-    asked = requirements_of(problem, rates / problem.robot.base_points.shape[0])
-    return tolerated(blocks, arcs, asked, partial(enclosure, problem, segments, arcs), whole=whole)
+    requirements = requirements_of(problem, rates / problem.robot.base_points.shape[0])
+    return tolerated(blocks, arcs, requirements, partial(enclosure, problem, segments, arcs), whole=whole)

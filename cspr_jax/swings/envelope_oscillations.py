@@ -28,7 +28,7 @@ UNROLL = 4
 # Golden section narrows the bracket to a three-hundredth, parabolas then find the place to rounding.
 STEPS = 12
 PARABOLAS, SMALLEST_SHARE, TINY = 2, 1e-3, 1e-100
-# Of a best inclination: the bracket ends at 4e-9 of where it began.
+# Steps of golden section for a best inclination: the bracket ends at 4e-9 of where it began.
 INCLINATION_STEPS = 40
 EPSILONS, SMALLEST_WIDTH = 50, 1e-9
 LARGEST_INCLINATION = 1.0 - 1e-9
@@ -51,7 +51,7 @@ def squared_oscillations_at(amplitude: Amplitude, weight: Array, inclination: Ar
 
 
 def _squared(omega: Array, end: Array) -> Array:
-    # N of Omega.
+    # Return N of Omega.
     return (omega + end) / (4.0 * math.pi**2)
 
 
@@ -64,17 +64,19 @@ def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]
     rest = load**2 * (c**2 + 4.0 * end * slope**2)
     squared = half**2 + d * rest
     root = jnp.sqrt(jnp.maximum(squared, 0.0))
-    # The second form of the root where the first would cancel. Without a real root every Omega keeps the envelope up.
+    # The second form of the root is taken where the first would cancel. Without a real root every Omega keeps the
+    # envelope up.
     is_second = half > 0.0
     largest = jnp.where(is_second, rest, root - half) / jnp.where(is_second, root + half, jnp.where(d > 0.0, d, 1.0))
     omega = jnp.where(squared < 0.0, 0.0, jnp.maximum(largest, 0.0))
-    # Where |v A| >= 1 some phase takes the effector to the spool plane, and one cable slack before that.
+    # If |v A| >= 1, some phase takes the effector to the spool plane, and one cable slack before that.
     return jnp.where(d > 0.0, omega, jnp.inf)
 
 
 @jax.jit
 def _samples(amplitude: Amplitude) -> Array:
-    # Every knot among them; dense towards the ends of each piece, where steep inclinations have their maximum.
+    # Every knot is among the samples, which are dense towards the ends of each piece, where steep inclinations have
+    # their maximum.
     ends = jnp.concatenate([jnp.zeros(1), jnp.asarray(amplitude.knots), jnp.ones(1)])
     part = 0.5 * (1.0 - np.cos(math.pi * np.arange(SAMPLES) / SAMPLES))
     inside = ends[:-1, None] + (ends[1:] - ends[:-1])[:, None] * part[None]
@@ -82,7 +84,7 @@ def _samples(amplitude: Amplitude) -> Array:
 
 
 def _golden(function: Callable[[Array], Array], low: Array, high: Array, steps: int) -> Array:
-    # Where a function that falls and then rises is smallest, by golden section.
+    # Find by golden section where a function that falls and then rises is smallest.
     left, right = inner_points(low, high)
     start = Bracket(low, high, left, right, function(left), function(right))
     last = lax.fori_loop(0, steps, lambda _, bracket: golden_step(function, bracket)[0], start)
@@ -95,8 +97,8 @@ def _least(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array)
     values = derivatives(amplitude, tau, order=2)
 
     def one(weight):
-        def needed(now):
-            return _root(inclination + weight, inclination, end, now)
+        def needed(sample):
+            return _root(inclination + weight, inclination, end, sample)
 
         def at(t):
             return needed(derivatives(amplitude, t, order=2))
@@ -109,8 +111,8 @@ def _least(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array)
 
 
 def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, ...]) -> tuple[Array, Array]:
-    # Where the two highest peaks of a sampled function lie, and the height of the first; one sample after the other,
-    # since sorting them would cost five times as much.
+    # Find where the two highest peaks of a sampled function lie, and the height of the first; samples are looked at one
+    # after the other, since sorting them would cost five times as much.
     none = -jnp.inf * jnp.ones_like(function(tuple(p[0] for p in points)))
     nowhere = jnp.zeros((), jnp.int32)
 
@@ -165,7 +167,7 @@ def least_oscillations(amplitude: Amplitude, weights: Array, inclination: Array)
 
 @jax.jit
 def _extreme(weights: Array) -> Array:
-    # What a load may be, for a given N, is an interval about zero: only the extreme cables count.
+    # The loads that a given N allows form an interval about zero: only the extreme cables count.
     return jnp.stack([jnp.max(weights), jnp.min(weights)])
 
 

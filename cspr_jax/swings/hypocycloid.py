@@ -113,7 +113,7 @@ def oscillation(segment: Segment, arcs: Array) -> Oscillation:
         its numbers.
     """
     ratio = segment.precession / arcs
-    # 1 - ratio first: it is what vanishes for p = 1 and psi -> 0.
+    # 1 - ratio comes first: it vanishes for p = 1 and psi -> 0.
     steady = (math.pi * arcs) ** 2 * (1.0 - ratio) * (1.0 + ratio)
     return Oscillation(ratio, steady, steady - segment.end_curvature)
 

@@ -24,15 +24,15 @@ class Hypocycloids(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the points; see `Leg.join`."""
-        answers, segments = self._found(problem, np.array([z0]))
+        answers, segments = self._answers_and_segments(problem, np.array([z0]))
         pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
         return answers, [Hypocycloid(segment, problem.amplitude, leaf(arcs)) for segment, arcs in pairs]
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
         """Answers for several depths; see `Leg.answers`."""
-        return self._found(problem, depths)[0]
+        return self._answers_and_segments(problem, depths)[0]
 
-    def _found(self, problem: Problem, depths: np.ndarray) -> tuple[Answers, Segment]:
+    def _answers_and_segments(self, problem: Problem, depths: np.ndarray) -> tuple[Answers, Segment]:
         points = self.stops.points(depths)
         starts, ends = points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
         return arcs_and_segments(

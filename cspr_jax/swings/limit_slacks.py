@@ -65,9 +65,9 @@ class _Closed(NamedTuple):
     sides: int = 1
 
 
-def _bends(now: _Now, limit: Array) -> Array:
-    bend = (now.length**2 * now.rate_slope - now.rate**2) / (limit * now.time**2)
-    return jnp.concatenate([now.length**3 - bend, now.length**3 + bend]) / now.z0**3
+def _bends(state: _Now, limit: Array) -> Array:
+    bend = (state.length**2 * state.rate_slope - state.rate**2) / (limit * state.time**2)
+    return jnp.concatenate([state.length**3 - bend, state.length**3 + bend]) / state.z0**3
 
 
 def _lifted(over: _Over, limit: Array) -> Array:
@@ -87,17 +87,19 @@ def _bent(over: _Over, limit: Array) -> Array:
     return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
 
 
-# One of each row of `schema.limits.LIMITS`.
+# Every row of `schema.limits.LIMITS` has an entry.
 CLOSED = {
-    "tension_min": _Closed(lambda now, limit: now.lift - limit / now.weight * now.eta, _lifted),
-    "tension_max": _Closed(lambda now, limit: limit / now.weight * now.eta - now.lift, _lifted),
-    "floor": _Closed(lambda now, limit: (limit - now.depth) / now.z0, lambda over, _: over.depth.curvature / over.z0),
+    "tension_min": _Closed(lambda state, limit: state.lift - limit / state.weight * state.eta, _lifted),
+    "tension_max": _Closed(lambda state, limit: limit / state.weight * state.eta - state.lift, _lifted),
+    "floor": _Closed(
+        lambda state, limit: (limit - state.depth) / state.z0, lambda over, _: over.depth.curvature / over.z0
+    ),
     "cable_length_max": _Closed(
-        lambda now, limit: (limit**2 - now.length**2) / (2.0 * now.z0**2),
+        lambda state, limit: (limit**2 - state.length**2) / (2.0 * state.z0**2),
         lambda over, _: 0.5 * over.square / over.z0**2,
     ),
     "cable_speed_max": _Closed(
-        lambda now, limit: (now.length**2 - (now.rate / (now.time * limit)) ** 2) / (2.0 * now.z0**2), _rated
+        lambda state, limit: (state.length**2 - (state.rate / (state.time * limit)) ** 2) / (2.0 * state.z0**2), _rated
     ),
     "cable_acceleration_max": _Closed(_bends, _bent, 2),
 }
@@ -147,17 +149,17 @@ def limit_slacks(
     return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in slacks)
 
 
-def _path(segment: Segment, arcs: Array, tau: Array, now: Instant) -> tuple[Array, Array, Array]:
+def _path(segment: Segment, arcs: Array, tau: Array, state: Instant) -> tuple[Array, Array, Array]:
     # Position and its first two derivatives in tau.
     ratio, steady, period = oscillation(segment, arcs)
     span = segment.end_radius - segment.start_radius
-    r, r1 = segment.start_radius + span * now.amplitude_values[0], span * now.amplitude_values[1]
+    r, r1 = segment.start_radius + span * state.amplitude_values[0], span * state.amplitude_values[1]
     sine, cosine = sincospi(segment.sense * arcs * tau)
     lateral, axial = sincospi(segment.sense * segment.precession * tau)
     slope_r = r1 * cosine - r * segment.sense * steady / (math.pi * arcs) * sine
     slope_t = r1 * ratio * sine
     slope = jnp.stack([axial * slope_r + lateral * slope_t, axial * slope_t - lateral * slope_r])
-    return segment.hub + segment.plane @ now.c, segment.plane @ slope, segment.plane @ (period * (now.d - now.c))
+    return segment.hub + segment.plane @ state.c, segment.plane @ slope, segment.plane @ (period * (state.d - state.c))
 
 
 def limit_curvatures(

@@ -37,7 +37,7 @@ def _block_estimates(function, problem: Problem, segment: Segment, arcs: Array, 
 
 
 def _lowest(estimates: Array, places: Array) -> tuple[Array, Array]:
-    # The smallest of the last axis and its place, without an argmin, which XLA computes one number at a time.
+    # Find the smallest of the last axis and its place without an argmin, which XLA computes one number at a time.
     smallest = jnp.min(estimates, axis=-1)
     return smallest, jnp.max(jnp.where(estimates == smallest[..., None], places, -jnp.inf), axis=-1)
 
@@ -100,12 +100,12 @@ class Functions(NamedTuple):
 
 
 def _best_of_groups(groups: tuple[int, ...], estimates: Array, places: Array) -> tuple[Array, Array]:
-    # Of each group its best candidates, whatever function they are of: which function, and where;
+    # Choose the best candidates of each group, whatever function they are of: the number of the function, and where;
     # (n_groups, CANDIDATES, n) each, from (CANDIDATES, n_functions, n).
     functions, taus, first = [], [], 0
     for size in groups:
-        mine = slice(first, first + size)
-        values, where = (x[:, mine].reshape(CANDIDATES * size, -1) for x in (estimates, places))
+        columns = slice(first, first + size)
+        values, where = (x[:, columns].reshape(CANDIDATES * size, -1) for x in (estimates, places))
         number = jnp.broadcast_to(jnp.arange(CANDIDATES * size)[:, None], values.shape)
         for _ in range(CANDIDATES):
             is_lowest = values == jnp.min(values, axis=0, keepdims=True)
@@ -131,17 +131,17 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
     nothing = jnp.full((CANDIDATES, sum(groups), *arcs.shape), jnp.inf, arcs.dtype)
     nowhere = jnp.full_like(nothing, -1.0)
     estimates, places = over_blocks(edges, counts, arcs, (nothing, nowhere), step)
-    which, where = _best_of_groups(groups, estimates, places)
+    number, where = _best_of_groups(groups, estimates, places)
     steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)]).astype(arcs.dtype)
 
-    def refine(segment, p, which, where, width):
-        # which, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.
-        def one(which, tau):
-            return refined_minimum(lambda t: jnp.stack(evaluate(*problem, segment, p, t))[which], tau, width)
+    def refine(segment, p, number, where, width):
+        # number, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.
+        def one(number, tau):
+            return refined_minimum(lambda t: jnp.stack(evaluate(*problem, segment, p, t))[number], tau, width)
 
-        return jnp.min(jax.vmap(jax.vmap(one))(which, where), axis=1)
+        return jnp.min(jax.vmap(jax.vmap(one))(number, where), axis=1)
 
-    return jax.vmap(refine, in_axes=(0, 0, 2, 2, 0))(segments, arcs, which, where, steps)
+    return jax.vmap(refine, in_axes=(0, 0, 2, 2, 0))(segments, arcs, number, where, steps)
 
 
 def smallest_values(
@@ -184,5 +184,5 @@ def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray
     # The smallest over the cables has kinks, each cable's own slack has none.
     functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))
     smallest = smallest_values(functions, problem, segments, arcs, table)
-    # A compiled minimum may pass over NaN; what has no finite minimum has none.
+    # A compiled minimum may pass over NaN; a function without a finite minimum has none.
     return np.where(np.isfinite(smallest), smallest, np.nan)

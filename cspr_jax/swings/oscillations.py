@@ -120,7 +120,7 @@ def _envelopes(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
 
 @jax.jit
 def _level(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
-    # Of horizontal transitions: a third of the work.
+    # Horizontal transitions take a third of the work.
     weights, _ = arguments
     here = jax.vmap(partial(counts.horizontal_oscillations, amplitude))(weights)
     return here, jnp.zeros_like(here)
@@ -128,7 +128,7 @@ def _level(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
 
 @partial(jax.jit, static_argnames="largest")
 def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.Array], *, largest: int) -> jax.Array:
-    # Of 1 + v A cos - L h, the pseudotension under a load L = v + w_k, and of the depth: L = 0.
+    # Bound 1 + v A cos - L h, the pseudotension under a load L = v + w_k, and the depth, which has L = 0.
     high, low, v = loads
     tau = (np.arange(SAMPLES) + 0.5) / SAMPLES
     size, slope, bend = derivatives(amplitude, jnp.asarray(tau), order=2)

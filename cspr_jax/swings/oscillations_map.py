@@ -13,7 +13,7 @@ from cspr_jax.schema.tiles import Grid
 from cspr_jax.swings.oscillations import best_inclinations, minimum_oscillations, transitions_to
 from cspr_jax.swings.transition import depth_for
 
-# Where a target above the spools has no p0 below it: its verdict does not depend on it.
+# Depth that stands in where a target above the spools has no p0 below it: its verdict does not depend on the depth.
 _ANY_DEPTH = 1.0
 
 
@@ -36,11 +36,11 @@ class MinimumOscillationsMap(PointMassMap):
     def _depths(self, cells: dict[str, np.ndarray], targets: np.ndarray) -> np.ndarray:
         if "z0" in cells:
             return cells["z0"]
-        given = self._keys.trajectory.inclination
+        setting = self._keys.trajectory.inclination
         if "inclination" in cells:
             inclination = cells["inclination"]
-        elif isinstance(given, float):
-            inclination = np.full(len(targets), given)
+        elif isinstance(setting, float):
+            inclination = np.full(len(targets), setting)
         else:
             inclination = best_inclinations(self._problem, targets)
         points = (jnp.asarray(targets), jnp.asarray(inclination))

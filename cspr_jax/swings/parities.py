@@ -37,4 +37,6 @@ def rows_of(parities: dict[int, Segment], rows: np.ndarray) -> dict[int, Segment
     Returns:
         leaves (m, ...).
     """
-    return {parity: jax.tree.map(lambda leaf: np.asarray(leaf)[rows], own) for parity, own in parities.items()}
+    return {
+        parity: jax.tree.map(lambda leaf: np.asarray(leaf)[rows], segments) for parity, segments in parities.items()
+    }

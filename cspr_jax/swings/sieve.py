@@ -124,9 +124,9 @@ def upper_bounds(amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs:
     bounds = jnp.zeros((max_arcs, len(even.rate)), dtype)
     scale = jax.vmap(partial(largest_term, amplitude), in_axes=(0, None))
     for first, segments in ((0, odd), (1, even)):
-        mine = numbers[first::2]
-        if len(mine):
-            terms = jax.vmap(scale, in_axes=(None, 0))(segments, jnp.asarray(mine, dtype))
+        arcs = numbers[first::2]
+        if len(arcs):
+            terms = jax.vmap(scale, in_axes=(None, 0))(segments, jnp.asarray(arcs, dtype))
             guard = ROUNDING * jnp.finfo(dtype).eps * jnp.where(jnp.isfinite(terms), terms, 0.0)
-            bounds = bounds.at[first::2].set(smallest_sampled(amplitude, segments, mine, tau) + guard)
+            bounds = bounds.at[first::2].set(smallest_sampled(amplitude, segments, arcs, tau) + guard)
     return bounds.T

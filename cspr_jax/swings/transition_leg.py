@@ -33,7 +33,7 @@ class Transitions(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
-        answers, segments = self._found(problem, np.array([z0]))
+        answers, segments = self._answers_and_segments(problem, np.array([z0]))
         motions: list[Motion] = []
         for i, segment in enumerate(each(segments, len(self))):
             motion = Hypocycloid(segment, problem.amplitude, leaf(answers.tried_arcs[i]))
@@ -42,9 +42,9 @@ class Transitions(Leg):
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
         """Answers for several depths; see `Leg.answers`."""
-        return self._found(problem, depths)[0]
+        return self._answers_and_segments(problem, depths)[0]
 
-    def _found(self, problem: Problem, depths: np.ndarray) -> tuple[Answers, Segment]:
+    def _answers_and_segments(self, problem: Problem, depths: np.ndarray) -> tuple[Answers, Segment]:
         count, z0 = len(depths), np.repeat(depths, len(self))
         targets = self.stops.points(depths)[:, self._target].reshape(-1, 3)
         is_steady = np.tile(self._steady, count)
