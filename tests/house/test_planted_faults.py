@@ -43,8 +43,8 @@ FAULTS = {
         "swings/test_hypocycloid.py",
     ),
     "a limit compared the wrong way": (
-        "lambda now, limit: (limit**2 - now.length**2) / (2.0 * now.z0**2)",
-        "lambda now, limit: (now.length**2 - limit**2) / (2.0 * now.z0**2)",
+        "lambda state, limit: (limit**2 - state.length**2) / (2.0 * state.z0**2)",
+        "lambda state, limit: (state.length**2 - limit**2) / (2.0 * state.z0**2)",
         "swings/test_margins.py",
     ),
     "a lost pair of cables": (
@@ -58,13 +58,13 @@ FAULTS = {
         "robots/test_platform.py::test_motions_are_the_oracle_s",
     ),
     "a mass centre that is left out of tolerances": (
-        "return _Reaches(off, np.minimum(known.moved / found.lengths, 1.0), radius * rest)",
-        "return _Reaches(off, np.minimum(known.moved / found.lengths, 1.0), 0.0 * rest)",
+        "return _Reaches(off, np.minimum(known.moved / influence.lengths, 1.0), radius * rest)",
+        "return _Reaches(off, np.minimum(known.moved / influence.lengths, 1.0), 0.0 * rest)",
         "motions/test_uncertainty.py",
     ),
     "spools that are displaced half as far": (
-        "multiple * float(given.spool_positions),",
-        "0.5 * multiple * float(given.spool_positions),",
+        "multiple * float(uncertainty.spool_positions),",
+        "0.5 * multiple * float(uncertainty.spool_positions),",
         "swings/test_enclosures.py",
     ),
     "tolerances whose functional is not corrected": (
