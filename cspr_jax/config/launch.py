@@ -68,7 +68,7 @@ _ASIDE = "from twice the robot's size on one side of the centroid of the spools 
 
 
 class LaunchSearch(Table):
-    """Where maps of launches look for a release."""
+    """Bounds within which maps of launches look for a release."""
 
     release_x: Interval | None = Field(None, description=_OF_RELEASES.format("x", _ASIDE))
     release_y: Interval | None = Field(None, description=_OF_RELEASES.format("y", "likewise"))
