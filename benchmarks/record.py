@@ -6,9 +6,9 @@ On an idle machine: `make bench-record`, which draws docs/rates.md from it, too.
 import datetime
 import json
 import subprocess
+import sys
 from pathlib import Path
 
-import cspr_jax
 from cspr_jax.sweep.environment import environment
 
 HISTORY = Path(__file__).with_name("history.jsonl")
@@ -26,7 +26,8 @@ KEPT = (
 
 
 def main() -> None:
-    report = cspr_jax.benchmark()
+    bench = [sys.executable, "-m", "cspr_jax", "bench", "--json"]  # with the flags of the command line
+    report = json.loads(subprocess.run(bench, capture_output=True, text=True, check=True).stdout)
     words = ["git", "-C", str(HISTORY.parent), "describe", "--always", "--dirty"]
     commit = subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
     here = environment()
