@@ -39,8 +39,9 @@ def picture(records: list[dict]) -> Figure:
             values = [record["ratio_to_numpy"][kind][dtype] for record in records]
             panel.plot(range(len(records)), values, style, label=f"{words}, {dtype}")
     panel.set_xticks(range(len(records)), [f"{r['commit']}\n{r['date']}" for r in records])
-    panel.set(yscale="log", ylabel="checks a second, over NumPy's", xlim=(-0.5, len(records) - 0.5))
-    panel.grid(alpha=0.3, which="both")
+    panel.set(ylabel="checks a second, over NumPy's", xlim=(-0.5, len(records) - 0.5))
+    panel.set_ylim(bottom=0.0)
+    panel.grid(alpha=0.3)
     figure.legend(loc="outside right upper")
     return figure
 
