@@ -13,7 +13,7 @@ Do not edit: written by `make bench-record`, which measures on the machine where
 `benchmarks/history.jsonl`. Rates are million checks a second; ratios are to NumPy in the same run, and carry over to
 other machines better; on a shared host single figures vary by 15 %, and more. What a check is, and what limits it, is in [performance](performance.md#a-check).
 
-![Checks a second over those of NumPy in the same run, by commit.](images/rates.png)
+![Checks a second over those of NumPy in the same run, by commit.](rates.png)
 
 | date | commit | processor, cores | jax | six cables float32 / float64 | x NumPy | three cables float32 / float64 | x NumPy |
 |---|---|---|---|---|---|---|---|
@@ -50,7 +50,7 @@ def main() -> None:
     """Write the page and its picture."""
     records = [json.loads(line) for line in HISTORY.read_text("utf-8").splitlines()]
     (HERE / "rates.md").write_text(HEAD + "".join(map(row, records)), "utf-8")
-    picture(records).savefig(HERE / "images" / "rates.png", dpi=110)
+    picture(records).savefig(HERE / "rates.png", dpi=110)
 
 
 if __name__ == "__main__":
