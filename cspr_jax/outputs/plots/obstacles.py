@@ -56,24 +56,25 @@ def outline(points: np.ndarray) -> np.ndarray:
         return np.empty((0, 2))
 
 
-def section_of(points: np.ndarray, axis: int, place: float) -> np.ndarray:
-    """Section of a convex body with a plane across an axis.
+def section_of(points: np.ndarray, across: list[str], place: float) -> np.ndarray:
+    """Section of a convex body with the plane over two axes.
 
     Args:
         points: (n, 3) whose hull it is, m.
-        axis: number of the axis.
-        place: of the plane on it, m.
+        across: the two axes of the plane, of x, y and z.
+        place: of the plane on the third axis, m.
 
     Returns:
-        (m, 2) corners, coordinates of the other axes in their order; empty where they do not meet.
+        (m, 2) corners, coordinates in the order of `across`; empty where they do not meet.
     """
+    axis = next(k for k, name in enumerate("xyz") if name not in across)
     _, edges = hull_of(points)
     start, end = edges[:, 0], edges[:, 1]
     low, high = start[:, axis] - place, end[:, axis] - place
     cut = low * high <= 0.0
     part = (low / np.where(low == high, 1.0, low - high))[cut, None]
     met = np.concatenate([start[cut] + part * (end - start)[cut], points[points[:, axis] == place]])
-    return outline(np.delete(met, axis, axis=1))
+    return outline(met[:, ["xyz".index(name) for name in across]])
 
 
 def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
@@ -95,8 +96,7 @@ def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[s
     for points in obstacles(result):
         shadow, cut = outline(points[:, columns]), np.empty((0, 2))
         if third in place:
-            cut = section_of(points, "xyz".index(third), place[third])
-            cut = cut if columns == sorted(columns) else cut[:, ::-1]
+            cut = section_of(points, across, place[third])
         if len(cut):
             panel.add_patch(Polygon(cut, facecolor=COLOUR, edgecolor="white", linewidth=0.8))
             entries["obstacle"] = Patch(facecolor=COLOUR)

@@ -132,16 +132,11 @@ def _obstacles(result: Result, names: list[str], points: list[np.ndarray]) -> di
         "bodies": [
             {
                 "shadow": _closed(outline(body[:, [SPACE.index(axis) for axis in plane]])),
-                "cuts": [_closed(_cut(body, plane, third, place)) for place in places],
+                "cuts": [_closed(section_of(body, plane, place)) for place in places],
             }
             for body in bodies
         ],
     }
-
-
-def _cut(body: np.ndarray, plane: list[str], third: str, place: float) -> np.ndarray:
-    corners = section_of(body, SPACE.index(third), place)
-    return corners if plane == sorted(plane) else corners[:, ::-1]
 
 
 def _closed(corners: np.ndarray) -> dict[str, list[float]]:
