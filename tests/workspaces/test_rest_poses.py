@@ -103,7 +103,7 @@ def test_files_hold_what_is_asked(tmp_path):
 
 OBSTACLES = [
     {"kind": "sphere", "centre": [0.0, 0.0, 1.2], "radius": 0.25},
-    {"kind": "box", "corners": [[-0.5, -0.5, 2.0], [0.0, 0.0, 2.5]]},
+    {"kind": "box", "corners": [[-0.5, -0.2, 2.0], [0.0, 0.4, 2.5]]},
     {"kind": "cylinder", "start": [0.5, 0.5, 0.0], "end": [0.5, 0.5, 3.0], "radius": 0.1},
 ]
 CLOSED = {"conditions": ["wrench-closure"]}
@@ -134,7 +134,9 @@ def test_obstacles_are_on_pages():
     sphere, box, cylinder = own["bodies"]
     assert sphere["cuts"][1]["up"] == [] and not box["cuts"][0]["up"] and cylinder["cuts"][0]["up"]
     assert np.ptp(sphere["cuts"][0]["across"]) == pytest.approx(0.3, rel=0.01)
-    assert (min(box["cuts"][1]["across"]), max(box["cuts"][1]["across"])) == (-0.5, 0.0)
+    for kind in (box["cuts"][1], box["shadow"]):
+        assert (min(kind["across"]), max(kind["across"])) == (-0.5, 0.0)
+        assert (min(kind["up"]), max(kind["up"])) == (-0.2, 0.4)
     assert np.ptp(sphere["shadow"]["up"]) == pytest.approx(0.5, rel=0.01)
     assert cylinder["shadow"]["up"][0] == cylinder["shadow"]["up"][-1]
     assert map_content(result(AXES, {"verdict": np.zeros(12, np.uint32)}, CLOSED))[0]["obstacles"] is None
