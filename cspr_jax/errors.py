@@ -44,8 +44,6 @@ class InputError(CsprError, ValueError):
 
     Args:
         key: the key or argument, dotted.
-        value: what was given.
-        allowed: what would be right.
         fault: what is wrong, in words, where the value does not show it.
     """
 
@@ -62,7 +60,6 @@ class ConfigError(CsprError):
     """A fault in a file: names the file, the key, the value and what is allowed.
 
     Args:
-        file: the file's name.
         message: the rest of the line.
         others: further faults of the file, each the rest of a line of its own; the error's text only counts them.
         count: how many others there are, where not all are given.
@@ -108,12 +105,7 @@ class SelfCheckError(CsprError):
 
 
 class StoppedError(CsprError):
-    """A run that was asked to stop, and can go on.
-
-    Args:
-        message: the line.
-        exit_code: that of the signal.
-    """
+    """A run that was asked to stop, and can go on."""
 
     def __init__(self, message: str, exit_code: ExitCode) -> None:
         """Keep the signal's exit code."""
@@ -143,9 +135,6 @@ def printable(text: object) -> str:
     Line breaks, escapes, other control characters, marks that turn the direction of writing, and halves of surrogate
     pairs are written out, as in a string of Python. Text that is printable already stays as it is.
 
-    Args:
-        text: anything.
-
     Returns:
         one line.
     """
@@ -154,9 +143,6 @@ def printable(text: object) -> str:
 
 def shown(value: object) -> str:
     """A value as a message shows it: TOML spelling, at most 60 characters.
-
-    Args:
-        value: anything.
 
     Returns:
         the text.

@@ -20,7 +20,6 @@ def real(
     """Rule of an argument of real numbers.
 
     Args:
-        allowed: in words.
         *shapes: that it may have; none: all.
         traced: whether jax may trace it.
         none: whether None is taken.
@@ -43,7 +42,6 @@ def integer(least: int, largest: int, *, none: bool = False) -> Rule:
 
     Args:
         least: smallest.
-        largest: largest.
         none: whether None is taken.
 
     Returns:
@@ -61,7 +59,6 @@ def kind_of(allowed: str, *kinds: type, none: bool = False, has: tuple[str, ...]
     """Rule of an argument that is one of some kinds.
 
     Args:
-        allowed: in words.
         *kinds: types.
         none: whether None is taken.
         has: names of attributes of a further kind, which need not be imported for this.
@@ -84,7 +81,6 @@ def choice(rule: Rule, *others: Any) -> Rule:
     """Rule of an argument that may be one of some values, too.
 
     Args:
-        rule: for all others.
         *others: strings, or None.
 
     Returns:
@@ -112,7 +108,6 @@ def robot(key: str, value: Any) -> None:
 
     Args:
         key: named in errors.
-        value: that was given.
 
     Raises:
         InputError: it is none.
@@ -126,7 +121,6 @@ def limits(key: str, value: Any) -> None:
 
     Args:
         key: named in errors.
-        value: that was given.
 
     Raises:
         InputError: it is none.
@@ -153,7 +147,6 @@ def state(key: str, value: Any) -> None:
 
     Args:
         key: named in errors.
-        value: that was given.
 
     Raises:
         InputError: it is none.
@@ -168,7 +161,6 @@ def pose(key: str, value: Any) -> None:
 
     Args:
         key: named in errors.
-        value: that was given.
 
     Raises:
         InputError: it is none.
@@ -184,7 +176,6 @@ def coordinates(key: str, value: Any) -> None:
 
     Args:
         key: named in errors.
-        value: that was given.
 
     Raises:
         InputError: it is none.
@@ -199,10 +190,6 @@ def coordinates(key: str, value: Any) -> None:
 
 def many(rule: Rule, allowed: str) -> Rule:
     """Rule of a sequence.
-
-    Args:
-        rule: of its elements.
-        allowed: in words.
 
     Returns:
         the rule.
@@ -225,7 +212,6 @@ def results(key: str, value: Any) -> None:
 
     Args:
         key: named in errors.
-        value: that was given.
 
     Raises:
         InputError: it is none.
@@ -242,7 +228,6 @@ def result(key: str, value: Any) -> None:
 
     Args:
         key: named in errors.
-        value: that was given.
 
     Raises:
         InputError: it is none.
@@ -256,7 +241,6 @@ def size(key: str, value: Any) -> None:
 
     Args:
         key: named in errors.
-        value: that was given.
 
     Raises:
         InputError: it is none.
@@ -270,7 +254,6 @@ def names(key: str, value: Any) -> None:
 
     Args:
         key: named in errors.
-        value: that was given.
 
     Raises:
         InputError: it is none.

@@ -30,9 +30,6 @@ DEPTHS = Numbers("a number > 0, at most 1e6 m", ((), (ANY,)), least=0.0, above=T
 def check_point_mass(robot: Any) -> None:
     """Refuse what is no point mass.
 
-    Args:
-        robot: what was given.
-
     Raises:
         InputError: another kind of robot.
     """
@@ -44,7 +41,6 @@ def amplitude_of(given: str | Amplitude, *, free_end: bool | None = None) -> Amp
     """Amplitude function that is given by its name, or itself.
 
     Args:
-        given: name or function.
         free_end: whether it must meet (1.27) and (1.28), or (2.49); None: neither. What jax is tracing is not checked.
 
     Returns:
@@ -72,7 +68,6 @@ def warn_of_rest(robot: Any, key: str, place: Any, z0: Any, cure: str) -> None:
     """Warn of a place that is P0 but for its last digits.
 
     Args:
-        robot: of the place.
         key: the argument that gives it.
         place: (3,) in the robot's axes, m.
         z0: () m.
@@ -119,9 +114,6 @@ def batched(kind, segments, problem: Problem, answers: Answers, frame: Frame, *m
     Args:
         kind: class of the motions.
         segments: leaves (n, ...).
-        problem: gives the amplitude function.
-        answers: of n motions.
-        frame: of the robot.
         *more: further fields of the class.
 
     Returns:

@@ -14,7 +14,6 @@ def completion(shell: str, parser: argparse.ArgumentParser) -> str:
 
     Args:
         shell: its name, one of `SHELLS`.
-        parser: of the command line.
 
     Returns:
         the script.

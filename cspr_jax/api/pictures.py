@@ -99,9 +99,7 @@ def finished(draw: Callable[[], Figure], name: str, style: Style, output: str | 
     """A picture in the style of all, written if that is asked for.
 
     Args:
-        draw: makes it.
         name: of what is drawn, for errors.
-        style: the chosen one.
         output: picture to write; its ending is the format. None: nothing is written.
 
     Returns:

@@ -39,7 +39,6 @@ def point_mass(
         gravity: m/s^2, positive.
         z_axis: where z points, "down" or "up".
         planar: whether everything lies in the plane y = 0.
-        name: for people.
         limits: limits beyond taut cables; None: none.
         pattern: "1T" along a vertical guide, "2T" or "3T"; None: as planar says.
 
@@ -80,7 +79,6 @@ def platform(  # noqa: PLR0913
         centre_of_mass: (3,) in platform axes, m; None: their origin.
         gravity: m/s^2, positive.
         z_axis: where z points, "down" or "up".
-        name: for people.
         limits: limits beyond taut cables; None: none.
         pattern: "3R3T"; "1R2T" in the plane y = 0; "2R3T" of a rod, platform_points on one line; "3R" about a fixed
             joint, the origin of the platform axes.
@@ -127,7 +125,6 @@ def parallel_pair_robot(
         inertia: (3, 3) about the mass centre, platform axes, kg m^2; None: of a uniform disc of that radius.
         gravity: m/s^2, positive.
         z_axis: where z points, "down" or "up".
-        name: for people.
         limits: limits beyond taut cables; None: none.
 
     Returns:

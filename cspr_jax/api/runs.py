@@ -16,9 +16,6 @@ open_result = checked(_open_result, "open_result", __name__)
 def status(directory: str | Path) -> dict[str, Any]:
     """How far a run has come, without touching it.
 
-    Args:
-        directory: of the run.
-
     Returns:
         what `cspr status --json` prints: "identity", "tiles", "shards", "result" and more.
 

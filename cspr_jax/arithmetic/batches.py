@@ -136,7 +136,6 @@ def padded(arguments, size: int):
 
     Args:
         arguments: pytree of NumPy arrays (n, ...), 0 < n <= size.
-        size: length of a batch.
 
     Returns:
         the pytree (size, ...), its last elements repeated.

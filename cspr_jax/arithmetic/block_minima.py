@@ -74,7 +74,6 @@ def smallest(
     """Smallest values over all blocks of each case.
 
     Args:
-        blocks: that cover the intervals.
         count: number of cases n.
         values: gives of blocks a lower bound, and a value that is attained, (n_blocks, n_groups) each.
         scales: (n_groups,) of the values.

@@ -57,7 +57,6 @@ def least(
 
     Args:
         parts: a function of a module, as it is compiled once.
-        given: its first argument.
         low: (n,) smallest unknowns.
         high: (n,) largest ones.
         judged: proves or refutes a place.

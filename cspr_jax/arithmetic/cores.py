@@ -28,7 +28,6 @@ def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
     """Cores' worth of time that the control groups of this process grant it, of versions 1 and 2 of Linux's.
 
     Args:
-        groups: file that names them.
         mounted: folder in which they lie.
 
     Returns:

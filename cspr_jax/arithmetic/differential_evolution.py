@@ -50,7 +50,6 @@ def moves_of(unknowns: int, population: int) -> Moves:
     """Moves, the same ones for all questions.
 
     Args:
-        unknowns: d.
         population: n, at least 2.
 
     Returns:
@@ -120,9 +119,7 @@ def evolved(
 
     Args:
         parts: a function of a module, as it is compiled once.
-        given: its first argument.
         questions: pytree of NumPy arrays (n, ...).
-        unknowns: d.
         asked: margins, below 1, at which the objective is to be least; inf: the margin is to be largest.
         population: members of it; one twice as large takes four times as long.
 

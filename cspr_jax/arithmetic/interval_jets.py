@@ -67,9 +67,6 @@ class Jet:
     def joined(self, other: "Jet") -> "Jet":
         """Bounds of two functions side by side in the last dimension.
 
-        Args:
-            other: of the same shape.
-
         Returns:
             the bounds.
         """
@@ -140,7 +137,6 @@ def lowest(ends: np.ndarray, jet: Jet) -> np.ndarray:
 
     Args:
         ends: (2, ...) its values at both ends of each block, of width 1.
-        jet: bounds over the blocks.
 
     Returns:
         (...); -inf where nothing is known.

@@ -52,7 +52,6 @@ def golden_step(function: Callable, bracket: Bracket, *, left_if_equal: bool = T
 
     Args:
         function: (...) to (...), of jax.
-        bracket: the wider one.
         left_if_equal: which side is kept where both points have one value.
 
     Returns:

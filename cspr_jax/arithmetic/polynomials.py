@@ -44,7 +44,6 @@ def derivatives(table: np.ndarray, order: int) -> list[np.ndarray]:
 
     Args:
         table: (..., n) coefficients.
-        order: of the last derivative.
 
     Returns:
         order + 1 tables: (..., n), (..., n - 1), ...; of constants (..., 1).

@@ -67,7 +67,6 @@ def rates(kernels: Kernels, six: six_cables.SixCableWork, three: three_cables.Th
 
     Args:
         kernels: compiled.
-        six: the work of one.
         three: the work of the other.
 
     Returns:

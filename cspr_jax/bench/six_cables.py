@@ -84,9 +84,6 @@ class Batch(NamedTuple):
 def batches(given: SixCableWork) -> list[Batch]:
     """The work by numbers of arcs.
 
-    Args:
-        given: the work.
-
     Returns:
         batches of one shape.
     """
@@ -118,8 +115,6 @@ def rate(robot: PlatformRobot, some: list[Batch], *, single_precision: bool) -> 
     """Checks a second.
 
     Args:
-        robot: the robot.
-        some: batches.
         single_precision: whether in float32.
 
     Returns:
@@ -139,8 +134,6 @@ def tensions(robot: PlatformRobot, batch: Batch, *, single_precision: bool) -> A
     """Smallest normalised tension of each trajectory.
 
     Args:
-        robot: the robot.
-        batch: of segments.
         single_precision: whether in float32.
 
     Returns:
@@ -154,10 +147,6 @@ def tensions(robot: PlatformRobot, batch: Batch, *, single_precision: bool) -> A
 
 def operations_a_check(robot: PlatformRobot, batch: Batch) -> float | None:
     """Arithmetic operations of one check.
-
-    Args:
-        robot: the robot.
-        batch: of segments.
 
     Returns:
         as XLA counts them; None where it does not.

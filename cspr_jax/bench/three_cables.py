@@ -61,7 +61,6 @@ def rate(given: ThreeCableWork, dtype: str) -> float:
     """Checks a second of the sieve.
 
     Args:
-        given: the work.
         dtype: "float32" or "float64".
 
     Returns:
@@ -78,9 +77,6 @@ def rate(given: ThreeCableWork, dtype: str) -> float:
 
 def checks(count: int) -> int:
     """Number of checks of segments.
-
-    Args:
-        count: of segments.
 
     Returns:
         their number.

@@ -17,7 +17,6 @@ def best(work: Callable[[], object], repeats: int | None = None) -> float:
     """The shortest of several times, after one that compiles.
 
     Args:
-        work: what is timed.
         repeats: how often; None: `REPEATS`.
 
     Returns:
@@ -60,7 +59,6 @@ def operations(lowered: Any, cases: int) -> float | None:
     """Arithmetic operations of a compiled function, as XLA counts them; a loop's are counted once.
 
     Args:
-        lowered: the function.
         cases: how many it computes.
 
     Returns:

@@ -78,11 +78,9 @@ def margin_rate(
     """Margins of one condition a second, from poses as lanes to their two bounds.
 
     Args:
-        robot: the robot.
         condition: of `workspaces.questions.CONDITIONS`.
         dtype: "float32" or "float64".
         by_null_space: which of the two ways.
-        batches: of poses.
 
     Returns:
         the rate; s that the first batch takes, mostly of compiling.
@@ -131,9 +129,6 @@ def clearance_rate(dtype: str) -> float:
 
 def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
     """Least tensions within limits a second, from arrays of wrench matrices to arrays of tensions.
-
-    Args:
-        robot: on eight cables.
 
     Returns:
         the rate.

@@ -53,7 +53,6 @@ def critical_durations(
         arms: (n_cables, 3) likewise.
         normal: (3,) of the spool plane, the third component 1.
         gravity: m/s^2.
-        ends: of n segments.
 
     Returns:
         (n_roots,) s of each segment, increasing.

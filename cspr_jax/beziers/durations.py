@@ -42,7 +42,6 @@ def proved_margins(robot: PointMassRobot, ends: Ends, durations: np.ndarray, z0:
 
     Args:
         robot: a point mass on as many cables as it has degrees of freedom; centred.
-        ends: of n segments.
         durations: (n,) s.
         z0: (n,) m.
 
@@ -59,7 +58,6 @@ def feasible_durations(robot: PointMassRobot, ends: Ends, z0: np.ndarray) -> lis
 
     Args:
         robot: a point mass on as many cables as it has degrees of freedom; centred.
-        ends: of n segments.
         z0: (n,) m.
 
     Returns:
@@ -108,7 +106,6 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
     them is narrowed down; a shorter one between two that do not is not excluded.
 
     Args:
-        problem: robot and limits.
         ends: of the segment, leading dimension 1.
         intervals: (n_intervals, 2) durations that keep every cable taut, s.
         z0: m.
@@ -153,7 +150,6 @@ def slowest(problem: Problem, points: np.ndarray) -> float:
     """Duration that is long enough for what limits the speed of the cables.
 
     Args:
-        problem: gives the limits.
         points: (n + 1, 3) of the way, m; what is not known yet is NaN.
 
     Returns:

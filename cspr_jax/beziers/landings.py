@@ -110,7 +110,6 @@ def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
 
     Args:
         robot: a point mass on as many cables as it has degrees of freedom; centred.
-        throw: the planned release.
         errors: (1 + 2 n_cables,) of the instant, s, of the lengths, m, and of their rates, m/s.
 
     Returns:
@@ -162,8 +161,6 @@ def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatte
 
     Args:
         robot: a point mass on as many cables as it has degrees of freedom; centred.
-        throw: the planned release.
-        errors: their sizes.
 
     Returns:
         the scatter, in the axes of the kernels.

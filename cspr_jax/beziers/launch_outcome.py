@@ -150,7 +150,6 @@ def scattered(plan: Any, errors: LaunchErrors) -> Scatter:
 
     Args:
         plan: a `Plan` with a launch.
-        errors: their sizes.
 
     Returns:
         the scatter.

@@ -106,9 +106,6 @@ class LaunchRange(Columns):
     def placed(self, frame: Frame) -> "LaunchRange":
         """The same, with the places of the releases in other axes.
 
-        Args:
-            frame: of the robot file.
-
         Returns:
             the launches.
         """

@@ -38,9 +38,6 @@ class LaunchRangeMap(FromPlacesMap):
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse starts that are all out of reach, since objects may land anywhere; see `GridMap.refuse_hopeless`.
 
-        Args:
-            grid: the grid.
-
         Raises:
             ConfigError: what is wrong with all of them.
         """

@@ -43,7 +43,6 @@ def cubics(robot: PointMassRobot, motion: Bezier) -> Array:
 
     Args:
         robot: a point mass on three cables, or on two in a plane; centred.
-        motion: the segment.
 
     Returns:
         (n_cables, 4) the constant first.
@@ -71,7 +70,6 @@ def depth_quadratic(robot: PointMassRobot, motion: Bezier) -> Array:
 
     Args:
         robot: a point mass on three cables, or on two in a plane; centred.
-        motion: the segment.
 
     Returns:
         (3,) the constant first.
@@ -86,7 +84,6 @@ def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
 
     Args:
         robot: a point mass on three cables, or on two in a plane; centred.
-        motion: the segment.
 
     Returns:
         the margins.

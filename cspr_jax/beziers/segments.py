@@ -98,7 +98,6 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
     """Answers of segments.
 
     Args:
-        problem: robot and limits.
         segments: of `joined_segments`.
 
     Returns:

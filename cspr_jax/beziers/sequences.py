@@ -48,7 +48,6 @@ def segments_of(sequence: Anchored, durations: Array) -> Bezier:
     """Segments of given durations.
 
     Args:
-        sequence: the points.
         durations: (n,) s.
 
     Returns:
@@ -92,7 +91,6 @@ def judged(problem: Problem, segments: Bezier) -> Judged:
     """Judgement of a sequence, proved.
 
     Args:
-        problem: robot and limits.
         segments: leaves with a leading dimension n.
 
     Returns:
@@ -129,7 +127,6 @@ def least_total(problem: Problem, sequence: Anchored, durations: list[float | No
 
     Args:
         problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
-        sequence: the points.
         durations: of the n segments, s; None: to be chosen.
 
     Returns:

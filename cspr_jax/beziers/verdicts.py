@@ -40,7 +40,6 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
     """Verdicts of Bezier segments: exact for taut cables, proved for limits.
 
     Args:
-        problem: robot and limits.
         motions: leaves with a leading dimension n.
 
     Returns:

@@ -11,7 +11,6 @@ def build_limits(robot_file: RobotFile, keys: LimitKeys, file: object) -> Limits
     """Limits of the file over those of the robot.
 
     Args:
-        robot_file: the robot.
         keys: of the plan or sweep.
         file: named in errors.
 

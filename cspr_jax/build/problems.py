@@ -66,9 +66,6 @@ def build_problem(
     """Robot, limits and amplitude function of a plan or sweep, as the kernels take them.
 
     Args:
-        robot_file: the robot file's content.
-        keys: of the trajectory.
-        limits: keys of the limits.
         file: named in errors.
         epsilon: stands in for an amplitude function's "best".
         at: prefix of keys of the trajectory in errors.

@@ -26,10 +26,6 @@ MAKERS = {"1T": point_mass.guided_robot, "2T": point_mass.planar_robot, "3T": po
 def gravity_of(robot_file: RobotFile, keys: TrajectoryKeys) -> float:
     """Gravity: the plan's or sweep's, else the robot's, else 9.81 m/s^2.
 
-    Args:
-        robot_file: the robot.
-        keys: of the plan or sweep.
-
     Returns:
         m/s^2.
     """
@@ -40,7 +36,6 @@ def build_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object) -> Po
     """The robot of a file, in its own axes and with its own limits.
 
     Args:
-        robot_file: the robot file's content.
         keys: of the plan or sweep.
         file: named in errors.
 
@@ -94,7 +89,6 @@ def kernel_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object, *, a
     """The robot of a file, as the kernels take it; a platform's axes are still those of the file.
 
     Args:
-        robot_file: the robot file's content.
         keys: of the plan or sweep.
         file: named in errors.
         any_cables: whether there may be more cables than degrees of freedom.
@@ -151,9 +145,6 @@ def fault_at_rest(robot_file: RobotFile) -> str | None:
 
 def is_redundant_platform(robot: PointMassRobot | PlatformRobot) -> bool:
     """Tell whether margins of tensions judge a robot, which know cables without a largest one.
-
-    Args:
-        robot: of any kind.
 
     Returns:
         whether it is a platform on more cables than degrees of freedom.

@@ -32,7 +32,6 @@ def add_json(parser: argparse.ArgumentParser, what: str = "object") -> None:
     """Option for programs that read the answer.
 
     Args:
-        parser: of a command.
         what: JSON value that it prints.
     """
     parser.add_argument("--json", action="store_true", help=f"print one JSON {what} and nothing else")
@@ -42,7 +41,6 @@ def add_device(parser: argparse.ArgumentParser, *, quick: bool = False) -> None:
     """Option of where to compute.
 
     Args:
-        parser: of a command.
         quick: whether it computes little; see `xla.prepare`.
     """
     usual = "cpu" if quick else "a GPU if jax finds one"
@@ -62,7 +60,6 @@ def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> N
     """Option of where the output goes.
 
     Args:
-        parser: of a command.
         text: for `--help`.
         settings: of argparse, such as metavar.
     """
@@ -73,7 +70,6 @@ def prepare_jax(options: argparse.Namespace, *, quick: bool = False) -> None:
     """Set up jax as the options want it; from here on it says when it compiles.
 
     Args:
-        options: of the command.
         quick: whether little is computed; see `xla.prepare`.
 
     Raises:
@@ -131,11 +127,7 @@ def print_json(value: Any) -> None:
 
 
 def print_table(renderable: Any) -> None:
-    """Print a table of rich.
-
-    Args:
-        renderable: the table.
-    """
+    """Print a table of rich."""
     with printing():
         terminal.print_table(renderable, sys.stdout)
 
@@ -150,19 +142,11 @@ def print_line(text: object) -> None:
 
 
 def print_path(path: Path | str) -> None:
-    """Print the path of a file, for people or for a program that opens it.
-
-    Args:
-        path: of the file.
-    """
+    """Print the path of a file, for people or for a program that opens it."""
     write(f"{printable(path) if sys.stdout.isatty() else path}\n")
 
 
 def warn(line: object) -> None:
-    """Say something on standard error; where that takes nothing more, there is nobody to be told.
-
-    Args:
-        line: what.
-    """
+    """Say something on standard error; where that takes nothing more, there is nobody to be told."""
     with contextlib.suppress(OSError, ValueError):
         sys.stderr.write(f"cspr: {printable(line)}\n")

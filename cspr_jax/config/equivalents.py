@@ -12,7 +12,6 @@ def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> Robo
     """The robot as trajectory families, or a kind of map, move it.
 
     Args:
-        robot_file: the robot of a file.
         patterns: for each of them, patterns of motion of the robots that it moves.
 
     Returns:
@@ -31,9 +30,6 @@ def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> Robo
 
 def no_equivalent(robot_file: RobotFile) -> str:
     """Why a platform is not moved as a point mass, to go on with in a line that refuses it.
-
-    Args:
-        robot_file: the robot.
 
     Returns:
         the reason; empty of other robots.

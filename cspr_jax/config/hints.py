@@ -24,9 +24,6 @@ ROUNDING = 1e-3
 def robot_hints(robot_file: RobotFile) -> list[str]:
     """Likely mistakes in the units of a robot, and what was left out of a file of another program.
 
-    Args:
-        robot_file: the robot.
-
     Returns:
         one line each.
     """
@@ -88,10 +85,6 @@ def _distance_to_hull(points: np.ndarray) -> float:
 def plan_hints(keys: PlanFile, robot_file: RobotFile) -> list[str]:
     """Likely mistakes in a plan that is not feasible.
 
-    Args:
-        keys: the plan.
-        robot_file: its robot.
-
     Returns:
         one line each.
     """
@@ -110,10 +103,6 @@ def plan_hints(keys: PlanFile, robot_file: RobotFile) -> list[str]:
 
 def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
     """Likely mistakes in a sweep.
-
-    Args:
-        keys: the sweep.
-        robot_file: its robot.
 
     Returns:
         one line each.
@@ -140,7 +129,6 @@ def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) ->
     """Tell whether the z axis seems to point the other way.
 
     Args:
-        robot_file: the robot.
         targets: [x, y, z] in the file's axes, m.
 
     Returns:

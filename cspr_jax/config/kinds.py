@@ -26,7 +26,6 @@ def refuse_other_kinds(data: dict[str, Any], wanted: str, file: object) -> None:
     """Refuse a file of another kind, rather than every key of it.
 
     Args:
-        data: the file's tables.
         wanted: "sweep", "plan" or "robot".
         file: named in errors.
 

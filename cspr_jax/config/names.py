@@ -12,9 +12,6 @@ from cspr_jax.config.wording import either
 def name_of(rows: Callable[[], Iterable[str]]) -> PlainValidator:
     """Validator of a key that names a row.
 
-    Args:
-        rows: gives the names.
-
     Returns:
         the validator; its error is that of a Literal of the names.
     """

@@ -17,7 +17,6 @@ def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure
     """Tell whether a place is P0 but for its last digits.
 
     Args:
-        key: that gives the place.
         place: (3,) in the robot's axes, m; not said to be at rest.
         z0: depth of P0 below the centroid of the spools, m.
         robot: its `base_points` and `z_axis`.

@@ -168,7 +168,6 @@ def read_plan(text: str, path: Path) -> PlanFile:
     """A plan file.
 
     Args:
-        text: its content.
         path: named in errors.
 
     Returns:
@@ -184,7 +183,6 @@ def kept_plan(text: str, path: Path) -> PlanFile:
     """A plan as a motion file keeps it: the text of its file, or JSON where there was none.
 
     Args:
-        text: what is kept.
         path: of the motion file, named in errors.
 
     Returns:
@@ -208,7 +206,6 @@ def plan_keys(data: dict[str, Any], file: object) -> PlanFile:
     """Parsed content of a plan file.
 
     Args:
-        data: its tables.
         file: named in errors.
 
     Returns:

@@ -47,9 +47,6 @@ class Table(BaseModel):
 def other_case(path: Path) -> str:
     """Clause for a message about a missing file that names one whose name differs in capitals alone.
 
-    Args:
-        path: of the file that is missing.
-
     Returns:
         the clause, which begins with a colon; "" if there is no such file or folder.
     """
@@ -65,9 +62,6 @@ def other_case(path: Path) -> str:
 
 def read_bytes(path: Path) -> bytes:
     """Content of a file.
-
-    Args:
-        path: the file.
 
     Returns:
         its bytes.
@@ -93,9 +87,6 @@ def read_bytes(path: Path) -> bytes:
 def read_text(path: Path) -> str:
     """Text of a file.
 
-    Args:
-        path: the file.
-
     Returns:
         its text, with plain line breaks, and without the byte order mark that some editors put before it.
 
@@ -109,7 +100,6 @@ def decoded(data: bytes, path: Path) -> str:
     """Text of the content of a file.
 
     Args:
-        data: the content.
         path: of the file, named in errors.
 
     Returns:
@@ -135,7 +125,6 @@ def look_alike_before(text: str, end: int) -> str:
     """Clause for the message of a parser that stopped at a character that only looks like one of its own.
 
     Args:
-        text: that was parsed.
         end: index of the character at which the parser stopped.
 
     Returns:
@@ -149,7 +138,6 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
     """Contents of a TOML text.
 
     Args:
-        text: the text.
         path: named in errors.
 
     Returns:
@@ -180,9 +168,6 @@ def _stop(text: str, message: str) -> int:
 def read_toml(path: Path) -> dict[str, Any]:
     """Contents of a TOML file.
 
-    Args:
-        path: the file.
-
     Returns:
         its tables.
 
@@ -196,8 +181,6 @@ def checked(model: type[Model], data: Any, file: object, *, at: str = "") -> Mod
     """Data as a model.
 
     Args:
-        model: what it must be.
-        data: parsed TOML.
         file: named in errors.
         at: key under which the data stands, for errors.
 

@@ -230,7 +230,6 @@ class RobotFile(LimitKeys):
         """Place of a key of the robot, for errors.
 
         Args:
-            key: one of the robot's.
             file: that names the robot, or holds it as a table.
 
         Returns:
@@ -266,7 +265,6 @@ def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
     Args:
         reference: a catalogue name, a path (relative to the file that holds it), or an inline table.
         file: named in errors.
-        directory: of that file.
 
     Returns:
         the robot.
@@ -326,9 +324,6 @@ def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, I
 
 def read_robot(path: Path) -> RobotFile:
     """A robot file.
-
-    Args:
-        path: the file.
 
     Returns:
         the robot.

@@ -51,10 +51,6 @@ _PLAIN = {character: plain for plain, characters in _LOOK_ALIKES.items() for cha
 def nearest(given: str, allowed: Iterable[str]) -> str | None:
     """The allowed name that a user probably meant.
 
-    Args:
-        given: what was written.
-        allowed: names.
-
     Returns:
         one of them; None if none is near.
     """
@@ -92,10 +88,6 @@ def look_alike(text: str) -> str:
 
 def did_you_mean(given: str, allowed: Iterable[str]) -> str:
     """The question for an error's line.
-
-    Args:
-        given: what was written.
-        allowed: names.
 
     Returns:
         "did you mean NAME? ", or nothing.

@@ -42,7 +42,6 @@ def fault(key: str, value: object, allowed: str) -> PydanticCustomError:
     Args:
         key: of the table; "" for the table itself.
         value: text that is shown as it is, or any other value.
-        allowed: what would be right.
 
     Returns:
         the error.
@@ -67,9 +66,6 @@ def either(names: Iterable[str]) -> str:
 def rank(error: ErrorDetails) -> int:
     """Place of an error among those of a file: what explains others goes first.
 
-    Args:
-        error: pydantic's.
-
     Returns:
         the smaller, the earlier: another version of the format, then a misspelt key, which explains a missing one.
     """
@@ -83,7 +79,6 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
 
     Args:
         model: what the file must be.
-        error: pydantic's.
         at: key under which the data stands.
 
     Returns:

@@ -51,7 +51,6 @@ def gain(line: LineSlacks, law: Amplitude, edges: Array, middle: Array, largest:
     """Feasible q of one law.
 
     Args:
-        line: slacks along it.
         law: s(tau).
         edges: (n_pieces + 1,) instants between which the law is smooth.
         middle: () instant that parts the halves.
@@ -176,7 +175,6 @@ def gain_of_law(line: LineSlacks, ratio: Array, largest: Array, law: Amplitude |
     """Feasible q of one motion.
 
     Args:
-        line: slacks along it.
         ratio: () p / T of the S-model.
         largest: () largest size of s'', inf for none, 1/s^2.
         law: s(tau) without a parameter; None: the S-model.
@@ -194,7 +192,6 @@ def least_by_search(line: LineSlacks, largest: Array, law: Amplitude | None) -> 
     """Least duration along a line under its limits.
 
     Args:
-        line: slacks along it.
         largest: () largest size of s'', inf for none, 1/s^2.
         law: s(tau) without a parameter; None: the S-model.
 

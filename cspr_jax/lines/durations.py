@@ -68,7 +68,6 @@ class Durations:
 
         Args:
             which: numbers of the lines.
-            part: theirs.
         """
         for name, values in vars(part).items():
             getattr(self, name)[which] = values
@@ -90,10 +89,6 @@ def moving(limits: Limits) -> tuple[str, ...]:
 def names_of(robot: PointMassRobot, limits: Limits) -> tuple[str, ...]:
     """Names of the bounds along a line.
 
-    Args:
-        robot: the robot.
-        limits: its limits.
-
     Returns:
         such as "cables 3, 4", one for each choice of cables, "max_acceleration", and the limits that depend on how the
         effector moves.
@@ -113,7 +108,6 @@ def by_formula(
         starts: (n, 3) m; at rest.
         ends: (n, 3) m; at rest.
         law: one of `lines.motion.LAWS`.
-        rule: of the S-model.
         max_acceleration: largest size of the acceleration, m/s^2.
 
     Returns:
@@ -136,7 +130,6 @@ def lines_of(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> LineSlac
     """Return the coefficients that slacks along lines depend on.
 
     Args:
-        problem: robot and limits.
         starts: (n, 3) m.
         ends: (n, 3) m, elsewhere.
 
@@ -150,7 +143,6 @@ def by_cells(problem: Problem, starts: np.ndarray, ends: np.ndarray, max_acceler
     """Lower bounds of the duration of any motion along lines, under limits of tensions and cables too.
 
     Args:
-        problem: robot and limits.
         starts: (n, 3) m; at rest.
         ends: (n, 3) m, elsewhere; at rest.
         max_acceleration: largest size of the acceleration, m/s^2.
@@ -168,7 +160,6 @@ def by_search(
     """Least durations along straight lines under any limits, of spools in any layout.
 
     Args:
-        problem: robot and limits.
         starts: (n, 3) m; at rest.
         ends: (n, 3) m, elsewhere; at rest.
         found: of `by_formula`.

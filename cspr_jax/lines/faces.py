@@ -61,9 +61,6 @@ class LineFaces:
 def in_one_plane(robot: PointMassRobot) -> bool:
     """Tell whether the spools lie in one plane, those of a planar robot on one line.
 
-    Args:
-        robot: the robot; NumPy leaves.
-
     Returns:
         the claim.
     """
@@ -165,7 +162,6 @@ def sides(faces: LineFaces, largest: Array) -> Sides:
     """Bounds of the path acceleration; the last one of each side is that of the largest acceleration.
 
     Args:
-        faces: of a line.
         largest: () largest size of s'', inf for none, 1/s^2.
 
     Returns:

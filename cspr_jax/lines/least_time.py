@@ -59,7 +59,6 @@ def least_times(
         starts: (n, 3) m; at rest.
         ends: (n, 3) m; at rest.
         law: one of `lines.motion.LAWS`.
-        rule: of the S-model.
         max_acceleration: largest size of the acceleration, m/s^2.
 
     Returns:

@@ -78,7 +78,6 @@ def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
     """Return the coefficients that slacks along a line depend on.
 
     Args:
-        problem: robot and limits.
         start: (3,) from the centroid of the spools, z down, m.
         end: (3,) likewise, elsewhere.
 
@@ -153,7 +152,6 @@ def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> A
 
     Args:
         line: of the line, with leading dimensions of the instants or none.
-        name: of the group.
         at: the instants, (..., 1).
         tensions: of a group of faces, (..., n_faces, n_cables) over the mass: of `tensions_at`, or of `tensions_over`
             for a lower bound.
@@ -188,7 +186,6 @@ def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
     """Tensions within their limits that pull least towards the inside of each face.
 
     Args:
-        line: of the line.
         name: of a group of faces.
         s: (..., 1) path coordinates.
 

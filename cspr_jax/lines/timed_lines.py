@@ -61,11 +61,9 @@ def timed_lines(
     """The fastest motions along straight lines by a law of time, proved.
 
     Args:
-        problem: robot and limits.
         starts: (n, 3) from the centroid of the spools, z down, m; at rest.
         ends: (n, 3) likewise, elsewhere.
         law: one of `lines.motion.LAWS`.
-        rule: of the S-model.
         max_acceleration: largest size of the acceleration, m/s^2.
 
     Returns:
@@ -96,7 +94,6 @@ def motions_of(answers: LineAnswers, starts: np.ndarray, ends: np.ndarray, *, la
     """Motions along straight lines.
 
     Args:
-        answers: of the lines.
         starts: (n, 3) from the centroid of the spools, z down, m.
         ends: (n, 3) likewise.
         law: one of `lines.motion.LAWS`.

@@ -55,8 +55,6 @@ def acceleration_slack(
     Args:
         starts: (n, 3) m.
         ends: (n, 3) m.
-        found: their durations.
-        law: of time.
         max_acceleration: m/s^2.
 
     Returns:
@@ -80,11 +78,9 @@ def verdicts(
     """Verdicts of motions whose durations are known.
 
     Args:
-        problem: robot and limits.
         starts: (n, 3) m.
         ends: (n, 3) m, elsewhere.
         found: finite durations.
-        law: of time.
         max_acceleration: largest size of the acceleration, m/s^2; a motion beyond it is undecided.
         sharp: whether margins are wanted, and not verdicts only.
 
@@ -127,7 +123,6 @@ def limits_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np
     """Limits that rest at either end breaks.
 
     Args:
-        problem: robot and limits.
         starts: (n, 3) m.
         ends: (n, 3) m.
 

@@ -29,8 +29,6 @@ class GridMap(abc.ABC):
     """The map of a sweep, ready to compute tiles; its row in `schema.map_kinds` names its class.
 
     Args:
-        robot_file: the robot.
-        keys: the sweep.
         file: named in errors.
         for_bounds: whether the amplitude function may be "ideal", which is no motion.
 
@@ -87,9 +85,6 @@ class GridMap(abc.ABC):
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse a grid in which no cell can have an answer, as where all targets are out of reach.
-
-        Args:
-            grid: the grid.
 
         Raises:
             ConfigError: what is wrong with all of them.

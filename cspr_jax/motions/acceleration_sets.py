@@ -42,7 +42,6 @@ def verdict(robot: PointMassRobot, faces: Faces, position: Array, acceleration: 
 
     Args:
         robot: a point mass, centred, z down.
-        faces: of that place.
         position: (3,) m.
         acceleration: (3,) m/s^2.
 

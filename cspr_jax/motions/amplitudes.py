@@ -75,7 +75,6 @@ def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array,
     """A and its derivatives with respect to tau.
 
     Args:
-        amplitude: the function.
         tau: (...) normalised time in [0, 1]; at a knot the piece on its right answers.
         order: the highest derivative wanted, at most 5.
 
@@ -103,7 +102,6 @@ def local_bounds(amplitude: Amplitude, middle: Array, radius: Array) -> tuple[Ar
     theorem), and never more than the largest over [0, 1].
 
     Args:
-        amplitude: the function.
         middle: (...) middle of the interval.
         radius: (...) half of its width.
 
@@ -121,7 +119,6 @@ def from_pieces(
     """Amplitude function from its pieces, with its extreme values found.
 
     Args:
-        name: for people.
         knots: (n_pieces - 1,) increasing, inside ]0, 1[.
         origins: (n_pieces,).
         pieces: n_pieces sequences of coefficients, lowest power first.
@@ -228,7 +225,6 @@ def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str
     """The conditions of thesis (2.49) that a function breaks: A(0) = 0, A(1) = 1, A' and A'' zero at both ends.
 
     Args:
-        amplitude: the function.
         free_end: whether A''(1) may be anything: then they are (1.27) and (1.28), of a transition.
 
     Returns:

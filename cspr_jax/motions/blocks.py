@@ -79,7 +79,6 @@ def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tup
     """Parts of an arc along a motion from rest, more of them where it swings farther.
 
     Args:
-        amplitude: A.
         at_cusps: how many where A is 0, and where it is 1; in between linear, beyond as at the nearer one.
         at_middles: likewise halfway between two cusps.
 

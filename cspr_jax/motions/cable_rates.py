@@ -10,9 +10,6 @@ def rates_hold(known: Enclosure, found: Influence, limits: Limits, spools: np.nd
     """Blocks in which every cable of every robot keeps its limits of speed and acceleration: proved.
 
     Args:
-        known: of k blocks.
-        found: of their middles.
-        limits: the limits.
         spools: (k,) largest displacement, m.
 
     Returns:
@@ -61,9 +58,6 @@ def rates_fail(known: Enclosure, found: Influence, limits: Limits, spools: np.nd
     Spools are displaced along their rays, and across them in the way of the velocity or the acceleration.
 
     Args:
-        known: of k blocks.
-        found: of their middles.
-        limits: the limits.
         spools: (k,) displacement, m.
 
     Returns:

@@ -175,7 +175,6 @@ def structure(rays: np.ndarray, arms: np.ndarray, *, is_platform: bool) -> np.nd
     Args:
         rays: (k, n_cables, 3) from spool to attachment point, m.
         arms: (n_cables, 3) m.
-        is_platform: whether moments count.
 
     Returns:
         (k, 6 or 3, n_cables).
@@ -217,9 +216,6 @@ class Influence(NamedTuple):
 
 def influence(known: Enclosure) -> Influence:
     """Influence in the middle of blocks.
-
-    Args:
-        known: of the blocks.
 
     Returns:
         the influence; NaN where the structure matrix is singular.

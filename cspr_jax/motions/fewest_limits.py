@@ -46,7 +46,6 @@ class FewestLimits:
     """Candidates of n motions that break the fewest limits, and the limits that all candidates of a motion break.
 
     Args:
-        count: of motions.
         flags: of the criteria.
     """
 

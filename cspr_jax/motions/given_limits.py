@@ -88,7 +88,6 @@ def check_certain(
     """Refuse an uncertainty where motions are not judged by it.
 
     Args:
-        robot: that moves.
         limits: with an uncertainty, or without.
         families: names of the trajectories; none: no motion of a family.
         in_pairs: whether its cables stand for pairs of cables.
@@ -128,7 +127,6 @@ def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
 
     Args:
         limits: of the six cables; the floor is that of the effector.
-        pairs: the pairs.
 
     Returns:
         the limits, (3,) each.

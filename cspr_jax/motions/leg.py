@@ -14,9 +14,6 @@ from cspr_jax.motions.waypoints import Waypoints
 class Leg(abc.ABC):
     """Consecutive poses of a plan, joined by one family.
 
-    Args:
-        stops: the poses.
-
     Raises:
         ConfigError: poses, or keys of the plan, that the family cannot use.
     """
@@ -31,9 +28,6 @@ class Leg(abc.ABC):
     def check(self, problem: Problem) -> None:  # noqa: B027
         """Refuse poses at which no motion can begin or end; called before z0 is chosen.
 
-        Args:
-            problem: robot, limits and amplitude.
-
         Raises:
             ConfigError: which pose, and why.
         """
@@ -43,7 +37,6 @@ class Leg(abc.ABC):
         """Join the poses.
 
         Args:
-            problem: robot, limits and amplitude.
             z0: depth of P0 below the centroid of the spools, m.
 
         Returns:
@@ -54,7 +47,6 @@ class Leg(abc.ABC):
         """Answers for several depths of P0.
 
         Args:
-            problem: robot, limits and amplitude.
             depths: (n_depths,) m.
 
         Returns:
@@ -64,9 +56,6 @@ class Leg(abc.ABC):
 
     def warnings(self, problem: Problem) -> list[str]:
         """Warnings for the user of the plan.
-
-        Args:
-            problem: robot, limits and amplitude.
 
         Returns:
             one line each.

@@ -16,9 +16,6 @@ from cspr_jax.schema.limits import LIMITS, Limit
 def limits_set(limits: Limits) -> tuple[Limit, ...]:
     """Rows of the limits that are given, in the order of their slacks.
 
-    Args:
-        limits: the limits.
-
     Returns:
         the rows.
     """
@@ -61,7 +58,6 @@ def scales(n_cables: int, weight: Array, z0: Array) -> dict[str, tuple[float, Ar
     """Numbers over which slacks are taken; a quantity that has none is taken over its limit.
 
     Args:
-        n_cables: of the robot.
         weight: () N.
         z0: (...) m.
 
@@ -75,7 +71,6 @@ def slack(row: Limit, limit: Array, value: Array, scale: Mapping[str, tuple[floa
     """Slack of a limit: positive exactly while it is met, and free of units.
 
     Args:
-        row: the limit's.
         limit: (...) its value.
         value: (...) of the quantity.
         scale: of `scales`.

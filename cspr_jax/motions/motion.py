@@ -122,7 +122,6 @@ def inward(frame: Frame, state: State) -> State:
     """State of the axes of a robot file in those of the kernels.
 
     Args:
-        frame: of the robot.
         state: in the axes of the file; leaves (..., 3), (..., 4) or (..., 3, 3).
 
     Returns:
@@ -137,7 +136,6 @@ def outward(frame: Frame, state: State) -> State:
     """State in the axes of a robot file.
 
     Args:
-        frame: of the robot.
         state: from the centroid of the spools, z down; leaves (..., 3), (..., 4) or (..., 3, 3).
 
     Returns:

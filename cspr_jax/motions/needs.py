@@ -60,7 +60,6 @@ def needs(problem: Problem, motion: Motion, samples: int) -> list[Need]:
     """Needs of a motion, one for each criterion; of tensions only where the motion determines them.
 
     Args:
-        problem: robot and limits.
         motion: from the centroid of the spools, z down; one without a finite duration is taken to rest everywhere.
         samples: equidistant instants to begin with, at least three.
 

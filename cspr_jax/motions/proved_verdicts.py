@@ -27,7 +27,6 @@ class Verdicts:
 
         Args:
             which: numbers of the motions.
-            part: theirs.
         """
         for name, values in vars(part).items():
             getattr(self, name)[which] = values
@@ -37,7 +36,6 @@ def plain_slack(name: str, values: np.ndarray) -> np.ndarray:
     """Slack of a limit as it is shown.
 
     Args:
-        name: of the limit.
         values: (...) as it is proved: of speeds 1 - (rate / limit)^2.
 
     Returns:

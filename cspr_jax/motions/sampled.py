@@ -26,7 +26,6 @@ def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400)
     """Answers of motions that are only sampled.
 
     Args:
-        problem: robot, limits and amplitude.
         motions: n of them, from the centroid of the spools, z down.
         samples: intervals between instants; the smallest slacks are then narrowed down.
 

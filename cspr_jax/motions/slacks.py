@@ -27,7 +27,6 @@ def slacks(problem: Problem, motion: Motion, tau: Array) -> Array:
     """Slacks of all criteria at one instant of a motion.
 
     Args:
-        problem: robot, limits and amplitude.
         motion: from the centroid of the spools, z down.
         tau: () normalised time in [0, 1].
 
@@ -48,9 +47,6 @@ def slacks(problem: Problem, motion: Motion, tau: Array) -> Array:
 
 def flags(problem: Problem) -> tuple[Verdict, ...]:
     """Flag that each slack breaks.
-
-    Args:
-        problem: robot, limits and amplitude.
 
     Returns:
         n_slacks flags, in the order of `slacks`.
@@ -84,7 +80,6 @@ def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array
     Its gradient is that of the smallest slack at the instant where it is smallest.
 
     Args:
-        problem: robot, limits and amplitude.
         motion: from the centroid of the spools, z down.
         samples: number of intervals between instants, ends included.
 

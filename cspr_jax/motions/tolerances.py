@@ -73,7 +73,6 @@ def tolerated(
     Args:
         blocks: of n motions, whole motions, each feasible as it is planned.
         arcs: (n,) numbers of arcs.
-        asked: what of all robots.
         enclose: what is known of blocks.
         whole: whether the multiples are wanted as near to each other as can be; else only whether they are below 1.
 

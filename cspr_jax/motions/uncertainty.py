@@ -126,8 +126,6 @@ def deviations(known: Enclosure, found: Influence, spools: np.ndarray, centre: n
     """Largest differences between tensions of robots and the planned ones, at the same instant of a block.
 
     Args:
-        known: of k blocks.
-        found: of their middles.
         spools: (k,) largest displacement, m.
         centre: (k,) likewise of the mass centre, m.
 
@@ -171,13 +169,10 @@ def closer_changes(
     functional y of wrenches whose products with the columns of the other robot's W are at least c_j.
 
     Args:
-        known: of k blocks.
-        found: of their middles.
         spools: (k,) largest displacement, m.
         centre: (k,) likewise of the mass centre, m.
         off: (k, n_cables) of `deviations`, finite.
         least: (k, n_cables) smallest tensions per mass and length, at least 0, 1/s^2.
-        upwards: whether gains are wanted.
 
     Returns:
         the changes; infinite where they would lead below the smallest tensions, or nothing is known, or wanted.
@@ -224,8 +219,6 @@ def holds(known: Enclosure, found: Influence, asked: Requirements, multiple: np.
     """Blocks in which every robot within a multiple of the uncertainty meets everything: proved.
 
     Args:
-        known: of k blocks.
-        found: of their middles.
         asked: its slack is that of each block, (k,).
         multiple: (k,).
 
@@ -298,11 +291,6 @@ class WorstDisplacements(NamedTuple):
 def worst(known: Enclosure, found: Influence, asked: Requirements) -> WorstDisplacements:
     """Robots that are worst to first order.
 
-    Args:
-        known: of k blocks.
-        found: of their middles.
-        asked: the requirements.
-
     Returns:
         the displacements.
     """
@@ -330,9 +318,6 @@ def fails(
     """Blocks in whose middles one of the worst robots within a multiple of the uncertainty breaks something.
 
     Args:
-        known: of k blocks.
-        found: of their middles.
-        worst: of these.
         asked: its slack is that of each block, (k,).
         multiple: (k,).
 
@@ -359,7 +344,6 @@ def tensions(known: Enclosure, spools: np.ndarray, centre: np.ndarray) -> tuple[
     """Tensions of other robots in the middles of blocks.
 
     Args:
-        known: of k blocks.
         spools: (k, n_cables, 3) displacements of the spools, m.
         centre: (k, 3) of the mass centre, m.
 

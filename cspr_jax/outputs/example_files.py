@@ -45,7 +45,6 @@ def copy(names: list[str], place: Path) -> list[Path]:
     """Copy some of them; nothing is overwritten.
 
     Args:
-        names: of them.
         place: folder to copy them to; it is made if absent.
 
     Returns:

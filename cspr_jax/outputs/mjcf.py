@@ -30,7 +30,6 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
     """A model of a robot for MuJoCo.
 
     Args:
-        body: the robot.
         moved: its motion, whose first row is the keyframe.
         step: of the integrator, s.
         control_file: name of the control file, which the model mentions.
@@ -143,7 +142,6 @@ def write_mjcf(plan: PlannedMotions, path: Path, step: float = STEP) -> None:
     """Write a model of a plan's robot, and beside it the control file that plays the plan.
 
     Args:
-        plan: the plan.
         path: of the model, NAME.xml.
         step: the longest step, s.
 

@@ -83,7 +83,6 @@ def rows(plan: PlannedMotions, *, rate: float | None = None) -> dict[str, np.nda
     """States along a plan.
 
     Args:
-        plan: the plan.
         rate: rows per second over the whole plan, Hz, and one at its end; None: `samples` rows per segment, ends
             included.
 
@@ -122,7 +121,6 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
     """States at given instants of the segments of a plan.
 
     Args:
-        plan: the plan.
         taus: of each segment, (n_i,) normalised times in [0, 1].
 
     Returns:
@@ -158,8 +156,6 @@ def write_rows(plan: PlannedMotions, path: Path, *, rate: float | None = None) -
     """Write the motion of a plan to a .csv or .h5 file; that of one that is not feasible says so.
 
     Args:
-        plan: the plan.
-        path: its ending says which.
         rate: rows per second, Hz, or None.
 
     Raises:
@@ -246,9 +242,6 @@ def _write_flight(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
 def flight(plan: PlannedMotions) -> dict[str, np.ndarray]:
     """Flight of the object that a plan releases, and the landings of a sample of throws.
 
-    Args:
-        plan: the plan.
-
     Returns:
         by the names of `schema.motion_quantities.FLIGHT`, in the axes of the robot file; none without a launch.
     """
@@ -267,9 +260,6 @@ def flight(plan: PlannedMotions) -> dict[str, np.ndarray]:
 
 def attributes(plan: PlannedMotions) -> dict[str, Any]:
     """Attributes of a motion file, from its plan.
-
-    Args:
-        plan: the plan.
 
     Returns:
         attributes of the whole file.
@@ -294,9 +284,6 @@ def attributes(plan: PlannedMotions) -> dict[str, Any]:
 
 def segments(plan: PlannedMotions) -> dict[str, np.ndarray]:
     """Quantities of each segment in a motion file.
-
-    Args:
-        plan: the plan.
 
     Returns:
         (n,) each, by the names of `schema.quantities.SEGMENTS`.

@@ -122,9 +122,6 @@ def upward(z_axis: str) -> Frame:
 def suspended(plan: PlannedMotions) -> Suspended:
     """The robot of a plan for MuJoCo.
 
-    Args:
-        plan: the plan.
-
     Returns:
         the robot; of a platform that only translates the platform, which its joints keep from turning as its winches
         do, on all six cables.
@@ -158,7 +155,6 @@ def played(plan: PlannedMotions, step: float = STEP) -> Played:
     """Motion and tensions of a plan, as MuJoCo asks for them.
 
     Args:
-        plan: the plan.
         step: the longest step, s.
 
     Returns:

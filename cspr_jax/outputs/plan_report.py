@@ -18,9 +18,6 @@ DIGITS = 12
 def plan_object(plan: PlannedMotions) -> dict[str, Any]:
     """The object that `cspr plan --json` prints.
 
-    Args:
-        plan: the plan.
-
     Returns:
         plain values; what does not apply, or is not finite, is None.
     """
@@ -47,7 +44,6 @@ def verdict_text(verdict: int, feasible: bool) -> str:
     """A verdict as a plan shows it.
 
     Args:
-        verdict: flags.
         feasible: whether the segment is; a smaller number of arcs may still be undecided.
 
     Returns:
@@ -127,9 +123,6 @@ def _finite(value: Any) -> Any:
 
 def plan_table(plan: PlannedMotions):
     """The plan as a table for a terminal.
-
-    Args:
-        plan: the plan.
 
     Returns:
         a rich table.

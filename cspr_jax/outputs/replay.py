@@ -169,9 +169,6 @@ def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
 def ends_of_steps(moved: Played) -> np.ndarray:
     """Rows of a motion at which steps start or end.
 
-    Args:
-        moved: the motion.
-
     Returns:
         (n,) numbers of rows.
     """
@@ -182,8 +179,6 @@ def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bo
     """Path on which the tensions of a motion take MuJoCo's robot, by its own integrator.
 
     Args:
-        body: the robot.
-        moved: the motion.
         step: the longest step, s.
         by_segment: whether each segment starts as planned, and not only the first.
 
@@ -242,10 +237,6 @@ def _way(moved: Played, coordinates: np.ndarray, axes: Sequence[int]) -> PlayedP
 
 def tension_deviation(body: Suspended, moved: Played) -> np.ndarray:
     """How far the tensions of a motion are from those that MuJoCo's inverse dynamics asks for along its path.
-
-    Args:
-        body: the robot.
-        moved: the motion.
 
     Returns:
         (n, n_cables) at the ends of the steps, N: the least change, in the sum of squares, that supplies the forces.

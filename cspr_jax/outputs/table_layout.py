@@ -59,8 +59,6 @@ def grid(
     """A table for a terminal, one block for each reading of the source.
 
     Args:
-        title: of the table, with its source.
-        cells: its cells.
         transposed: whether rows are printed as columns.
         heads: names of rows and columns that are others in this table, as people read them.
 
@@ -105,10 +103,6 @@ def _text(cell: Cell, cells: list[Cell]) -> Any:
 
 def computed_text(cell: Cell, cells: list[Cell]) -> str:
     """The computed number with the digits of the printed one, or of its column.
-
-    Args:
-        cell: to write.
-        cells: of the same block.
 
     Returns:
         text; `NOTHING` where nothing was found.

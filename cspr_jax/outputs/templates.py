@@ -37,9 +37,6 @@ OWN = {"rule": ("s-curve",)}
 def robot_template(like: str) -> str:
     """A robot file with the values of one of the catalogue.
 
-    Args:
-        like: name of that robot.
-
     Returns:
         TOML.
 
@@ -56,9 +53,6 @@ def robot_template(like: str) -> str:
 
 def sweep_template(kind: str) -> str:
     """A sweep file of a kind of map, with the values of an example.
-
-    Args:
-        kind: name of the kind.
 
     Returns:
         TOML.
@@ -87,9 +81,6 @@ def sweep_template(kind: str) -> str:
 def plan_template(family: str) -> str:
     """A plan file of a trajectory family, with the values of an example.
 
-    Args:
-        family: name of the family.
-
     Returns:
         TOML.
 
@@ -112,7 +103,6 @@ def write_new(path: Path, text: str) -> Path:
 
     Args:
         path: the file, .toml.
-        text: the template.
 
     Returns:
         the path.

@@ -132,9 +132,6 @@ def causes(problem: Problem, frame: Frame, answers: Answers, motions: list[Motio
     """Causes of segments of one family.
 
     Args:
-        problem: robot and limits.
-        frame: of the robot file.
-        answers: of n segments.
         motions: theirs, from the centroid of the spools, z down.
         samples: (n,) equidistant instants to begin with, at least three.
 

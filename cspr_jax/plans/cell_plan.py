@@ -26,7 +26,6 @@ def cell_plan(
         place: coordinates of the cell by axis, SI units.
         values: quantities of the cell; those of `COUNTS` fix the number of arcs where they are positive, beta_hat that
             of the target.
-        samples: rows of its motion.
 
     Returns:
         what a plan file holds; None of a kind of map whose cells are no motions from pose to pose.

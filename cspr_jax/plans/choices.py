@@ -33,7 +33,6 @@ def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
 
     Args:
         problem: robot, limits and amplitude, `Problem` or `Problem`.
-        sequence: the plan's poses.
 
     Returns:
         z0, m.
@@ -171,7 +170,6 @@ def best_amplitude(problem: Any, sequence: PlanLegs, z0: float) -> tuple[Amplitu
 
     Args:
         problem: robot and limits, `Problem` or `Problem`.
-        sequence: the plan's poses.
         z0: m.
 
     Returns:

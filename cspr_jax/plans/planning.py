@@ -124,9 +124,6 @@ class PlannedMotions:
 def plan(path: Path) -> PlannedMotions:
     """Plan the sequence of a plan file.
 
-    Args:
-        path: the file.
-
     Returns:
         the plan, feasible or not.
 
@@ -141,7 +138,6 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     """Plan the sequence of a plan file's content.
 
     Args:
-        keys: the content.
         path: of the file, named in errors.
 
     Returns:

@@ -22,8 +22,6 @@ class PlanLegs:
     """Poses of a plan.
 
     Args:
-        robot_file: the robot.
-        keys: the plan.
         path: named in errors.
 
     Fields:
@@ -52,7 +50,6 @@ class PlanLegs:
         """Feasibility, durations and margins for several depths of P0.
 
         Args:
-            problem: robot, limits and amplitude.
             depths: (n_depths,) m.
 
         Returns:

@@ -76,7 +76,6 @@ def settled(
     """Answers of motions, whether a number of arcs was found or not.
 
     Args:
-        checker: of the robot.
         candidates: one of each of n motions.
         smallest: of these; its checks are completed.
         refused: those of them that only limits refuse.
@@ -185,12 +184,10 @@ def reached(
     """Smallest numbers of arcs of motions, each with several values of beta-hat at its end.
 
     Args:
-        checker: of the robot.
         motions: n of them, one candidate each, with the values at their starts.
         values: (n, n_values) in the order in which they are tried; NaN for none.
         max_arcs: largest number tried.
         same: whether the value at the end holds at the start too.
-        margins: whether they are wanted.
 
     Returns:
         the answers; where there is none, those of the first value, or of that at rest.

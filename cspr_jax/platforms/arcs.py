@@ -113,8 +113,6 @@ def smallest_arcs(
     A few instants refute most motions before they are checked in full.
 
     Args:
-        checker: of the robot.
-        candidates: n of them.
         max_arcs: largest number tried.
         fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
         beyond: how many arcs beyond the smallest one of a motion are tried for its other candidates; -1: the first
@@ -180,8 +178,6 @@ def refused_by_limits(
     """Candidates of motions, none of which is feasible, that only limits refuse.
 
     Args:
-        checker: of the robot.
-        candidates: n of them.
         max_arcs: largest number tried.
         fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
 
@@ -234,7 +230,6 @@ def unavoidable(
     """Criteria that every number of arcs breaks.
 
     Args:
-        checker: of the robot.
         candidates: n of them, one of each motion.
         suspects: (n, n_criteria) criteria that are asked about, which some number of arcs breaks.
         max_arcs: largest number tried.
@@ -262,8 +257,6 @@ def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs:
     """The number of arcs with the largest smallest tension over some samples, where none is feasible.
 
     Args:
-        checker: of the robot.
-        candidates: n of them.
         max_arcs: largest number tried.
 
     Returns:
@@ -286,8 +279,6 @@ def segments_with(robot: PlatformRobot, candidates: Candidates, arcs: np.ndarray
     """The segments for given numbers of arcs.
 
     Args:
-        robot: the robot.
-        candidates: n of them.
         arcs: (n,).
 
     Returns:

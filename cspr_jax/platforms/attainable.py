@@ -37,7 +37,6 @@ def attainable(
     """Smallest numbers of arcs from rest to orientations of places.
 
     Args:
-        checker: of motions from rest.
         places: (n, 3) from the centroid of the spools, z down, m.
         angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
         z0: (n,) m.
@@ -75,7 +74,6 @@ def attained(
     `attainable` says this too, and tells how, and why not; this function takes half of the work.
 
     Args:
-        checker: of motions from rest.
         places: (n, 3) from the centroid of the spools, z down, m.
         angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
         z0: (n,) m.

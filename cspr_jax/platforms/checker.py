@@ -51,7 +51,6 @@ class PlatformChecker(MotionChecker):
 
     Args:
         problem: robot, limits, amplitude.
-        kind: of the motions.
         batch: how many are computed at a time.
 
     Fields:

@@ -12,7 +12,6 @@ def pose_checker(problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: i
 
     Args:
         problem: robot, limits, amplitude.
-        kind: of the motions.
         batch: how many are computed at a time.
 
     Returns:

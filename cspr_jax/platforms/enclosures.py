@@ -229,7 +229,6 @@ class Robustness:
 
     Args:
         problem: robot, limits with an uncertainty, amplitude.
-        kind: of the motions.
         batch: how many blocks are computed at a time.
         count_instants: is told how many were looked at.
     """
@@ -266,7 +265,6 @@ class Robustness:
         Args:
             segments: leaves (n, ...), of the parity of `arcs`.
             arcs: (n,).
-            blocks: of these motions.
 
         Returns:
             the enclosure.

@@ -44,7 +44,6 @@ def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array
     """Tensions at one end of a segment as functions of beta-hat.
 
     Args:
-        robot: the robot.
         position: (3,) from the centroid of the spools, z down, m.
         quaternion: (4,) unit.
         z0: () depth of p0 below the centroid of the spools, m.
@@ -83,7 +82,6 @@ def end_state(robot: PlatformRobot, position: Array, quaternion: Array, z0: Arra
     """State at one end of a segment, of a robot on any number of cables.
 
     Args:
-        robot: the robot.
         position: (3,) from the centroid of the spools, z down, m.
         quaternion: (4,) unit.
         z0: () depth of p0 below the centroid of the spools, m.

@@ -84,10 +84,8 @@ def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: PlatformMoti
     """Table that segments from rest of one number of arcs share.
 
     Args:
-        amplitude: A.
         arcs: () number of arcs, a float.
         tau: (m,) instants.
-        kind: of the motions.
 
     Returns:
         (m, 11): position and acceleration; angle, speed and acceleration of the rotation, of each what is constant and
@@ -131,7 +129,6 @@ def swing(which: Swings, row: Array) -> Swing:
     """The state at one instant.
 
     Args:
-        which: the segments.
         row: (11,) of `rest_table`.
 
     Returns:

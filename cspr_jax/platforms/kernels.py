@@ -23,7 +23,6 @@ def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind
         problem: robot, limits, amplitude.
         items: segments (leaves (n, ...)), arcs (n,), instants (n,).
         pairs: of cables that can meet.
-        kind: of the motions.
 
     Returns:
         n_criteria + 1 times (n,): slacks in the order of `slacks.flags`, infinite where the fast balance has too few

@@ -33,7 +33,6 @@ def narrowed(
     Args:
         values_at: of motions (j,) at instants (j,), (n_criteria, j).
         least: (n_criteria, n) smallest values so far; written into.
-        samples: of n motions.
         wanted: (n,) motions that are asked about.
     """
     place, value, item = low_points(samples, wanted)
@@ -55,7 +54,6 @@ def low_points(samples: Samples, wanted: np.ndarray) -> tuple[np.ndarray, ...]:
     """Samples no larger than their neighbours, where a parabola of twice the bend could reach the smallest value.
 
     Args:
-        samples: of n motions.
         wanted: (n,) motions that are asked about.
 
     Returns:

@@ -55,7 +55,6 @@ def cables_meet(base: np.ndarray, pairs: np.ndarray, found: CablesOfStep) -> np.
     Args:
         base: (n_cables, 3) spools, m.
         pairs: (n_pairs, 2) of cables that can meet.
-        found: of n blocks.
 
     Returns:
         (n,) one of each block, from 0 on; -1: none.
@@ -86,7 +85,6 @@ def cables_hit(sides: np.ndarray, normal: np.ndarray, found: CablesOfStep) -> np
     Args:
         sides: (n_cables, 2, 3) of `interference.contacts`.
         normal: (3,) of it.
-        found: of n blocks.
 
     Returns:
         (n,) one of each block, from 0 on; -1: none.

@@ -52,7 +52,6 @@ class PlatformChecks:
 
         Args:
             which: (m,) their places.
-            others: of m motions.
         """
         for column, new_column in zip(vars(self).values(), vars(others).values(), strict=True):
             column[which] = new_column
@@ -110,7 +109,6 @@ class MotionChecker(abc.ABC):
 
     Args:
         problem: robot, limits, amplitude.
-        kind: of the motions.
         batch: how many are computed at a time.
 
     Fields:
@@ -140,9 +138,6 @@ class MotionChecker(abc.ABC):
 
     def nothing(self, count: int) -> PlatformChecks:
         """Checks to be filled.
-
-        Args:
-            count: of motions.
 
         Returns:
             verdicts 0, the rest NaN.

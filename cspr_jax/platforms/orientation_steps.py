@@ -118,9 +118,6 @@ class OrientationSteps:
     def regular(self, samples: OrientationSamples) -> np.ndarray:
         """Orientations that are not beyond a singularity.
 
-        Args:
-            samples: of n orientations.
-
         Returns:
             (n,).
         """
@@ -130,7 +127,6 @@ class OrientationSteps:
         """Possible steps from one orientation to a neighbouring one.
 
         Args:
-            samples: of all orientations.
             first: (n,) indices.
             last: (n,) indices.
 

@@ -109,7 +109,6 @@ def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Arr
     """The orientation and its first two derivatives in tau, (3.59) to (3.65).
 
     Args:
-        how: the turn.
         amplitude_values: A, A', A'', () each.
         beats: beta, beta', beta'', () each.
 

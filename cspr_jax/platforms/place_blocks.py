@@ -91,7 +91,6 @@ def place_blocks(
         one: () the number 1; see `arithmetic.lanes.stored`.
         items: segments (leaves (n, ...)), arcs (n,), and where blocks start (n,) and stop (n,), with no knot inside.
         pairs: of cables that can meet.
-        kind: of the motions.
         margins: whether all instants and distances between cables are wanted; else these are infinite.
 
     Returns:

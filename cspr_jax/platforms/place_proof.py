@@ -72,7 +72,6 @@ def wires_beside(problem: Problem, items, *, kind: PlatformMotionKind) -> tuple[
     Args:
         problem: robot, limits, amplitude.
         items: segments (leaves (n, ...)), arcs (n,), middles (n,) and how far beside them (n,), of tau.
-        kind: of the motions.
 
     Returns:
         (n, n_cables, 3) from spool to platform, and from platform to spool in platform axes, m.
@@ -89,7 +88,6 @@ class PlaceCertifier:
 
     Args:
         problem: robot, limits, amplitude.
-        kind: of the motions.
         batch: how many blocks are computed at a time.
         count_instants: is told how many were looked at.
 

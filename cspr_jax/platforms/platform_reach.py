@@ -63,7 +63,6 @@ def middle_of(amplitude: Amplitude, tau: Array) -> Middle:
     """The middle of a block.
 
     Args:
-        amplitude: A.
         tau: (n,) no knot.
 
     Returns:
@@ -77,7 +76,6 @@ def instant_beside(middle: Middle, sense: Array, arcs: Array, off: Array) -> Ins
     """Instant beside the middle of a block, by the polynomial piece of the middle.
 
     Args:
-        middle: of the block.
         sense: (n,) +1 (odd) or -1 (even).
         arcs: (n,) number of arcs, a float.
         off: (n,) of tau.
@@ -98,9 +96,7 @@ def reach(
     Args:
         segment: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, a float.
-        middle: of the blocks.
         axes: a and b of the ellipses, (n,) of tau each.
-        kind: of the motions.
 
     Returns:
         the bounds; infinite where there is none.

@@ -122,7 +122,6 @@ def motion(
         amplitude: A; with a variable amplitude its third derivative enters the acceleration.
         arcs: () number of arcs, a float.
         tau: () normalised time in [0, 1].
-        kind: of the motion.
 
     Returns:
         the state, in time.
@@ -149,10 +148,8 @@ def quaternion_at(
 
     Args:
         segment: of the parity of `arcs`.
-        amplitude: A.
         arcs: () number of arcs, a float.
         tau: () normalised time in [0, 1].
-        kind: of the motion.
 
     Returns:
         (4,) unit quaternion; continuous along the segment.

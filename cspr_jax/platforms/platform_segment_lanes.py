@@ -71,7 +71,6 @@ def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> Inst
     """Instant common to segments of the same number of arcs.
 
     Args:
-        amplitude: A.
         sense: (...) +1 (odd) or -1 (even).
         arcs: (...) number of arcs, a float.
         tau: (...) normalised time.
@@ -106,8 +105,6 @@ def state(
     Args:
         segment: leaves (n, ...), of the parity of `arcs`.
         arcs: () or (n,) number of arcs, a float.
-        now: of these arcs.
-        kind: of the motions.
         one: () the number 1 as an argument of what is compiled, where the sine and cosine of a turn about one axis are
             to be stored; see `arithmetic.lanes.stored`.
 

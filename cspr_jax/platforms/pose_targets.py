@@ -37,7 +37,6 @@ def start_beta_hat(checker: PlatformChecker, starts: Poses, z0: np.ndarray) -> n
     """Beta-hat at starts beyond P0: the preferred one of (3.91), else that at rest.
 
     Args:
-        checker: of the robot.
         starts: positions (n, 3) and quaternions (n, 4), from the centroid of the spools, z down.
         z0: (n,) m.
 
@@ -61,7 +60,6 @@ def pose_arcs(
     """Smallest number of arcs of each motion.
 
     Args:
-        checker: of the robot.
         motions: n of them, one candidate each, with the values of beta-hat at their starts.
         beta_hat: at the ends: a number, "preferred" (3.91), or None: several are tried, the preferred one first.
         beat: time function of the rotation; None: "beta_ff".

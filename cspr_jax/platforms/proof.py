@@ -81,7 +81,6 @@ class Certifier:
 
     Args:
         problem: robot, limits, amplitude.
-        kind: of the motions.
         batch: how many blocks are computed at a time.
         count_instants: is told how many were looked at.
     """
@@ -153,7 +152,6 @@ class Certifier:
 
         Args:
             order: of the cables, from 0 on, below `ORDERS`.
-            blocks: k of them.
             motions: segments (leaves (n, ...)), arcs (n,), and det J(P0) (n,) by the first order.
             margins: whether the nodes of the normalised determinant are wanted.
             least: whether of the nodes only the smallest values are.
@@ -177,7 +175,6 @@ class Certifier:
         """Ranges of the tensions on blocks.
 
         Args:
-            blocks: k of them.
             segments: leaves (n, ...), of the parity of `arcs`.
             arcs: (n,).
 
@@ -245,7 +242,6 @@ def determinant_at_rest(problem: Problem, segments: PlatformSegment) -> np.ndarr
     """Determinant of the Jacobian J (3.5) in the rest point, with the sign that `wrench_lanes.balance` gives it.
 
     Args:
-        problem: robot.
         segments: leaves (n, ...).
 
     Returns:

@@ -38,11 +38,7 @@ NONE = (LARGEST, -LARGEST)
 
 
 class MarginSieve:
-    """First look at motions by the margins of their tensions, and other limits; see `Sieve`.
-
-    Args:
-        checker: of the motions.
-    """
+    """First look at motions by the margins of their tensions, and other limits; see `Sieve`."""
 
     def __init__(self, checker: "RedundantChecker") -> None:
         """Keep the checker."""
@@ -94,7 +90,6 @@ class RedundantChecker(MotionChecker):
         """Margins, other slacks and distances along motions.
 
         Args:
-            motions: n of them.
             tau: (n, m) when.
 
         Returns:

@@ -38,9 +38,6 @@ class PoseInstants(NamedTuple):
 def other_limits(limits: Limits) -> list[Limit]:
     """Rows of the limits that are given, but for those of the tensions, which are within the margin.
 
-    Args:
-        limits: the limits.
-
     Returns:
         the rows.
     """
@@ -57,7 +54,6 @@ def instants(
         problem: robot, limits, amplitude.
         pairs: (n_pairs, 2) of cables that can meet.
         items: segments (leaves (n, ...)), arcs (n,), instants (n,).
-        kind: of the motions.
 
     Returns:
         the same, n of them.
@@ -92,7 +88,6 @@ def cable_vectors(
         problem: robot, limits, amplitude.
         pairs: (n_pairs, 2) of cables that can meet.
         items: segments (leaves (n, ...)), arcs (n,), instants (n,).
-        kind: of the motions.
 
     Returns:
         (n, n_pairs, 3) m, and (n, n_cables, 3).
@@ -111,7 +106,6 @@ def end_wrenches(robot: PlatformRobot, position: Array, quaternion: Array, z0: A
     """Wrenches at one end of a segment.
 
     Args:
-        robot: the robot.
         position: (3,) from the centroid of the spools, z down, m.
         quaternion: (4,) unit.
         z0: () m.

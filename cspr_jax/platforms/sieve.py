@@ -45,11 +45,9 @@ def smallest_tensions(
 
     Args:
         robot: in its reference axes.
-        amplitude: A.
         arcs: () number of arcs, the same for all, a float.
         tau: (m,) instants.
         segments: leaves (n, ...), of the parity of `arcs`.
-        kind: of the motions.
         single_precision: whether in float32.
 
     Returns:

@@ -56,8 +56,6 @@ def certain_tension(rate: Array, regular: Array, wires: CableLanes, balance: Bal
     Args:
         rate: (n,) lambda of (3.50), 1/s^2.
         regular: (n,) determinant at rest in P0, whose sign must not change.
-        wires: the cables.
-        balance: the tensions.
 
     Returns:
         (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign, infinite
@@ -76,8 +74,6 @@ def lowest_tension(
         robot: in its reference axes.
         segment: leaves (n, ...), of the parity of `arcs`.
         arcs: () or (n,) number of arcs, a float.
-        now: of these arcs.
-        kind: of the motions.
 
     Returns:
         (n,) of `certain_tension`.
@@ -97,8 +93,6 @@ def moving_slacks(
         problem: robot, limits.
         segment: leaves (n, ...), of the parity of `arcs`.
         arcs: () or (n,) number of arcs, a float.
-        now: of these arcs.
-        kind: of the motions.
 
     Returns:
         (n,) each: the taut cables', then those of limits on the motion; infinite where the fast balance has too few
@@ -132,8 +126,6 @@ def still_slacks(problem: Problem, segment: PlatformSegment, here: StateLanes, w
     Args:
         problem: robot, limits.
         segment: leaves (n, ...).
-        here: the state.
-        wires: the cables there.
 
     Returns:
         (n,) each: regular, below the spools, then those of limits on the pose.
@@ -160,9 +152,6 @@ def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
 
 def order(limits: Limits) -> list[int]:
     """Order of the criteria of `slacks.flags` among moving slacks and still ones, one after the other.
-
-    Args:
-        limits: which limits are given.
 
     Returns:
         n_criteria indices.

@@ -25,9 +25,6 @@ from cspr_jax.schema.verdicts import Verdict
 def flags(limits: Limits) -> tuple[Verdict, ...]:
     """The flag that says that a criterion is broken, for each criterion.
 
-    Args:
-        limits: which limits are given.
-
     Returns:
         n_criteria flags.
     """
@@ -39,7 +36,6 @@ def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Ar
 
     Args:
         problem: robot, limits.
-        state: the state.
         z0: () m.
         regular: () determinant at rest in P0.
 

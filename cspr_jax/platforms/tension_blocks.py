@@ -94,7 +94,6 @@ def tension_blocks(
         one: () the number 1; see `arithmetic.lanes.stored`.
         items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start (n,) and stop (n,), with
             no knot inside.
-        kind: of the motions.
         margins: whether the normalised determinant is wanted.
         least: whether of the nodes only the smallest values are.
 
@@ -138,7 +137,6 @@ def tension_ranges(problem: Problem, one: Array, items, *, kind: PlatformMotionK
         one: () the number 1; see `arithmetic.lanes.stored`.
         items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start (n,) and stop (n,), with
             no knot inside.
-        kind: of the motions.
 
     Returns:
         the ranges.

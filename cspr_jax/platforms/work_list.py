@@ -62,7 +62,6 @@ class WorkList:
         """Look at blocks, and at halves of what stays open.
 
         Args:
-            blocks: of the motions.
             look: of blocks that were halved so many times.
 
         Returns:

@@ -68,7 +68,6 @@ def variant(definition: str, amplitude: str) -> str:
     """Settings with which a cell was computed.
 
     Args:
-        definition: of the accessible set.
         amplitude: key of `AMPLITUDES`.
 
     Returns:
@@ -175,7 +174,6 @@ def table_3_3(choice: TableSettings, workers: int = 1) -> dict[Key, float | None
 
     Args:
         choice: definitions, amplitude functions, step.
-        workers: processes.
 
     Returns:
         cells; proportions, volumes (accessible of SO(3), attainable of that) and errors in percent.

@@ -73,7 +73,6 @@ def table_3_4(choice: TableSettings, workers: int = 1) -> dict[Key, float | None
 
     Args:
         choice: definitions, amplitude functions, step.
-        workers: processes.
 
     Returns:
         cells, in percent.

@@ -156,10 +156,6 @@ def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1
 def table_object(name: str, cells: list[Cell]) -> dict[str, Any]:
     """The object that `cspr table --json` prints.
 
-    Args:
-        name: of the table.
-        cells: its cells.
-
     Returns:
         plain values.
     """
@@ -181,10 +177,6 @@ def _variant(text: str) -> dict[str, str]:
 def table_for_people(name: str, cells: list[Cell]) -> Any:
     """The table for a terminal, as printed: published and computed in each cell.
 
-    Args:
-        name: of the table.
-        cells: its cells.
-
     Returns:
         a rich renderable.
     """
@@ -195,7 +187,6 @@ def chosen(name: str, given: dict[str, Any]) -> TableSettings | None:
     """Settings of a table, from the options of the command line.
 
     Args:
-        name: of the table.
         given: values of --definition, --amplitude, --fine, --max-arcs, --values and --workers, None where absent.
 
     Returns:

@@ -21,7 +21,6 @@ def is_same(points: np.ndarray, first: int, second: int) -> bool:
     Args:
         points: (n, 3) m.
         first: number of one, from 0 on.
-        second: of the other.
 
     Returns:
         whether they are nearer to each other than rounding.
@@ -36,7 +35,6 @@ def checked_platform(given, count: int, pattern: Pattern) -> np.ndarray:
     Args:
         given: (n_cables, 3) in platform axes, m.
         count: number of cables.
-        pattern: of the body.
 
     Returns:
         (n_cables, 3) m.
@@ -73,7 +71,6 @@ def checked_centre(given, platform: np.ndarray, pattern: Pattern) -> np.ndarray:
     Args:
         given: (3,) in platform axes, m.
         platform: (n_cables, 3) attachment points, m.
-        pattern: of the body.
 
     Returns:
         (3,) m.

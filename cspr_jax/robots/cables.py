@@ -31,7 +31,6 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
     """A robot with thick cables, or pulleys.
 
     Args:
-        robot: the robot.
         cable_diameter: m; None: 0.
         pulley_radius: () or (n_cables,) m; None: no pulleys.
         pulley_axes: (3,) or (n_cables, 3) swivel axes, in the direction in which the cables enter; None: straight up.
@@ -84,7 +83,6 @@ def shared(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Distribu
     Args:
         robot: z down.
         state: in the robot's axes.
-        limits: of the tensions.
         rule: as for `tensions`.
 
     Returns:
@@ -108,7 +106,6 @@ def cable_motion(robot: AnyRobot, state: State) -> tuple[Array, Array, Array]:
     """Lengths of the cables and their first two derivatives in time.
 
     Args:
-        robot: the robot.
         state: in the robot's axes.
 
     Returns:

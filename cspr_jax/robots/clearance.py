@@ -145,9 +145,6 @@ def scene(
 def attachment_hull(robot: PlatformRobot) -> Hull | None:
     """The convex hull of the points where cables are attached.
 
-    Args:
-        robot: the robot.
-
     Returns:
         the hull, platform axes from the mass centre; None where the points lie in a plane, so that it has no inside.
     """

@@ -136,7 +136,6 @@ def of_cables(points: Points, poses: PoseLanes, pairs: np.ndarray) -> Array:
     """The nearest two cables.
 
     Args:
-        points: of the robot.
         poses: lanes (n,).
         pairs: (n_pairs, 2) cables that can meet.
 
@@ -189,9 +188,7 @@ def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Array:
     """The cable that is the nearest to an obstacle.
 
     Args:
-        points: of the robot.
         poses: lanes (n,).
-        solid: the obstacle.
 
     Returns:
         (n,) complex: distance from the surface less half a diameter, m, and the cable.
@@ -220,7 +217,6 @@ def of_platform(points: Points, poses: PoseLanes, own: Own, leave: Array) -> Arr
     """The cable that is the nearest to its own platform.
 
     Args:
-        points: of the robot.
         poses: lanes (n,).
         own: shape of the platform in its axes.
         leave: () length next to the attachment point that is left out, m.
@@ -254,7 +250,6 @@ def of_body(poses: PoseLanes, own: Own, solid: Ball | Rod) -> Array:
     Args:
         poses: lanes (n,).
         own: shape of the platform in its axes.
-        solid: the obstacle.
 
     Returns:
         (n,) complex: signed distance, m, and 0.
@@ -273,7 +268,6 @@ def of_boxes(poses: PoseLanes, own: Brick, solid: Brick) -> Array:
     Args:
         poses: lanes (n,).
         own: shape of the platform in its axes.
-        solid: the obstacle.
 
     Returns:
         (n,) complex: no larger than the signed distance, with its sign, m, and 0.
@@ -293,7 +287,6 @@ def of_hull_box(poses: PoseLanes, own: Polyhedron, solid: Brick) -> Array:
     Args:
         poses: lanes (n,).
         own: shape of the platform in its axes.
-        solid: the obstacle.
 
     Returns:
         (n,) complex: no larger than the signed distance, with its sign, m, and 0.

@@ -196,7 +196,6 @@ def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
     Args:
         a: start of the segment, m.
         u: from there to its end, m; may be zero.
-        hull: the polyhedron.
 
     Returns:
         (...) m: the distance outside; where the segment enters, minus the depth of the middle of its part inside, from
@@ -298,7 +297,6 @@ def hull_box(hull: Polyhedron, centre: Vector, axes: Sequence[Vector], half: Num
     farthest that it reaches along the line: those to the faces of the sum of both shapes.
 
     Args:
-        hull: the polyhedron.
         centre: of the box, m.
         axes: three unit vectors of the box.
         half: three halves of the lengths of its edges, m.

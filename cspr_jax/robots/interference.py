@@ -34,9 +34,6 @@ def contacts(robot: PlatformRobot) -> Contacts:
 
     The platform is the convex hull of its points, seen along its normal.
 
-    Args:
-        robot: the robot.
-
     Returns:
         the contacts.
     """
@@ -67,7 +64,6 @@ def gaps(robot: PlatformRobot, pairs: Array, position: Array, rotation: Array) -
     """The shortest vectors between cables.
 
     Args:
-        robot: the robot.
         pairs: (n_pairs, 2) indices of cables.
         position: (3,) m.
         rotation: (3, 3).
@@ -123,7 +119,6 @@ def cable_directions(robot: PlatformRobot, position: Array, rotation: Array) -> 
     """The cables as unit vectors from the platform to the spools, in the platform's axes.
 
     Args:
-        robot: the robot.
         position: (3,) m.
         rotation: (3, 3).
 

@@ -18,7 +18,6 @@ def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: CableLanes
     Args:
         base_points: (n_cables, 3) m.
         pairs: indices of cables; known when this is compiled.
-        wires: the cables.
 
     Returns:
         one vector a pair, from its first cable to its second, m.
@@ -85,7 +84,6 @@ def cable_directions(wires: CableLanes, turn: Matrix) -> list[Vector]:
     """The cables from the platform to the spools, in the platform's axes; not of unit length.
 
     Args:
-        wires: the cables.
         turn: rows of the rotation matrix.
 
     Returns:

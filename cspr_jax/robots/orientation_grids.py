@@ -34,9 +34,6 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
     The volume of SO(3) is sin(theta) d phi d theta d sigma / (8 pi^2): the angles are Euler angles ZXZ, and sigma is
     the sum of the outer two.
 
-    Args:
-        divisions: of pi.
-
     Returns:
         the grid; neighbours differ by one step in one angle.
     """
@@ -70,9 +67,6 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
     Cells of equal area on the sphere of tilts (bands of equal cells) times equal torsions: by the metric of SO(3) a
     torsion moves at a right angle to the tilts.
 
-    Args:
-        divisions: of pi.
-
     Returns:
         the grid; neighbours are up to 1.5 steps apart.
     """
@@ -104,7 +98,6 @@ def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, 
     boundary, which lie on it.
 
     Args:
-        divisions: of pi.
         tilt: the largest, in [0, pi], rad.
         torsion: the largest of either sign, in [0, pi], rad.
 
@@ -135,7 +128,6 @@ def turn_grid(divisions: int, turn: float) -> tuple[np.ndarray, np.ndarray]:
     """Turns about y, some pi / divisions apart.
 
     Args:
-        divisions: of pi.
         turn: the largest of either sign, in [0, pi], rad.
 
     Returns:

@@ -135,7 +135,6 @@ def platform_robot(  # noqa: PLR0913
         inertia: (3, 3) about the mass centre, platform axes, kg m^2; symmetric, positive definite, of a real body.
         centre_of_mass: (3,) in platform axes, m.
         gravity: m/s^2, positive.
-        name: for people.
         z_axis: where z points, "down" or "up".
         limits: limits beyond taut cables; None: none.
         pattern: "3R3T", "1R2T", "2R3T" or "3R".
@@ -176,9 +175,6 @@ def platform_robot(  # noqa: PLR0913
 def across_line(robot: PlatformRobot) -> Array:
     """Two axes of a rod, normal to the line of its attachment points and to each other.
 
-    Args:
-        robot: the robot.
-
     Returns:
         (3, 2) unit vectors in platform axes.
     """
@@ -204,7 +200,6 @@ def rays(robot: PlatformRobot, position: Array, rotation: Array) -> tuple[Array,
     """Cables as vectors from spool to platform, (3.1), and their attachment points from the mass centre.
 
     Args:
-        robot: the robot.
         position: (3,) m.
         rotation: (3, 3).
 
@@ -218,10 +213,6 @@ def rays(robot: PlatformRobot, position: Array, rotation: Array) -> tuple[Array,
 def wrench_per_mass(robot: PlatformRobot, state: State) -> Array:
     """Right-hand side of (3.11): what the cables must supply per mass.
 
-    Args:
-        robot: the robot.
-        state: the state.
-
     Returns:
         (6,) p'' - g, m/s^2, and the rate of the angular momentum (3.8) over the mass, m^2/s^2.
     """
@@ -231,9 +222,6 @@ def wrench_per_mass(robot: PlatformRobot, state: State) -> Array:
 
 def pairs_apart(robot: PlatformRobot) -> tuple[tuple[int, int], ...]:
     """Pairs of cables that can meet: those that share neither spool nor platform point.
-
-    Args:
-        robot: the robot.
 
     Returns:
         pairs of indices from 0 on.

@@ -108,7 +108,6 @@ def point_mass_robot(
             than three: that of least squares) is not vertical.
         mass: kg, positive.
         gravity: m/s^2, positive.
-        name: for people.
         z_axis: where z points, "down" or "up".
         limits: limits beyond taut cables; None: none.
 
@@ -140,7 +139,6 @@ def planar_robot(
         base_points: (n_cables, 3) spool points, two or more, y = 0, two of them on a level line; m.
         mass: kg, positive.
         gravity: m/s^2, positive.
-        name: for people.
         z_axis: where z points, "down" or "up".
         limits: limits beyond taut cables; None: none.
 
@@ -177,7 +175,6 @@ def guided_robot(
         base_points: (n_cables, 3) spool points, one or more, m.
         mass: kg, positive.
         gravity: m/s^2, positive.
-        name: for people.
         z_axis: where z points, "down" or "up".
         limits: limits beyond taut cables; None: none.
 
@@ -245,7 +242,6 @@ def pulls(robot: Robot, targets: Array) -> Array:
     """Unit vectors of the cables, from the effector on; with pulleys those of the free cables.
 
     Args:
-        robot: the robot.
         targets: (n_cables, 3) or (1, 3) where the cables are attached, in the axes of the spools, m.
 
     Returns:
@@ -263,7 +259,6 @@ def relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:
     """Acceleration beyond that of free fall, p'' - g.
 
     Args:
-        robot: gives gravity.
         acceleration: (3,) z down, m/s^2.
 
     Returns:
@@ -290,9 +285,6 @@ def check_numbers(mass: float, gravity: float) -> None:
 def check_axis(z_axis: str) -> None:
     """Refuse a z axis that points nowhere.
 
-    Args:
-        z_axis: what was given.
-
     Raises:
         InputError: neither "down" nor "up".
     """
@@ -302,9 +294,6 @@ def check_axis(z_axis: str) -> None:
 
 def is_planar(robot: PointMassRobot) -> bool:
     """Tell whether the robot moves in the plane y = 0.
-
-    Args:
-        robot: the robot.
 
     Returns:
         the claim; known when a function is compiled.

@@ -80,9 +80,6 @@ MOVED = ("2T", "3T", "3R3T")  # patterns that trajectories and searches know; wo
 def check_moved(robot: Robot) -> None:
     """Refuse a robot that no trajectory and no search moves.
 
-    Args:
-        robot: the robot.
-
     Raises:
         InputError: another pattern than 2T, 3T or 3R3T, or pulleys.
     """
@@ -97,9 +94,6 @@ def check_moved(robot: Robot) -> None:
 
 def check_determined(robot: Robot) -> None:
     """Refuse a robot whose motion does not determine its tensions.
-
-    Args:
-        robot: the robot.
 
     Raises:
         InputError: more cables than degrees of freedom, or what `check_moved` refuses.

@@ -42,7 +42,6 @@ def sensitivities(robot: Robot, position: Array, rotation: Array | None = None) 
     """Sensitivities of a robot with as many cables as degrees of freedom, errors of all of them independent.
 
     Args:
-        robot: the robot.
         position: (3,) m.
         rotation: (3, 3) of a platform; None for a point mass.
 

@@ -98,7 +98,6 @@ def sphere(centre, radius: float, *, name: str = "sphere") -> Sphere:
     Args:
         centre: (3,) m.
         radius: m, not negative.
-        name: for people.
 
     Returns:
         the ball.
@@ -116,7 +115,6 @@ def cylinder(start, end, radius: float, *, name: str = "cylinder") -> Cylinder:
         start: (3,) of the axis, m.
         end: (3,) of the axis, m; may be the start.
         radius: m, not negative.
-        name: for people.
 
     Returns:
         the cylinder; it reaches beyond both ends of its axis by its radius.
@@ -134,7 +132,6 @@ def box(centre, size, quaternion=IDENTITY, *, name: str = "box") -> Box:
         centre: (3,) m.
         size: (3,) lengths of its edges, m, not negative.
         quaternion: (4,) its orientation, scalar first.
-        name: for people.
 
     Returns:
         the box.
@@ -156,7 +153,6 @@ def box_between(lowest, highest, *, name: str = "box") -> Box:
     Args:
         lowest: (3,) corner of the least coordinates, m.
         highest: (3,) corner of the largest, m.
-        name: for people.
 
     Returns:
         the box.
@@ -175,7 +171,6 @@ def hull(points, *, name: str = "hull") -> Hull:
 
     Args:
         points: (n, 3) m.
-        name: for people.
 
     Returns:
         the hull.
@@ -222,7 +217,6 @@ def is_within(shape: Body, points: np.ndarray) -> np.ndarray:
     """Tell whether points belong to a shape, its surface included.
 
     Args:
-        shape: the shape.
         points: (n, 3) m.
 
     Returns:

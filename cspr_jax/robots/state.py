@@ -32,9 +32,6 @@ class State(NamedTuple):
 def backwards(state: State) -> State:
     """State of the same motion with time reversed.
 
-    Args:
-        state: of the motion.
-
     Returns:
         the state with velocity and angular velocity of the other sign.
     """

@@ -18,7 +18,6 @@ def slack_at_rest(robot: AnyRobot, limits: Limits) -> str | None:
 
     Args:
         robot: centred; a platform keeps the orientation of its file, on the vertical through the centroid.
-        limits: its tensions are kept.
 
     Returns:
         the reason; None if it can at some of the depths that are tried.

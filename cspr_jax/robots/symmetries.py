@@ -56,7 +56,6 @@ def folded(symmetry: Symmetries, azimuths: np.ndarray) -> np.ndarray:
     """Azimuths that stand for others, at which the robot can do the same.
 
     Args:
-        symmetry: symmetries of the robot.
         azimuths: (n,) directions from the vertical through the centroid, rad.
 
     Returns:
@@ -71,7 +70,6 @@ def alike(symmetry: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.nd
     """Orientations that stand for others: where a place lies on a mirror plane, the plane joins them in pairs.
 
     Args:
-        symmetry: symmetries of the robot.
         places: (n, m) x and y from the vertical through the centroid, and whatever else tells places apart.
         angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad.
 

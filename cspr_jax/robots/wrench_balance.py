@@ -31,7 +31,6 @@ def jacobian(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
     """J of (3.5): cable lengths times their rates, from velocity and angular velocity.
 
     Args:
-        robot: the robot.
         position: (3,) m.
         rotation: (3, 3).
 
@@ -48,7 +47,6 @@ def normalised_determinant(robot: PlatformRobot, position: Array, rotation: Arra
     It is zero where the cables cannot carry every wrench, (3.5); its sign is that of det J.
 
     Args:
-        robot: the robot.
         position: (3,) m.
         rotation: (3, 3).
 
@@ -96,10 +94,6 @@ def determinant_share(robot: PlatformRobot, position: Array, rotation: Array) ->
 def tensions_per_length(robot: PlatformRobot, state: State) -> Array:
     """Tension per mass and length of each cable: mu of (3.11).
 
-    Args:
-        robot: the robot.
-        state: the state.
-
     Returns:
         (6,) in cable order, 1/s^2. Not clipped: a negative entry is a push that a cable cannot give.
 
@@ -114,10 +108,6 @@ def tensions_per_length(robot: PlatformRobot, state: State) -> Array:
 def tensions(robot: PlatformRobot, state: State) -> Array:
     """Cable tensions, (3.10).
 
-    Args:
-        robot: the robot.
-        state: the state.
-
     Returns:
         (6,) in cable order, N; negative where a cable would have to push.
     """
@@ -127,10 +117,6 @@ def tensions(robot: PlatformRobot, state: State) -> Array:
 
 def cable_motion(robot: PlatformRobot, state: State) -> tuple[Array, Array, Array]:
     """Lengths of the cables, (3.2), and their first two derivatives in time, (3.3).
-
-    Args:
-        robot: the robot.
-        state: the state.
 
     Returns:
         lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2.

@@ -49,7 +49,6 @@ def cables(robot: PlatformRobot, position: Vector, turn: Matrix) -> CableLanes:
     """The cables, (3.1).
 
     Args:
-        robot: the robot.
         position: of the mass centre, m.
         turn: rows of the rotation matrix.
 
@@ -68,7 +67,6 @@ def inertial_wrench(
     """Right-hand side of (3.11), per mass.
 
     Args:
-        robot: the robot.
         acceleration: m/s^2.
         turn: rows of the rotation matrix.
         omega: rad/s.
@@ -92,7 +90,6 @@ def balance(wires: CableLanes, force: Vector, moment: Vector) -> Balance:
     """The tensions that give a wrench, (3.11).
 
     Args:
-        wires: the cables.
         force: per mass, m/s^2.
         moment: per mass, m^2/s^2.
 
@@ -125,9 +122,6 @@ def balance(wires: CableLanes, force: Vector, moment: Vector) -> Balance:
 def determinant(wires: CableLanes) -> Array:
     """Determinant of J, (3.5), in three pairs of cables: the volumes of their forces times those of their moments.
 
-    Args:
-        wires: the cables.
-
     Returns:
         (...) m^9.
     """
@@ -146,10 +140,6 @@ def determinant(wires: CableLanes) -> Array:
 def normalised_determinant(robot: PlatformRobot, wires: CableLanes) -> Array:
     """Determinant of J with unit cables and the platform's size as unit; see `wrench_balance.normalised_determinant`.
 
-    Args:
-        robot: the robot.
-        wires: the cables.
-
     Returns:
         (...).
     """
@@ -164,7 +154,6 @@ def cable_rates(
     """Lengths of the cables and their first two derivatives, (3.2) and (3.3).
 
     Args:
-        wires: the cables.
         velocity: of the mass centre, per unit of time.
         acceleration: likewise.
         omega: angular velocity.

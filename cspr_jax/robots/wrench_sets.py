@@ -122,7 +122,6 @@ def spanning(count: int, dof: int) -> np.ndarray:
 
     Args:
         count: number of cables.
-        dof: d.
 
     Returns:
         (n_faces / 2, d - 1) numbers of cables from 0 on; faces of the other sign follow in the same order.
@@ -227,7 +226,6 @@ def tension_range(robot: Robot, limits: Limits) -> tuple[Array, Array]:
 
     Args:
         robot: gives the number of cables.
-        limits: what is given.
 
     Returns:
         (n_cables,) N: 0 where no smallest tension is given; (n_cables,) N: inf where no largest is.

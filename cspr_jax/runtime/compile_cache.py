@@ -40,7 +40,6 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
     """The folder of this run, with all that is known; what it adds is handed over at the end of the process.
 
     Args:
-        folder: where everything is kept.
         warn: called with a line for people, once, where something there is damaged or nothing can be written.
 
     Returns:
@@ -77,7 +76,6 @@ def check_owner(folder: Path, *, may_be_shared: bool = False) -> None:
     """Refuse a folder in which others could place code for us to execute.
 
     Args:
-        folder: that is there.
         may_be_shared: whether all may write there as in /tmp, where nobody can replace a folder of ours.
 
     Raises:
@@ -100,7 +98,6 @@ def plain_bytes(path: Path, most: int = LARGEST_ENTRY) -> bytes:
     """Content of a plain file; nothing that lies in its place, such as a pipe, holds up the reader.
 
     Args:
-        path: the file.
         most: largest size, bytes.
 
     Returns:

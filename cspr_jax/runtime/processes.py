@@ -90,7 +90,6 @@ class Workers:
         """Have a worker call a function.
 
         Args:
-            function: of a module.
             given: what it is called with.
 
         Returns:
@@ -138,7 +137,6 @@ class Spread:
 
         Args:
             function: gives of a list of items one result each; it can be pickled.
-            items: the items.
             sizes: how long each takes, in any unit.
 
         Returns:

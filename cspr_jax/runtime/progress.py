@@ -33,12 +33,7 @@ class Pace:
         self.ends: float | None = None
 
     def told(self, done: int, total: int) -> None:
-        """Take note of a finished tile; the first call says how many cells an earlier run has left.
-
-        Args:
-            done: cells done.
-            total: all cells.
-        """
+        """Take note of a finished tile; the first call says how many cells an earlier run has left."""
         instant = self._clock()
         self._tiles += 1
         if self._tiles == 0:

@@ -106,9 +106,6 @@ def check_threads_of_jax(processes: int = 0) -> None:
 def shortage(error: Exception) -> str | None:
     """Name what the machine lacks, if that is why something failed.
 
-    Args:
-        error: what was raised.
-
     Returns:
         a line; None for any other failure.
     """

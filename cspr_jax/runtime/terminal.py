@@ -35,11 +35,7 @@ codecs.register_error(_PLAINER, _plainer)
 
 
 def encodable(stream: IO[str]) -> None:
-    """Have a stream write whatever is printed: signs that its encoding lacks become plainer ones, or escapes.
-
-    Args:
-        stream: such as standard output.
-    """
+    """Have a stream write whatever is printed: signs that its encoding lacks become plainer ones, or escapes."""
     if isinstance(stream, io.TextIOWrapper):
         stream.reconfigure(errors=_PLAINER)
 
@@ -48,7 +44,6 @@ def plainer(text: str, encoding: str | None) -> str:
     """Text as a stream of an encoding shows it.
 
     Args:
-        text: anything without surrogates.
         encoding: of the stream; None: one that has all signs.
 
     Returns:
@@ -62,7 +57,6 @@ def cell(*lines: object, style: str = "") -> "Text":
 
     Args:
         lines: anything; each becomes one line.
-        style: of rich.
 
     Returns:
         the text.
@@ -77,7 +71,6 @@ def print_table(renderable: Any, file: TextIO) -> None:
 
     Args:
         renderable: a table, a text, or a group of them.
-        file: where it goes.
     """
     from rich.console import Console as Usual
 

@@ -41,9 +41,6 @@ _NO_CHOICES = ("tau", "cable")
 def best_name(axis: str) -> str:
     """The quantity that says which point of an axis is the best one.
 
-    Args:
-        axis: its name.
-
     Returns:
         its name.
     """

@@ -40,7 +40,6 @@ def check_axis(axis: str, known: Sequence[str]) -> None:
     """Refuse an axis of which no best point can be chosen.
 
     Args:
-        axis: its name.
         known: axes that there are.
 
     Raises:
@@ -58,7 +57,6 @@ def best_of(
 
     Args:
         data: (..., n, ...) by names of the table of quantities; further dimensions may follow.
-        name: of the axis.
         points: (n,) of it.
         place: of the axis among the dimensions.
         pictured: quantities that the map is about, the first one first.

@@ -39,9 +39,6 @@ class Family:
     def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.
 
-        Args:
-            pattern: of the robot.
-
         Returns:
             the class.
 
@@ -103,9 +100,6 @@ FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}
 
 def moving(pattern: str) -> list[str]:
     """Names of the families that move a robot.
-
-    Args:
-        pattern: of the robot.
 
     Returns:
         the names.

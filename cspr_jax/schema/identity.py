@@ -48,10 +48,6 @@ def identity(settings: dict[str, Any]) -> str:
 def differences(here: dict[str, Any], there: dict[str, Any]) -> list[str]:
     """Differences between two sets of settings, one phrase a key.
 
-    Args:
-        here: nested settings.
-        there: nested settings.
-
     Returns:
         "key = value here, value there", sorted by key.
     """

@@ -43,7 +43,6 @@ def dataset(
     Args:
         variables: names of dimensions and values by name.
         axes: (n,) coordinates by name.
-        attributes: of the whole dataset.
         settings: of a sweep, on which meanings of numbers may depend; None: unknown.
 
     Returns:
@@ -67,7 +66,6 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
 
     Args:
         arrays: by the names of `schema.quantities.TRAJECTORY` and `SEGMENTS`.
-        attributes: of the whole dataset.
 
     Returns:
         the dataset, over "t" with "axis", "component", "cable" or "couple", and over "segment".

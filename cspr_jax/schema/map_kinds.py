@@ -90,9 +90,6 @@ class MapKind:
     def keys_of(self, quantity: str) -> tuple[str, ...]:
         """Keys without which a quantity is no number.
 
-        Args:
-            quantity: its name.
-
         Returns:
             the keys, of which one must be given; empty where none is needed.
         """
@@ -340,7 +337,6 @@ def register(kind: MapKind, *own: Quantity) -> None:
     """Add a kind of map from outside of the package; a second time changes nothing.
 
     Args:
-        kind: its row.
         own: rows of those of its quantities that are not in the table yet.
 
     Raises:
@@ -369,7 +365,6 @@ def registered(kind: MapKind, *own: Quantity) -> Iterator[None]:
     """Add a kind of map for as long as a block lasts; see `register`.
 
     Args:
-        kind: its row.
         own: rows of its own quantities.
 
     Yields:

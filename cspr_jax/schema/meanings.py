@@ -72,7 +72,6 @@ def meanings_of(quantity: Quantity, settings: Mapping[str, Any] | None) -> tuple
     """Meanings of a quantity's numbers.
 
     Args:
-        quantity: its row.
         settings: of a sweep, as its result has them; None: unknown.
 
     Returns:
@@ -88,7 +87,6 @@ def value_attributes(quantity: Quantity, settings: Mapping[str, Any] | None) -> 
     """The CF attributes that explain a quantity's numbers.
 
     Args:
-        quantity: its row.
         settings: as for `meanings_of`.
 
     Returns:

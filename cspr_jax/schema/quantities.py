@@ -339,9 +339,6 @@ _OWN = frozenset(QUANTITIES)
 def register(quantity: Quantity) -> None:
     """Add a quantity that maps can give, from outside of the package; a second time changes nothing.
 
-    Args:
-        quantity: its row.
-
     Raises:
         InputError: another quantity, or a coordinate, has that name.
     """

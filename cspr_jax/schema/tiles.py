@@ -30,10 +30,6 @@ ORDINARY_COST = CellCost()
 def tile_shape(shape: tuple[int, ...], most: int = LARGEST_TILE) -> tuple[int, ...]:
     """Shape of the tiles of a grid: whole trailing axes as long as they fit, and equal parts of the next one.
 
-    Args:
-        shape: of the grid.
-        most: cells of a tile.
-
     Returns:
         a shape with at most so many cells.
     """
@@ -71,9 +67,6 @@ class Tiling:
     def place(self, index: int) -> tuple[slice, ...]:
         """Place of a tile.
 
-        Args:
-            index: of the tile.
-
         Returns:
             one slice an axis.
         """
@@ -82,9 +75,6 @@ class Tiling:
 
     def extent(self, index: int) -> tuple[int, ...]:
         """Shape of one tile.
-
-        Args:
-            index: of the tile.
 
         Returns:
             its lengths.
@@ -121,9 +111,6 @@ class Grid:
 
     def cells(self, place: tuple[slice, ...]) -> dict[str, np.ndarray]:
         """Coordinates of the cells of a tile.
-
-        Args:
-            place: of the tile.
 
         Returns:
             (n,) for each axis, the last axis fastest.

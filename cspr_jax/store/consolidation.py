@@ -70,9 +70,6 @@ def consolidate(
     """Write the result, read it back, and give it its name.
 
     Args:
-        disk: what to write with.
-        path: final name.
-        layout: of the run.
         grid: its axes and tiles.
         shards: one a tile, in order, verified.
         attributes: of the file; must hold "environment" and "settings".

@@ -29,8 +29,6 @@ class Disk:
 
         Args:
             file: descriptor.
-            data: what to write.
-            offset: where.
 
         Returns:
             how many bytes were written.
@@ -55,20 +53,11 @@ class Disk:
         os.fsync(file)
 
     def replace(self, part: Path, path: Path) -> None:
-        """Rename a file, over another if there is one.
-
-        Args:
-            part: its name.
-            path: its new name.
-        """
+        """Rename a file, over another if there is one."""
         os.replace(part, path)
 
     def sync_folder(self, path: Path) -> None:
-        """Flush the names in a folder to the disk.
-
-        Args:
-            path: the folder.
-        """
+        """Flush the names in a folder to the disk."""
         folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
         try:
             os.fsync(folder)
@@ -76,28 +65,15 @@ class Disk:
             os.close(folder)
 
     def unlink(self, path: Path) -> None:
-        """Remove a file.
-
-        Args:
-            path: its name.
-        """
+        """Remove a file."""
         os.unlink(path)
 
     def make_folder(self, path: Path) -> None:
-        """Make a folder whose parent is there.
-
-        Args:
-            path: its name.
-        """
+        """Make a folder whose parent is there."""
         os.mkdir(path)
 
     def append(self, path: Path, data: bytes) -> None:
-        """Add to the end of a plain file; it is made if absent.
-
-        Args:
-            path: its name.
-            data: what to add.
-        """
+        """Add to the end of a plain file; it is made if absent."""
         file = open_plain(path, os.O_WRONLY | os.O_APPEND)
         try:
             os.write(file, data)
@@ -109,7 +85,6 @@ def open_plain(path: Path, how: int) -> int:
     """Open a file for writing that has no other name, or make it.
 
     Args:
-        path: its name.
         how: flags of `os.open`, besides those that every file has here.
 
     Returns:
@@ -132,9 +107,6 @@ def open_plain(path: Path, how: int) -> int:
 def check_plain(path: Path) -> None:
     """Refuse what `open_plain` refuses, without opening it; a name that is free will do.
 
-    Args:
-        path: the name.
-
     Raises:
         OSError: it is a link, a file with a second name, or no file.
     """
@@ -153,10 +125,7 @@ def write_all(disk: Disk, file: int, data: bytes, offset: int = 0) -> None:
     """Write all of the data, in as many calls as it takes.
 
     Args:
-        disk: what to write with.
         file: descriptor.
-        data: what to write.
-        offset: where.
 
     Raises:
         OSError: the disk refuses.

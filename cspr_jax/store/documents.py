@@ -186,9 +186,6 @@ class Record(Document):
 def plain_json(text: str | bytes) -> Any:
     """JSON of finite numbers that is not nested deeply.
 
-    Args:
-        text: anything.
-
     Returns:
         its value.
 
@@ -214,7 +211,6 @@ def document(kind: type[Known], value: Any, what: str) -> Known:
     """JSON as the document that it must be.
 
     Args:
-        kind: of the document.
         value: from `plain_json`.
         what: its name in errors.
 

@@ -29,9 +29,7 @@ class RunFolder:
     """Names and upkeep of a run directory.
 
     Args:
-        path: the directory.
         name: of the sweep; its result is `name`.h5.
-        disk: what to write with.
     """
 
     def __init__(self, path: Path, name: str, disk: Disk) -> None:
@@ -47,9 +45,6 @@ class RunFolder:
 
     def shard(self, index: int) -> Path:
         """Path of the shard of a tile.
-
-        Args:
-            index: of the tile.
 
         Returns:
             its path.
@@ -189,7 +184,6 @@ class RunFolder:
         """Add a line to log.jsonl, which no decision ever reads.
 
         Args:
-            event: what happened.
             **fields: details.
 
         Raises:

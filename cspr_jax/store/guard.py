@@ -75,10 +75,6 @@ class ReadableDataset(NamedTuple):
 def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, ReadableDataset]:
     """Open the named datasets that a file holds; nothing else of the file is looked at.
 
-    Args:
-        file: open.
-        names: of the datasets.
-
     Returns:
         the datasets by name.
 
@@ -132,8 +128,6 @@ def text(item: h5py.HLObject, name: str, *, largest: int = LARGEST_TEXT) -> str 
     """An attribute that is a text of fixed length.
 
     Args:
-        item: a file or dataset.
-        name: of the attribute.
         largest: bytes.
 
     Returns:
@@ -163,9 +157,6 @@ def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None,
     """An attribute that is a number, or a few.
 
     Args:
-        item: a file or dataset.
-        name: of the attribute.
-        dtype: of NumPy.
         shape: what it must be; None stands for any number up to `MOST_ROWS`.
 
     Returns:

@@ -108,7 +108,6 @@ class Reader:
         """Content of a result, from `store.consolidation.content_of`.
 
         Args:
-            path: the file.
             follow: whether it may be a link to one.
 
         Returns:
@@ -125,10 +124,7 @@ class Reader:
         """A shard, checked in every respect.
 
         Args:
-            path: the file.
-            layout: of the run.
             index: of the tile that it must hold.
-            shape: of the tile.
 
         Returns:
             its content.
@@ -150,9 +146,6 @@ class Reader:
 
     def header(self, path: Path) -> Header:
         """Header of a shard, of whatever run.
-
-        Args:
-            path: the file.
 
         Returns:
             what it says.

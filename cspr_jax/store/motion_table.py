@@ -22,9 +22,6 @@ FEASIBLE = "feasible"
 def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Columns of a table of a motion.
 
-    Args:
-        path: the file.
-
     Returns:
         attributes, and arrays by the names of `schema.motion_quantities.TRAJECTORY`: (n,), or (n, k) of vectors.
 

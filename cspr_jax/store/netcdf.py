@@ -29,10 +29,6 @@ UNREADABLE = (OSError, KeyError, ValueError, RuntimeError, IndexError, TypeError
 def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
     """An HDF5 file that appears under its name only when it is whole.
 
-    Args:
-        path: final name.
-        attributes: of the whole file.
-
     Yields:
         the open file.
 
@@ -47,11 +43,6 @@ def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
 @contextlib.contextmanager
 def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterator[h5py.File]:
     """An HDF5 file in an empty file that is open; it is sealed when HDF5 has closed it.
-
-    Args:
-        disk: what to write with.
-        descriptor: of the empty file.
-        attributes: of the whole file.
 
     Yields:
         the open file.
@@ -85,9 +76,7 @@ def make_datasets(
     Args:
         file: an empty HDF5 file.
         axes: coordinates, in the order of the dimensions.
-        store: names of the quantities.
         dtype: of quantities of kind "float".
-        tile: chunk shape.
         settings: of the sweep, on which meanings of numbers may depend; None: unknown.
     """
     for name, points in axes.items():
@@ -108,13 +97,6 @@ def make_datasets(
 def new_dataset(file: h5py.File, name: str, shape: tuple[int, ...], dtype: str, chunk: tuple[int, ...]) -> h5py.Dataset:
     """An empty dataset, compressed and with checksums.
 
-    Args:
-        file: where.
-        name: its name.
-        shape: its shape.
-        dtype: of NumPy.
-        chunk: shape of its chunks.
-
     Returns:
         the dataset.
     """
@@ -127,7 +109,6 @@ def dtype_of(name: str, dtype: str) -> str:
     """Type of a stored quantity.
 
     Args:
-        name: of the quantity.
         dtype: of those of kind "float".
 
     Returns:
@@ -138,24 +119,14 @@ def dtype_of(name: str, dtype: str) -> str:
 
 
 def describe(data: h5py.Dataset, quantity: Quantity) -> None:
-    """Write units and names beside a dataset.
-
-    Args:
-        data: the dataset.
-        quantity: what it is.
-    """
+    """Write units and names beside a dataset."""
     set_attributes(
         data, {"units": quantity.units, "long_name": quantity.long_name, "description": quantity.description}
     )
 
 
 def set_attributes(item: h5py.HLObject, values: dict[str, Any]) -> None:
-    """Write attributes; text has a fixed length, which is what netCDF does, and lies under HDF5's checksums.
-
-    Args:
-        item: a file or dataset.
-        values: by name.
-    """
+    """Write attributes; text has a fixed length, which is what netCDF does, and lies under HDF5's checksums."""
     for name, value in values.items():
         if isinstance(value, str):
             data = value.encode()
@@ -182,8 +153,6 @@ def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:
     """Room that a run needs at most, its shards and its result together.
 
     Args:
-        shape: of the grid.
-        store: names of the quantities.
         dtype: of quantities of kind "float".
 
     Returns:
@@ -197,9 +166,6 @@ def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:
 def reason(error: BaseException) -> str:
     """The first line of what a library says.
 
-    Args:
-        error: what it raised.
-
     Returns:
         the line, or the error's name where it says nothing.
     """
@@ -208,9 +174,6 @@ def reason(error: BaseException) -> str:
 
 def file_size(path: Path) -> int:
     """Size of a regular file.
-
-    Args:
-        path: the file.
 
     Returns:
         bytes; -1 if it is not a regular file, a link included.

@@ -20,9 +20,6 @@ PART = r"\.(?:[0-9a-f]{12}|\d+)\.part"
 def part_of(path: Path) -> Path:
     """Name under which a file is written until it is whole; nobody can know it beforehand.
 
-    Args:
-        path: its final name.
-
     Returns:
         the name, in the same folder.
     """
@@ -34,8 +31,6 @@ def new_file(disk: Disk, path: Path, *, mode: int = USUAL) -> Iterator[int]:
     """A file that gets its name when the block ends well, and leaves nothing when it does not.
 
     Args:
-        disk: what to write with.
-        path: final name.
         mode: its permissions.
 
     Yields:
@@ -67,9 +62,6 @@ def publish(disk: Disk, path: Path, data: bytes, *, mode: int = USUAL) -> None:
     """Write a small file whole or not at all.
 
     Args:
-        disk: what to write with.
-        path: its name.
-        data: its content.
         mode: its permissions.
 
     Raises:
@@ -81,10 +73,6 @@ def publish(disk: Disk, path: Path, data: bytes, *, mode: int = USUAL) -> None:
 
 def make_folders(disk: Disk, path: Path) -> None:
     """Make a folder and those above it, each named on the disk before the next.
-
-    Args:
-        disk: what to write with.
-        path: the folder.
 
     Raises:
         StoreError: the disk or a folder refuses.
@@ -109,10 +97,6 @@ def make_folders(disk: Disk, path: Path) -> None:
 
 def refusal(path: Path, error: OSError) -> StoreError:
     """Error for a file that cannot be written.
-
-    Args:
-        path: the file.
-        error: the system's.
 
     Returns:
         the error to raise.

@@ -60,13 +60,7 @@ def serve() -> None:
 
 
 def answer(file: Path, words: dict[str, Any], out: BinaryIO) -> None:
-    """Answer one question.
-
-    Args:
-        file: the file.
-        words: the question.
-        out: where the answer goes.
-    """
+    """Answer one question."""
     try:
         _ANSWERS[words["what"]](file, words, out)
     except MemoryError:

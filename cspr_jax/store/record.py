@@ -15,11 +15,6 @@ LARGEST_RECORD = 64 << 20
 def write_record(disk: Disk, path: Path, record: Record) -> None:
     """Write run.json.
 
-    Args:
-        disk: what to write with.
-        path: its name.
-        record: its content.
-
     Raises:
         StoreError: the disk or the folder refuses.
     """
@@ -30,9 +25,6 @@ def write_record(disk: Disk, path: Path, record: Record) -> None:
 
 def read_record(path: Path) -> Record:
     """Read run.json.
-
-    Args:
-        path: its name.
 
     Returns:
         its content.

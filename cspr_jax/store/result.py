@@ -114,9 +114,6 @@ class Result:
     def place(self, index: tuple[int, ...]) -> dict[str, float]:
         """Coordinates of a cell of a map.
 
-        Args:
-            index: of the cell.
-
         Returns:
             by axis, those chosen by `best` included.
         """
@@ -146,9 +143,6 @@ def open_result(path: Path) -> Result:
 
     An HDF5 file may come from anybody: another process reads it, within limits of memory and time, and what it finds
     is checked like a sweep file.
-
-    Args:
-        path: the file.
 
     Returns:
         the result.

@@ -31,10 +31,6 @@ class DamagedError(Exception):
 def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
     """Error for a file that cannot be read.
 
-    Args:
-        path: the file.
-        error: the system's.
-
     Returns:
         the error to raise: damage, or a refusal that may pass.
     """
@@ -46,9 +42,6 @@ def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
 
 def sealed(data: bytes) -> bytes:
     """Data with their seal.
-
-    Args:
-        data: anything.
 
     Returns:
         the data and the line.
@@ -72,7 +65,6 @@ def seal_file(disk: Disk, file: int, size: int) -> None:
     """Seal a file that is open.
 
     Args:
-        disk: what to write with.
         file: descriptor.
         size: of its content, bytes.
 
@@ -86,7 +78,6 @@ def open_regular(path: Path, *, follow: bool = True) -> int:
     """Open a file for reading, and only a file: a pipe would keep its reader waiting.
 
     Args:
-        path: the file.
         follow: whether it may be a link to one, as a user may name it; nothing in a run directory is a link.
 
     Returns:
@@ -116,7 +107,6 @@ def read_regular(path: Path, most: int, *, last: bool = False) -> bytes:
     """Content of a file of a run directory, which is no link.
 
     Args:
-        path: the file.
         most: bytes that it may have.
         last: whether only so many of its last bytes are read, of however many.
 

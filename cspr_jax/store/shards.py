@@ -82,10 +82,6 @@ def digest_of(values: dict[str, np.ndarray]) -> str:
 def encode(layout: Layout, shard: Shard) -> bytes:
     """A shard as bytes; equal shards give equal bytes.
 
-    Args:
-        layout: of the run.
-        shard: its content.
-
     Returns:
         the file's content.
     """
@@ -116,9 +112,7 @@ def decode(
     Args:
         place: the file, or what it holds. HDF5 may fail or hang on one that this process has not written itself:
             `store.isolated` reads it elsewhere.
-        layout: of the run.
         index: of the tile that it must hold.
-        shape: of the tile.
         begun: called with all datasets before they are read.
 
     Returns:

@@ -13,7 +13,6 @@ class DiskFile(io.RawIOBase):
     So the first refusal is kept, everything after it is dropped, and `raise_failure` tells.
 
     Args:
-        disk: what to write with.
         file: descriptor of an empty file.
     """
 

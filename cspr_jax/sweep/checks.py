@@ -30,8 +30,6 @@ def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
     """Refuse a sweep whose keys do not fit its map.
 
     Args:
-        kind: of the map.
-        keys: the sweep.
         path: named in errors.
 
     Raises:
@@ -87,7 +85,6 @@ def is_given(keys: SweepFile, name: str) -> bool:
     """Tell whether a sweep has a key.
 
     Args:
-        keys: the sweep.
         name: dotted.
 
     Returns:
@@ -100,7 +97,6 @@ def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
     """Tell whether a sweep, or its robot, asks for what a key stands for.
 
     Args:
-        keys: the sweep.
         robot: its robot, whose limits hold where the sweep gives none.
         name: dotted; a condition of a workspace as "workspace.conditions.static".
 
@@ -117,12 +113,6 @@ def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
 
 def check_store(kind: MapKind, keys: SweepFile, robot: RobotFile, path: Path) -> None:
     """Refuse to store what the map does not give, or what nobody asks for.
-
-    Args:
-        kind: of the map.
-        keys: the sweep.
-        robot: its robot.
-        path: of the file.
 
     Raises:
         ConfigError: such a quantity.

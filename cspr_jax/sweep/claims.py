@@ -19,11 +19,6 @@ from cspr_jax.sweep.definition import Sweep
 def refuse_other_sweep(sweep: Sweep, folder: RunFolder, reader: Reader) -> None:
     """Refuse a directory that belongs to another sweep.
 
-    Args:
-        sweep: the sweep.
-        folder: the directory.
-        reader: of its files.
-
     Raises:
         RefusedError: with a line for each key that differs.
     """
@@ -46,10 +41,6 @@ def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
 
     A run makes its lock before anything else, so that where it is, a file that is not whole is a damaged one.
 
-    Args:
-        folder: the directory.
-        reader: of its files.
-
     Raises:
         RefusedError: names the file.
     """
@@ -63,11 +54,6 @@ def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
 def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> list[str]:
     """Differences between a sweep and the one that a directory belongs to.
 
-    Args:
-        sweep: the sweep.
-        folder: the directory.
-        settings: of the other one.
-
     Returns:
         a line for each key.
     """
@@ -79,10 +65,7 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
     """Refuse to go on with another program, library or machine than began.
 
     Args:
-        folder: the directory.
-        environment: what computes now.
         accept: whether it may be mixed in.
-        reader: of its files.
 
     Raises:
         RefusedError: with a line for each key that differs.
@@ -102,10 +85,6 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
 def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
     """Refuse a tile of a worker that differs from what the run was begun with.
 
-    Args:
-        expected: environment of the run.
-        actual: of the worker.
-
     Raises:
         RefusedError: with a line for each key that differs.
     """
@@ -118,9 +97,6 @@ def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
 
 def damage(path: Path) -> str | None:
     """Damage of a run.json, in words.
-
-    Args:
-        path: its name.
 
     Returns:
         a phrase, or None where it is whole or absent.
@@ -136,12 +112,6 @@ def damage(path: Path) -> str | None:
 
 def own_record(sweep: Sweep, folder: RunFolder, environment: dict[str, Any], command: tuple[str, ...]) -> Record:
     """The record of a directory that is the sweep's, written if it is not there.
-
-    Args:
-        sweep: the sweep.
-        folder: the directory.
-        environment: what computes.
-        command: words of the command.
 
     Returns:
         the record.
@@ -168,10 +138,6 @@ def _record(path: Path) -> Record | None:
 
 def content_at(path: Path, reader: Reader) -> Content | str:
     """Content of a result in a run directory.
-
-    Args:
-        path: its name.
-        reader: of the directory's files.
 
     Returns:
         what it holds, or what is wrong with it.

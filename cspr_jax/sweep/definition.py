@@ -78,9 +78,6 @@ class Sweep:
 def read_sweep(path: Path) -> Sweep:
     """A sweep file, checked without computing anything.
 
-    Args:
-        path: the file.
-
     Returns:
         the sweep.
 
@@ -97,7 +94,6 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     """A sweep file's parsed content, checked without computing anything.
 
     Args:
-        data: its tables.
         path: of the file, named in errors; paths in it are relative to its folder.
         text: of the file, which a run keeps.
 
@@ -185,7 +181,6 @@ def check_room(sweep: Sweep, directory: Path, done: float) -> None:
     """Refuse a sweep whose files would not fit on the disk.
 
     Args:
-        sweep: the sweep.
         directory: of the run; it need not be there yet.
         done: part of the tiles that are there already.
 
@@ -213,9 +208,6 @@ def _cells_of(counts: dict[str, int]) -> str:
 def run_directory(sweep: Sweep) -> Path:
     """Directory of a sweep's result without -o.
 
-    Args:
-        sweep: the sweep.
-
     Returns:
         results/<sweep>-<first 12 digits of its identity>.
     """
@@ -224,9 +216,6 @@ def run_directory(sweep: Sweep) -> Path:
 
 def attributes(sweep: Sweep) -> dict[str, Any]:
     """Attributes of a result file, from its sweep.
-
-    Args:
-        sweep: the sweep.
 
     Returns:
         attributes of the whole file.

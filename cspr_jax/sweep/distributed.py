@@ -30,7 +30,6 @@ class Scheduler:
     """Tiles on the workers of a scheduler; dask computes the tiles of a lost worker again.
 
     Args:
-        sweep: the sweep.
         address: of the scheduler, such as tcp://host:8786.
         accept_environment_change: whether workers may differ from one another.
         stop: when it is set, nobody waits for workers any longer.
@@ -128,7 +127,6 @@ class Scheduler:
         """Compute tiles in any order.
 
         Args:
-            indices: which ones.
             stop: when it is set, what is in progress is finished and nothing is begun.
 
         Yields:

@@ -76,11 +76,9 @@ class Run:
     """One process's work on a run directory.
 
     Args:
-        sweep: the sweep.
         directory: the run's own folder; made if absent.
         options: how it goes on.
         hooks: what it tells and asks.
-        disk: what writes.
     """
 
     def __init__(
@@ -125,9 +123,6 @@ class Run:
 
     def go(self, executor: Executor) -> Outcome:
         """Compute what is missing and publish the result.
-
-        Args:
-            executor: computes tiles.
 
         Returns:
             what was done.

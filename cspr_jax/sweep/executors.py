@@ -23,11 +23,7 @@ TILES_EACH = 4
 
 
 class ThisProcess:
-    """Tiles one after the other in this process.
-
-    Args:
-        tile_map: what computes one.
-    """
+    """Tiles one after the other in this process."""
 
     def __init__(self, tile_map: TileMap) -> None:
         """Keep the map."""
@@ -45,7 +41,6 @@ class ThisProcess:
         """Compute tiles in order.
 
         Args:
-            indices: which ones.
             stop: when it is set, what is in progress is finished and nothing is begun.
 
         Yields:
@@ -72,9 +67,6 @@ def _take(pickled: bytes) -> None:
 def usual_workers(sweep: Sweep) -> int:
     """Number of processes for a sweep where nobody says how many.
 
-    Args:
-        sweep: the sweep.
-
     Returns:
         the number.
     """
@@ -85,7 +77,6 @@ class Processes:
     """Tiles in several processes of this machine.
 
     Args:
-        sweep: the sweep.
         count: how many processes.
     """
 
@@ -105,7 +96,6 @@ class Processes:
         """Compute tiles in any order; one whose worker died is computed again.
 
         Args:
-            indices: which ones.
             stop: when it is set, what is in progress is finished and nothing is begun.
 
         Yields:

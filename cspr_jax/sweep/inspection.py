@@ -30,9 +30,6 @@ LOG_TAIL = 1 << 16
 def status(directory: Path) -> dict[str, Any]:
     """Progress of a run, from the names in its directory.
 
-    Args:
-        directory: of the run.
-
     Returns:
         plain values: "identity", "tiles", "shards", "quarantined", "unfinished", "result", "last" (of log.jsonl),
         "cells", "cells_done", "cells_per_second" and "seconds_left" (None where nothing tells).
@@ -115,9 +112,6 @@ def _is_read(report: dict[str, Any], path: Path, read: Callable[[], object]) -> 
 
 def result_in(directory: Path) -> Path:
     """The result of a run directory.
-
-    Args:
-        directory: of the run.
 
     Returns:
         its path.

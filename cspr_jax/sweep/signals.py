@@ -47,12 +47,7 @@ class Stop:
         return self.code is not None
 
     def ask(self, number: int, frame: FrameType | None = None) -> None:
-        """Ask to stop; asked again, end the process: whatever was published stays whole.
-
-        Args:
-            number: of the signal.
-            frame: not used.
-        """
+        """Ask to stop; asked again, end the process: whatever was published stays whole."""
         del frame
         if self.code is None:
             self.code = CODES[signal.Signals(number)]
@@ -62,11 +57,7 @@ class Stop:
         self.end(CODES[signal.Signals(number)])
 
     def end(self, code: ExitCode) -> None:
-        """End the process now.
-
-        Args:
-            code: its exit code.
-        """
+        """End the process now."""
         self.at_once()
         signal_name = "SIGTERM: " if code is ExitCode.TERMINATED else ""
         line = f"cspr: {signal_name}stopped at once; finished tiles are kept, run it again to go on\n"

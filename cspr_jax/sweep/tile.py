@@ -22,9 +22,6 @@ NEAR_ZERO = 1e-9
 class TileMap:
     """The map of a sweep, ready to compute its tiles.
 
-    Args:
-        sweep: the sweep.
-
     Raises:
         ConfigError: its robot, amplitude function or limits cannot be used, or nothing in its grid can be reached.
     """
@@ -91,10 +88,6 @@ def _tile_map(pickled: bytes) -> TileMap:
 
 def compute_tile(pickled: bytes, index: int) -> Computed:
     """Compute a tile in a process that may not know the sweep yet.
-
-    Args:
-        pickled: the sweep.
-        index: of the tile.
 
     Returns:
         the tile.

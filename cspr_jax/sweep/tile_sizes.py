@@ -34,10 +34,6 @@ ARCS = 30
 def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
     """Estimate what a cell takes on one core.
 
-    Args:
-        kind: of map.
-        keys: of the sweep.
-
     Returns:
         seconds.
     """
@@ -55,11 +51,6 @@ def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
 
 def tile_cells(kind: MapKind, keys: SweepFile, cells: int) -> int:
     """Choose the largest number of cells of a tile.
-
-    Args:
-        kind: of map.
-        keys: of the sweep.
-        cells: of the whole grid.
 
     Returns:
         at least 1.

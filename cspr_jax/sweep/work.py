@@ -36,7 +36,6 @@ class Executor(Protocol):
         """Compute tiles.
 
         Args:
-            indices: which ones.
             stop: when it is set, what is in progress is finished and nothing is begun.
 
         Yields:

@@ -67,7 +67,6 @@ def minimum_arcs(
     Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
 
     Args:
-        problem: robot, limits and amplitude.
         starts: (n, 3) from the centroid of the spools, z down, m.
         ends: (n, 3) likewise.
         z0: (n,) depth of p0 below the centroid of the spools, m; positive.
@@ -105,7 +104,6 @@ def arcs_and_segments(
     """Smallest number of arcs of each segment, with the segments: `minimum_arcs` in one part.
 
     Args:
-        problem: robot, limits and amplitude.
         starts: (n, 3) from the centroid of the spools, z down, m.
         ends: (n, 3) likewise.
         z0: (n,) depth of p0 below the centroid of the spools, m; positive.

@@ -19,7 +19,6 @@ def blocks(amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int 
     """Edges of blocks, for each number of arcs p: some density (p + 4) blocks, none across a knot.
 
     Args:
-        amplitude: its knots are block edges.
         max_arcs: largest number of arcs.
         density: 1 for a first look.
         least: smallest number of blocks.

@@ -20,9 +20,6 @@ from cspr_jax.swings.slacks import instant, row_bounds, stretch, taut_bounds
 def flags(limits: Limits) -> tuple[Verdict, ...]:
     """The flag that says that a criterion is broken, for each criterion.
 
-    Args:
-        limits: which limits are given.
-
     Returns:
         n_criteria flags.
     """
@@ -34,7 +31,6 @@ def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
 
     Args:
         robot: a point mass on cables.
-        limits: which limits are given.
 
     Returns:
         n_criteria numbers.
@@ -51,7 +47,6 @@ def smooth_slacks(
     Args:
         robot: a point mass on three cables.
         limits: what else must be met.
-        amplitude: A.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
         tau: () normalised time.
@@ -74,7 +69,6 @@ def slacks(
     Args:
         robot: a point mass on three cables.
         limits: what else must be met.
-        amplitude: A.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
         tau: () normalised time.
@@ -100,7 +94,6 @@ def curvatures(
     Args:
         robot: a point mass on three cables.
         limits: what else must be met.
-        amplitude: A.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
         start: () tau.

@@ -64,7 +64,6 @@ def decided(
     """Answers from upper bounds.
 
     Args:
-        problem: robot, limits and amplitude.
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
         upper: (n, max_arcs) upper bounds of the slack of the cables and of the depth, column p - 1 for p arcs; -inf
             where it is out of the question.
@@ -112,7 +111,6 @@ def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
     There the velocity is zero and the acceleration a pendulum's, whatever the number of arcs.
 
     Args:
-        problem: robot, limits and amplitude.
         arcs: any number of arcs of the segments' parity.
         segments: leaves (n, ...).
 

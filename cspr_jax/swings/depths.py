@@ -45,7 +45,6 @@ def conservative_depth(robot: Robot, targets: np.ndarray) -> float:
     not level the condition is quadratic in z0, and can fail for large z0 too, or for all.
 
     Args:
-        robot: any robot.
         targets: (n, 3) from the centroid of the spools, z down, m; below the spools.
 
     Returns:

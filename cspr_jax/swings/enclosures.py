@@ -83,7 +83,6 @@ def enclosure(problem: Problem, segments: Segment, arcs: np.ndarray, blocks: Blo
         problem: robot, limits and amplitude; the robot has as many cables as degrees of freedom.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, 1 or more.
-        blocks: of these motions.
 
     Returns:
         the enclosure.

@@ -38,7 +38,6 @@ def squared_oscillations_at(amplitude: Amplitude, weight: Array, inclination: Ar
     """N_k(v, tau) of (1.44): what keeps one cable taut at one instant, whatever the phase.
 
     Args:
-        amplitude: A.
         weight: () w_k.
         inclination: () v, |v| < 1.
         tau: ().
@@ -232,7 +231,6 @@ def many_oscillations(amplitude: Amplitude, weights: Array) -> Array:
     """Limit of `least_oscillations` on a horizontal transition as the weights grow, (1.55).
 
     Args:
-        amplitude: A.
         weights: (n_cables,) w_k.
 
     Returns:

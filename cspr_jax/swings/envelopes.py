@@ -24,7 +24,6 @@ def lower_envelope(amplitude: Amplitude, weight: Array, inclination: Array, n: A
     """Lower envelope of the normalised pseudotension of one cable at one instant, (1.39); (1.50) for v = 0.
 
     Args:
-        amplitude: A.
         weight: () w_k.
         inclination: () v.
         n: () number of oscillations, a real number.

@@ -172,7 +172,6 @@ def motion(segment: Segment, amplitude: Amplitude, arcs: Array, tau: Array) -> t
 
     Args:
         segment: of the parity of `arcs`.
-        amplitude: A.
         arcs: () number of arcs, a float.
         tau: () normalised time in [0, 1].
 
@@ -239,7 +238,6 @@ def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Array:
     """Left-hand side of (2.55): positive means that enough arcs make the segment feasible.
 
     Args:
-        segment: of either parity.
         amplitude: A; one that overshoots counts with its largest radius.
 
     Returns:
@@ -257,7 +255,6 @@ def limit_of_many_arcs(segment: Segment, amplitude: Amplitude, tau: Array) -> Ar
 
     Args:
         segment: of the parity in question.
-        amplitude: A.
         tau: () normalised time.
 
     Returns:

@@ -108,10 +108,6 @@ CLOSED = {
 def count(row: Limit, n_cables: int) -> int:
     """Number of smooth functions of which the slack of a limit is the smallest.
 
-    Args:
-        row: the limit's.
-        n_cables: of the robot.
-
     Returns:
         one of a height, one a cable, or two a cable for either sign.
     """
@@ -126,7 +122,6 @@ def limit_slacks(
 
     Args:
         robot: a point mass on three cables.
-        limits: the limits.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
         tau: () normalised time.
@@ -169,10 +164,8 @@ def limit_curvatures(
 
     Args:
         robot: a point mass on three cables.
-        limits: the limits.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
-        over: the interval.
         kappa: bounds of the variable part of the pseudotensions over it, leaves (n_cables,).
 
     Returns:
@@ -196,7 +189,6 @@ def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, B
     Args:
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
-        over: the interval.
 
     Returns:
         the bounds, () each: of the distance from P0 and of its first two derivatives, m; of the second derivative and

@@ -151,7 +151,6 @@ def smallest_values(
 
     Args:
         functions: of one instant, in groups.
-        problem: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, 1 or more.
         table: blocks to sample, from `blocks.blocks`.
@@ -173,7 +172,6 @@ def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray
     The smallest sample of every block is refined, so the value does not depend on where the samples lie.
 
     Args:
-        problem: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, 1 or more.
 

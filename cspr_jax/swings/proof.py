@@ -63,7 +63,6 @@ def tolerance(amplitude: Amplitude, segment: Segment, arcs: Array) -> Array:
     error of a slack is measured below a tenth of that (tests).
 
     Args:
-        amplitude: A.
         segment: of the parity of `arcs`.
         arcs: () number of arcs.
 
@@ -78,7 +77,6 @@ def block_bounds(problem: Problem, segments: Segment, arcs: Array, start: Array,
     """Smallest sampled slack, and proved lower bound, of each criterion over one block of each segment.
 
     Args:
-        problem: robot, limits and amplitude.
         segments: leaves (n, ...).
         arcs: (n,).
         start: (n,) tau where each block starts.
@@ -119,7 +117,6 @@ def prove(problem: Problem, segments: Segment, arcs: np.ndarray, *, ignored: np.
     """Decide segments, each with a given number of arcs.
 
     Args:
-        problem: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`; float64.
         arcs: (n,) number of arcs, 1 or more.
         ignored: (n, n_criteria) criteria that do not count; None: all do.
@@ -147,7 +144,6 @@ def is_met_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> 
     """Criteria that no sample of a first look breaks.
 
     Args:
-        problem: robot, limits and amplitude.
         segments: leaves (n, ...), of the parity of `arcs`; float64.
         arcs: (n,) number of arcs, 1 or more.
 

@@ -19,7 +19,6 @@ def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray) 
     """Limits that refuse segments whose cables some number of arcs keeps taut.
 
     Args:
-        problem: robot, limits and amplitude.
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...); none is feasible.
         upper: (n, max_arcs) upper bounds of the slack of the cables and of the depth; -inf where out of the question.
 
@@ -60,7 +59,6 @@ def unavoidable(problem: Problem, parities: dict[int, Segment], upper: np.ndarra
     """Criteria that every number of arcs breaks.
 
     Args:
-        problem: robot, limits and amplitude.
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
         upper: (n, max_arcs) -inf at numbers of arcs that are out of the question.
         suspects: (n, n_criteria) criteria that are asked about, which some number of arcs breaks.

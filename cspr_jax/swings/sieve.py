@@ -37,7 +37,6 @@ def sample_table(amplitude: Amplitude, arcs: np.ndarray, tau: np.ndarray, dtype)
     """Table of what a check needs that does not depend on the points: of the phase pi p tau and of A.
 
     Args:
-        amplitude: A.
         arcs: (n_arcs,) numbers of arcs.
         tau: (n_samples,).
         dtype: of the table.
@@ -55,7 +54,6 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
     """Smallest normalised pseudotension, or depth ratio, over samples, for several numbers of arcs of one parity.
 
     Args:
-        amplitude: A.
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n_arcs,) all odd or all even.
         tau: (n_samples,), a multiple of 4.
@@ -110,7 +108,6 @@ def upper_bounds(amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs:
     """Upper bounds of the margin of segments, for every number of arcs; rounding is allowed for.
 
     Args:
-        amplitude: A.
         even: the segments for even numbers of arcs, leaves (n, ...).
         odd: the segments for odd numbers of arcs, leaves (n, ...).
         max_arcs: largest number of arcs.

@@ -46,7 +46,6 @@ def instant(segment: Segment, amplitude: Amplitude, arcs: Array, tau: Array) -> 
 
     Args:
         segment: of the parity of `arcs`.
-        amplitude: A.
         arcs: () number of arcs, a float.
         tau: () normalised time.
 
@@ -67,7 +66,6 @@ def normalised_pseudotensions(segment: Segment, amplitude: Amplitude, arcs: Arra
 
     Args:
         segment: of the parity of `arcs`.
-        amplitude: A.
         arcs: () number of arcs, a float.
         tau: () normalised time.
 
@@ -81,7 +79,6 @@ def largest_term(amplitude: Amplitude, segment: Segment, arcs: Array) -> Array:
     """Bound of the sum of the sizes of all terms of a normalised pseudotension: the scale of its rounding error.
 
     Args:
-        amplitude: A.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
 
@@ -124,7 +121,6 @@ def stretch(segment: Segment, amplitude: Amplitude, arcs: Array, start: Array, s
 
     Args:
         segment: gives r1 and r2.
-        amplitude: A.
         arcs: () number of arcs, a float.
         start: () tau.
         stop: () tau, larger; no knot between.
@@ -168,7 +164,6 @@ def row_bounds(
     Args:
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
-        over: the interval.
         tilt: (2,).
         pull: (2,), or None for no such term.
         twist: (), or None.
@@ -211,7 +206,6 @@ def taut_bounds(segment: Segment, arcs: Array, over: Stretch) -> Bounds:
     Args:
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
-        over: the interval.
 
     Returns:
         bounds with leaves (n_cables,), in cable order.

@@ -43,9 +43,6 @@ def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: A
 def steady(segment: Segment) -> Segment:
     """The swing of one size that a transition ends in.
 
-    Args:
-        segment: a transition.
-
     Returns:
         the segment between the target and itself, for even numbers of arcs.
     """

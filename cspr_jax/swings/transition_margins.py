@@ -40,7 +40,6 @@ def transition_margins(problem: Problem, segments: Segment, arcs: np.ndarray) ->
     Where both are positive, the slack of the cables stands in both of the first two columns.
 
     Args:
-        problem: robot, limits and amplitude.
         segments: transitions from rest, leaves (n, ...).
         arcs: (n,) even.
 

@@ -68,7 +68,6 @@ def judged(
 
     Args:
         robot: a point mass, centred, z down.
-        faces: of these places.
         positions: (n, 3) m.
         accelerations: (n, 3) m/s^2.
 

@@ -49,7 +49,6 @@ def turned_arms(robot: AnyRobot, quaternion: Vector) -> Vector | None:
     """Arms from the mass centre, or from the joint, to the attachment points.
 
     Args:
-        robot: the robot.
         quaternion: unit quaternion, scalar first, four arrays (n,).
 
     Returns:
@@ -134,9 +133,6 @@ def _columns(
 def scales(robot: AnyRobot) -> np.ndarray:
     """Which components of a wrench are moments.
 
-    Args:
-        robot: the robot.
-
     Returns:
         (dof,).
     """
@@ -179,7 +175,6 @@ def exit_points(robot: AnyRobot, pulleys: Pulleys, positions: Array, quaternions
 
     Args:
         robot: z down.
-        pulleys: of the robot.
         positions: (n, 3) m.
         quaternions: (n, 4).
 

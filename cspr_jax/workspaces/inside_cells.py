@@ -40,7 +40,6 @@ def least_margins(
     """Lower bounds of the tension margin over cells.
 
     Args:
-        cells: the cells.
         tensions: (n, n_cables) at the centres, between the limits, that give the wrench, N.
         wrench: (m,) what the cables must supply, moments over a length, N.
         low: (n_cables,) smallest tensions, at least 0, N.
@@ -63,7 +62,6 @@ def tension_bounds(
     """Bounds of tensions that give a wrench everywhere in cells.
 
     Args:
-        cells: the cells.
         tensions: as for `least_margins`, as what follows.
         wrench: (m,) N.
         low: (n_cables,) N.

@@ -53,7 +53,6 @@ def by_normals(
         every: columns of the wrench matrix, of `geometry.wrench_columns`.
         loss: (n,) their errors over rounding, likewise.
         wrenches: what the cables must supply.
-        asked: limits.
         choices: of `cocircuits.choices_of`.
         measure: "tensions", "capacity" or "closure"; known when this is compiled, as what follows.
         is_bounded: whether all largest tensions are finite.

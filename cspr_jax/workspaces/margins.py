@@ -86,7 +86,6 @@ def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
 
     Args:
         normal: dof components.
-        wrenches: the set.
 
     Returns:
         both (...), in units of the normal times N.
@@ -106,7 +105,6 @@ def bounded_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
     """Bounds of the margin of one cocircuit whose cables all have a largest tension.
 
     Args:
-        pull: the cocircuit.
         most: the largest product that a wrench asks for.
         least: that of the negative.
 
@@ -135,7 +133,6 @@ def free_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
     A component that rounding may have made of a zero frees the upper bound, and does not free the lower one.
 
     Args:
-        pull: the cocircuit.
         most: the largest product that a wrench asks for.
         least: that of the negative.
 
@@ -156,9 +153,6 @@ def free_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
 
 def closure_margin(pull: CocircuitLimits) -> Bounds:
     """Bounds of the margin of wrench closure of one cocircuit.
-
-    Args:
-        pull: the cocircuit.
 
     Returns:
         lower and upper bound of its largest component of the rarer sign, over the largest of all, in [-1, 1]; of

@@ -58,7 +58,6 @@ def are_beyond(
     """Tell whether a wrench is beyond what tensions can give at every position of cells.
 
     Args:
-        cells: the cells.
         normals: (n, m) c at the centres.
         held: (n, m - 1) the cables S; None: none, and c does not move.
         wrenches: (n, m) what the cables must supply, moments over a length, N.
@@ -88,7 +87,6 @@ def are_one_sided(cells: Cells, normals: np.ndarray, held: np.ndarray | None) ->
     """Tell whether cables fail to resist every wrench at every position of cells.
 
     Args:
-        cells: the cells.
         normals: (n, m) c at the centres, with which no other cable has a negative product.
         held: as for `are_beyond`.
 
@@ -113,7 +111,6 @@ def products_of(cells: Cells, normals: np.ndarray, held: np.ndarray | None, wren
     """Products of a normal that moves with the cables that are held.
 
     Args:
-        cells: the cells.
         normals: as for `are_beyond`, as what follows.
         held: (n, m - 1).
         wrenches: (n, m) N.
@@ -173,7 +170,6 @@ def least_slacks(cells: Cells, products: Products, limits: np.ndarray) -> np.nda
     """Lower bounds over cells of what a wrench asks for along c, less what some tensions give.
 
     Args:
-        cells: the cells.
         products: of `products_of`.
         limits: (n, n_cables) the tensions, 0 of cables that are held, N.
 

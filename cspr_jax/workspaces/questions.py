@@ -45,9 +45,6 @@ class Requirement:
 def check_cables(robot: AnyRobot) -> None:
     """Refuse more cables than workspaces can be computed for: their number grows with a power of it.
 
-    Args:
-        robot: the robot.
-
     Raises:
         InputError: of the robot.
     """
@@ -102,7 +99,6 @@ def required_wrenches(
 
     Args:
         robot: centred, z down.
-        frame: of the file.
         points: (k, dof) in the axes of the file, N and N m; None: what holds the weight still.
         box: (dof,) half widths of a box, N and N m; None: there is none.
         ellipsoid: (dof,) semi-axes of an ellipsoid, N and N m; None: there is none.

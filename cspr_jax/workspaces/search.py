@@ -78,9 +78,6 @@ class Poses(NamedTuple):
     def some(self, which: Any) -> "Poses":
         """Some of them.
 
-        Args:
-            which: an index of NumPy.
-
         Returns:
             those.
         """
@@ -218,9 +215,6 @@ class WorkspaceSearch:
     def batch(self, dtype: type) -> int:
         """Length of a batch on a CPU where many poses are asked about.
 
-        Args:
-            dtype: of the numbers.
-
         Returns:
             a power of two.
         """
@@ -231,7 +225,6 @@ class WorkspaceSearch:
         """Compiled margins of a batch of poses.
 
         Args:
-            dtype: of the numbers.
             by_null_space: whether by the null space, which only some robots and questions take.
 
         Returns:

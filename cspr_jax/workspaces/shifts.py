@@ -73,9 +73,6 @@ class Shifts(NamedTuple):
     def near_platform(self, around: Scene) -> np.ndarray:
         """How far positive distances of cables from their own platform fall.
 
-        Args:
-            around: the scene.
-
         Returns:
             (n,) m.
         """

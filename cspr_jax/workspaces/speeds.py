@@ -56,9 +56,6 @@ class CableSpeeds:
     def changes(self, moved: Shifts) -> np.ndarray:
         """How far `margins` change within cells at most.
 
-        Args:
-            moved: of the cells.
-
         Returns:
             (n, n_cables) m/s.
         """

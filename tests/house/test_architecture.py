@@ -241,13 +241,18 @@ def _answers(node: ast.AST) -> bool:
     return any(_answers(child) for child in inner)
 
 
+# Types whose values have shapes or units.
+NUMBERS = re.compile(r"\b(Array|ndarray|ArrayLike|float)\b")
+
+
 def _missing_parts(function: ast.FunctionDef, is_method: bool) -> list[str]:
-    """Sections and parameters that a Google-style docstring lacks."""
+    """Sections, and parameters with shapes or units, that a Google-style docstring lacks."""
     text = ast.get_docstring(function) or ""
     if is_method and re.fullmatch(r".*; see `\w+\.\w+`\.", text):
         return []  # what it overrides says it
     given = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs][is_method:]
-    missing = [arg.arg for arg in given if not re.search(rf"^Args:\n(.*\n)*? +{arg.arg}: ", text, re.M)]
+    numbers = [arg.arg for arg in given if arg.annotation and NUMBERS.search(ast.unparse(arg.annotation))]
+    missing = [name for name in numbers if not re.search(rf"^Args:\n(.*\n)*? +{name}: ", text, re.M)]
     is_property = any(ast.unparse(d).endswith("property") for d in function.decorator_list)
     if _answers(function) and not is_property and not re.search(r"^(Returns|Yields):", text, re.M):
         missing.append("Returns")

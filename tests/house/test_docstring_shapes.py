@@ -242,7 +242,7 @@ def traced(function, examples: dict, sizes: Sizes):
     """What a function returns of arguments as its docstring describes them."""
     texts, kinds, given = entries(function, "Args"), typing.get_type_hints(function), {}
     for name, parameter in inspect.signature(function).parameters.items():
-        given[name] = argument(kinds.get(name, parameter.empty), texts[name], parameter, examples, sizes)
+        given[name] = argument(kinds.get(name, parameter.empty), texts.get(name, ""), parameter, examples, sizes)
     static = {name: value for name, value in given.items() if is_static(value)}
     rest = {name: value for name, value in given.items() if name not in static}
     return jax.eval_shape(lambda rest: function(**static, **rest), rest)

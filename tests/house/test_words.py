@@ -62,3 +62,42 @@ def test_a_class_name_is_bound_once():
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(name)
     assert {name: where for name, where in places.items() if len(where) > 1} == {}
+
+
+ARTICLES = {"a", "an", "and", "as", "at", "be", "by", "for", "from", "in", "is", "it", "its", "of", "on", "or", "that"}
+ARTICLES |= {"the", "their", "this", "to", "which", "with", "are"}
+
+
+def words(text):
+    """Words of a text or a name, without plural endings."""
+    spaced = re.sub(r"([A-Z])", r" \1", text).lower()
+    return {word.rstrip("s") for word in re.findall("[a-z]+", spaced)}
+
+
+def arguments(tree):
+    """Name, text and type of each entry of an `Args:` section, and what else its docstring says first."""
+    for node in ast.walk(tree):
+        text = ast.get_docstring(node) if isinstance(node, ast.FunctionDef | ast.ClassDef) else None
+        section = re.search(r"^Args:\n((?: .*\n?)+)", text or "", re.M)
+        if not section:
+            continue
+        functions = sorted(
+            (f for f in ast.walk(node) if isinstance(f, ast.FunctionDef)), key=lambda f: f.name != "__init__"
+        )
+        parameters = ast.walk(functions[0].args) if functions else ()
+        types = {p.arg: ast.unparse(p.annotation) for p in parameters if isinstance(p, ast.arg) and p.annotation}
+        for name, entry in re.findall(r"^    (\w+): (.*(?:\n     .*)*)", section[1], re.M):
+            yield name, entry, types.get(name, ""), text.splitlines()[0] + node.name
+
+
+def test_arguments_say_what_is_not_said():
+    """An entry says more than its name, its type and the summary do; numbers have shapes and units."""
+    empty = []
+    for module, source in SOURCES.items():
+        for name, entry, kind, summary in arguments(ast.parse(source)):
+            if not kind or "None" in entry or re.search("Array|ndarray|float", kind):
+                continue
+            is_repeated = words(entry) - words(" ".join(ARTICLES)) <= words(name) | words(kind) | words(summary)
+            if is_repeated and re.fullmatch(r"[a-z ]+\.", entry):
+                empty.append(f"{module}: {name}: {entry}")
+    assert empty == []

@@ -29,9 +29,6 @@ LARGEST = 1_000_000  # values of a file
 def read_json(path: Path) -> Body:
     """A robot of a JSON file.
 
-    Args:
-        path: the file.
-
     Returns:
         the body.
 
@@ -43,9 +40,6 @@ def read_json(path: Path) -> Body:
 
 def read_yaml(path: Path) -> Body:
     """A robot of a YAML file.
-
-    Args:
-        path: the file.
 
     Returns:
         the body.

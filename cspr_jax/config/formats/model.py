@@ -99,9 +99,6 @@ def about_centre(tensor: np.ndarray, mass: float, centre: list[float]) -> np.nda
 def robot_keys(body: Body) -> dict[str, Any]:
     """Keys of the robot file that a body becomes.
 
-    Args:
-        body: the body.
-
     Returns:
         plain values, as TOML would give them.
 

@@ -68,9 +68,6 @@ class Imported:
 def format_of(name: str) -> Format | None:
     """The format of a file.
 
-    Args:
-        name: of the file.
-
     Returns:
         its row; None if another program does not write such files.
     """
@@ -79,9 +76,6 @@ def format_of(name: str) -> Format | None:
 
 def parted(reference: str) -> tuple[str, str | None]:
     """File and set of cables that a reference such as "robot_cables.xml#set" names.
-
-    Args:
-        reference: the text.
 
     Returns:
         the name of the file, and that of the set; None: not said.

@@ -29,9 +29,6 @@ _TENSORS = (np.diag([14.0, 0.0, 0.0]), np.diag([2.0, 3.0, 4.0]))  # kg m^2
 def read(path: Path) -> Body:
     """A robot.
 
-    Args:
-        path: the file.
-
     Returns:
         the body.
 

@@ -12,7 +12,6 @@ def robot_text(keys: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
     """Text of a robot file.
 
     Args:
-        keys: of the robot.
         cable_names: named in a comment, if they have any.
 
     Returns:

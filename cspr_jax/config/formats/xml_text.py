@@ -24,9 +24,6 @@ _UTF16 = {
 def read_xml(path: Path) -> Element:
     """Root of an XML file.
 
-    Args:
-        path: the file.
-
     Returns:
         the root. A DOCTYPE that names a file is passed over: that file is not read. The encoding is the one that the
         file declares; without a declaration it is UTF-8, or UTF-16 if the file begins so.
@@ -71,7 +68,6 @@ def child(parent: Element, tag: str, file: object, place: str = "") -> Element:
     """The one element of a kind below another.
 
     Args:
-        parent: the other.
         tag: of the kind, directly below it.
         file: named in errors.
         place: what the parent is, for errors.
@@ -91,9 +87,6 @@ def child(parent: Element, tag: str, file: object, place: str = "") -> Element:
 def text_of(element: Element) -> str:
     """Text of an element.
 
-    Args:
-        element: the element.
-
     Returns:
         its text without spaces around it.
     """
@@ -104,7 +97,6 @@ def number(text: str, file: object, place: str, *, infinite: bool = False) -> fl
     """A number.
 
     Args:
-        text: that says it.
         file: named in errors.
         place: where it stands, for errors.
         infinite: whether it may be infinite.
@@ -129,7 +121,6 @@ def vector(element: Element, file: object, place: str) -> list[float]:
     """A point or a direction.
 
     Args:
-        element: whose text holds it.
         file: named in errors.
         place: where it stands, for errors.
 

@@ -30,9 +30,6 @@ class _Loader(_Base):
 def load(text: str) -> Any:
     """Value of a YAML text.
 
-    Args:
-        text: the text.
-
     Returns:
         plain values; references (*name) share them.
 

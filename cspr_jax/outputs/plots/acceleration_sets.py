@@ -76,7 +76,6 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
     """Feasible accelerations at an instant of a motion.
 
     Args:
-        result: a motion.
         file: its name, for errors.
         at: the instant as "t"; empty: that of the smallest margin.
 

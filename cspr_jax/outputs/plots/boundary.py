@@ -61,8 +61,6 @@ def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Boundary
     """Points of a map of a workspace, and their sides.
 
     Args:
-        result: the map.
-        axes: those that vary.
         index: of the others, which point.
 
     Returns:

@@ -118,11 +118,8 @@ def add_bar(figure: Figure, image, every: list[Axes], scale: Scale, words: str) 
     """The bar that explains the colours.
 
     Args:
-        figure: the picture.
         image: what is coloured.
         every: the panels that it belongs to.
-        scale: of the colours.
-        words: for its label.
     """
     text = f"{words}; {scale.beyond}" if scale.beyond else words
     bar = figure.colorbar(image, ax=every, shrink=0.9, extend=scale.extend, label=text, spacing="uniform")

@@ -58,7 +58,6 @@ def comparison_figure(every: list[Compared], fixed: list[str]) -> Figure:
     """Outlines of workspaces, one a result, in the sections of the first.
 
     Args:
-        every: the results.
         fixed: what is constant, in words.
 
     Returns:

@@ -24,9 +24,6 @@ SETS = {"maximum": "some", "inclusion": "some", "dextrous": "every", "total": "e
 def is_workspace(result: Result) -> bool:
     """Tell whether a result is a map of a workspace with its verdicts.
 
-    Args:
-        result: any.
-
     Returns:
         whether it is.
     """
@@ -36,9 +33,6 @@ def is_workspace(result: Result) -> bool:
 def said(result: Result) -> list[str]:
     """Phrase with which the title of a picture of a map names its conditions.
 
-    Args:
-        result: any map.
-
     Returns:
         the conditions of a workspace, as one phrase; empty of another map.
     """
@@ -47,9 +41,6 @@ def said(result: Result) -> list[str]:
 
 def shown_first(result: Result) -> str:
     """The quantity of a map that a picture shows where nobody says which.
-
-    Args:
-        result: the map.
 
     Returns:
         of a workspace with one margin that margin, with several the verdict, which alone counts all conditions; else
@@ -66,10 +57,6 @@ def shown_first(result: Result) -> str:
 def is_margin(result: Result, name: str) -> bool:
     """Tell whether a quantity is the margin of one condition of a workspace, positive inside.
 
-    Args:
-        result: any map.
-        name: of the quantity.
-
     Returns:
         whether it is.
     """
@@ -78,10 +65,6 @@ def is_margin(result: Result, name: str) -> bool:
 
 def excluded(result: Result, name: str) -> np.ndarray:
     """Cells that a margin of a workspace counts as inside, but other conditions exclude.
-
-    Args:
-        result: the map.
-        name: of the quantity.
 
     Returns:
         whether a cell is such a one, as the quantity; nowhere if it is no margin of a workspace.
@@ -94,9 +77,6 @@ def excluded(result: Result, name: str) -> np.ndarray:
 
 def conditions(result: Result) -> str:
     """Conditions that the poses of a map of a workspace have to meet.
-
-    Args:
-        result: the map.
 
     Returns:
         the conditions with their numbers, and the orientations that they are asked of if the map says which.

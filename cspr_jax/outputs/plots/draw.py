@@ -57,7 +57,6 @@ def drawn(
 
     Args:
         results: of `cspr run`, or motions of `cspr plan -o`.
-        names: of their files.
         quantity: which one of a map; None: the one that its kind of map is about. Of a motion a
             name of `motion_pictures.MOTION_PICTURES`; None: its path and tensions.
         at: fixed values of axes, within their ranges; the nearest point is taken.

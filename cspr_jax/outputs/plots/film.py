@@ -49,7 +49,6 @@ def film(
 
     Args:
         ending: of its file, one of `ENDINGS`.
-        title: of the motion.
         columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, in the axes of the robot file.
         robot_file: the robot whose cables have these tensions.
         keys: the plan, for the limits.
@@ -180,11 +179,7 @@ class _Picture:
         self._clock = panel.annotate("", (0.99, 0.98), xycoords="axes fraction", ha="right", va="top")
 
     def show(self, number: int) -> None:
-        """Move everything to a row.
-
-        Args:
-            number: of the picture.
-        """
+        """Move everything to a row."""
         row = self._rows[number]
         robot: Moving = self.robot
         for k, cable in enumerate(self.cables):

@@ -28,7 +28,6 @@ def shortened(text: str, most: int = LONGEST_NAME) -> str:
     """A text from a file, on one line and not too long.
 
     Args:
-        text: anything.
         most: how many letters at most.
 
     Returns:
@@ -47,7 +46,6 @@ def fit(figure: Figure, *, has_title: bool = True, lines: int | None = None) -> 
     Numbers get a real minus sign.
 
     Args:
-        figure: with its final size.
         has_title: whether the title stays; what it says of a doubt stays in any case.
         lines: of the title, at most: 1, or None for as many as it needs.
     """
@@ -70,9 +68,6 @@ def fit(figure: Figure, *, has_title: bool = True, lines: int | None = None) -> 
 
 def with_minus(text: str) -> str:
     """A text whose negative numbers have a minus sign, not a hyphen.
-
-    Args:
-        text: any.
 
     Returns:
         the text.
@@ -142,10 +137,7 @@ def legend_above(panel: Axes, columns: int, handles: list | None = None, words: 
     """A legend above a panel, at its right; `fit` breaks it into lines.
 
     Args:
-        panel: whose.
-        columns: entries side by side.
         handles: of the entries; None: those of the panel.
-        words: of the entries.
 
     Returns:
         the legend.

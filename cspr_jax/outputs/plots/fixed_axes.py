@@ -13,7 +13,6 @@ def table(settings: object, key: str) -> dict:
 
     Args:
         settings: of a result, or a table in them.
-        key: its name.
 
     Returns:
         the table; empty if there is none.
@@ -25,9 +24,6 @@ def table(settings: object, key: str) -> dict:
 def start(result: Result) -> dict[str, float]:
     """Start of all segments of a map, if it is one place.
 
-    Args:
-        result: a map.
-
     Returns:
         its coordinates; empty if it is none.
     """
@@ -38,10 +34,6 @@ def start(result: Result) -> dict[str, float]:
 
 def starts_at_rest(result: Result, name: str) -> bool:
     """Tell whether a quantity belongs to motions that start at rest.
-
-    Args:
-        result: a map.
-        name: of the quantity.
 
     Returns:
         whether it does.
@@ -56,7 +48,6 @@ def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[
     """Constants of a picture of a map, in words.
 
     Args:
-        result: the map.
         name: of the quantity; empty where the picture shows several.
         fixed: what was fixed for the picture, in words.
         used: axes that the picture shows, or of which `fixed` speaks.
@@ -89,10 +80,6 @@ def _best(result: Result, axis: str) -> str:
 
 def first_of(result: Result, axis: str) -> str:
     """A coordinate that the picture shows because nobody chose another one.
-
-    Args:
-        result: the map.
-        axis: its name.
 
     Returns:
         its value, and of how many points it is the first.

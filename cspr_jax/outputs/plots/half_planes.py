@@ -61,7 +61,6 @@ def section(plane: Plane, normals: np.ndarray, offsets: np.ndarray, window: Wind
     """The section of a set whose points keep `normals @ point >= offsets`.
 
     Args:
-        plane: of the section.
         normals: (n, 3).
         offsets: (n,); -inf of what bounds nothing.
         window: what is seen of the plane.

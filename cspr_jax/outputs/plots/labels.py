@@ -58,9 +58,6 @@ def cable_names(columns: Mapping[str, np.ndarray]) -> list[str]:
 def robot_name(result: Result) -> str:
     """The robot, as a title names it.
 
-    Args:
-        result: any result.
-
     Returns:
         its name, shortened.
     """
@@ -72,7 +69,6 @@ def heading(result: Result, name: str) -> str:
 
     Args:
         result: gives the robot and the long name.
-        name: of the quantity.
 
     Returns:
         both, shortened.
@@ -85,7 +81,6 @@ def label(result: Result, name: str) -> str:
 
     Args:
         result: gives its long name and unit.
-        name: of the quantity.
 
     Returns:
         the words, with the unit if it has one.
@@ -95,10 +90,6 @@ def label(result: Result, name: str) -> str:
 
 def axis_label(result: Result, axis: str) -> str:
     """A coordinate for an axis.
-
-    Args:
-        result: gives its unit.
-        axis: its name.
 
     Returns:
         the words, with the unit if it has one.
@@ -128,10 +119,6 @@ def unit(result: Result, name: str) -> str:
 
 def is_angle(result: Result, name: str) -> bool:
     """Tell whether an axis or a quantity is an angle, in radians in the file and in degrees in pictures.
-
-    Args:
-        result: gives its unit.
-        name: of the axis or the quantity.
 
     Returns:
         whether it is one.
@@ -169,8 +156,6 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
     """A coordinate with its value.
 
     Args:
-        result: gives its unit.
-        axis: its name.
         point: the value, as in the file.
         digits: significant.
 
@@ -193,8 +178,6 @@ def values(result: Result, axis: str, points: np.ndarray) -> list[str]:
     """Coordinates with their values, in as few digits as tell them apart, but three.
 
     Args:
-        result: gives the unit.
-        axis: its name.
         points: (n,) values, as in the file.
 
     Returns:
@@ -212,7 +195,6 @@ def chosen(count: int, most: int) -> np.ndarray:
     """Evenly chosen points of many.
 
     Args:
-        count: of the points.
         most: how many at most.
 
     Returns:

@@ -20,9 +20,6 @@ LEAST_WIDTH = 1.6
 def columns_of(count: int) -> int:
     """Number of panels side by side in a picture of the width that `in_style` has set.
 
-    Args:
-        count: of all panels.
-
     Returns:
         at most three and what the width has room for, in a full rectangle where that is possible.
     """
@@ -36,9 +33,7 @@ def panels(
     """Panels with common axes, or common horizontal ones.
 
     Args:
-        figure: where.
         count: how many.
-        polar: whether in polar coordinates.
         same: whether their vertical axes are the same.
 
     Returns:
@@ -62,7 +57,6 @@ def in_degrees(axis: Axis, span: float) -> None:
     """Ticks of an angle, without whole turns.
 
     Args:
-        axis: of a panel.
         span: of its values, degrees.
     """
     step = next((step for step in DEGREES if span <= 7.0 * step), None)
@@ -74,7 +68,6 @@ def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
     """Ticks at whole numbers only.
 
     Args:
-        axis: of a panel.
         none: whether zero means that there is none.
     """
     axis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
@@ -87,7 +80,6 @@ def reach_polar(every: list[Axes], reach: float, unit: str) -> None:
     Args:
         every: polar panels with a common radius.
         reach: the largest radius shown.
-        unit: of the radius.
     """
     step = next((step for step in DEGREES if reach <= 4.5 * step), None)
     even = step is None or unit != "°"

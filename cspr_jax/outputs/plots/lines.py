@@ -55,11 +55,7 @@ def line_figure(
     """Lines over one axis, in one panel or several.
 
     Args:
-        result: gives labels and units.
-        name: of the quantity.
         groups: the lines of each panel, by its title; as in the file.
-        across: the axis.
-        title: of the picture.
         fixed: what is constant, in words.
 
     Returns:
@@ -166,7 +162,6 @@ def names_of(results: list[Result], stems: list[str]) -> list[str]:
     """Names that tell results of one picture apart: their amplitude functions, else robots, else files.
 
     Args:
-        results: the results.
         stems: names of their files, all different.
 
     Returns:
@@ -194,7 +189,6 @@ def overlaid(names: list[str], results: list[tuple[Result, str, PlottedLine]]) -
     """One line a result, over the same axis.
 
     Args:
-        names: of the results.
         results: of each itself, its axis, its line.
 
     Returns:

@@ -44,8 +44,6 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
 
     Args:
         panel: the section, with its cells.
-        result: the map.
-        name: of the quantity.
         across: the two axes of the section.
         place: the other axes, and where the section is.
 
@@ -71,8 +69,6 @@ def marked(result: Result, name: str, across: list[str], over: str, place: dict[
     """Find the sections, among many parallel ones, that contain P0 or the fixed end of the motions.
 
     Args:
-        result: the map.
-        name: of the quantity.
         across: the two axes of a section.
         over: the axis along which the sections lie.
         place: the axes that are the same for all, and where.

@@ -96,10 +96,8 @@ def draw_limits(
     """Limits over time as lines, named in the legend; one far above all values is only named.
 
     Args:
-        panel: over time.
         limits: words and values.
         values: that the panel shows.
-        unit: of both.
         signed: whether a limit bounds both signs.
     """
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
@@ -129,21 +127,13 @@ def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
 
 
 def boundaries(panel: Axes, result: Result) -> None:
-    """Lines between the segments of a motion; files of earlier versions do not say where these are.
-
-    Args:
-        panel: over time.
-        result: the motion.
-    """
+    """Lines between the segments of a motion; files of earlier versions do not say where these are."""
     for time in result.data.get("segment_end", np.empty(0))[:-1][:BOUNDARIES]:
         panel.axvline(time, color="black", linewidth=0.8, alpha=0.35)
 
 
 def doubt(result: Result) -> str:
     """A line that says which segments of a motion are not proved feasible.
-
-    Args:
-        result: the motion.
 
     Returns:
         the line after a line break; empty where all are.

@@ -17,10 +17,6 @@ from cspr_jax.store.result import Result
 def motion_comparison_figure(results: list[Result], files: list[str]) -> Figure:
     """Paths from the side and from above; over time the smallest tension and the largest speed of a cable.
 
-    Args:
-        results: the motions.
-        files: their names.
-
     Returns:
         the figure.
 

@@ -51,7 +51,6 @@ def motion_picture(result: Result, file: str, quantity: str | None, at: dict[str
     """The picture of a motion that is asked for.
 
     Args:
-        result: the motion.
         file: its name, for errors.
         quantity: a name of `MOTION_PICTURES`; None: path and tensions.
         at: the instant, as "t", of a picture that is of one.

@@ -23,9 +23,6 @@ SAME_LENGTH = 1e-6
 def keeps_plan(result: Result) -> bool:
     """Tell whether a motion has its robot and its plan.
 
-    Args:
-        result: the motion.
-
     Returns:
         not of tables read without their plan, and of files of earlier versions.
     """
@@ -36,9 +33,7 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
     """A motion without robot and plan, with those of a plan file.
 
     Args:
-        result: the motion.
         file: its name, for errors.
-        path: of the plan file.
 
     Returns:
         the motion, with the attributes that an HDF5 file keeps.
@@ -87,7 +82,6 @@ def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]
     """Robot and plan of a motion.
 
     Args:
-        result: the motion.
         file: its name, for errors.
         quantity: that is asked for, for errors.
 

@@ -18,9 +18,6 @@ CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
 def obstacles(result: Result) -> list[np.ndarray]:
     """Obstacles of a map of a workspace; all are convex.
 
-    Args:
-        result: any map.
-
     Returns:
         (n, 3) of each, points in the axes of the file whose hull it is, m; none of another map.
     """
@@ -82,7 +79,6 @@ def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[s
 
     Args:
         panel: the section, with its cells.
-        result: the map.
         across: the two axes of the section.
         place: the other axes, and where the section is.
 

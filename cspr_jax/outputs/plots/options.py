@@ -9,11 +9,7 @@ TRAJECTORY, TENSIONS, SUMMARY = "trajectory", "tensions", "summary"
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
-    """Arguments of the command that draws results.
-
-    Args:
-        parser: of that command.
-    """
+    """Arguments of the command that draws results."""
     parser.add_argument("result", type=Path, nargs="+", help="result or run directory, or motion of `cspr plan -o`")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
     parser.add_argument(
@@ -53,11 +49,7 @@ def add_best(parser: argparse.ArgumentParser) -> None:
 
 
 def add_motion_plan(parser: argparse.ArgumentParser) -> None:
-    """The argument of commands that read motions in CSV.
-
-    Args:
-        parser: of the command.
-    """
+    """The argument of commands that read motions in CSV."""
     parser.add_argument(
         "--plan", type=Path, metavar="FILE", help="plan file of a motion in CSV, which keeps neither robot nor limits"
     )

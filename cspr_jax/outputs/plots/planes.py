@@ -14,10 +14,6 @@ OTHERS = (AROUND, ("x", "z"), ("y", "z"), ("radius", "z"))
 def in_order(result: Result, across: Sequence[str]) -> list[str]:
     """Axes that vary, those of the plane first.
 
-    Args:
-        result: the map.
-        across: axes that vary.
-
     Returns:
         the same axes.
     """

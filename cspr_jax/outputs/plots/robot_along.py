@@ -58,7 +58,6 @@ def limits_of(robot_file: RobotFile, asked: PlanFile, quantity: str = "tension")
     """Limits of a quantity, to be drawn beside its values.
 
     Args:
-        robot_file: the robot.
         asked: the plan, whose limits go before the robot's.
         quantity: of `schema.limits.LIMITS`.
 

@@ -34,9 +34,6 @@ class Posed(NamedTuple):
 def robot_of(result: Result) -> RobotFile:
     """The robot of a map.
 
-    Args:
-        result: the map.
-
     Returns:
         it, as its file has it.
     """
@@ -45,9 +42,6 @@ def robot_of(result: Result) -> RobotFile:
 
 def asked(result: Result) -> WorkspaceTable:
     """Requirements of a map of a workspace on its poses.
-
-    Args:
-        result: the map.
 
     Returns:
         its table.
@@ -59,7 +53,6 @@ def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
     """The robot of a map of a workspace, with the origin of the platform frame at a place.
 
     Args:
-        result: the map.
         place: (3,) in the axes of the file, m.
         angles: tilt_azimuth, tilt and torsion, as far as the map has them, rad; `arithmetic.rotations`.
 

@@ -55,7 +55,6 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
 
     Args:
         result: gives axes, labels and constants.
-        section: what to show.
         data: (n_first, n_second, n_panels).
         told: of data's shape, the cells that say more than that there is nothing; None: all.
 
@@ -159,7 +158,6 @@ def tells(name: str, data: np.ndarray) -> np.ndarray:
     """Cells that say more than that there is nothing: most of all orientations are none that a robot can take.
 
     Args:
-        name: of the quantity.
         data: it.
 
     Returns:

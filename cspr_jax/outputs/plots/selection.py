@@ -61,8 +61,6 @@ def nearest(result: Result, axis: str, wanted: float, option: str = "--at") -> t
     """The point of an axis that is drawn where a value is asked for.
 
     Args:
-        result: a map.
-        axis: its name.
         wanted: the value.
         option: that gave it, for errors.
 

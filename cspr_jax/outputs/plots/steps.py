@@ -15,8 +15,6 @@ def number_scale(result: Result, name: str, values: np.ndarray) -> Scale:
     """The scale of a quantity whose numbers are no words.
 
     Args:
-        result: the map.
-        name: of the quantity.
         values: all of the picture, as drawn.
 
     Returns:

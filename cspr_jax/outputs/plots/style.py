@@ -87,7 +87,6 @@ def style_of(
         dpi: pixels an inch; None: the default.
         font_size: points; None: the default.
         preset: "column" or "page" of a paper; None: neither.
-        title: whether titles are drawn.
 
     Returns:
         the style.
@@ -132,9 +131,6 @@ def _bounded(key: str, value: float, bounds: tuple[float, float]) -> float:
 def in_style(style: Style) -> Iterator[None]:
     """Make figures look alike, whatever the user's matplotlib is set to.
 
-    Args:
-        style: the chosen one.
-
     Yields:
         nothing; figures are to be made and saved inside.
     """
@@ -151,7 +147,6 @@ def laid_out(figure: Figure, style: Style) -> None:
 
     Args:
         figure: the picture, made inside `in_style`.
-        style: the chosen one.
 
     Raises:
         InputError: too many pixels.
@@ -210,7 +205,6 @@ def rendered(figure: Figure, ending: str, style: Style) -> bytes:
     Args:
         figure: the picture, `laid_out`.
         ending: of its file, such as ".png": the format.
-        style: the chosen one.
 
     Returns:
         the content.

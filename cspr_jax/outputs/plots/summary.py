@@ -27,7 +27,6 @@ def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fig
     """The plan on a page.
 
     Args:
-        result: its motion.
         robot_file: the robot whose cables have these tensions.
         keys: the plan, whose limits go before the robot's.
 

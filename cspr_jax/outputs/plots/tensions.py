@@ -16,7 +16,6 @@ def tensions_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fi
     """The band of tensions over time, with the limits.
 
     Args:
-        result: the motion.
         robot_file: the robot whose cables have these tensions.
         keys: the plan, whose limits go before the robot's.
 
@@ -33,9 +32,6 @@ def tensions_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fi
 
 def extremes(result: Result) -> str:
     """The smallest and the largest tension of a motion's rows, in words.
-
-    Args:
-        result: the motion.
 
     Returns:
         both, with their cables and instants.
@@ -54,8 +50,6 @@ def draw_tensions(panel: Axes, result: Result, limits: list[tuple[str, float]]) 
     """Tensions as a band from the smallest to the largest of all cables, each cable as a thin line, and the limits.
 
     Args:
-        panel: over time.
-        result: the motion.
         limits: words and values, N.
     """
     time, tension = result.axes["t"], result.data["tension"]

@@ -28,7 +28,6 @@ def trajectory_figure(result: Result, robot_file: RobotFile) -> Figure:
     """The motion in space.
 
     Args:
-        result: the motion.
         robot_file: the robot whose cables have these tensions.
 
     Returns:
@@ -48,9 +47,7 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
     """Path, spools, flight of a released object, and the robot where segments begin and end.
 
     Args:
-        figure: for the colour bar.
         panel: axes in three dimensions, without computed z order.
-        result: the motion.
         robot_file: the robot whose cables have these tensions.
     """
     rows = _instants(result)
@@ -113,9 +110,6 @@ def _instants(result: Result) -> np.ndarray:
 
 def legend_of(result: Result) -> tuple[list[Line2D], list[str]]:
     """Entries of the legend of a motion in space.
-
-    Args:
-        result: the motion.
 
     Returns:
         lines and words.

@@ -20,7 +20,6 @@ def worded(result: Result, name: str, values: np.ndarray) -> tuple[np.ndarray, l
 
     Args:
         result: gives the settings, on which the words may depend.
-        name: of the quantity.
         values: (...) of it.
 
     Returns:
@@ -49,7 +48,6 @@ def word_scale(words: list[str], colours: list[str]) -> Scale:
 
     Args:
         words: of 0, 1, 2, ...
-        colours: theirs.
 
     Returns:
         the scale.

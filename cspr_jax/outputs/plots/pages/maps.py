@@ -30,9 +30,6 @@ SPACE, WORKSPACE = ("x", "y", "z"), "workspace"
 def order_of(result: Result) -> tuple[list[str], list[np.ndarray]]:
     """Order of the axes in a page, the last one that of a row, and of their points.
 
-    Args:
-        result: the map.
-
     Returns:
         names: those of the plane last, upward before across.
         points: indices of each axis' points, ascending, each value once.
@@ -50,7 +47,6 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
     """Content of the page of a map.
 
     Args:
-        result: the map.
         quantity: that it shows first; None: the one that its kind of map is about.
 
     Returns:

@@ -33,7 +33,6 @@ def motion_content(
     """Content of the page of a motion.
 
     Args:
-        title: of the motion.
         columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, and the flight if there is one.
         segments: by the names of `schema.motion_quantities.SEGMENTS`.
         robot_file: the robot whose cables have these tensions; None: the file does not keep it.
