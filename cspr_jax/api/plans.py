@@ -10,7 +10,7 @@ import numpy as np
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.beziers.landings import LaunchErrors, Scatter
-from cspr_jax.beziers.launch_outcome import scattered
+from cspr_jax.beziers.launch_outcome import LaunchOutcome
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError, InputError
@@ -155,6 +155,11 @@ class Plan(planning.PlannedMotions):
         with double_precision():
             return plan_report.plan_table(self)
 
+    @property
+    def launch(self) -> LaunchOutcome | None:
+        """Release and flight of the object that the plan launches; None: it launches nothing."""
+        return next((outcome for outcome in self.outcomes if isinstance(outcome, LaunchOutcome)), None)
+
     @checked
     def scatter(self, errors: LaunchErrors) -> Scatter:
         """Scatter of the landings of the object that the plan launches.
@@ -168,10 +173,11 @@ class Plan(planning.PlannedMotions):
         Raises:
             ConfigError: a plan that launches nothing.
         """
-        if self.keys.launch is None:
+        launch = self.launch
+        if launch is None:
             raise ConfigError(NAME, "launch is missing: nothing is released")
         with double_precision():
-            return scattered(self, errors)
+            return launch.scatter_of(errors)
 
     @checked
     def to_xarray(self, rate: float | None = None) -> "xarray.Dataset":
@@ -188,7 +194,7 @@ class Plan(planning.PlannedMotions):
         """
         labelled.need_xarray()
         with double_precision():
-            arrays = self.rows(rate) | motion_files.segments(self) | motion_files.flight(self)
+            arrays = self.rows(rate) | motion_files.segments(self) | self.outcome_columns
         return labelled.motion(arrays, motion_files.attributes(self))
 
 

@@ -126,8 +126,8 @@ def _planned(planned: Plan, title: str) -> dict[str, Any]:
     with double_precision():
         length = float(np.sum(planned.answers.duration))
         columns = motion_files.rows(planned, rate=min(RATE, MOST_ROWS / length))
-        more = motion_files.flight(planned)
-        return motion_content(title, columns | more, motion_files.segments(planned), planned.robot_file, planned.keys)
+        columns |= planned.outcome_columns
+        return motion_content(title, columns, motion_files.segments(planned), planned.robot_file, planned.keys)
 
 
 def _of_map(

@@ -22,7 +22,7 @@ Files, each importing only from those above it:
     release_bounds      bounds within which a release is looked for
     launch_range        releases for many landing places
     landings            scatter of landings
-    launch_outcome      what a plan asks of a launch, and what comes of it
+    launch_outcome      release and flight of a launch, in the axes of the robot file
     leg                 Bezier segments in a plan
     launch_range_map    maps of launches
 """

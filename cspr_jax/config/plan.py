@@ -117,6 +117,19 @@ class PlanFile(TrajectoryKeys, LimitTable):
         return tuple(dict.fromkeys(map(self.family_of, range(len(self.pose) - 1))))
 
     @property
+    def resulting_poses(self) -> tuple[int, ...]:
+        """Numbers of the poses whose places follow from what else the plan asks: the end of a launch's segment."""
+        return () if self.launch is None else (self.launch.segment + 1,)
+
+    @property
+    def vectors(self) -> dict[str, list[float] | None]:
+        """Points and velocities of the plan beside its poses, by their keys."""
+        vectors = {"first_control_point": self.first_control_point}
+        if self.launch is not None:
+            vectors |= {f"launch.{name}": getattr(self.launch, name) for name in ("point", "target", "velocity")}
+        return vectors
+
+    @property
     def tension_rule(self) -> str:
         """Rule that chooses the tensions of redundant cables."""
         return self.tensions or CENTRED

@@ -27,5 +27,6 @@ Files, each importing only from those above it:
     uncertainty         verdicts about all robots within an uncertainty
     tolerances          the largest multiple of an uncertainty that a motion stands
     waypoints           consecutive poses of a plan, as points of the kernels
+    outcome             what comes of a leg beyond its motion
     leg                 consecutive poses that one family joins
 """

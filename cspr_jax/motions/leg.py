@@ -1,14 +1,31 @@
 """Leg of a plan: consecutive poses, and how a trajectory family joins them."""
 
 import abc
+import dataclasses
 
 import jax
 import numpy as np
 
 from cspr_jax.motions.answers import Answers, joined
 from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.outcome import LegOutcome
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.waypoints import Waypoints
+
+
+@dataclasses.dataclass(frozen=True)
+class JoinedLeg:
+    """Segments of one family, joined.
+
+    Fields:
+        family: its name.
+        answers: of its n segments.
+        motions: n, from the centroid of the spools, z down.
+    """
+
+    family: str
+    answers: Answers
+    motions: list[Motion]
 
 
 class Leg(abc.ABC):
@@ -53,6 +70,18 @@ class Leg(abc.ABC):
             the answers of n_depths * n_segments, those of one depth side by side.
         """
         return joined([self.join(problem, float(z0))[0] for z0 in depths])
+
+    def outcome(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegOutcome | None:
+        """LegOutcome of the joined leg beyond its motion; a plan asks once.
+
+        Args:
+            tension_min: (n,) smallest tension of any cable on each segment, N.
+            start: since the start of the plan, s.
+
+        Returns:
+            the outcome; None of a leg that has none.
+        """
+        return None
 
     def warnings(self, problem: Problem) -> list[str]:
         """Warnings for the user of the plan.

@@ -13,7 +13,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import __version__
-from cspr_jax.beziers.launch_outcome import released
 from cspr_jax.errors import ConfigError
 from cspr_jax.lines.motion import TimedLine
 from cspr_jax.motions.acceleration_sets import along
@@ -49,8 +48,6 @@ _FIELDS = {
     "omega_dot": "angular_acceleration",
 }
 LARGEST_ROWS = 20_000_000
-# Rows of the flight of a released object.
-FLIGHT_ROWS = 101
 # Quantities that may be infinite along the way although the motion itself is finite.
 OPEN = ("tension", "tension_residual", "tension_each", "tension_couple", "path_acceleration")
 # A tick that lies so near to the end of a segment, in parts of a tick, is that end.
@@ -221,10 +218,10 @@ def _write_hdf5(plan: PlannedMotions, path: Path, columns: dict[str, np.ndarray]
             if name != "segment":
                 data.dims[0].attach_scale(file["segment"])
         set_attributes(file["segment_verdict"], flag_attributes())
-        _write_flight(file, flight(plan))
+        _write_outcomes(file, plan.outcome_columns)
 
 
-def _write_flight(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
+def _write_outcomes(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
     if "landing" in columns:
         file["level"] = list(PARTS["level"])
         file["level"].make_scale("level")
@@ -237,25 +234,6 @@ def _write_flight(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
         for i, scale in enumerate(FLIGHT_DIMS[name]):
             if scale != name:
                 file[name].dims[i].attach_scale(file[scale])
-
-
-def flight(plan: PlannedMotions) -> dict[str, np.ndarray]:
-    """Flight of the object that a plan releases, and the landings of a sample of throws.
-
-    Returns:
-        by the names of `schema.motion_quantities.FLIGHT`, in the axes of the robot file; none without a launch.
-    """
-    launch = released(plan)
-    if launch is None or not np.isfinite(launch.flight_time):
-        return {}
-    time = np.linspace(0.0, launch.flight_time, FLIGHT_ROWS)
-    down = plan.frame.turned(np.array([0.0, 0.0, float(plan.problem.robot.gravity)]))
-    position = launch.position + launch.velocity * time[:, None] + 0.5 * down * time[:, None] ** 2
-    columns = {"flight_t": launch.time + time, "flight_position": position}
-    if launch.scatter is not None:
-        count = len(launch.scatter.landings)
-        columns |= {"throw": np.arange(1.0, count + 1.0), "landing": launch.scatter.landings}
-    return columns
 
 
 def attributes(plan: PlannedMotions) -> dict[str, Any]:

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from cspr_jax.beziers.launch_outcome import released
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
@@ -34,10 +33,7 @@ def plan_object(plan: PlannedMotions) -> dict[str, Any]:
         "total_duration": float(plan.answers.duration.sum()),
         "feasible": plan.feasible,
     }
-    launch = released(plan)
-    if launch is not None:
-        fields["launch"] = launch.to_dict()
-    return _finite(fields)
+    return _finite(fields | {outcome.key: outcome.to_dict() for outcome in plan.outcomes})
 
 
 def verdict_text(verdict: int, feasible: bool) -> str:
@@ -132,10 +128,10 @@ def plan_table(plan: PlannedMotions):
     words = [", ".join(plan.keys.families), plan.problem.amplitude.name if plan.keys.takes_amplitude else ""]
     words += [f"z0 = {plan.z0:.{DIGITS}g} m"] if math.isfinite(plan.z0) else []
     title = f"{plan.robot_file.name}: {', '.join(filter(None, words))}"
-    whole = plan_object(plan)
-    caption, segments = _caption(plan) + _launch(whole.get("launch")), whole["segments"]
+    lines = [*_caption(plan).splitlines(), *(line for outcome in plan.outcomes for line in outcome.lines())]
+    segments = plan_object(plan)["segments"]
     table = Table(title=cell(title, style="table.title"), title_justify="left", caption_justify="left")
-    table.caption = cell(*caption.splitlines(), style="table.caption")
+    table.caption = cell(*lines, style="table.caption")
     columns = {**_places(plan), **_numbers(segments), "verdict": lambda segment: segment["verdict"]}
     for head in columns:
         table.add_column(cell(head), justify="left" if head in ("position (m)", "held back by", "verdict") else "right")
@@ -234,26 +230,6 @@ def _causes(plan: PlannedMotions) -> str:
     # A line for each segment that is not feasible, after its number in the table.
     lines = [(i + 1, [cause.text for cause in causes]) for i, causes in enumerate(plan.causes) if causes]
     return "".join(f"\nto {to}: {'; '.join(words)}" for to, words in lines)
-
-
-def _launch(launch: dict[str, Any] | None) -> str:
-    # A released object gets a line of its own; a second line says where throws land.
-    if launch is None:
-        return ""
-    release = launch["release"]
-    if None in (release["time"], launch["flight_time"]):
-        return "\nno launch"
-    places = [
-        ", ".join(f"{round(x, 9) + 0.0:.4g}" for x in place) for place in (release["position"], launch["landing"])
-    ]
-    speed = math.dist(release["velocity"], (0.0, 0.0, 0.0))
-    line = f"\nreleased after {release['time']:.4f} s at ({places[0]}) m with {speed:.3f} m/s"
-    line += f"; lands {launch['flight_time']:.4f} s later at ({places[1]}) m"
-    if "scatter" in launch:
-        scatter = launch["scatter"]
-        sizes = [1e3 * scatter[name] for name in ("mean_error", "standard_deviation")]
-        line += f"\n{scatter['throws']} throws land {sizes[0]:.2f} ± {sizes[1]:.2f} mm from the target"
-    return line
 
 
 def _number(value: float | None, form: str) -> str:

@@ -20,7 +20,9 @@ from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError
 from cspr_jax.motions.answers import Answers, joined
 from cspr_jax.motions.demands import SAMPLES, Demands, demands
+from cspr_jax.motions.leg import JoinedLeg
 from cspr_jax.motions.motion import Motion, Placed
+from cspr_jax.motions.outcome import LegOutcome
 from cspr_jax.motions.problem import Problem
 from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
@@ -38,21 +40,6 @@ CONTINUOUS = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
-class JoinedLeg:
-    """Segments of one family, joined.
-
-    Fields:
-        family: its name.
-        answers: of its segments.
-        motions: of the same, from the centroid of the spools, z down.
-    """
-
-    family: str
-    answers: Answers
-    motions: list[Motion]
-
-
-@dataclasses.dataclass(frozen=True)
 class PlannedMotions:
     """A planned sequence.
 
@@ -65,6 +52,7 @@ class PlannedMotions:
         points: (n + 1, 3) in the axes of the robot file, m.
         legs: consecutive segments of one family each, n segments in all.
         demands: of the n segments; `lowest` is z in the axes of the robot file.
+        outcomes: of the legs that have one.
         causes: of the n segments, why each is not feasible, the worst cause first.
         warnings: what its user should know, one line each.
         text: of the plan file; empty for a plan that has none.
@@ -78,6 +66,7 @@ class PlannedMotions:
     points: np.ndarray
     legs: tuple[JoinedLeg, ...]
     demands: Demands
+    outcomes: tuple[LegOutcome, ...] = ()
     causes: tuple[tuple[Cause, ...], ...] = ()
     warnings: tuple[str, ...] = ()
     text: str = ""
@@ -109,6 +98,11 @@ class PlannedMotions:
     def motions(self) -> list[Placed]:
         """Motions of the n segments, in the axes of the robot file."""
         return [Placed(motion, self.frame) for leg in self.legs for motion in leg.motions]
+
+    @property
+    def outcome_columns(self) -> dict[str, np.ndarray]:
+        """Datasets that the outcomes of the legs add to a motion file."""
+        return {name: values for outcome in self.outcomes for name, values in outcome.columns().items()}
 
     @property
     def feasible(self) -> bool:
@@ -164,18 +158,43 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     why = [causes(problem, frame, leg.answers, leg.motions, _counts(leg, keys)) for leg in legs]
     extremes = _demands(problem, legs, keys)
     extremes = dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
-    points = np.array(frame.outward(sequence.stops.points(z0)))
-    if keys.launch is not None:  # whose segment ends where it follows from the launch
-        motions = [motion for leg in legs for motion in leg.motions]
-        end = motions[keys.launch.segment].state(jnp.asarray(1.0)).position
-        points[keys.launch.segment + 1] = frame.outward(np.asarray(end))
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
     lines += nearly_resting(sequence.stops, z0)
     lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
-    all_causes = tuple(itertools.chain.from_iterable(why))
     return PlannedMotions(
-        robot_file, keys, problem, z0, frame, points, legs, extremes, all_causes, tuple(dict.fromkeys(lines))
+        robot_file=robot_file,
+        keys=keys,
+        problem=problem,
+        z0=z0,
+        frame=frame,
+        points=_points(sequence, legs, z0),
+        legs=legs,
+        demands=extremes,
+        outcomes=_outcomes(problem, sequence, legs, extremes),
+        causes=tuple(itertools.chain.from_iterable(why)),
+        warnings=tuple(dict.fromkeys(lines)),
     )
+
+
+def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.ndarray:
+    # Return the places of all poses in the axes of the robot file, also of those that the motion before them decides.
+    stops = sequence.stops
+    points = np.array(stops.frame.outward(stops.points(z0)))
+    motions = [motion for leg in legs for motion in leg.motions]
+    for i in stops.keys.resulting_poses:
+        points[i] = stops.frame.outward(np.asarray(motions[i - 1].state(jnp.asarray(1.0)).position))
+    return points
+
+
+def _outcomes(
+    problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...], extremes: Demands
+) -> tuple[LegOutcome, ...]:
+    outcomes, first, start = [], 0, 0.0
+    for leg, joined_leg in zip(sequence.legs, legs, strict=True):
+        tension_min = extremes.tension_min[first : first + len(leg)]
+        outcomes.append(leg.outcome(problem, joined_leg, tension_min, start))
+        first, start = first + len(leg), start + float(joined_leg.answers.duration.sum())
+    return tuple(outcome for outcome in outcomes if outcome is not None)
 
 
 def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:

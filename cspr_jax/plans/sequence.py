@@ -35,7 +35,7 @@ class PlanLegs:
     def __init__(self, robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
         """Refuse poses that are none, and families that do not move the robot."""
         _check_families(robot_file, keys, path)
-        _check_lines(keys, path)
+        _check_keys(keys, path)
         _check_poses(robot_file, keys, path)
         frame, last = frame_of(robot_file.base_points, robot_file.z_axis), len(keys.pose) - 1
         self.stops = Waypoints(robot_file, keys, path, frame, keys.family, 0, last)
@@ -78,15 +78,9 @@ def _check_families(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
         raise ConfigError(path, f'{key} = "{family}": must be {names} for {robot_file.kind} ("{robot_file.name}"){why}')
 
 
-def _check_lines(keys: PlanFile, path: Path) -> None:
-    lines = [name for name, row in FAMILIES.items() if row.is_line]
-    known = (
-        ("max_acceleration", lines),
-        ("rule", ["s-curve"]),
-        ("first_control_point", ["bezier"]),
-        ("least", ["bezier"]),
-    )
-    for key, families in known:
+def _check_keys(keys: PlanFile, path: Path) -> None:
+    for key in dict.fromkeys(key for row in FAMILIES.values() for key in row.keys):
+        families = [name for name, row in FAMILIES.items() if key in row.keys]
         if getattr(keys, key) is not None and not set(keys.families) & set(families):
             raise ConfigError(path, f"{key}: must be absent unless family = {either(families)}")
 
@@ -96,10 +90,10 @@ def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
     if keys.beat is not None and not robot_file.is_platform:
         raise ConfigError(path, f'beat = "{keys.beat}": must be absent for {robot_file.kind}')
     for i, pose in enumerate(keys.pose):
-        if pose.duration is not None and (i == 0 or keys.family_of(i - 1) != "bezier"):
-            raise ConfigError(path, f'pose[{i}].duration: must be absent unless family = "bezier" leads there')
-        follows = keys.launch is not None and i == keys.launch.segment + 1
-        if pose.position is None and not pose.rest and not follows:
+        timed = [name for name, row in FAMILIES.items() if row.takes_durations]
+        if pose.duration is not None and (i == 0 or keys.family_of(i - 1) not in timed):
+            raise ConfigError(path, f"pose[{i}].duration: must be absent unless family = {either(timed)} leads there")
+        if pose.position is None and not pose.rest and i not in keys.resulting_poses:
             raise ConfigError(path, f"pose[{i}].position is missing: [x, y, z] in m, or rest = true")
         for key in () if robot_file.is_platform else ("tilt_torsion", "quaternion", "beta_hat"):
             if getattr(pose, key) is not None:
@@ -109,9 +103,6 @@ def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
 
 
 def _check_plane(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
-    vectors = {"first_control_point": keys.first_control_point}
-    if keys.launch is not None:
-        vectors |= {f"launch.{name}": getattr(keys.launch, name) for name in ("point", "target", "velocity")}
-    for key, value in vectors.items():
+    for key, value in keys.vectors.items():
         if robot_file.is_planar and value is not None and value[1] != 0.0:
             raise ConfigError(path, f"{key} = {shown(value)}: must have y = 0: a planar robot")

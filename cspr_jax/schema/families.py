@@ -24,6 +24,8 @@ class Family:
             function.
         any_cables: patterns of the robots that may have more cables than degrees of freedom.
         is_line: whether its motions are straight lines, in the least time of their law.
+        keys: keys of a plan that only this family takes, and others that name them too.
+        takes_durations: whether a pose may give the duration of the segment that ends there.
         knows_uncertainty: whether its motions are judged by all of an uncertainty.
     """
 
@@ -34,6 +36,8 @@ class Family:
     rests_anywhere: bool = False
     any_cables: tuple[str, ...] = ()
     is_line: bool = False
+    keys: tuple[str, ...] = ()
+    takes_durations: bool = False
     knows_uncertainty: bool = False
 
     def leg(self, pattern: str) -> Any:
@@ -81,11 +85,12 @@ _ROWS = (
             rests_anywhere=True,
             any_cables=("2T", "3T"),
             is_line=True,
+            keys=("max_acceleration", *keys),
         )
-        for name, law in (
-            ("s-curve", "by the S-model (Boralugoda), in the least time"),
-            ("quintic", "by a quintic in time, in the least time"),
-            ("cubic", "by a cubic in time, in the least time"),
+        for name, law, keys in (
+            ("s-curve", "by the S-model (Boralugoda), in the least time", ("rule",)),
+            ("quintic", "by a quintic in time, in the least time", ()),
+            ("cubic", "by a cubic in time, in the least time", ()),
         )
     ),
     Family(
@@ -93,6 +98,8 @@ _ROWS = (
         "Bezier curves of the second order, at rest in every pose (launch paper)",
         dict.fromkeys(("2T", "3T"), "cspr_jax.beziers.leg:Beziers"),
         rests_anywhere=True,
+        keys=("first_control_point", "least"),
+        takes_durations=True,
     ),
 )
 FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}

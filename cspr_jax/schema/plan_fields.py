@@ -63,7 +63,7 @@ SEGMENT = {
 }
 LAUNCH = {
     "segment": ("1", "Number of the segment on which the object is released, from 0 on."),
-    "release": ("", "Its `position`, m, `velocity`, m/s, and `time`, s, after the start of the segment."),
+    "release": ("", "Its `position`, m, `velocity`, m/s, and `time`, s, after the start of the plan."),
     "control_points": ("m", "Control points of the segment."),
     "landing": ("m", "Place of the landing."),
     "flight_time": ("s", "Duration of the flight."),

@@ -17,6 +17,7 @@ from support.commands import cspr
 from support.platforms import state_of
 
 import cspr_jax
+from cspr_jax.motions.outcome import LegOutcome
 from cspr_jax.schema import map_kinds
 from cspr_jax.schema.families import FAMILIES, moving, registered
 from cspr_jax.store.result import open_result
@@ -97,6 +98,28 @@ def test_a_family_from_file_to_picture(lines):
     code, _, err = cspr("report", lines / "plan.toml", "-o", lines / "motion.html")
     assert (code, err) == (0, "cspr: not proved feasible; the page says so\n")
     assert "prototype" in (lines / "motion.html").read_text()
+
+
+class Photo(LegOutcome):
+    """What a family may have beyond its motion."""
+
+    key = "photo"
+
+    def to_dict(self):
+        return {"focus": np.nan}
+
+    def lines(self):
+        return ["one photo"]
+
+    def columns(self):
+        return {}
+
+
+def test_an_outcome_of_a_family(lines, monkeypatch, tmp_path):
+    """Reports show what a leg adds to its motion without knowing it."""
+    monkeypatch.setattr("straight_lines.leg.Lines.outcome", lambda *_: Photo())
+    assert planned(lines)[1]["photo"] == {"focus": None}
+    assert "one photo" in cspr("plan", lines / "plan.toml")[1]
 
 
 def test_mujoco_plays_a_family(lines):

@@ -1,0 +1,40 @@
+"""LegOutcome of a leg: what comes of its motion beyond the motion itself, such as the flight of a released object."""
+
+import abc
+from typing import Any, ClassVar
+
+import numpy as np
+
+
+class LegOutcome(abc.ABC):
+    """LegOutcome of a leg, in the axes of the robot file; computed once, with the plan.
+
+    Fields:
+        key: its name in a plan's JSON.
+    """
+
+    key: ClassVar[str]
+
+    @abc.abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """The outcome as a plan's JSON has it.
+
+        Returns:
+            plain values.
+        """
+
+    @abc.abstractmethod
+    def lines(self) -> list[str]:
+        """The outcome for people.
+
+        Returns:
+            lines below the table of a plan.
+        """
+
+    @abc.abstractmethod
+    def columns(self) -> dict[str, np.ndarray]:
+        """Datasets that the outcome adds to a motion file.
+
+        Returns:
+            by the names of `schema.motion_quantities.FLIGHT`.
+        """
