@@ -24,7 +24,7 @@ from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
 from cspr_jax.schema.identity import canonical_json
-from cspr_jax.schema.motion_quantities import (
+from cspr_jax.schema.quantities import (
     ACROSS,
     FLIGHT,
     FLIGHT_DIMS,
@@ -32,8 +32,8 @@ from cspr_jax.schema.motion_quantities import (
     SEGMENTS,
     TRAJECTORY,
     columns_of,
+    flag_attributes,
 )
-from cspr_jax.schema.quantities import flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
@@ -243,7 +243,7 @@ def flight(plan: PlannedMotions) -> dict[str, np.ndarray]:
     """Flight of the object that a plan releases, and the landings of a sample of throws.
 
     Returns:
-        by the names of `schema.motion_quantities.FLIGHT`, in the axes of the robot file; none without a launch.
+        by the names of `schema.quantities.FLIGHT`, in the axes of the robot file; none without a launch.
     """
     launch = released(plan)
     if launch is None or not np.isfinite(launch.flight_time):

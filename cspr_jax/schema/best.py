@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cspr_jax.errors import InputError
-from cspr_jax.schema.axes import AXES, BEST, best_name
 from cspr_jax.schema.meanings import CELL_SIDES
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.quantities import AXES, BEST, QUANTITIES, best_name
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 # These quantities tell first which of two points is better, if the kind of map does not say; then any other that can.

@@ -9,8 +9,7 @@ import numpy as np
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
-from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT_DIMS, PARTS, SEGMENTS
-from cspr_jax.schema.quantities import EVERY, flag_attributes
+from cspr_jax.schema.quantities import ACROSS, EVERY, FLIGHT_DIMS, PARTS, SEGMENTS, flag_attributes
 
 if TYPE_CHECKING:
     import xarray

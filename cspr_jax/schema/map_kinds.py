@@ -15,10 +15,8 @@ from typing import Any, Literal
 from cspr_jax.errors import InputError
 from cspr_jax.schema import map_columns as columns
 from cspr_jax.schema import workspace_columns as of_workspaces
-from cspr_jax.schema.pose_quantities import POSE_VERDICT
-from cspr_jax.schema.quantities import EVERY, QUANTITIES
+from cspr_jax.schema.quantities import EVERY, POSE_VERDICT, QUANTITIES, Quantity
 from cspr_jax.schema.quantities import register as register_quantity
-from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.tiles import LARGEST_TILE, ORDINARY_COST, CellCost
 
 

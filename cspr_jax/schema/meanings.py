@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.quantity import Quantity
+from cspr_jax.schema.quantities import Quantity
 
 
 def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:

@@ -12,8 +12,7 @@ import numpy as np
 
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
-from cspr_jax.schema.quantities import AXES, QUANTITIES, flag_attributes
-from cspr_jax.schema.quantity import Quantity
+from cspr_jax.schema.quantities import AXES, QUANTITIES, Quantity, flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import new_file
 from cspr_jax.store.seal import seal_file

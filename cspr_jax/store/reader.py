@@ -15,9 +15,7 @@ import h5py
 import numpy as np
 
 from cspr_jax.errors import StoreError
-from cspr_jax.schema.motion_quantities import FLIGHT, SEGMENTS, TRAJECTORY
-from cspr_jax.schema.quantities import AXES, QUANTITIES, register
-from cspr_jax.schema.quantity import Quantity
+from cspr_jax.schema.quantities import AXES, FLIGHT, QUANTITIES, SEGMENTS, TRAJECTORY, Quantity, register
 from cspr_jax.store import guard
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.netcdf import UNREADABLE, reason

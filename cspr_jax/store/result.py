@@ -14,8 +14,7 @@ from cspr_jax.errors import ConfigError, InputError, StoreError, printable, show
 from cspr_jax.schema import labelled
 from cspr_jax.schema.best import best_of, check_axis
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
-from cspr_jax.schema.motion_quantities import FLIGHT_DIMS, PARTS, SEGMENTS
-from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES
+from cspr_jax.schema.quantities import AXES, EVERY, FLIGHT_DIMS, PARTS, QUANTITIES, SEGMENTS
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.isolated import Reader
 from cspr_jax.store.motion_table import read_table

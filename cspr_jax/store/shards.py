@@ -13,7 +13,7 @@ import numpy as np
 
 from cspr_jax.errors import printable
 from cspr_jax.schema.identity import canonical_json
-from cspr_jax.schema.quantity import EARLIER
+from cspr_jax.schema.quantities import EARLIER
 from cspr_jax.store import guard
 from cspr_jax.store.documents import Header, document, plain_json
 from cspr_jax.store.guard import ReadableDataset

@@ -19,7 +19,7 @@ from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.sections import POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.outputs.plots.solid import SPACE, solid_figure
-from cspr_jax.schema.axes import TILT_TORSION
+from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.store.result import Result
 
 

@@ -49,7 +49,7 @@ def film(
 
     Args:
         ending: of its file, one of `ENDINGS`.
-        columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, in the axes of the robot file.
+        columns: rows by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file.
         robot_file: the robot whose cables have these tensions.
         keys: the plan, for the limits.
         speed: times real time, positive.

@@ -11,7 +11,7 @@ from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.motion_source import keeps_plan, kept
 from cspr_jax.outputs.plots.robot_along import limits_of
-from cspr_jax.schema.motion_quantities import PARTS
+from cspr_jax.schema.quantities import PARTS
 from cspr_jax.store.result import Result
 
 # In longer plans the lines would hide the rest.

@@ -32,7 +32,7 @@ def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows
     """The robot at some rows of its motion.
 
     Args:
-        columns: by the names of `schema.motion_quantities.TRAJECTORY`.
+        columns: by the names of `schema.quantities.TRAJECTORY`.
         robot_file: the robot whose cables have these tensions; None: it is not known, and has no cables here.
         rows: (n,) which.
 

@@ -6,8 +6,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from cspr_jax.outputs.plots.colours import NONE_COLOUR, TOLD_APART, Scale, scale_of
 from cspr_jax.outputs.plots.labels import as_drawn
-from cspr_jax.schema.axes import best_name
-from cspr_jax.schema.quantities import EVERY
+from cspr_jax.schema.quantities import EVERY, best_name
 from cspr_jax.store.result import Result
 
 
