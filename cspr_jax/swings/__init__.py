@@ -12,7 +12,6 @@ hypocycloids: numbers of arcs).
 
 Files, each importing only from those above it:
 
-    couplings               position and acceleration -> normalised pseudotensions within a plane
     hypocycloid             segment between two points, (2.31) to (2.55)
     transition              segment between rest and a point, chapter 1
     depths                  guides for the choice of z0
