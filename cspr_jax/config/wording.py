@@ -2,10 +2,10 @@
 
 import datetime
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, PlainValidator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from cspr_jax.config.suggestions import look_alike, nearest
@@ -61,6 +61,22 @@ def either(names: Iterable[str]) -> str:
     """
     *others, last = (f'"{name}"' for name in names)
     return f"{', '.join(others)} or {last}" if others else last
+
+
+def name_of(rows: Callable[[], Iterable[str]]) -> PlainValidator:
+    """Validator of a key whose values are names of rows of a table, which may grow.
+
+    Returns:
+        the validator; its error is that of a Literal of the names.
+    """
+
+    def check(value: Any) -> str:
+        names = list(rows())
+        if value not in names:
+            raise PydanticCustomError("literal_error", "{expected}", {"expected": either(names).replace('"', "'")})
+        return value
+
+    return PlainValidator(check)
 
 
 def rank(error: ErrorDetails) -> int:
