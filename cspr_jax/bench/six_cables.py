@@ -81,19 +81,19 @@ class Batch(NamedTuple):
     segments: PlatformSegment
 
 
-def batches(given: SixCableWork) -> list[Batch]:
+def batches(work: SixCableWork) -> list[Batch]:
     """The work by numbers of arcs.
 
     Returns:
         batches of one shape.
     """
-    half = given.angle[:, None] / 2.0
-    quaternions = np.concatenate([np.cos(half), np.sin(half) * given.axis], axis=1)
+    half = work.angle[:, None] / 2.0
+    quaternions = np.concatenate([np.cos(half), np.sin(half) * work.axis], axis=1)
     portions, lanes = [], room(LANES)
-    for arcs in np.unique(given.arcs):
-        cases = np.flatnonzero(given.arcs == arcs)
-        kernel = partial(_segments, given.robot, np.asarray(arcs % 2 == 1))
-        segments = in_batches(kernel, (quaternions[cases], given.beta_hat[cases]), size=LANES)
+    for arcs in np.unique(work.arcs):
+        cases = np.flatnonzero(work.arcs == arcs)
+        kernel = partial(_segments, work.robot, np.asarray(arcs % 2 == 1))
+        segments = in_batches(kernel, (quaternions[cases], work.beta_hat[cases]), size=LANES)
         for start in range(0, len(cases), lanes):
             portion = jax.tree.map(lambda x, s=start: x[s : s + lanes], segments)
             portions.append(Batch(int(arcs), len(portion.rate), jax.device_put(padded(portion, lanes))))
@@ -111,7 +111,7 @@ def _segments(robot: PlatformRobot, odd, items) -> PlatformSegment:
     return jax.vmap(one)(*items)
 
 
-def rate(robot: PlatformRobot, some: list[Batch], *, single_precision: bool) -> tuple[float, float]:
+def rate(robot: PlatformRobot, portions: list[Batch], *, single_precision: bool) -> tuple[float, float]:
     """Checks a second.
 
     Args:
@@ -124,10 +124,10 @@ def rate(robot: PlatformRobot, some: list[Batch], *, single_precision: bool) -> 
     def call(batch):
         return jax.block_until_ready(tensions(robot, batch, single_precision=single_precision))
 
-    lowest = [np.asarray(call(batch)) for batch in some]
-    total = sum(batch.real for batch in some)
-    taut = sum(int((x[: batch.real] > 0.0).sum()) for x, batch in zip(lowest, some, strict=True))
-    return total * SAMPLES / best(partial(in_threads, call, some)), taut / total
+    lowest = [np.asarray(call(batch)) for batch in portions]
+    total = sum(batch.real for batch in portions)
+    taut = sum(int((x[: batch.real] > 0.0).sum()) for x, batch in zip(lowest, portions, strict=True))
+    return total * SAMPLES / best(partial(in_threads, call, portions)), taut / total
 
 
 def tensions(robot: PlatformRobot, batch: Batch, *, single_precision: bool) -> Array:
@@ -157,16 +157,16 @@ def operations_a_check(robot: PlatformRobot, batch: Batch) -> float | None:
     return operations(lowered, len(batch.segments.rate))
 
 
-def numpy_rate(given: SixCableWork) -> float:
+def numpy_rate(work: SixCableWork) -> float:
     """Checks a second of the NumPy version.
 
     Args:
-        given: the work; a part of it is done.
+        work: a part of it is done.
 
     Returns:
         the rate.
     """
-    first_cases = SixCableWork(given.robot, *(x[:NUMPY_TRAJECTORIES] for x in given[1:]))
+    first_cases = SixCableWork(work.robot, *(x[:NUMPY_TRAJECTORIES] for x in work[1:]))
     return len(first_cases.arcs) * SAMPLES / best(partial(_numpy_checks, first_cases))
 
 

@@ -184,17 +184,17 @@ def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
     return {"HiGHS": rate(by_program), "NNLS": rate(by_squares)}
 
 
-def lines(found: dict[str, Any]) -> list[str]:
+def lines(measured: dict[str, Any]) -> list[str]:
     """Lines for people.
 
     Args:
-        found: of `rates`.
+        measured: of `rates`.
 
     Returns:
         the lines.
     """
     text = ["workspaces, poses a second"]
-    for name, row in found.items():
+    for name, row in measured.items():
         words = [f"{key} {value / 1e6:8.3g} M/s" for key, value in row.items() if key != "first_s"]
         text.append(
             f"  {name:26s} {', '.join(words)}" + (f", first {row['first_s']:.1f} s" if "first_s" in row else "")

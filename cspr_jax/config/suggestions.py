@@ -48,25 +48,25 @@ _LOOK_ALIKES = {
 _PLAIN = {character: plain for plain, characters in _LOOK_ALIKES.items() for character in characters}
 
 
-def nearest(given: str, allowed: Iterable[str]) -> str | None:
+def nearest(text: str, allowed: Iterable[str]) -> str | None:
     """The allowed name that a user probably meant.
 
     Returns:
         one of them; None if none is near.
     """
     names = list(allowed)
-    if len(given) > LONGEST:
+    if len(text) > LONGEST:
         return None
-    words = _words(given)
+    words = _words(text)
     if "height" in words and _HEIGHT.isdisjoint(names):
         words = [word.replace("height", "floor") for word in words]
     if words:
         # Among equals the one with the same letters.
-        ranked = [(_problem(words, _words(name)), _letters(given, name), name) for name in names]
+        ranked = [(_problem(words, _words(name)), _letters(text, name), name) for name in names]
         best = max(ranked, default=(0.0, 0.0, ""))
         if best[0] > ENOUGH:
             return best[2]
-    near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=LETTERS)
+    near = difflib.get_close_matches(text.lower(), names, n=1, cutoff=LETTERS)
     return near[0] if near else None
 
 
@@ -86,13 +86,13 @@ def look_alike(text: str) -> str:
     return f": did you mean {plain} in place of {name}?" if plain else f": it holds {name}, which cannot be seen"
 
 
-def did_you_mean(given: str, allowed: Iterable[str]) -> str:
+def did_you_mean(text: str, allowed: Iterable[str]) -> str:
     """The question for an error's line.
 
     Returns:
         "did you mean NAME? ", or nothing.
     """
-    near = nearest(given, allowed)
+    near = nearest(text, allowed)
     return f"did you mean {near}? " if near else ""
 
 

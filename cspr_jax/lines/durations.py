@@ -52,25 +52,25 @@ class Durations:
     up: np.ndarray
     down: np.ndarray
 
-    def part(self, wanted: np.ndarray) -> "Durations":
+    def part(self, rows: np.ndarray) -> "Durations":
         """Durations of some of the lines.
 
         Args:
-            wanted: (n,) whether, or numbers of lines.
+            rows: (n,) whether, or numbers of lines.
 
         Returns:
             theirs.
         """
-        return Durations(**{name: value[wanted] for name, value in vars(self).items()})
+        return Durations(**{name: value[rows] for name, value in vars(self).items()})
 
-    def replace(self, which: np.ndarray, part: "Durations") -> None:
+    def replace(self, rows: np.ndarray, part: "Durations") -> None:
         """Put other durations in place of some.
 
         Args:
-            which: numbers of the lines.
+            rows: numbers of the lines.
         """
         for name, values in vars(part).items():
-            getattr(self, name)[which] = values
+            getattr(self, name)[rows] = values
 
 
 def moving(limits: Limits) -> tuple[str, ...]:
@@ -155,14 +155,14 @@ def by_cells(problem: Problem, starts: np.ndarray, ends: np.ndarray, max_acceler
 
 
 def by_search(
-    problem: Problem, starts: np.ndarray, ends: np.ndarray, found: Durations, *, law: str, max_acceleration: float
+    problem: Problem, starts: np.ndarray, ends: np.ndarray, timings: Durations, *, law: str, max_acceleration: float
 ) -> Durations:
     """Least durations along straight lines under any limits, of spools in any layout.
 
     Args:
         starts: (n, 3) m; at rest.
         ends: (n, 3) m, elsewhere; at rest.
-        found: of `by_formula`.
+        timings: of `by_formula`.
         law: one of `lines.motion.LAWS`.
         max_acceleration: largest size of the acceleration, m/s^2.
 
@@ -176,7 +176,7 @@ def by_search(
     least = in_batches(partial(_by_search, moving_problem, law=law), (starts, ends, largest), size=BATCH_OF_SEARCH)
     rows = _bounds_of_rows(moving_problem)
     return dataclasses.replace(
-        found, duration=least.duration, ratio=least.ratio, up=rows[least.up], down=rows[least.down]
+        timings, duration=least.duration, ratio=least.ratio, up=rows[least.up], down=rows[least.down]
     )
 
 

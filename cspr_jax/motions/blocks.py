@@ -26,9 +26,9 @@ class Blocks(NamedTuple):
     start: np.ndarray
     stop: np.ndarray
 
-    def some(self, which: np.ndarray) -> "Blocks":
+    def part(self, rows: np.ndarray) -> "Blocks":
         """Blocks chosen by indices, or by a mask (k,)."""
-        return Blocks(*(x[which] for x in self))
+        return Blocks(*(x[rows] for x in self))
 
     def instants(self, places: np.ndarray) -> np.ndarray:
         """Instants at the same places of each block.

@@ -115,14 +115,14 @@ class Enclosure(NamedTuple):
         """By how much rays differ at most within the block, (k, n_cables) m."""
         return largest_moves(self.way, self.bent)
 
-    def some(self, which: np.ndarray) -> "Enclosure":
+    def part(self, rows: np.ndarray) -> "Enclosure":
         """Blocks chosen by indices, or by a mask (k,)."""
         distances = self.distances._replace(
-            **{name: value[which] for name, value in self.distances._asdict().items() if name != "spools"}
+            **{name: value[rows] for name, value in self.distances._asdict().items() if name != "spools"}
         )
-        rates = Rates(*(x[which] for x in self.rates))
+        rates = Rates(*(x[rows] for x in self.rates))
         fields = {
-            name: value[which] for name, value in self._asdict().items() if name not in ("arms", "distances", "rates")
+            name: value[rows] for name, value in self._asdict().items() if name not in ("arms", "distances", "rates")
         }
         return self._replace(**fields, distances=distances, rates=rates)
 
@@ -209,9 +209,9 @@ class Influence(NamedTuple):
     lengths: np.ndarray
     mu: np.ndarray
 
-    def some(self, which: np.ndarray) -> "Influence":
+    def part(self, rows: np.ndarray) -> "Influence":
         """Blocks chosen by indices, or by a mask (k,)."""
-        return Influence(*(x[which] for x in self))
+        return Influence(*(x[rows] for x in self))
 
 
 def influence(known: Enclosure) -> Influence:

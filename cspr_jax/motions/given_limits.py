@@ -20,14 +20,14 @@ from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
 
 
 def limits_of(
-    robot: Any, given: Mapping[str, Any], own: Mapping[str, Any], at: str, n_cables: int | None = None
+    robot: Any, limits: Mapping[str, Any], defaults: Mapping[str, Any], at: str, n_cables: int | None = None
 ) -> Limits:
     """Limits that are given over those of a robot.
 
     Args:
         robot: has base_points and z_axis of its file.
-        given: by name, one number or one a cable each; None: as in `own`.
-        own: likewise; None: no limit.
+        limits: by name, one number or one a cable each; None: as in `defaults`.
+        defaults: likewise; None: no limit.
         at: prefix of keys in errors.
         n_cables: of which the limits are; None: those of the robot.
 
@@ -40,16 +40,16 @@ def limits_of(
     """
     n_cables, values = n_cables or len(robot.base_points), dict[str, Any]()
     for row in LIMITS:
-        value = given.get(row.name)
-        value = own.get(row.name) if value is None else value
+        value = limits.get(row.name)
+        value = defaults.get(row.name) if value is None else value
         values[row.name] = None if value is None else _limit(row, value, n_cables, at)
     low, high = values["tension_min"], values["tension_max"]
     if low is not None and high is not None and not (low < high).all():
         raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
     if values["floor"] is not None:
         values["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
-    uncertain = given.get("uncertainty")
-    uncertain = own.get("uncertainty") if uncertain is None else uncertain
+    uncertain = limits.get("uncertainty")
+    uncertain = defaults.get("uncertainty") if uncertain is None else uncertain
     return Limits(**values, uncertainty=None if uncertain is None else _uncertainty(uncertain, f"{at}uncertainty."))
 
 

@@ -22,14 +22,14 @@ class Verdicts:
     bound: np.ndarray
     room: np.ndarray
 
-    def replace(self, which: np.ndarray, part: "Verdicts") -> None:
+    def replace(self, rows: np.ndarray, part: "Verdicts") -> None:
         """Put other verdicts in place of some.
 
         Args:
-            which: numbers of the motions.
+            rows: numbers of the motions.
         """
         for name, values in vars(part).items():
-            getattr(self, name)[which] = values
+            getattr(self, name)[rows] = values
 
 
 def plain_slack(name: str, values: np.ndarray) -> np.ndarray:

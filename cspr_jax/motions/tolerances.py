@@ -45,28 +45,33 @@ class _Open:
     # Blocks that are looked at, and what is known of them.
     blocks: Blocks
     known: Enclosure
-    found: Influence
+    influence: Influence
     worst: WorstDisplacements
-    asked: Requirements
+    requirements: Requirements
 
-    def some(self, rows: np.ndarray) -> "_Open":
+    def part(self, rows: np.ndarray) -> "_Open":
         worst = WorstDisplacements(*(x[:, rows] for x in self.worst))
-        requirements = dataclasses.replace(self.asked, slack=self.asked.slack[rows])
-        return _Open(self.blocks.some(rows), self.known.some(rows), self.found.some(rows), worst, requirements)
+        requirements = dataclasses.replace(self.requirements, slack=self.requirements.slack[rows])
+        return _Open(self.blocks.part(rows), self.known.part(rows), self.influence.part(rows), worst, requirements)
 
     def middles(self) -> "_Open":
         """The same, as if blocks had no length."""
-        return dataclasses.replace(self, known=self.known.middle(self.found.mu))
+        return dataclasses.replace(self, known=self.known.middle(self.influence.mu))
 
     def fail(self, multiple: np.ndarray) -> np.ndarray:
-        return fails(self.known, self.found, self.worst, self.asked, multiple)
+        return fails(self.known, self.influence, self.worst, self.requirements, multiple)
 
     def hold(self, multiple: np.ndarray) -> np.ndarray:
-        return holds(self.known, self.found, self.asked, multiple)
+        return holds(self.known, self.influence, self.requirements, multiple)
 
 
 def tolerated(
-    blocks: Blocks, arcs: np.ndarray, asked: Requirements, enclose: Callable[[Blocks], Enclosure], *, whole: bool = True
+    blocks: Blocks,
+    arcs: np.ndarray,
+    requirements: Requirements,
+    enclose: Callable[[Blocks], Enclosure],
+    *,
+    whole: bool = True,
 ) -> Tolerated:
     """Multiples of an uncertainty that motions stand, and that they do not.
 
@@ -81,17 +86,17 @@ def tolerated(
     """
     if not len(arcs):
         return Tolerated(np.zeros(0), np.zeros(0))
-    pool, search = _looked_at(blocks, asked, enclose), _MultipleSearch(arcs, whole=whole)
+    pool, search = _looked_at(blocks, requirements, enclose), _MultipleSearch(arcs, whole=whole)
     search.refuted = (
         _refuted_first(pool, len(arcs)) if whole else _refuted_below(pool, search.refuted, np.ones(len(arcs)))
     )
-    search.wanted = _targets(search.refuted, whole=whole)
+    search.targets = _targets(search.refuted, whole=whole)
     for level in range(HALVINGS + 1):
         pool = search.left(pool)
         is_open = search.open_blocks(pool, level)
         if not is_open.any():
             break
-        pool = _looked_at(pool.blocks.some(is_open).halves(), asked, enclose)
+        pool = _looked_at(pool.blocks.part(is_open).halves(), requirements, enclose)
         search.refute(pool)
     return Tolerated(search.proved, search.refuted)
 
@@ -101,29 +106,29 @@ class _MultipleSearch:
 
     def __init__(self, arcs: np.ndarray, *, whole: bool) -> None:
         self._arcs, self._whole, self._count = arcs, whole, len(arcs)
-        self.refuted, self.wanted = np.full(len(arcs), np.inf), np.ones(len(arcs))
+        self.refuted, self.targets = np.full(len(arcs), np.inf), np.ones(len(arcs))
         self.proved, self._is_hopeless = np.full(len(arcs), np.nan), np.zeros(len(arcs), bool)
 
     def left(self, pool: _Open) -> _Open:
         # Return the blocks of motions that are not settled.
         if self._whole:
-            self.wanted = _reachable(pool, self.wanted)
-        self.proved = np.where(np.isnan(self.proved) & (self.wanted == 0.0), 0.0, self.proved)
-        return pool.some(np.isnan(self.proved)[pool.blocks.row])
+            self.targets = _reachable(pool, self.targets)
+        self.proved = np.where(np.isnan(self.proved) & (self.targets == 0.0), 0.0, self.proved)
+        return pool.part(np.isnan(self.proved)[pool.blocks.row])
 
     def open_blocks(self, pool: _Open, level: int) -> np.ndarray:
         # Return the blocks that are to be halved; settle motions without any, and those of which too much is open.
         row = pool.blocks.row
-        is_open = ~pool.hold(self.wanted[row])
+        is_open = ~pool.hold(self.targets[row])
         is_open = self._lessened(pool, is_open) if self._whole else self._hopeful(pool, is_open)
         many = np.bincount(row[is_open], minlength=self._count)
         ends = (many > OPEN * self._arcs) | ((many > 0) & (level == HALVINGS))
         ends |= self._is_hopeless & (many > 0) & (level >= MORE)
         left = is_open & ends[row]
         if left.any():
-            self.proved[ends] = _held(pool.some(left), self.wanted)[ends] if self._whole else 0.0
+            self.proved[ends] = _held(pool.part(left), self.targets)[ends] if self._whole else 0.0
         done = np.isnan(self.proved) & (many == 0)
-        self.proved[done] = np.where(self._is_hopeless, 0.0, self.wanted)[done]
+        self.proved[done] = np.where(self._is_hopeless, 0.0, self.targets)[done]
         return is_open & ~ends[row]
 
     def _lessened(self, pool: _Open, is_open: np.ndarray) -> np.ndarray:
@@ -133,23 +138,23 @@ class _MultipleSearch:
             much = np.bincount(row[is_open], minlength=self._count) > OPEN * self._arcs
             if not much.any():
                 break
-            self.wanted = np.where(much, LESS * self.wanted, self.wanted)
+            self.targets = np.where(much, LESS * self.targets, self.targets)
             indices = np.flatnonzero(is_open & much[row])
-            is_open[indices] = ~pool.some(indices).hold(self.wanted[row[indices]])
+            is_open[indices] = ~pool.part(indices).hold(self.targets[row[indices]])
         return is_open
 
     def _hopeful(self, pool: _Open, is_open: np.ndarray) -> np.ndarray:
         # If the middle of a block itself cannot hold, nothing is proved for the motion any more, and a robot that fails
         # is looked for in such middles alone.
         row = pool.blocks.row
-        is_bad = is_open & ~pool.middles().hold(self.wanted[row])
+        is_bad = is_open & ~pool.middles().hold(self.targets[row])
         self._is_hopeless |= _any(row, is_bad, self._count)
         return is_open & (is_bad | ~self._is_hopeless[row])
 
     def refute(self, pool: _Open) -> None:
         # Take in the multiples that the middles of new blocks refute.
-        self.refuted = _refuted_below(pool, self.refuted, NEAR * self.refuted if self._whole else self.wanted)
-        self.wanted = np.minimum(self.wanted, _targets(self.refuted, whole=self._whole))
+        self.refuted = _refuted_below(pool, self.refuted, NEAR * self.refuted if self._whole else self.targets)
+        self.targets = np.minimum(self.targets, _targets(self.refuted, whole=self._whole))
 
 
 def _reachable(pool: _Open, multiples: np.ndarray) -> np.ndarray:
@@ -158,7 +163,7 @@ def _reachable(pool: _Open, multiples: np.ndarray) -> np.ndarray:
     fails = ~middles.hold(multiples[row])
     if not fails.any():
         return multiples
-    failing = middles.some(fails)
+    failing = middles.part(fails)
     least = _held(failing, multiples)
     return np.where(least < multiples, _near(least), multiples)
 
@@ -190,16 +195,16 @@ def _refuted_first(pool: _Open, count: int) -> np.ndarray:
     # Find the least multiple of a coarse row that the middles refute, then narrow it down.
     high, row = np.full(count, np.inf), pool.blocks.row
     for multiple in ROW:
-        left = pool.some(np.isinf(high)[row])
+        left = pool.part(np.isinf(high)[row])
         broken = left.fail(np.full(len(left.blocks.row), multiple))
         high[_any(left.blocks.row, broken, count)] = multiple
-    bad = pool.some(np.isfinite(high)[row])
-    bad = bad.some(bad.fail(high[bad.blocks.row]))
+    bad = pool.part(np.isfinite(high)[row])
+    bad = bad.part(bad.fail(high[bad.blocks.row]))
     while len(bad.blocks.row):
         broken = bad.fail(high[bad.blocks.row] / RATIO)
         lower = _any(bad.blocks.row, broken, count) & (high > FIRST)
         high = np.where(lower, high / RATIO, high)
-        bad = bad.some(broken & lower[bad.blocks.row])
+        bad = bad.part(broken & lower[bad.blocks.row])
     return _narrowed(pool, high / RATIO, high)
 
 
@@ -213,8 +218,8 @@ def _refuted_below(pool: _Open, refuted: np.ndarray, multiples: np.ndarray) -> n
 
 def _narrowed(pool: _Open, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     # Narrow `high`, which some middle refutes where it is finite, down towards `low`: some middle refutes it still.
-    pool = pool.some(np.isfinite(high)[pool.blocks.row])
-    pool = pool.some(pool.fail(high[pool.blocks.row]))
+    pool = pool.part(np.isfinite(high)[pool.blocks.row])
+    pool = pool.part(pool.fail(high[pool.blocks.row]))
     low, high = low.copy(), high.copy()
     for _ in range(STEPS):
         if not len(pool.blocks.row):
@@ -223,7 +228,7 @@ def _narrowed(pool: _Open, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         broken = pool.fail(middle[pool.blocks.row])
         lower = _any(pool.blocks.row, broken, len(high))
         low, high = np.where(lower, low, middle), np.where(lower, middle, high)
-        pool = pool.some(broken | ~lower[pool.blocks.row])
+        pool = pool.part(broken | ~lower[pool.blocks.row])
     return high
 
 

@@ -122,7 +122,7 @@ def _changes(
 
 
 @UNKNOWN
-def deviations(known: Enclosure, found: Influence, spools: np.ndarray, centre: np.ndarray) -> np.ndarray:
+def deviations(known: Enclosure, influence: Influence, spools: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Largest differences between tensions of robots and the planned ones, at the same instant of a block.
 
     Args:
@@ -132,8 +132,8 @@ def deviations(known: Enclosure, found: Influence, spools: np.ndarray, centre: n
     Returns:
         (k, n_cables) per mass and length, 1/s^2; infinite where nothing is known, also that no robot is singular.
     """
-    far = _reaches(known, found, spools, centre)
-    within, displaced = _changes(known, found, found.spools, far)
+    far = _reaches(known, influence, spools, centre)
+    within, displaced = _changes(known, influence, influence.spools, far)
     rest = (displaced @ known.high[..., None])[..., 0] + ROUNDING * known.high + far.centre
     return _solved(within + displaced, rest)
 
@@ -153,7 +153,7 @@ class Changes(NamedTuple):
 @UNKNOWN
 def closer_changes(
     known: Enclosure,
-    found: Influence,
+    influence: Influence,
     spools: np.ndarray,
     centre: np.ndarray,
     off: np.ndarray,
@@ -177,13 +177,13 @@ def closer_changes(
     Returns:
         the changes; infinite where they would lead below the smallest tensions, or nothing is known, or wanted.
     """
-    far = _reaches(known, found, spools, centre)
-    within, displaced = _changes(known, found, found.spools, far)
+    far = _reaches(known, influence, spools, centre)
+    within, displaced = _changes(known, influence, influence.spools, far)
     diagonal = np.eye(displaced.shape[1])[None] * displaced
     rest = np.sum(within * off[:, None], axis=2) + far.centre + ROUNDING * known.high
-    down = _largest_sum(known, found, displaced - diagonal, far) + rest + np.sum(diagonal, axis=2) * least
+    down = _largest_sum(known, influence, displaced - diagonal, far) + rest + np.sum(diagonal, axis=2) * least
     is_valid = (known.low - down > least).all(1)
-    up = _largest_sum(known, found, displaced, far) + rest if upwards else np.full_like(down, np.inf)
+    up = _largest_sum(known, influence, displaced, far) + rest if upwards else np.full_like(down, np.inf)
     return Changes(*(np.where(is_valid[:, None], x, np.inf) for x in (down, up)))
 
 
@@ -215,28 +215,29 @@ def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 @UNKNOWN
-def holds(known: Enclosure, found: Influence, asked: Requirements, multiple: np.ndarray) -> np.ndarray:
+def holds(known: Enclosure, influence: Influence, requirements: Requirements, multiple: np.ndarray) -> np.ndarray:
     """Blocks in which every robot within a multiple of the uncertainty meets everything: proved.
 
     Args:
-        asked: its slack is that of each block, (k,).
+        requirements: its slack is that of each block, (k,).
         multiple: (k,).
 
     Returns:
         (k,).
     """
-    share = _share(asked, multiple)
+    share = _share(requirements, multiple)
     is_met = np.ones(len(multiple), bool)
-    if float(asked.uncertainty.spool_positions) > 0.0:
+    if float(requirements.uncertainty.spool_positions) > 0.0:
         is_met &= known.distances.hold(share.spools)
-        is_met &= rates_hold(known, found, asked.limits, share.spools)
-    off = deviations(known, found, share.spools, share.centre)
-    is_taut = _tensions_hold(known, found, asked, share, Changes(off, off))
+        is_met &= rates_hold(known, influence, requirements.limits, share.spools)
+    off = deviations(known, influence, share.spools, share.centre)
+    is_taut = _tensions_hold(known, influence, requirements, share, Changes(off, off))
     again = np.flatnonzero(is_met & ~is_taut & np.isfinite(off).all(1))
     if len(again):
-        part = known.some(again), found.some(again)
-        part_share, less = _Share(*(x[again] for x in share)), dataclasses.replace(asked, slack=asked.slack[again])
-        upwards = asked.limits.tension_max is not None
+        part = known.part(again), influence.part(again)
+        part_share = _Share(*(x[again] for x in share))
+        less = dataclasses.replace(requirements, slack=requirements.slack[again])
+        upwards = requirements.limits.tension_max is not None
         closer = closer_changes(
             *part, part_share.spools, part_share.centre, off[again], _least(*part, less, part_share), upwards=upwards
         )
@@ -288,55 +289,55 @@ class WorstDisplacements(NamedTuple):
 
 
 @UNKNOWN
-def worst(known: Enclosure, found: Influence, asked: Requirements) -> WorstDisplacements:
+def worst(known: Enclosure, influence: Influence, requirements: Requirements) -> WorstDisplacements:
     """Robots that are worst to first order.
 
     Returns:
         the displacements.
     """
-    uncertainty, rows = asked.uncertainty, np.arange(len(found.mu))
-    size = np.sum(np.linalg.norm(found.across, axis=3) * np.abs(found.mu)[:, None], axis=2)
+    uncertainty, rows = requirements.uncertainty, np.arange(len(influence.mu))
+    size = np.sum(np.linalg.norm(influence.across, axis=3) * np.abs(influence.mu)[:, None], axis=2)
     change = float(uncertainty.spool_positions) * size
-    change += float(uncertainty.mass_centre) * np.linalg.norm(found.centre, axis=2)
-    limits, pull = asked.limits, asked.mass * found.lengths
+    change += float(uncertainty.mass_centre) * np.linalg.norm(influence.centre, axis=2)
+    limits, pull = requirements.limits, requirements.mass * influence.lengths
     low = 0.0 if limits.tension_min is None else limits.tension_min / pull
-    rooms = [(found.mu - low, 1.0)]
+    rooms = [(influence.mu - low, 1.0)]
     if limits.tension_max is not None:
-        rooms.append((np.asarray(limits.tension_max) / pull - found.mu, -1.0))
+        rooms.append((np.asarray(limits.tension_max) / pull - influence.mu, -1.0))
     spools, centre = [], []
     for room, sign in rooms:
         cable = np.argmin(np.nan_to_num(room / change, nan=np.inf), axis=1)
-        spools.append(sign * unit_vectors(found.across[rows, cable] * np.sign(found.mu)[..., None]))
-        centre.append(-sign * unit_vectors(found.centre[rows, cable]))
+        spools.append(sign * unit_vectors(influence.across[rows, cable] * np.sign(influence.mu)[..., None]))
+        centre.append(-sign * unit_vectors(influence.centre[rows, cable]))
     return WorstDisplacements(np.stack(spools), np.stack(centre))
 
 
 @UNKNOWN
 def fails(
-    known: Enclosure, found: Influence, worst: WorstDisplacements, asked: Requirements, multiple: np.ndarray
+    known: Enclosure, influence: Influence, worst: WorstDisplacements, requirements: Requirements, multiple: np.ndarray
 ) -> np.ndarray:
     """Blocks in whose middles one of the worst robots within a multiple of the uncertainty breaks something.
 
     Args:
-        asked: its slack is that of each block, (k,).
+        requirements: its slack is that of each block, (k,).
         multiple: (k,).
 
     Returns:
         (k,).
     """
-    share, limits = _share(asked, multiple), asked.limits
+    share, limits = _share(requirements, multiple), requirements.limits
     broken = np.zeros(len(multiple), bool)
     for spools, centre in zip(*worst, strict=True):
         mu, lengths = tensions(known, share.spools[:, None, None] * spools, share.centre[:, None] * centre)
-        broken |= (mu < -TOLERANCE * asked.slack[:, None]).any(1)
-        pull, unit = asked.mass * mu * lengths, _unit(asked)[:, None]
+        broken |= (mu < -TOLERANCE * requirements.slack[:, None]).any(1)
+        pull, unit = requirements.mass * mu * lengths, _unit(requirements)[:, None]
         if limits.tension_min is not None:
             broken |= (pull / share.factor[:, None] < limits.tension_min - unit).any(1)
         if limits.tension_max is not None:
             broken |= (pull * share.factor[:, None] > limits.tension_max * (1.0 + TOUCHED) + unit).any(1)
-    if float(asked.uncertainty.spool_positions) > 0.0:
+    if float(requirements.uncertainty.spool_positions) > 0.0:
         broken |= known.distances.fail(share.spools)
-        broken |= rates_fail(known, found, limits, share.spools)
+        broken |= rates_fail(known, influence, limits, share.spools)
     return broken
 
 

@@ -122,19 +122,19 @@ def attained(
     return np.split(good, np.cumsum(sizes)[:-1])
 
 
-def accessible_there(amplitude: str, definition: str, asked: list[tuple[np.ndarray, int]]) -> list[Accessible]:
+def accessible_there(amplitude: str, definition: str, grids: list[tuple[np.ndarray, int]]) -> list[Accessible]:
     """Accessible orientations of places, in whichever process.
 
     Args:
         amplitude: key of `AMPLITUDES`.
         definition: of `platforms.accessible.DEFINITIONS`.
-        asked: of each its place (3,), m, and its divisions of pi.
+        grids: of each its place (3,), m, and its divisions of pi.
 
     Returns:
         the orientations of each.
     """
     with double_precision():
-        return accessible_sets(checker_of(amplitude).problem.robot, asked, definition)
+        return accessible_sets(checker_of(amplitude).problem.robot, grids, definition)
 
 
 def attained_there(

@@ -183,11 +183,11 @@ def table_for_people(name: str, cells: list[Cell]) -> Any:
     return grid(TABLES[name].title, cells, transposed=TABLES[name].transposed, heads=TABLES[name].heads)
 
 
-def chosen(name: str, given: dict[str, Any]) -> TableSettings | None:
+def chosen(name: str, options: dict[str, Any]) -> TableSettings | None:
     """Settings of a table, from the options of the command line.
 
     Args:
-        given: values of --definition, --amplitude, --fine, --max-arcs, --values and --workers, None where absent.
+        options: values of --definition, --amplitude, --fine, --max-arcs, --values and --workers, None where absent.
 
     Returns:
         the choice; None for a table that has none.
@@ -196,14 +196,14 @@ def chosen(name: str, given: dict[str, Any]) -> TableSettings | None:
         ConfigError: an option given with such a table, or a value that it does not have.
     """
     if not TABLES[name].with_choice:
-        for option, value in given.items():
+        for option, value in options.items():
             if value is not None:
                 raise ConfigError(option, f"must be absent with table {name}")
         return None
     usual = TableSettings()
 
     def values_of(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
-        value, known = given[option], tuple(names)
+        value, known = options[option], tuple(names)
         if value not in (None, "all", *known):
             raise ConfigError(option, f"{shown(value)}: must be one of {', '.join(known)}, all")
         return otherwise if value is None else known if value == "all" else (value,)
@@ -211,9 +211,9 @@ def chosen(name: str, given: dict[str, Any]) -> TableSettings | None:
     return TableSettings(
         values_of("--definition", chapter_3.DEFINITIONS, usual.definitions),
         values_of("--amplitude", chapter_3.AMPLITUDES, usual.amplitudes),
-        2 if given["--fine"] else 1,
-        _count("--max-arcs", given["--max-arcs"], usual.max_arcs, LARGEST_ARCS),
-        _count("--values", given["--values"], usual.values, LARGEST_VALUES),
+        2 if options["--fine"] else 1,
+        _count("--max-arcs", options["--max-arcs"], usual.max_arcs, LARGEST_ARCS),
+        _count("--values", options["--values"], usual.values, LARGEST_VALUES),
     )
 
 

@@ -63,13 +63,13 @@ class Workers:
     Args:
         count: how many.
         begin: called first in each; None: nothing is.
-        given: what it is called with.
+        arguments: what it is called with.
 
     Raises:
         ResourceError: their threads could not be started.
     """
 
-    def __init__(self, count: int, begin: Callable[..., None] | None = None, *given: Any) -> None:
+    def __init__(self, count: int, begin: Callable[..., None] | None = None, *arguments: Any) -> None:
         """Start nothing yet."""
         check_threads_of_jax(count)
         # A second Ctrl-C ends everything at once; what then cleans up behind Python need not complain about it.
@@ -83,20 +83,20 @@ class Workers:
                 count,
                 mp_context=multiprocessing.get_context("spawn"),
                 initializer=_start,
-                initargs=(os.getpid(), begin, given),
+                initargs=(os.getpid(), begin, arguments),
             )
 
-    def submit(self, function: Callable, *given: Any) -> concurrent.futures.Future:
+    def submit(self, function: Callable, *arguments: Any) -> concurrent.futures.Future:
         """Have a worker call a function.
 
         Args:
-            given: what it is called with.
+            arguments: what it is called with.
 
         Returns:
             its result, when there is one.
         """
         with _signals_blocked(), _environment(self._settings):  # workers inherit both, from their first moment on
-            return self._pool.submit(function, *given)
+            return self._pool.submit(function, *arguments)
 
     def kill(self) -> None:
         """End all workers now."""

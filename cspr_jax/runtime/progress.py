@@ -32,7 +32,7 @@ class Pace:
         self.rate: float | None = None
         self.ends: float | None = None
 
-    def told(self, done: int, total: int) -> None:
+    def advance(self, done: int, total: int) -> None:
         """Take note of a finished tile; the first call says how many cells an earlier run has left."""
         instant = self._clock()
         self._tiles += 1
@@ -83,7 +83,7 @@ def progress() -> Iterator[Callable[[int, int], None]]:
         task = bar.add_task("starting", total=None)
 
         def on_tile(done: int, total: int) -> None:
-            pace.told(done, total)
+            pace.advance(done, total)
             bar.update(task, completed=done, total=total)
 
         with stages.heard(lambda text: bar.update(task, description=printable(text) or "computing")):
@@ -95,7 +95,7 @@ def _lines() -> Iterator[Callable[[int, int], None]]:
     pace, cells, over = Pace(), [(0, 0)], threading.Event()
 
     def on_tile(done: int, total: int) -> None:
-        pace.told(done, total)
+        pace.advance(done, total)
         cells.append((done, total))
 
     def write_lines() -> None:

@@ -84,18 +84,18 @@ def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, ReadableDataset
     return {name: _dataset(file, name) for name in names if file.id.links.exists(name.encode())}
 
 
-def refuse_dense(wanted: Iterable[ReadableDataset], size: int, *, densest: int = DENSEST) -> None:
+def refuse_dense(datasets: Iterable[ReadableDataset], size: int, *, densest: int = DENSEST) -> None:
     """Refuse datasets that hold much more than their file can, or much less than it has.
 
     Args:
-        wanted: all that would be read.
+        datasets: all that would be read.
         size: of the file, bytes.
         densest: bytes that one of the file may stand for.
 
     Raises:
         DamagedError: they do.
     """
-    readable = list(wanted)
+    readable = list(datasets)
     total, most = sum(one.size for one in readable), _PLENTY + densest * size
     if total > most:
         raise DamagedError(

@@ -49,12 +49,12 @@ class Outcome:
     Fields:
         result: path of the finished file.
         computed: number of tiles computed now.
-        kept: number of tiles found finished.
+        reused: number of tiles found finished.
     """
 
     result: Path
     computed: int
-    kept: int
+    reused: int
 
 
 @dataclasses.dataclass

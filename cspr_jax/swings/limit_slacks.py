@@ -116,7 +116,7 @@ def count(row: Limit, n_cables: int) -> int:
 
 @jax.jit
 def limit_slacks(
-    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, now: Instant
+    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, state: Instant
 ) -> tuple[list[Array], ...]:
     """The slacks of each limit, at one instant: smooth functions, one a cable or more.
 
@@ -125,21 +125,21 @@ def limit_slacks(
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
         tau: () normalised time.
-        now: the state at `tau`.
+        state: the state at `tau`.
 
     Returns:
         a list of () for each limit of `limits_set`, as long as `count` says.
     """
     if not limits_set(limits):
         return ()
-    position, slope, curvature = _path(segment, arcs, tau, now)
+    position, slope, curvature = _path(segment, arcs, tau, state)
     rays = position[None] - robot.base_points
     length = jnp.linalg.norm(rays, axis=1)
     rate = rays @ slope
     rate_slope = jnp.dot(slope, slope) + rays @ curvature
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
-    lift = jnp.stack(now.kappa) * length / (len(now.kappa) * z0)
-    here = _Now(z0, time, weight, now.eta, lift, position[2], length, rate, rate_slope)
+    lift = jnp.stack(state.kappa) * length / (len(state.kappa) * z0)
+    here = _Now(z0, time, weight, state.eta, lift, position[2], length, rate, rate_slope)
     slacks = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in limits_set(limits))
     return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in slacks)
 

@@ -10,7 +10,7 @@ from cspr_jax.build.limits import build_limits
 from cspr_jax.build.robots import gravity_of, kernel_robot
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.labels import value
-from cspr_jax.outputs.plots.motion_source import kept
+from cspr_jax.outputs.plots.motion_source import robot_and_plan
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
@@ -86,7 +86,7 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         InputError: a platform, a file without its robot, no such instant, or cables that do not span the space there.
         ConfigError: a mistake in the plan that the file keeps.
     """
-    robot_file, keys = kept(result, file, "acceleration")
+    robot_file, keys = robot_and_plan(result, file, "acceleration")
     if robot_file.is_platform:
         fault = f'"acceleration" of {robot_file.kind}'
         raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", fault=fault)

@@ -114,15 +114,15 @@ def _of_counts(data: np.ndarray) -> Scale:
     return Scale(colours, BoundaryNorm(bounds, len(shown)), extend, beyond, (ticks, texts), whole=True)
 
 
-def add_bar(figure: Figure, image, every: list[Axes], scale: Scale, words: str) -> None:
+def add_bar(figure: Figure, image, panels: list[Axes], scale: Scale, words: str) -> None:
     """The bar that explains the colours.
 
     Args:
         image: what is coloured.
-        every: the panels that it belongs to.
+        panels: the panels that it belongs to.
     """
     text = f"{words}; {scale.beyond}" if scale.beyond else words
-    bar = figure.colorbar(image, ax=every, shrink=0.9, extend=scale.extend, label=text, spacing="uniform")
+    bar = figure.colorbar(image, ax=panels, shrink=0.9, extend=scale.extend, label=text, spacing="uniform")
     if scale.ticks is not None:
         bar.set_ticks(scale.ticks[0], labels=scale.ticks[1])
         bar.ax.minorticks_off()

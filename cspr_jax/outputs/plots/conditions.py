@@ -5,7 +5,7 @@ import numpy as np
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.outputs.plots.fixed_axes import table
-from cspr_jax.outputs.plots.robot_at import asked, robot_of
+from cspr_jax.outputs.plots.robot_at import robot_of, workspace_of
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
 
@@ -47,7 +47,7 @@ def shown_first(result: Result) -> str:
         the one that its kind of map is about.
     """
     known = [name for name in MAP_KINDS[result.attributes["map"]].pictured if name in result.data]
-    if is_workspace(result) and len({MARGINS[name] for name in asked(result).conditions}) > 1:
+    if is_workspace(result) and len({MARGINS[name] for name in workspace_of(result).conditions}) > 1:
         return "verdict"
     names = [*known, *result.data]
     # A margin that nobody asks for has no picture.
@@ -81,7 +81,7 @@ def conditions(result: Result) -> str:
     Returns:
         the conditions with their numbers, and the orientations that they are asked of if the map says which.
     """
-    workspace, limits, robot = asked(result), table(result.settings, "limits"), robot_of(result)
+    workspace, limits, robot = workspace_of(result), table(result.settings, "limits"), robot_of(result)
     words = []
     for name in workspace.conditions:
         words.append(name + (f" {_tensions(limits, robot)}" if name == "wrench-feasible" else ""))

@@ -74,20 +74,20 @@ def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
     axis.set_major_formatter(FuncFormatter(lambda tick, _: "none" if none and tick == 0.0 else f"{tick:.0f}"))
 
 
-def reach_polar(every: list[Axes], reach: float, unit: str) -> None:
+def reach_polar(axes: list[Axes], reach: float, unit: str) -> None:
     """Ticks around and outward.
 
     Args:
-        every: polar panels with a common radius.
+        axes: polar panels with a common radius.
         reach: the largest radius shown.
     """
     step = next((step for step in DEGREES if reach <= 4.5 * step), None)
     even = step is None or unit != "°"
-    every_tick = np.asarray(MaxNLocator(4).tick_values(0.0, reach)) if even else np.arange(0.0, reach, step)
-    ticks = every_tick[(every_tick > 0.0) & (every_tick < 0.95 * reach)]
+    all_ticks = np.asarray(MaxNLocator(4).tick_values(0.0, reach)) if even else np.arange(0.0, reach, step)
+    ticks = all_ticks[(all_ticks > 0.0) & (all_ticks < 0.95 * reach)]
     around = range(0, 360, 45)
     gap = " " if unit.isalpha() else ""
-    for panel in every:
+    for panel in axes:
         panel.set_ylim(0.0, reach)
         panel.set_yticks(ticks, labels=[""] * len(ticks))
         panel.set_xticks([math.radians(angle) for angle in around], labels=[f"{turned(angle):g}°" for angle in around])

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
-from cspr_jax.outputs.plots.motion_source import keeps_plan, kept
+from cspr_jax.outputs.plots.motion_source import keeps_plan, robot_and_plan
 from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.schema.quantities import PARTS
 from cspr_jax.store.result import Result
@@ -116,7 +116,7 @@ def draw_limits(
 
 def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
     tension = result.data["tension"]
-    robot_file, keys = kept(result, "plan", "tension")
+    robot_file, keys = robot_and_plan(result, "plan", "tension")
     draw_limits(drawn["tension"], limits_of(robot_file, keys), tension, "N")
     legend_above(drawn["tension"], len(tension.T) + 2)
     if "tension_residual" in result.data:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.landings import landing_figure
 from cspr_jax.outputs.plots.motion import motion_figure
-from cspr_jax.outputs.plots.motion_source import kept
+from cspr_jax.outputs.plots.motion_source import robot_and_plan
 from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION, SUMMARY, TENSIONS, TRAJECTORY
 from cspr_jax.outputs.plots.path_accelerations import path_figure
 from cspr_jax.outputs.plots.summary import summary_figure
@@ -38,9 +38,11 @@ def _acceleration(result: Result, file: str, at: dict[str, float]) -> Figure:
 
 
 MOTION_PICTURES = {
-    TRAJECTORY: MotionPicture(lambda result, file, _: trajectory_figure(result, kept(result, file, TRAJECTORY)[0])),
-    TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, *kept(result, file, TENSIONS))),
-    SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *kept(result, file, SUMMARY))),
+    TRAJECTORY: MotionPicture(
+        lambda result, file, _: trajectory_figure(result, robot_and_plan(result, file, TRAJECTORY)[0])
+    ),
+    TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, *robot_and_plan(result, file, TENSIONS))),
+    SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *robot_and_plan(result, file, SUMMARY))),
     ACCELERATION: MotionPicture(_acceleration, at_instant=True),
     PATH_ACCELERATION: MotionPicture(lambda result, file, _: path_figure(result, file), needs=PATH_ACCELERATION),
     LANDING: MotionPicture(lambda result, *_: landing_figure(result), needs=LANDING),

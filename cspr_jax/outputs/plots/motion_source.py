@@ -78,7 +78,7 @@ def _check_cables(result: Result, file: str, robot_file: RobotFile, path: Path) 
             raise ConfigError(path, f"its robot {robot_file.name} is not that of {file}, where {fault}")
 
 
-def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]:
+def robot_and_plan(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]:
     """Robot and plan of a motion.
 
     Args:

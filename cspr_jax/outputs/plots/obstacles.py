@@ -5,7 +5,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch, Polygon
 
-from cspr_jax.outputs.plots.robot_at import asked, hull_of
+from cspr_jax.outputs.plots.robot_at import hull_of, workspace_of
 from cspr_jax.robots.shapes import Box, Cylinder, Obstacle
 from cspr_jax.store.result import Result
 
@@ -23,7 +23,7 @@ def obstacles(result: Result) -> list[np.ndarray]:
     """
     if result.attributes.get("map") != "workspace" or not result.settings:
         return []
-    return [_points(table.shape()) for table in asked(result).obstacle or ()]
+    return [_points(table.shape()) for table in workspace_of(result).obstacle or ()]
 
 
 def _points(shape: Obstacle) -> np.ndarray:

@@ -14,7 +14,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.labels import COLOURS, PANELS, chosen, robot_name
 from cspr_jax.outputs.plots.layout import columns_of, panels
 from cspr_jax.outputs.plots.motion import doubt
-from cspr_jax.outputs.plots.motion_source import kept
+from cspr_jax.outputs.plots.motion_source import robot_and_plan
 from cspr_jax.store.result import Result
 
 # Bounds beyond so many times the largest acceleration of the motion leave the picture.
@@ -53,7 +53,7 @@ def path_figure(result: Result, file: str) -> Figure:
         InputError: the file keeps no plan, or its rows do not fit it.
         ConfigError: a mistake in the plan that it keeps.
     """
-    robot_file, keys = kept(result, file, "path_acceleration")
+    robot_file, keys = robot_and_plan(result, file, "path_acceleration")
     ways = _ways(result, robot_file, keys)
     shown = [ways[k] for k in chosen(len(ways), PANELS)]
     columns = columns_of(len(shown))

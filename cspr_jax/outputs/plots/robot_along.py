@@ -54,11 +54,11 @@ def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows
     return Moving(base, position, attached, corners)
 
 
-def limits_of(robot_file: RobotFile, asked: PlanFile, quantity: str = "tension") -> list[tuple[str, float]]:
+def limits_of(robot_file: RobotFile, plan: PlanFile, quantity: str = "tension") -> list[tuple[str, float]]:
     """Limits of a quantity, to be drawn beside its values.
 
     Args:
-        asked: the plan, whose limits go before the robot's.
+        plan: the plan, whose limits go before the robot's.
         quantity: of `schema.limits.LIMITS`.
 
     Returns:
@@ -66,7 +66,7 @@ def limits_of(robot_file: RobotFile, asked: PlanFile, quantity: str = "tension")
     """
     limits = []
     for row in LIMITS:
-        limit_of_plan = getattr(asked, row.name, None)
+        limit_of_plan = getattr(plan, row.name, None)
         limit = getattr(robot_file, row.name, None) if limit_of_plan is None else limit_of_plan
         if row.quantity != quantity or limit is None:
             continue

@@ -40,7 +40,7 @@ def robot_of(result: Result) -> RobotFile:
     return RobotFile(**result.settings["robot"])
 
 
-def asked(result: Result) -> WorkspaceTable:
+def workspace_of(result: Result) -> WorkspaceTable:
     """Requirements of a map of a workspace on its poses.
 
     Returns:
@@ -65,7 +65,7 @@ def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
     robot_file = robot_of(result)
     azimuth, tilt, torsion = (angles.get(name, 0.0) for name in ("tilt_azimuth", "tilt", "torsion"))
     turn = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
-    quaternion = np.array(asked(result).orientation or IDENTITY)
+    quaternion = np.array(workspace_of(result).orientation or IDENTITY)
     size = np.linalg.norm(quaternion)
     if abs(size - 1.0) > UNIT_TOLERANCE:
         raise InputError("workspace.orientation", quaternion.tolist(), "of length 1")

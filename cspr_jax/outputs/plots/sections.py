@@ -50,20 +50,20 @@ class Section(NamedTuple):
     excluded: np.ndarray
 
 
-def section_figure(result: Result, section: Section, data: np.ndarray, told: np.ndarray | None = None) -> Figure:
+def section_figure(result: Result, section: Section, data: np.ndarray, informative: np.ndarray | None = None) -> Figure:
     """Sections of a map, one a panel.
 
     Args:
         result: gives axes, labels and constants.
         data: (n_first, n_second, n_panels).
-        told: of data's shape, the cells that say more than that there is nothing; None: all.
+        informative: of data's shape, the cells that say more than that there is nothing; None: all.
 
     Returns:
         the figure.
     """
     name, across, over = section.name, section.across, section.over
     polar = tuple(across) in (POLAR, AROUND)
-    says = np.ones(data.shape, bool) if told is None else told
+    says = np.ones(data.shape, bool) if informative is None else informative
     saying = np.flatnonzero(says.any((0, 1)))
     shown = saying[chosen(len(saying), PANELS)] if len(saying) else chosen(data.shape[2], PANELS)
     alone = {axis: float(points[0]) for axis, points in result.axes.items() if len(points) == 1} | section.place

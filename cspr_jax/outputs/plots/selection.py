@@ -57,11 +57,10 @@ def places(words: list[str], option: str = "--at") -> dict[str, float]:
     return at
 
 
-def nearest(result: Result, axis: str, wanted: float, option: str = "--at") -> tuple[int, str]:
+def nearest(result: Result, axis: str, coordinate: float, option: str = "--at") -> tuple[int, str]:
     """The point of an axis that is drawn where a value is asked for.
 
     Args:
-        wanted: the value.
         option: that gave it, for errors.
 
     Returns:
@@ -75,11 +74,11 @@ def nearest(result: Result, axis: str, wanted: float, option: str = "--at") -> t
     points = result.axes[axis]
     low, high = float(points.min()), float(points.max())
     rounding = SAME * max(abs(low), abs(high))
-    if not low - rounding <= wanted <= high + rounding:
+    if not low - rounding <= coordinate <= high + rounding:
         allowed = f"{axis} in [{low:.6g}, {high:.6g}]" if high > low else f"{axis} = {low:.6g}, its one point"
-        raise InputError(option, f"{axis}={wanted:.6g}", allowed)
-    place = int(np.argmin(np.abs(points - wanted)))
+        raise InputError(option, f"{axis}={coordinate:.6g}", allowed)
+    place = int(np.argmin(np.abs(points - coordinate)))
     words = value(result, axis, points[place])
-    if abs(points[place] - wanted) > rounding:
-        words += f" (nearest to {value(result, axis, wanted).partition(' = ')[2]})"
+    if abs(points[place] - coordinate) > rounding:
+        words += f" (nearest to {value(result, axis, coordinate).partition(' = ')[2]})"
     return place, words

@@ -13,7 +13,7 @@ from cspr_jax.outputs.plots.labels import WORDS, as_drawn, axis_label, label, un
 from cspr_jax.outputs.plots.obstacles import COLOUR, obstacles, outline, section_of
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.planes import in_order
-from cspr_jax.outputs.plots.robot_at import asked, robot_of
+from cspr_jax.outputs.plots.robot_at import robot_of, workspace_of
 from cspr_jax.outputs.plots.verdict_colours import FEASIBLE_COLOUR, REASONS
 from cspr_jax.outputs.plots.word_ticks import word_scale, worded
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
@@ -101,7 +101,7 @@ def _is_asked(result: Result, name: str) -> bool:
     if result.attributes["map"] != WORKSPACE:
         return True
     if name == "orientation_fraction":
-        return asked(result).orientations is not None
+        return workspace_of(result).orientations is not None
     return name != "cell_side" or bool(data.any())
 
 

@@ -31,15 +31,15 @@ def packed(values: np.ndarray) -> dict[str, Any]:
     return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}
 
 
-def unpacked(given: dict[str, Any]) -> np.ndarray:
+def unpacked(array: dict[str, Any]) -> np.ndarray:
     """Values of a page, as a browser has them.
 
     Args:
-        given: of `packed`.
+        array: of `packed`.
 
     Returns:
         (n,) numbers.
     """
-    name = next(name for name, other in TYPES.items() if other == given["type"])
-    data = gzip.decompress(base64.b64decode(given["data"]))
+    name = next(name for name, other in TYPES.items() if other == array["type"])
+    data = gzip.decompress(base64.b64decode(array["data"]))
     return np.frombuffer(data, np.dtype(name).newbyteorder("<"))
