@@ -181,9 +181,12 @@ def _numpy_checks(task: SixCableWork) -> np.ndarray:
     h = task.beta_hat[:, None]
     beat = ((9 + h) * c - (1 + h) * c3) / 8
     beat1, beat2 = theta * (3 * (1 + h) * s3 - (9 + h) * s) / 8, theta**2 * (9 * (1 + h) * c3 - (9 + h) * c) / 8
-    turn = (sign * task.angle[:, None])[..., None]
-    angle = turn * (a * beat)[..., None]
-    speed, spin = turn * (a1 * beat + a * beat1)[..., None], turn * (a2 * beat + 2 * a1 * beat1 + a * beat2)[..., None]
+    signed_angle = (sign * task.angle[:, None])[..., None]
+    angle = signed_angle * (a * beat)[..., None]
+    angular_speed, angular_acceleration = (
+        signed_angle * (a1 * beat + a * beat1)[..., None],
+        signed_angle * (a2 * beat + 2 * a1 * beat1 + a * beat2)[..., None],
+    )
     reach = (sign * (a * c - a1 * s / theta))[..., None]
     pull = (-sign * ((a * theta**2 + a2) * c + (a1 * theta + a3 / theta) * s) / squared)[..., None]
     rest, far = rest_point(PLACE[2]), np.array([*PLACE[:2], 0.0])
@@ -192,7 +195,7 @@ def _numpy_checks(task: SixCableWork) -> np.ndarray:
     skew = np.cross(np.eye(3), task.axis[:, None, :])[:, None]
     rotation = np.eye(3) + np.sin(angle)[..., None] * skew + (1 - np.cos(angle))[..., None] * skew @ skew
     weight = np.einsum("ntij,jk,nlk->nti", rotation, np.asarray(task.robot.inertia / task.robot.mass), e)
-    moment = (spin * weight + speed**2 * np.cross(e, weight)) / squared[..., None]
+    moment = (angular_acceleration * weight + angular_speed**2 * np.cross(e, weight)) / squared[..., None]
     arms = np.einsum("ntij,kj->ntki", rotation, np.asarray(task.robot.platform_points))
     rays = position[:, :, None] + arms - np.asarray(task.robot.base_points)
     matrix = -np.concatenate([rays, np.cross(arms, rays)], axis=3).swapaxes(2, 3)

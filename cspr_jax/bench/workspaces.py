@@ -35,24 +35,24 @@ class SamplePoses(NamedTuple):
 
     Fields:
         place: three arrays (n,), of the mass centre, m.
-        turn: four arrays (n,), unit quaternions; None of a point mass.
+        quaternion: four arrays (n,), unit quaternions; None of a point mass.
     """
 
     place: tuple[np.ndarray, ...]
-    turn: tuple[np.ndarray, ...] | None
+    quaternion: tuple[np.ndarray, ...] | None
 
 
 def _poses(robot: PointMassRobot | PlatformRobot, count: int, dtype: str) -> SamplePoses:
     rng, base = np.random.default_rng(0), np.asarray(robot.base_points)
     half = np.maximum(0.4 * np.ptp(base, axis=0), 0.5)
-    turns = np.array(IDENTITY) + 0.1 * rng.normal(size=(count, 4))
-    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    quaternions = np.array(IDENTITY) + 0.1 * rng.normal(size=(count, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
 
     def lanes(array):
         return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
     place = lanes(half * rng.uniform(-1.0, 1.0, (count, 3)))
-    return SamplePoses(place, lanes(turns) if isinstance(robot, PlatformRobot) else None)
+    return SamplePoses(place, lanes(quaternions) if isinstance(robot, PlatformRobot) else None)
 
 
 def _four_cables() -> PointMassRobot:
@@ -94,7 +94,7 @@ def margin_rate(
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::batches], all_poses)) for i in range(batches)]
 
     def one(poses):
-        return jax.block_until_ready(kernel(poses.place, poses.turn, None))
+        return jax.block_until_ready(kernel(poses.place, poses.quaternion, None))
 
     one(parts[0])
     first = time.perf_counter() - start
@@ -121,7 +121,7 @@ def clearance_rate(dtype: str) -> float:
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::4], all_poses)) for i in range(4)]
 
     def one(poses):
-        lanes = clearance_kernels.PoseLanes(poses.place, poses.turn, None)
+        lanes = clearance_kernels.PoseLanes(poses.place, poses.quaternion, None)
         return jax.block_until_ready(clearance_kernels.of_cables(points, lanes, pairs))
 
     return 4 * size / best(partial(in_threads, one, parts))
@@ -137,9 +137,9 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
     poses = _poses(centred_robot, count, "float64")
-    places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
-    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, turns)) / search.unit[:, None]
-    wrenches = np.repeat(search.required(places[0], turns[0]).corners, count, axis=0)
+    places, quaternions = np.stack(poses.place, 1), np.stack(poses.quaternion or (), 1)
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, quaternions)) / search.unit[:, None]
+    wrenches = np.repeat(search.required(places[0], quaternions[0]).corners, count, axis=0)
     limits = [np.broadcast_to(x, (count, centred_robot.n_cables)) for x in (search.asked.low, search.asked.high)]
     return count / best(lambda: least_norms(matrices, wrenches, *limits))
 
@@ -174,9 +174,9 @@ def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
     poses = _poses(centred_robot, SAMPLE, "float64")
-    places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
-    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, turns)) / search.unit[:, None]
-    wrench = search.required(places[0], turns[0]).corners[0]
+    places, quaternions = np.stack(poses.place, 1), np.stack(poses.quaternion or (), 1)
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, quaternions)) / search.unit[:, None]
+    wrench = search.required(places[0], quaternions[0]).corners[0]
 
     def rate(way) -> float:
         return SAMPLE / best(lambda: [way(matrix, wrench, search.asked.low, search.asked.high) for matrix in matrices])

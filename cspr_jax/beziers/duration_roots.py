@@ -21,13 +21,13 @@ class Ends(NamedTuple):
         start: (n, 3) from the centroid of the spools, z down, m.
         end: (n, 3) likewise.
         middle: (n, 3) second control point for r = 0, m.
-        turn: (n, 3) its change with r: 0, or the acceleration at the start, m/s^2.
+        middle_change: (n, 3) its change with r: 0, or the acceleration at the start, m/s^2.
     """
 
     start: np.ndarray
     end: np.ndarray
     middle: np.ndarray
-    turn: np.ndarray
+    middle_change: np.ndarray
 
     def middles(self, durations: np.ndarray) -> np.ndarray:
         """Second control points of given durations.
@@ -40,7 +40,7 @@ class Ends(NamedTuple):
         """
         r = (np.asarray(durations) / np.pi) ** 2
         more = (slice(None), *[None] * (r.ndim - 1))
-        return self.middle[more] + self.turn[more] * r[..., None]
+        return self.middle[more] + self.middle_change[more] * r[..., None]
 
 
 def critical_durations(
@@ -68,8 +68,8 @@ def critical_durations(
 def _vectors(ends: Ends, unit: np.ndarray) -> list[np.ndarray]:
     # The coefficients A, B, C of (17): (n, 3, 2) each, by powers of r over its unit.
     constant = powers(ends.start, ends.middle, ends.end)
-    nothing = np.zeros_like(ends.turn)
-    change = powers(nothing, ends.turn * unit[:, None], nothing)
+    nothing = np.zeros_like(ends.middle_change)
+    change = powers(nothing, ends.middle_change * unit[:, None], nothing)
     return [np.stack(pair, axis=-1) for pair in zip(constant, change, strict=True)]
 
 
@@ -82,7 +82,7 @@ def _of_cables(
     fall = np.zeros((len(unit), 3, 2))
     fall[:, 2, 1] = gravity * unit
     first = total(2.0 * square, -fall)
-    turned = [
+    moments = [
         _cross(first, rest),
         total(total(-_cross(slope, rest), 2.0 * _cross(square, slope)), -_cross(fall, slope)),
         total(-4.0 * _cross(square, rest), -_cross(fall, square)),
@@ -91,7 +91,7 @@ def _of_cables(
     pulled = [first, -slope, -4.0 * square, 0.0 * square]
     polynomials = []
     for row, arm in zip(rows, arms, strict=True):
-        f = [total(_dot(row, p), _dot(arm, t)) for p, t in zip(pulled, turned, strict=True)]
+        f = [total(_dot(row, p), _dot(arm, t)) for p, t in zip(pulled, moments, strict=True)]
         scale = sum(np.abs(x).max(-1, keepdims=True) for x in f)
         f = [x / np.where(scale > 0.0, scale, 1.0) for x in f]
         even, odd = total(f[0], f[2]), total(f[1], f[3])

@@ -52,7 +52,7 @@ def cubics(robot: PointMassRobot, motion: Bezier) -> Array:
     u = (np.pi / motion.time) ** 2
     fall = jnp.zeros_like(square).at[2].set(robot.gravity)
     first = 2.0 * u * square - fall
-    turned = jnp.stack(
+    moments = jnp.stack(
         [
             jnp.cross(first, rest),
             -u * jnp.cross(slope, rest) + 2.0 * u * jnp.cross(square, slope) - jnp.cross(fall, slope),
@@ -61,7 +61,7 @@ def cubics(robot: PointMassRobot, motion: Bezier) -> Array:
         ]
     )
     pulled = jnp.stack([first, -u * slope, -4.0 * u * square, jnp.zeros_like(square)])
-    return (rows @ pulled.T + arms @ turned.T) / _at_rest(robot, motion.z0)[:, None]
+    return (rows @ pulled.T + arms @ moments.T) / _at_rest(robot, motion.z0)[:, None]
 
 
 @jax.jit

@@ -89,8 +89,8 @@ def joined_segments(
         motions.append(Bezier(ends.start, middle, ends.end, np.array([time]), depth))
         intervals.append(taut_durations)
         if i + 1 < len(durations):
-            turn = end_acceleration(middle, ends.end, time)
-            ends = Ends(ends.end, points[i + 2 : i + 3], ends.end, turn)
+            acceleration = end_acceleration(middle, ends.end, time)
+            ends = Ends(ends.end, points[i + 2 : i + 3], ends.end, acceleration)
     return Joined(jax.tree.map(lambda *rows: np.concatenate(rows), *motions), intervals)
 
 

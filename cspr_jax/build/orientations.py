@@ -35,8 +35,8 @@ def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> 
     Raises:
         ConfigError: not of unit length.
     """
-    turn = np.asarray(IDENTITY if quaternion is None else quaternion)
-    size = float(np.linalg.norm(turn))
+    unit_quaternion = np.asarray(IDENTITY if quaternion is None else quaternion)
+    size = float(np.linalg.norm(unit_quaternion))
     if abs(size - 1.0) > UNIT_TOLERANCE:
         raise ConfigError(file, f"{key} = {shown(quaternion)}: must have length 1 (it has {size:.7g})")
-    return turn / size
+    return unit_quaternion / size

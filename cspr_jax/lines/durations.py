@@ -191,7 +191,7 @@ def _by_formula(robot: PointMassRobot, arguments, *, law: str, rule: str, in_pla
             least = fastest.least_s_curve(bounds)
         else:
             least = fastest.thesis_s_curve(bounds)
-        sizes = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.turn, axis=1) for t in (0.0, 1.0)])
+        sizes = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.normal_change, axis=1) for t in (0.0, 1.0)])
         resting = -jnp.stack([faces.offset, faces.offset + faces.slope]) / jnp.where(sizes > 0.0, sizes, 1.0)
         there = faces.bounds[None] & jnp.stack([faces.first <= 0.0, faces.last >= 1.0])
         rest = jnp.min(jnp.where(there, resting, jnp.inf))

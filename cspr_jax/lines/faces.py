@@ -28,16 +28,17 @@ IN_PLANE = 1e-9
 class LineFaces:
     """Half-planes steepness * s'' >= offset + slope * s in which a motion along a line stays.
 
-    Over the length of the normal at s, normal + turn * s, a slack is the distance of the acceleration from the face.
+    A slack over the length of the normal at s, normal + normal_change * s, is the distance of the acceleration from the
+    face.
 
     Fields:
         steepness: (..., n_faces) n . D.
         offset: (..., n_faces) n . g at the start.
         slope: (..., n_faces) change of n . g from start to end.
         normal: (..., n_faces, 3) n at the start, to the side of the other cables.
-        turn: (..., n_faces, 3) change of n from start to end.
+        normal_change: (..., n_faces, 3) change of n from start to end.
         along: (..., n_faces, n_cables) product of n with each ray to a spool at the start; 0 of rays in the face.
-        along_turn: (..., n_faces, n_cables) its change from start to end.
+        along_change: (..., n_faces, n_cables) its change from start to end.
         first: (..., n_faces) s from which on it bounds the accelerations of taut cables.
         last: (..., n_faces) s up to which it does; not above `first` if it bounds none.
     """
@@ -46,9 +47,9 @@ class LineFaces:
     offset: Array
     slope: Array
     normal: Array
-    turn: Array
+    normal_change: Array
     along: Array
-    along_turn: Array
+    along_change: Array
     first: Array
     last: Array
 
@@ -113,15 +114,15 @@ def line_faces(robot: PointMassRobot, start: Array, end: Array, *, in_plane: boo
         normal, at_end, along, along_end = (jnp.concatenate([x, -x]) for x in (normal, at_end, along, along_end))
         first, last = _bounding(along, along_end)
     free_fall = -relative_acceleration(robot, jnp.zeros_like(start))
-    turn = at_end - normal
+    normal_change = at_end - normal
     return LineFaces(
         steepness=normal @ (end - start),
         offset=normal @ free_fall,
-        slope=turn @ free_fall,
+        slope=normal_change @ free_fall,
         normal=normal,
-        turn=turn,
+        normal_change=normal_change,
         along=along,
-        along_turn=along_end - along,
+        along_change=along_end - along,
         first=first,
         last=last,
     )

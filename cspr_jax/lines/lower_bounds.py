@@ -87,10 +87,10 @@ def _reach(line: LineSlacks, name: str, s: Jet, shortness: Jet) -> np.ndarray:
     # Bound s'' or -s'' by each face over the cells, (n, CELLS, n_faces): inf if the face bounds nothing there.
     first, last = s.value
     free = [line.offset + line.slope * x for x in (first, last)]
-    along = (s.expanded(-1) * line.along_turn + line.along) * shortness.expanded(-2)
+    along = (s.expanded(-1) * line.along_change + line.along) * shortness.expanded(-2)
     ends = np.stack(
         [
-            (line.along + line.along_turn * x[..., None])
+            (line.along + line.along_change * x[..., None])
             * ((x - line.nearest) ** 2 * line.square[..., None] + line.apart)[..., None, :] ** -0.5
             for x in (first, last)
         ]

@@ -156,8 +156,8 @@ def _passed(upper: PublishedLine, lower: PublishedLine, largest: float) -> tuple
 def _largest(curve: np.ndarray, spans: np.ndarray) -> np.ndarray:
     # Return the largest values of cubics without a square, (4, n, n_pieces), over their spans, (2, n, n_pieces).
     square = -curve[1] / np.where(curve[3] != 0.0, 3.0 * curve[3], np.inf)
-    turn = np.sqrt(np.maximum(square, 0.0))
-    places = np.clip(np.stack([spans[0], spans[1], turn, -turn]), spans[0], spans[1])
+    stationary = np.sqrt(np.maximum(square, 0.0))
+    places = np.clip(np.stack([spans[0], spans[1], stationary, -stationary]), spans[0], spans[1])
     return (curve[0] + places * (curve[1] + places**2 * curve[3])).max(0)
 
 

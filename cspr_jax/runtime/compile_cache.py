@@ -54,7 +54,7 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
     check_owner(folder)
     whole.mkdir(mode=PRIVATE, exist_ok=True)
     check_owner(whole)
-    _sweep(folder)
+    _remove_leftovers(folder)
     shutil.rmtree(run_folder, ignore_errors=True)  # of a process of the same number
     run_folder.mkdir(mode=PRIVATE)
     damaged = _take(whole, run_folder)
@@ -246,7 +246,7 @@ def _is_whole_zstd(zstd, data: bytes) -> bool:
     return bool(reader.eof)
 
 
-def _sweep(folder: Path) -> None:
+def _remove_leftovers(folder: Path) -> None:
     # Runs of this machine that were killed have left these folders behind.
     for place in folder.glob(f"{_OWN}-{socket.gethostname()}-*"):
         process = place.name.rpartition("-")[2]

@@ -142,7 +142,7 @@ class RunFolder:
         parts = [part for folder in (self.path, self.shards) for part in sorted(folder.glob(".*.part"))]
         return [part for part in parts if pattern.fullmatch(part.name) and _is_file(part)]
 
-    def sweep_leftovers(self) -> None:
+    def remove_leftovers(self) -> None:
         """Remove what dead processes left unfinished; only under the lock.
 
         Raises:

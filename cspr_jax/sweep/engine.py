@@ -147,7 +147,7 @@ class Run:
             if (reason := claims.damage(self._folder.record)) is not None:
                 self._quarantine(self._folder.record, reason)
             claims.refuse_other_environment(self._folder, environment, accept, self._reader)
-            self._folder.sweep_leftovers()
+            self._folder.remove_leftovers()
             record = claims.own_record(self._sweep, self._folder, environment, self._options.command)
             if self._is_whole():  # another process finished it meanwhile
                 if self._options.prune:

@@ -196,14 +196,14 @@ def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, B
     """
     ratio, steady, period = oscillation(segment, arcs)
     omega, gain = math.pi * arcs, steady / period
-    turn = math.pi * segment.precession
+    precession = math.pi * segment.precession
     one = jnp.ones_like(omega)
     wave = Bounds(one, omega, omega**2)
     rho = (over.bend + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
-    c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(turn)
+    c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(precession)
     d_r = rho * wave + (over.growth * wave).times(2.0 * gain / omega)
     d_t = ((rho + over.size.times(2.0 * gain)) * wave).times(ratio)
-    return c, (d_r.combined(d_t).turned(turn) + c).times(period)  # c'' = T^2 lambda (d - c)
+    return c, (d_r.combined(d_t).turned(precession) + c).times(period)  # c'' = T^2 lambda (d - c)
 
 
 def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Bounds:

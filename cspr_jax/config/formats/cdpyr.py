@@ -197,12 +197,12 @@ def _cables(robot: _Table, platform: _Table) -> list[Cable]:
             pulley = start.table("pulley")
             radius = pulley.numbers("radius")
             cable.radius = 0.0 if radius is None else float(radius)
-            cable.axis = (_turn(start) @ _turn(pulley))[:, 2].tolist()
+            cable.axis = (_rotation(start) @ _rotation(pulley))[:, 2].tolist()
         cables.append(cable)
     return cables
 
 
-def _turn(anchor: _Table) -> np.ndarray:
+def _rotation(anchor: _Table) -> np.ndarray:
     matrix = anchor.numbers("dcm", 3, 3)
     return np.eye(3) if matrix is None else matrix
 

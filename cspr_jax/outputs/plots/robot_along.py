@@ -46,11 +46,13 @@ def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows
     body = np.zeros_like(base) if robot_file.platform_points is None else np.asarray(robot_file.platform_points, float)
     if robot_file.centre_of_mass is not None:  # whose position a motion holds
         body = body - np.asarray(robot_file.centre_of_mass, float)
-    edges, turn = np.empty((0, 2, 3)), np.eye(3)[None]
+    edges, rotations = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
-        edges, turn = hull_of(body)[1], np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
+        edges, rotations = hull_of(body)[1], np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
     # These points turn with the platform, at each row.
-    attached, corners = (position[:, None] + np.einsum("rij,kj->rki", turn, x) for x in (body, edges.reshape(-1, 3)))
+    attached, corners = (
+        position[:, None] + np.einsum("rij,kj->rki", rotations, x) for x in (body, edges.reshape(-1, 3))
+    )
     return Moving(base, position, attached, corners)
 
 

@@ -64,16 +64,16 @@ def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
     """
     robot_file = robot_of(result)
     azimuth, tilt, torsion = (angles.get(name, 0.0) for name in ("tilt_azimuth", "tilt", "torsion"))
-    turn = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
+    rotation = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
     quaternion = np.array(workspace_of(result).orientation or IDENTITY)
     size = np.linalg.norm(quaternion)
     if abs(size - 1.0) > UNIT_TOLERANCE:
         raise InputError("workspace.orientation", quaternion.tolist(), "of length 1")
-    turn = turn @ rotation_matrix(quaternion / size)
+    rotation = rotation @ rotation_matrix(quaternion / size)
     base = np.array(robot_file.base_points, float)
     body = np.zeros_like(base) if robot_file.platform_points is None else np.array(robot_file.platform_points, float)
     faces, edges = hull_of(body)
-    return Posed(base, place + body @ turn.T, place + faces @ turn.T, place + edges @ turn.T)
+    return Posed(base, place + body @ rotation.T, place + faces @ rotation.T, place + edges @ rotation.T)
 
 
 def _about(axis: str, angle: float) -> np.ndarray:
