@@ -1,7 +1,7 @@
 """Base of all maps of a sweep: robot, limits, amplitude function, and the targets of a grid."""
 
 import abc
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -47,8 +47,15 @@ class GridMap(abc.ABC):
         """Build what all tiles share."""
         self._keys, self._file = keys, file
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
-        options: dict[str, Any] = {"at": "trajectory.", "for_bounds": for_bounds, "any_cables": self.any_cables}
-        self._problem = build_problem(robot_file, keys.trajectory, keys.limits, file, **options)
+        self._problem = build_problem(
+            robot_file,
+            keys.trajectory,
+            keys.limits,
+            file,
+            at="trajectory.",
+            for_bounds=for_bounds,
+            any_cables=self.any_cables,
+        )
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

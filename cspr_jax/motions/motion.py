@@ -5,6 +5,7 @@ vmapped and differentiated. Normalised time tau runs from 0 to 1.
 """
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any, Generic, Protocol, TypeVar
 
 import jax
@@ -141,10 +142,7 @@ def outward(frame: Frame, state: State) -> State:
     Returns:
         the state.
     """
-    turned: dict[str, Any] = {"position": frame.outward(state.position)}
-    turned |= {name: frame.turned(getattr(state, name)) for name in ("velocity", "acceleration")}
-    if state.rotation is not None:
-        turned["quaternion"] = None if state.quaternion is None else frame.turned_quaternions(state.quaternion)
-        turned["rotation"] = frame.turned_tensor(state.rotation)
-        turned |= {name: frame.turned(getattr(state, name)) for name in ("angular_velocity", "angular_acceleration")}
-    return State(**turned)
+    vector, tensor, quaternion = frame.turned, frame.turned_tensor, frame.turned_quaternions
+    # In the order of the fields of a state; a point mass has no orientation.
+    changes: tuple[Callable[..., Any], ...] = (frame.outward, vector, vector, tensor, vector, vector, quaternion)
+    return State(*(value if value is None else change(value) for change, value in zip(changes, state, strict=True)))

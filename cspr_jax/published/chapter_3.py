@@ -117,8 +117,16 @@ def attained(
     symmetry = symmetries(checker.problem.robot)
     orientations = np.concatenate([angles for _, angles in sets])
     z0 = places[:, 2]
-    how = {"max_arcs": choice.max_arcs, "values": choice.values}
-    good = attainable.attained(checker, places, orientations, z0, tried=tried, symmetry=symmetry, **how)
+    good = attainable.attained(
+        checker,
+        places,
+        orientations,
+        z0,
+        tried=tried,
+        symmetry=symmetry,
+        max_arcs=choice.max_arcs,
+        values=choice.values,
+    )
     return np.split(good, np.cumsum(sizes)[:-1])
 
 

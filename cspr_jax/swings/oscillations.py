@@ -25,6 +25,7 @@ from cspr_jax.swings.arcs import check_numbers
 from cspr_jax.swings.decide import BATCH, Known, decided, end_slacks
 from cspr_jax.swings.envelopes import proved_envelope
 from cspr_jax.swings.hypocycloid import Segment
+from cspr_jax.swings.margins import margins
 from cspr_jax.swings.proof import tolerance
 from cspr_jax.swings.transition_margins import transition_margins
 
@@ -204,13 +205,10 @@ def minimum_oscillations(
     infinity = 1.0 - np.abs(v) * max(abs(float(problem.amplitude.lowest)), float(problem.amplitude.highest))
     allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
     parities = {0: segments, 1: segments}
-    if steady is None:
-        is_plain = not limits_set(problem.limits) and problem.limits.uncertainty is None
-        known = _known(problem, segments, (weights, v), allowed) if is_plain else None
-        how: dict[str, Any] = {"known": known, "measure": transition_margins}
-    else:
-        how = {}
-    answers, _ = decided(problem, parities, upper, at_ends, infinity, arcs=arcs, **how)
+    is_plain = steady is None and not limits_set(problem.limits) and problem.limits.uncertainty is None
+    known = _known(problem, segments, (weights, v), allowed) if is_plain else None
+    measure = transition_margins if steady is None else margins
+    answers, _ = decided(problem, parities, upper, at_ends, infinity, arcs=arcs, known=known, measure=measure)
     return OscillationAnswers(
         **vars(answers),
         oscillations=answers.arcs // 2,

@@ -143,8 +143,16 @@ def legend_above(panel: Axes, columns: int, handles: list | None = None, words: 
         the legend.
     """
     entries: Any = panel.get_legend_handles_labels() if handles is None or words is None else (handles, words)
-    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
-    legend = panel.legend(*entries, ncols=columns, frameon=False, columnspacing=1.2, handlelength=1.8, **place)
+    legend = panel.legend(
+        *entries,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.2,
+        ncols=columns,
+        frameon=False,
+        columnspacing=1.2,
+        handlelength=1.8,
+    )
     legend.set_gid(ABOVE)
     return legend
 

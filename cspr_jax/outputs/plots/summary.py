@@ -46,9 +46,9 @@ def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fig
     if cells:
         table = figure.add_subplot(parts[3])
         table.axis("off")
-        place: Any = {"bbox": (0.0, 0.0, 1.0, 1.0), "colWidths": WIDTHS}
         # Its letters get smaller where the picture is narrow.
-        table.table(cells, colLabels=HEADS, cellLoc="center", edges="horizontal", **place)
+        bbox: Any = (0.0, 0.0, 1.0, 1.0)
+        table.table(cells, colLabels=HEADS, cellLoc="center", edges="horizontal", bbox=bbox, colWidths=WIDTHS)
     figure.suptitle(f"{robot_name(result)}: {result.axes['t'][-1]:.4g} s\n{extremes(result)}{doubt(result)}")
     return figure
 
