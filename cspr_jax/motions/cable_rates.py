@@ -7,18 +7,18 @@ from cspr_jax.robots.limits import Limits
 
 
 def rates_hold(known: Enclosure, influence: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
-    """Blocks in which every cable of every robot keeps its limits of speed and acceleration: proved.
+    """Prove that every cable of every robot keeps its limits of speed and acceleration within blocks.
 
     Args:
-        spools: (k,) largest displacement, m.
+        spools: (k,) largest displacement of a spool, m.
 
     Returns:
-        (k,).
+        (k,) whether it is proved.
     """
     is_met, largest = np.ones(len(spools), bool), _limits_of_rates(limits)
     if largest is None:
         return is_met
-    # Within the block every ray of every robot is in a ball around the planned one of the middle.
+    # Within the block every ray of every robot lies in a ball around the planned ray in the middle.
     ball = np.minimum((known.moved + spools[:, None]) / influence.lengths, 1.0)
     units, rates = known.rays / influence.lengths[..., None], known.rates
     slowest, fastest = _along(units, rates.velocity, ball)
@@ -53,12 +53,12 @@ def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np
 
 
 def rates_fail(known: Enclosure, influence: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
-    """Blocks in whose middles a cable of some robot breaks a limit of speed or acceleration.
+    """Tell whether a cable of some robot breaks a limit of speed or acceleration in the middle of each block.
 
-    Spools are displaced along their rays, and across them in the way of the velocity or the acceleration.
+    Spools are displaced along their rays, and across them in the direction of the velocity or the acceleration.
 
     Args:
-        spools: (k,) displacement, m.
+        spools: (k,) displacement of the spools, m.
 
     Returns:
         (k,).

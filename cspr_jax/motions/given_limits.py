@@ -1,4 +1,4 @@
-"""Limits as somebody gives them, checked, in the kernels' axes."""
+"""Limits of a file or a caller, checked, in the kernels' axes."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -22,14 +22,14 @@ from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
 def limits_of(
     robot: Any, limits: Mapping[str, Any], defaults: Mapping[str, Any], at: str, n_cables: int | None = None
 ) -> Limits:
-    """Limits that are given over those of a robot.
+    """Limits, with those of a robot where none are given.
 
     Args:
         robot: has base_points and z_axis of its file.
         limits: by name, one number or one a cable each; None: as in `defaults`.
-        defaults: likewise; None: no limit.
+        defaults: limits of the robot, likewise; None: no limit.
         at: prefix of keys in errors.
-        n_cables: of which the limits are; None: those of the robot.
+        n_cables: number of cables that have the limits; None: as the robot has.
 
     Returns:
         the limits, the floor as a depth; some of the largest tensions may be infinite.
@@ -85,7 +85,7 @@ def check_bounded(limits: Limits) -> None:
 def check_certain(
     robot: PointMassRobot | PlatformRobot, limits: Limits, families: tuple[str, ...], *, in_pairs: bool = False
 ) -> None:
-    """Refuse an uncertainty where motions are not judged by it.
+    """Refuse an uncertainty where verdicts do not take it into account.
 
     Args:
         limits: with an uncertainty, or without.
@@ -157,13 +157,13 @@ def limits_over(
     any_tensions: bool = False,
     families: tuple[str, ...] = (),
 ) -> Limits:
-    """Limits that are given over those of a robot, as the kernels take them.
+    """Limits, with those of a robot where none are given, as the kernels take them.
 
     Args:
         robot: in its own axes.
         limits: one number or one a cable each, in the robot's axes; None: those of the robot.
         any_tensions: whether some of the largest tensions may be infinite.
-        families: of the trajectories that are judged by all of an uncertainty; none: there may be none.
+        families: names of the trajectories, which decide whether an uncertainty is allowed; none: it is not.
 
     Returns:
         the limits.

@@ -1,4 +1,4 @@
-"""Motion of an effector: what every trajectory family gives, and what plans, margins, demands and files take.
+"""Motion of an effector: what every trajectory family provides, and what plans, margins, demands and files take.
 
 A motion is a pytree that holds its own amplitude function, number of arcs and depth of P0, so that it can be jitted,
 vmapped and differentiated. Normalised time tau runs from 0 to 1.
@@ -120,7 +120,7 @@ class Placed(Generic[Kind]):
 
 
 def inward(frame: Frame, state: State) -> State:
-    """State of the axes of a robot file in those of the kernels.
+    """State in the kernels' axes, from the axes of a robot file.
 
     Args:
         state: in the axes of the file; leaves (..., 3), (..., 4) or (..., 3, 3).
@@ -128,7 +128,7 @@ def inward(frame: Frame, state: State) -> State:
     Returns:
         the state, from the centroid of the spools, z down.
     """
-    # Turning is its own inverse.
+    # The rotation between the axes is its own inverse.
     place: Any = frame.inward(state.position)
     return outward(frame, state)._replace(position=place)
 

@@ -27,10 +27,10 @@ BATCH = 512
 
 
 class Need(NamedTuple):
-    """Need of a motion at the instant at which it breaks a criterion by most, or comes nearest to it.
+    """Need of a motion at the instant at which it breaks a criterion most, or comes nearest to it.
 
     Fields:
-        criterion: the flag that says that it is broken.
+        criterion: flag that says that the criterion is broken.
         cables: numbers from 0 on: of one cable, of two that touch, or none.
         tau: the instant, normalised time.
         needed: what the motion has there, in `unit`.
@@ -89,7 +89,7 @@ def needs(problem: Problem, motion: Motion, samples: int) -> list[Need]:
 
 
 def _with_tensions(robot: AnyRobot, limits: Limits) -> Limits:
-    # Cables may not push where no smallest tension is given; redundant ones leave a choice.
+    # Without a smallest tension, cables may still not push. A motion does not determine tensions of redundant cables.
     if robot.n_cables > robot.dof:
         return dataclasses.replace(limits, tension_min=None, tension_max=None)
     if limits.tension_min is not None:

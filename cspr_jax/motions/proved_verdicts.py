@@ -13,7 +13,7 @@ class Verdicts:
         verdict: flags of `Verdict`; 0 if proved.
         margin: smallest slack of taut cables that is attained: of lines a distance from faces, m/s^2; of Bezier
             segments without a unit, the depth below the spools included.
-        bound: proved lower bound of it.
+        bound: proved lower bound of the margin.
         room: smallest slack of the limits, without a unit; inf without limits.
     """
 
@@ -23,7 +23,7 @@ class Verdicts:
     room: np.ndarray
 
     def replace(self, rows: np.ndarray, part: "Verdicts") -> None:
-        """Put other verdicts in place of some.
+        """Replace the verdicts of some of the motions.
 
         Args:
             rows: numbers of the motions.
@@ -36,7 +36,7 @@ def plain_slack(name: str, values: np.ndarray) -> np.ndarray:
     """Slack of a limit as it is shown.
 
     Args:
-        values: (...) as it is proved: of speeds 1 - (rate / limit)^2.
+        values: (...) slack as it is proved: of speeds 1 - (rate / limit)^2.
 
     Returns:
         (...) of speeds 1 - rate / limit.

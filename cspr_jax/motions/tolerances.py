@@ -1,7 +1,7 @@
-"""Largest multiple of an uncertainty that motions are proved to stand, with one that they do not.
+"""Largest multiple of an uncertainty that motions are proved to tolerate, and the smallest that is refuted.
 
-Blocks of a motion are proved for a multiple or halved (`uncertainty.holds`); a robot that breaks something in the
-middle of one bounds the multiple from above (`uncertainty.fails`).
+Blocks of a motion are proved for a multiple or halved (`uncertainty.holds`); a robot that breaks a criterion in the
+middle of a block bounds the multiple from above (`uncertainty.fails`).
 """
 
 import dataclasses
@@ -15,16 +15,16 @@ from cspr_jax.motions.enclosures import Enclosure, Influence, influence
 from cspr_jax.motions.uncertainty import Requirements, WorstDisplacements, fails, holds, worst
 from cspr_jax.schema.limits import LARGEST_MULTIPLE
 
-# Multiples that are tried first, one after the other; then they are divided, down to the first one or less.
+# `ROW` is tried first, in its order. A multiple that fails is then divided by `RATIO` while it fails, down to `FIRST`.
 RATIO, FIRST = 8.0, 1e-6
 ROW = (1.0, 8.0, 64.0, 512.0, LARGEST_MULTIPLE)
-# Ratio that the two multiples of an answer are to reach, and steps in which each is found.
+# Ratio that the proved and the refuted multiple are to reach, and bisections that find each.
 NEAR, STEPS = 0.99, 12
-# Largest number of times that a block is halved, and of blocks of an arc that may be open.
+# Most halvings of a block, and most open blocks of an arc.
 HALVINGS, OPEN = 14, 256
-# Factor of the wanted multiple where more blocks are open, and how often it is applied in a row.
+# Factor by which a target is lowered where more blocks are open, and how often it is applied in a row.
 LESS, LESSER = 0.95, 8
-# Levels of halving down to which a robot that fails is looked for where the bounds cannot hold.
+# Levels of halving at which a robot that fails is still looked for once the bounds cannot hold.
 MORE = 3
 
 
@@ -32,8 +32,8 @@ class Tolerated(NamedTuple):
     """Multiples of an uncertainty, of n motions.
 
     Fields:
-        proved: (n,) every robot within this multiple meets everything: proved; 0 where nothing is.
-        refuted: (n,) a robot within this multiple breaks something; infinite where none was found.
+        proved: (n,) every robot within this multiple is proved to meet all criteria; 0 where nothing is proved.
+        refuted: (n,) a robot within this multiple breaks a criterion; infinite where none was found.
     """
 
     proved: np.ndarray
@@ -42,7 +42,7 @@ class Tolerated(NamedTuple):
 
 @dataclasses.dataclass
 class _Open:
-    # Blocks that are looked at, and what is known of them.
+    # Blocks that are not settled, and what is known of them.
     blocks: Blocks
     known: Enclosure
     influence: Influence
@@ -73,13 +73,13 @@ def tolerated(
     *,
     whole: bool = True,
 ) -> Tolerated:
-    """Multiples of an uncertainty that motions stand, and that they do not.
+    """Multiples of an uncertainty that motions tolerate, and that they do not.
 
     Args:
-        blocks: of n motions, whole motions, each feasible as it is planned.
+        blocks: of n whole motions, each feasible as planned.
         arcs: (n,) numbers of arcs.
-        enclose: what is known of blocks.
-        whole: whether the multiples are wanted as near to each other as can be; else only whether they are below 1.
+        enclose: gives the enclosure of blocks.
+        whole: True: find multiples as near to each other as can be; False: only decide on which side of 1 they lie.
 
     Returns:
         the multiples.
@@ -102,7 +102,7 @@ def tolerated(
 
 
 class _MultipleSearch:
-    # State of the search for n motions: multiples that are refuted, wanted and, where it is settled, proved.
+    # State of the search for n motions: refuted multiples, targets and, of motions that are settled, proved multiples.
 
     def __init__(self, arcs: np.ndarray, *, whole: bool) -> None:
         self._arcs, self._whole, self._count = arcs, whole, len(arcs)
@@ -117,7 +117,7 @@ class _MultipleSearch:
         return pool.part(np.isnan(self.proved)[pool.blocks.row])
 
     def open_blocks(self, pool: _Open, level: int) -> np.ndarray:
-        # Return the blocks that are to be halved; settle motions without any, and those of which too much is open.
+        # Return the blocks to be halved; settle motions without any, and motions with too many.
         row = pool.blocks.row
         is_open = ~pool.hold(self.targets[row])
         is_open = self._lessened(pool, is_open) if self._whole else self._hopeful(pool, is_open)
@@ -132,7 +132,7 @@ class _MultipleSearch:
         return is_open & ~ends[row]
 
     def _lessened(self, pool: _Open, is_open: np.ndarray) -> np.ndarray:
-        # Less is wanted where too much is open.
+        # Lower the targets of motions of which too many blocks are open.
         row = pool.blocks.row
         for _ in range(LESSER):
             much = np.bincount(row[is_open], minlength=self._count) > OPEN * self._arcs
@@ -144,8 +144,8 @@ class _MultipleSearch:
         return is_open
 
     def _hopeful(self, pool: _Open, is_open: np.ndarray) -> np.ndarray:
-        # If the middle of a block itself cannot hold, nothing is proved for the motion any more, and a robot that fails
-        # is looked for in such middles alone.
+        # Once the middle of a block cannot hold, nothing can be proved for its motion: only look for a robot that
+        # fails, in such middles.
         row = pool.blocks.row
         is_bad = is_open & ~pool.middles().hold(self.targets[row])
         self._is_hopeless |= _any(row, is_bad, self._count)
@@ -209,7 +209,7 @@ def _refuted_first(pool: _Open, count: int) -> np.ndarray:
 
 
 def _refuted_below(pool: _Open, refuted: np.ndarray, multiples: np.ndarray) -> np.ndarray:
-    # Return the least multiples that are refuted, with those of the wanted multiples that the blocks refute.
+    # Try the multiples on the blocks, narrow down those that they refute, and return the least refuted multiples.
     multiples = np.minimum(multiples, LARGEST_MULTIPLE)
     is_new = _any(pool.blocks.row, pool.fail(multiples[pool.blocks.row]), len(refuted)) & (multiples > 0.0)
     high = np.where(is_new, multiples, np.inf)
@@ -233,7 +233,7 @@ def _narrowed(pool: _Open, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def _held(left: _Open, multiples: np.ndarray) -> np.ndarray:
-    # Find the largest multiples that hold in all of some blocks, (n,); motions without any keep the wanted one.
+    # Find the largest multiple that holds in all blocks of each motion, (n,); motions without blocks keep theirs.
     row = left.blocks.row
     low, high = np.zeros(len(row)), multiples[row]
     for _ in range(STEPS):

@@ -6,9 +6,9 @@ the tensions mu' of another robot differ from the planned ones mu at the same in
 
     |d| <= A |d| + B mu + b,    so |d| <= (1 - A)^-1 (B mu + b)  where the spectral radius of A = G + B is below 1,
 
-component by component: G_kj is |g_kj . the way of ray j| and |g_kj| times what the ray leaves its tangent, B_kj is
-|g_kj across ray j| times the largest displacement of spool j, b is what the mass centre does: docs/theory.md. Then no
-such robot is singular either.
+component by component. G_kj is |g_kj . the way of ray j| plus |g_kj| times the distance of the ray from its tangent,
+B_kj is |g_kj across ray j| times the largest displacement of spool j, and b is the effect of the mass centre:
+docs/theory.md. Then no such robot is singular either.
 """
 
 import dataclasses
@@ -28,7 +28,7 @@ TOLERANCE = 1e-6
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
 # Largest error of solving for a deviation, as a part of it, and of the tensions.
 ROUNDING = 1e-9
-# Rounds in which functionals are corrected, and by how much more than is known to be needed.
+# Rounds in which functionals are corrected, and the relative surplus of each correction.
 ROUNDS, SPARE = 8, 0.01
 
 
@@ -85,8 +85,8 @@ def _share(requirements: Requirements, multiple: np.ndarray) -> _Share:
 
 
 class _Reaches(NamedTuple):
-    # By how much rays differ within k blocks and a multiple of the uncertainty: across ray j, at the planned length
-    # (k, n_cables); as parts of lengths from the middle; and what the mass centre does to each tension.
+    # Reach of k blocks and a multiple of the uncertainty, (k, n_cables) each: displacement of spools across rays, at
+    # planned lengths; motion of rays from the middle, over their lengths; effect of the mass centre on tensions.
     off: np.ndarray
     turned: np.ndarray
     centre: np.ndarray
@@ -130,7 +130,7 @@ def deviations(known: Enclosure, influence: Influence, spools: np.ndarray, centr
         centre: (k,) likewise of the mass centre, m.
 
     Returns:
-        (k, n_cables) per mass and length, 1/s^2; infinite where nothing is known, also that no robot is singular.
+        (k, n_cables) per mass and length, 1/s^2; infinite where nothing is known, not even that no robot is singular.
     """
     far = _reaches(known, influence, spools, centre)
     within, displaced = _changes(known, influence, influence.spools, far)
@@ -161,11 +161,11 @@ def closer_changes(
     *,
     upwards: bool,
 ) -> Changes:
-    """Largest changes of tensions, which are less as long as none is below its smallest value.
+    """Closer bounds of the changes of tensions, which hold as long as no tension falls below its smallest value.
 
-    On the way from the planned robot to another one, the first tension that comes to its smallest value finds all
-    others above theirs, all of them at least 0. With c_j the terms of row k of B, it has changed by no more than the
-    largest sum of c_j mu'_j that such tensions can have, its own of them known. That is at most y . w for every
+    Change the planned robot into another one little by little, until a first tension mu'_k reaches its smallest value.
+    All others are then above theirs, and at least 0. With c_j the terms of row k of B, mu'_k has changed by at most
+    the largest sum of c_j mu'_j over such tensions, in which mu'_k itself is known. That sum is at most y . w for every
     functional y of wrenches whose products with the columns of the other robot's W are at least c_j.
 
     Args:
@@ -175,7 +175,8 @@ def closer_changes(
         least: (k, n_cables) smallest tensions per mass and length, at least 0, 1/s^2.
 
     Returns:
-        the changes; infinite where they would lead below the smallest tensions, or nothing is known, or wanted.
+        the changes; infinite where they would lead below the smallest tensions, where nothing is known, and upwards
+        unless `upwards`.
     """
     far = _reaches(known, influence, spools, centre)
     within, displaced = _changes(known, influence, influence.spools, far)
@@ -194,7 +195,7 @@ def _largest_sum(known: Enclosure, influence: Influence, weights: np.ndarray, fa
         functional = np.einsum("kij,kjlx->kilx", weights + more, influence.spools)
         moved, shifted = _changes(known, influence, functional, far)
         more, last = (moved + shifted) * (1.0 + SPARE) + ROUNDING * np.max(weights, axis=2, keepdims=True), more
-    # The last one was enough for the functional of the one before; it must be for its own.
+    # The last correction is enough for the functional of the round before; it must be enough for its own.
     functional = np.einsum("kij,kjlx->kilx", weights + last, influence.spools)
     moved, shifted = _changes(known, influence, functional, far)
     total = np.sum((weights + last) * (known.high + far.centre)[:, None] + moved * known.high[:, None], axis=2)
@@ -216,7 +217,7 @@ def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 @UNKNOWN
 def holds(known: Enclosure, influence: Influence, requirements: Requirements, multiple: np.ndarray) -> np.ndarray:
-    """Blocks in which every robot within a multiple of the uncertainty meets everything: proved.
+    """Prove that every robot within a multiple of the uncertainty meets all criteria within blocks.
 
     Args:
         requirements: its slack is that of each block, (k,).
@@ -276,12 +277,12 @@ def _unit(requirements: Requirements) -> np.ndarray:
 
 
 class WorstDisplacements(NamedTuple):
-    """Robots that are worst to first order in the middles of k blocks, per displacement.
+    """Unit displacements that are worst, to first order, in the middles of k blocks.
 
     Fields:
-        spools: (1 or 2, k, n_cables, 3) unit displacements: of the cable that falls slack first and, where a largest
-            tension is given, of the one that comes to it first.
-        centre: (1 or 2, k, 3) likewise.
+        spools: (1 or 2, k, n_cables, 3) of the spools: worst for the cable that falls slack first and, where a largest
+            tension is given, for the cable that reaches it first.
+        centre: (1 or 2, k, 3) of the mass centre, likewise.
     """
 
     spools: np.ndarray
@@ -290,7 +291,7 @@ class WorstDisplacements(NamedTuple):
 
 @UNKNOWN
 def worst(known: Enclosure, influence: Influence, requirements: Requirements) -> WorstDisplacements:
-    """Robots that are worst to first order.
+    """Displacements that are worst to first order.
 
     Returns:
         the displacements.
@@ -316,7 +317,7 @@ def worst(known: Enclosure, influence: Influence, requirements: Requirements) ->
 def fails(
     known: Enclosure, influence: Influence, worst: WorstDisplacements, requirements: Requirements, multiple: np.ndarray
 ) -> np.ndarray:
-    """Blocks in whose middles one of the worst robots within a multiple of the uncertainty breaks something.
+    """Tell whether a worst robot within a multiple of the uncertainty breaks a criterion in the middle of each block.
 
     Args:
         requirements: its slack is that of each block, (k,).
@@ -349,7 +350,7 @@ def tensions(known: Enclosure, spools: np.ndarray, centre: np.ndarray) -> tuple[
         centre: (k, 3) of the mass centre, m.
 
     Returns:
-        (k, n_cables) per mass and length of the other robot, 1/s^2; these lengths, m.
+        (k, n_cables) tensions per mass and length, 1/s^2, and lengths of the cables, m, of the other robots.
     """
     rays, is_platform = known.rays - spools, bool(known.arms.any())
     extra = np.einsum("kij,kj->ki", known.whirl, centre)
