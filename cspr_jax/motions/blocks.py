@@ -64,10 +64,7 @@ class Parts(NamedTuple):
     at_middles: np.ndarray
 
     def of(self, arcs: int) -> np.ndarray:
-        """Number of parts of an arc, along a motion.
-
-        Args:
-            arcs: number of arcs of the motion.
+        """Number of parts of an arc, along a motion of so many arcs.
 
         Returns:
             (m,).

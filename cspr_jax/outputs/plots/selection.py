@@ -61,6 +61,7 @@ def nearest(result: Result, axis: str, coordinate: float, option: str = "--at") 
     """The point of an axis that is drawn where a value is asked for.
 
     Args:
+        coordinate: that is asked for, in the unit of the axis.
         option: that gave it, for errors.
 
     Returns:
