@@ -68,7 +68,7 @@ class Segment:
 
 
 def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Array, Array]:
-    """Coefficients of a motion p = p0 + axes c, about which the effector swings like a pendulum hung from the centroid.
+    """Coefficients that couple a motion p = p0 + axes c, in a plane or on a line through p0, to the pseudotensions.
 
     With d = c + c'' / lambda and lambda = gravity / z0, from (2.12) to (2.14) divided by their value
     at rest in p0: cable k has the normalised pseudotension 1 + tilt . c + pull_k . d + twist_k (c x d).
@@ -82,7 +82,7 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
         tilt (n,), 1/m; pull (n_cables, n), 1/m, one row a cable; twist (n_cables,), 1/m^2, zero for a line.
 
     Raises:
-        InputError: more cables.
+        InputError: more cables than degrees of freedom.
     """
     check_determined(robot)
     if point_mass.is_planar(robot):

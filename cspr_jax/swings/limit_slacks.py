@@ -44,7 +44,7 @@ class _Now(NamedTuple):
 
 
 class _Over(NamedTuple):
-    # Bounds over an interval; `square` of (rho^2)'', without rho's own division.
+    # Bounds over an interval; `square` bounds (rho^2)'' without the division that is in `length`.
     n_cables: int
     z0: Array
     time: Array
@@ -59,7 +59,7 @@ class _Over(NamedTuple):
 
 
 class _Closed(NamedTuple):
-    # A limit's slacks, how many a cable (or one of a height), and the bound of their second derivatives.
+    # Closed form of a limit: its slacks, the bound of their second derivatives, and how many slacks each cable has.
     slack: Callable[[_Now, Array], Array]
     curvature: Callable[[_Over, Array], Array]
     sides: int = 1
@@ -109,7 +109,7 @@ def count(row: Limit, n_cables: int) -> int:
     """Number of smooth functions of which the slack of a limit is the smallest.
 
     Returns:
-        one of a height, one a cable, or two a cable for either sign.
+        one for a height; one for each cable, or two for either sign.
     """
     return CLOSED[row.name].sides * (n_cables if row.per_cable else 1)
 
@@ -118,7 +118,7 @@ def count(row: Limit, n_cables: int) -> int:
 def limit_slacks(
     robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, state: Instant
 ) -> tuple[list[Array], ...]:
-    """The slacks of each limit, at one instant: smooth functions, one a cable or more.
+    """The slacks of each limit, at one instant: smooth functions, one or two for each cable.
 
     Args:
         robot: a point mass on three cables.
@@ -145,7 +145,7 @@ def limit_slacks(
 
 
 def _path(segment: Segment, arcs: Array, tau: Array, state: Instant) -> tuple[Array, Array, Array]:
-    # Position and its first two derivatives in tau.
+    # Return the position and its first two derivatives in tau.
     ratio, steady, period = oscillation(segment, arcs)
     span = segment.end_radius - segment.start_radius
     r, r1 = segment.start_radius + span * state.amplitude_values[0], span * state.amplitude_values[1]
@@ -166,7 +166,7 @@ def limit_curvatures(
         robot: a point mass on three cables.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
-        kappa: bounds of the variable part of the pseudotensions over it, leaves (n_cables,).
+        kappa: bounds of the variable part of the pseudotensions over the interval, leaves (n_cables,).
 
     Returns:
         one () for each limit of `limits_set`, the largest over the cables.
@@ -191,8 +191,8 @@ def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, B
         arcs: () number of arcs, a float.
 
     Returns:
-        the bounds, () each: of the distance from P0 and of its first two derivatives, m; of the second derivative and
-        of its first two.
+        the bounds, () each: of the position from P0 and of its first two derivatives, m; of the second derivative and
+        of its first two derivatives.
     """
     ratio, steady, period = oscillation(segment, arcs)
     omega, gain = math.pi * arcs, steady / period

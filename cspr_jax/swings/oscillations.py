@@ -36,13 +36,13 @@ ROUNDING = 1e-12
 
 @dataclasses.dataclass(frozen=True)
 class OscillationAnswers(Answers):
-    """One answer a transition; arcs are two an oscillation.
+    """One answer for each transition; an oscillation has two arcs.
 
     Fields:
         oscillations: (n,) smallest number of oscillations proved feasible; 0: none.
         tried_oscillations: (n,) the number that duration and margins belong to.
         envelope_oscillations: (n,) smallest integer that keeps the envelopes positive; 0: none up to the largest tried.
-        least_oscillations: (n,) the real number that they ask for; NaN where |v A| reaches 1, so that none will do.
+        least_oscillations: (n,) smallest real number that does; NaN where |v A| reaches 1, so that none does.
         inclination_gain: (n,) oscillations, a real number, that the inclination saves over a horizontal transition.
         used_inclination: (n,) v.
         used_z0: (n,) depth of p0 below the centroid of the spools, m.
@@ -159,7 +159,7 @@ def _proofs(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
 def _known(
     problem: Problem, segments: Segment, of_targets: tuple[np.ndarray, np.ndarray], allowed: np.ndarray
 ) -> Known:
-    # Whole numbers of oscillations that the envelopes prove.
+    # Return the whole numbers of oscillations that the envelopes prove.
     n = np.where(np.isfinite(allowed), allowed, 1.0)
     kernel = partial(_proofs, problem.amplitude)
     bound, near = in_batches(kernel, (segments, *of_targets, n), size=BATCH)
@@ -179,7 +179,8 @@ def minimum_oscillations(
         z0: (n,) depth of p0 below the centroid of the spools, m; positive.
         max_arcs: twice the largest number of oscillations tried, at least 2.
         arcs: (n,) a fixed, even number of arcs for each transition, 0 where free; None: all free.
-        steady: (n,) whether it is no transition but the swing of one size that it ends in; None: nowhere.
+        steady: (n,) whether the segment is no transition but the swing of constant size that one ends in; None:
+            nowhere.
 
     Returns:
         the answers.
