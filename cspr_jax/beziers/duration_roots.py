@@ -1,8 +1,8 @@
 """Durations at which the verdict of a Bezier segment can change: roots of polynomials in r = (T / pi)^2.
 
-Times r, the cubics of `margins` have coefficients that are polynomials in r, if the second control point is
+Multiplied by r, the cubics of `margins` have coefficients that are polynomials in r, if the second control point is
 given or follows from an acceleration at the start, middle = start + r acceleration (15). Their smallest value on
-[-1, 1] can be zero only where an end is, or where two roots in c meet: where the discriminant, of degree 8 in r at
+[-1, 1] can be zero only if the value at an end is, or if two roots in c meet: if the discriminant, of degree 8 in r at
 most, is zero.
 """
 
@@ -15,13 +15,13 @@ from cspr_jax.beziers.motion import powers
 
 
 class Ends(NamedTuple):
-    """Ends of n segments, and what their second control points follow from.
+    """Ends of n segments, and their second control points as functions of r.
 
     Fields:
         start: (n, 3) from the centroid of the spools, z down, m.
         end: (n, 3) likewise.
         middle: (n, 3) second control point for r = 0, m.
-        middle_change: (n, 3) its change with r: 0, or the acceleration at the start, m/s^2.
+        middle_change: (n, 3) change of the second control point with r: 0, or the acceleration at the start, m/s^2.
     """
 
     start: np.ndarray
@@ -66,7 +66,7 @@ def critical_durations(
 
 
 def _vectors(ends: Ends, unit: np.ndarray) -> list[np.ndarray]:
-    # The coefficients A, B, C of (17): (n, 3, 2) each, by powers of r over its unit.
+    # Return the coefficients A, B, C of (17): (n, 3, 2) each, by powers of r over its unit.
     constant = powers(ends.start, ends.middle, ends.end)
     nothing = np.zeros_like(ends.middle_change)
     change = powers(nothing, ends.middle_change * unit[:, None], nothing)
@@ -76,7 +76,7 @@ def _vectors(ends: Ends, unit: np.ndarray) -> list[np.ndarray]:
 def _of_cables(
     rows: np.ndarray, arms: np.ndarray, gravity: float, unit: np.ndarray, vectors: list[np.ndarray]
 ) -> list[np.ndarray]:
-    # Pseudotensions times r: at both ends, and the discriminants of the cubics.
+    # Return pseudotensions times r at both ends, and the discriminants of the cubics.
     square, slope, rest = vectors
     # r g, z down.
     fall = np.zeros((len(unit), 3, 2))

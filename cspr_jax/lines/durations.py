@@ -33,11 +33,11 @@ class Durations:
     """Durations of n lines, (n,) each.
 
     Fields:
-        duration: T, s; not finite where there is none.
+        duration: T, s; not finite where there is no motion.
         ratio: p / T.
         least: no motion along the line is faster, s; 0 where nothing is known.
-        rest: smaller one of the margins of rest at both ends, m/s^2.
-        depth: smaller one of the depths of both ends below the spools' plane, m; inf if they have none.
+        rest: smaller margin of rest of the two ends, m/s^2.
+        depth: smaller depth of the two ends below the plane of the spools, m; inf if the spools have no common plane.
         is_bounded: whether anything bounds the acceleration.
         up: number of the bound that holds back the acceleration, in the order of `names_of`.
         down: likewise of the braking.
@@ -56,15 +56,15 @@ class Durations:
         """Durations of some of the lines.
 
         Args:
-            rows: (n,) whether, or numbers of lines.
+            rows: a mask (n,), or numbers of lines.
 
         Returns:
-            theirs.
+            the durations of these lines.
         """
         return Durations(**{name: value[rows] for name, value in vars(self).items()})
 
     def replace(self, rows: np.ndarray, part: "Durations") -> None:
-        """Put other durations in place of some.
+        """Replace the durations of some of the lines.
 
         Args:
             rows: numbers of the lines.
@@ -80,7 +80,7 @@ def moving(limits: Limits) -> tuple[str, ...]:
         limits: the limits, without tracers.
 
     Returns:
-        names of those that are given; a smallest tension of zero is what taut cables ask for anyway.
+        names of those that are set; a smallest tension of zero is left out, since taut cables keep it anyway.
     """
     known = [name for name in MOVING if getattr(limits, name) is not None]
     return tuple(name for name in known if name != "tension_min" or np.asarray(limits.tension_min).any())
@@ -111,7 +111,7 @@ def by_formula(
         max_acceleration: largest size of the acceleration, m/s^2.
 
     Returns:
-        what formulas give; no durations of spools that are not in one plane.
+        the durations that formulas give; NaN if the spools are not in one plane.
     """
     in_plane, largest = in_one_plane(robot), np.full(len(starts), float(max_acceleration))
     kernel = partial(_by_formula, robot, law=law, rule=rule, in_plane=in_plane)
@@ -167,7 +167,7 @@ def by_search(
         max_acceleration: largest size of the acceleration, m/s^2.
 
     Returns:
-        what a search gives, the rest as it was.
+        the timings, with durations that a search gives.
     """
     moving_problem = problem._replace(
         limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)})
@@ -218,7 +218,7 @@ def _by_search(problem: Problem, arguments, *, law: str):
 
 
 def _bounds_of_rows(problem: Problem) -> np.ndarray:
-    # Numbers in `names_of` of what bounds a search, see `any_limits.Gain`; faces are of both sides.
+    # Return the number in `names_of` of each row that can bound a search, see `any_limits.Gain`; faces have two sides.
     robot, names = problem.robot, names_of(problem.robot, problem.limits)
     faces, limit_names = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
     counts = {"tension_min": faces, "tension_max": faces, "cable_speed_max": robot.n_cables}
@@ -228,5 +228,5 @@ def _bounds_of_rows(problem: Problem) -> np.ndarray:
         if name in limit_names:
             rows.append(np.full(count, names.index(name)))
         elif name.startswith("tension"):
-            rows.append(np.full(count, -1))  # none is shifted so
+            rows.append(np.full(count, -1))  # no face is shifted by a tension without a limit
     return np.concatenate([*rows, [names.index("max_acceleration")]])

@@ -3,8 +3,8 @@
 On the line X0 + D s the normal to two cables' directions, times their lengths, is affine in s, and its product with D
 does not depend on s at all: n(s) . D = n(0) . D, since each of its changes is normal to D. So every face of the cone of
 feasible accelerations is a straight boundary in the plane of s and s'', Boralugoda (15) to (21), here for any spools.
-The product of n(s) with another cable's ray is affine too: a face bounds the cone from where all of them are positive
-to where one no longer is. Of spools in one plane that is everywhere or nowhere below them.
+The product of n(s) with another cable's ray is affine too: a face bounds the cone where all these products are
+positive. If the spools lie in one plane, that is so everywhere below them or nowhere.
 """
 
 import dataclasses
@@ -63,7 +63,7 @@ def in_one_plane(robot: PointMassRobot) -> bool:
     """Tell whether the spools lie in one plane, those of a planar robot on one line.
 
     Returns:
-        the claim.
+        whether they do.
     """
     points = np.asarray(robot.base_points)
     if robot.n_cables <= robot.dof:
@@ -140,7 +140,7 @@ def _bounding(start: Array, end: Array) -> tuple[Array, Array]:
 
 
 class Sides(NamedTuple):
-    """Bounds of s'' from above, and of -s'' from above seen from the end of the line: lines in s, and in 1 - s.
+    """Upper bounds of s'', as lines in s, and of -s'', as lines in 1 - s from the end of the line.
 
     Fields:
         up: (..., n_faces + 1) largest s'' at the start; inf of a face that does not bound it.

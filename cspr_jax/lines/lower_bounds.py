@@ -2,7 +2,7 @@
 
 The line is cut into cells. Over each, faces, cable rates and their limits bound s'', -s'' and s' by constants from
 above, by interval arithmetic; nothing is faster than to accelerate at these bounds, keep the largest speed, and brake.
-That the limit of the cables' accelerations takes from fast motions is left out, which makes the bound lower.
+The limit of the cables' accelerations restricts fast motions further; that is left out, which makes the bound lower.
 """
 
 import jax

@@ -37,7 +37,7 @@ class LineSlacks:
         slope: (n_faces,) change of n . g, likewise.
         along: (n_faces, n_cables) n . r of the rays at the start, likewise.
         along_change: (n_faces, n_cables) its change, likewise.
-        turning: (n_faces,) size of the change of n, likewise.
+        normal_change_square: (n_faces,) square of the size of the change of n, likewise.
         narrowest: (n_faces,) s at which n is smallest, beyond the ends too.
         least_size: (n_faces,) square of the size of n there, likewise.
         spans: (n_faces,) whether the cables of the face span it.
@@ -54,7 +54,7 @@ class LineSlacks:
     slope: Array
     along: Array
     along_change: Array
-    turning: Array
+    normal_change_square: Array
     narrowest: Array
     least_size: Array
     spans: Array
@@ -107,7 +107,7 @@ def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
         slope=faces.slope / over,
         along=faces.along / over[:, None],
         along_change=faces.along_change / over[:, None],
-        turning=change / over**2,
+        normal_change_square=change / over**2,
         narrowest=narrowest,
         least_size=least / over**2,
         spans=spans,
@@ -122,7 +122,7 @@ def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
 
 
 def _tensions(problem: Problem) -> tuple[dict[str, Array], dict[str, Array]]:
-    # The largest tension is asked for together with the smallest.
+    # The group of the largest tension keeps the smallest tension too.
     robot, none = problem.robot, jnp.zeros(problem.robot.n_cables)
     least, most = tension_range(robot, problem.limits)
     low, high = {TAUT: none}, {TAUT: none + jnp.inf}
@@ -171,7 +171,7 @@ def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> A
     slack = at.bend * line.steepness - at.s * line.slope - line.offset
     if tensions is not None:
         slack = slack - _pulled(line, at.s, length2**-0.5, tensions)
-    size2 = (at.s - line.narrowest) ** 2 * line.turning + line.least_size
+    size2 = (at.s - line.narrowest) ** 2 * line.normal_change_square + line.least_size
     return slack * size2**-0.5
 
 

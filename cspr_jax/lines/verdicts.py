@@ -22,7 +22,7 @@ from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# Margins nearer to zero, over gravity or a limit's size, are undecided, and rest with a smaller margin is none.
+# Margins nearer to zero, over gravity or a limit's size, are undecided; rest with a smaller margin does not count.
 TOLERANCE = 1e-12
 
 
@@ -82,7 +82,7 @@ def verdicts(
         ends: (n, 3) m, elsewhere.
         timings: finite durations.
         max_acceleration: largest size of the acceleration, m/s^2; a motion beyond it is undecided.
-        sharp: whether margins are wanted, and not verdicts only.
+        sharp: whether margins must be sharp; else only verdicts count.
 
     Returns:
         the verdicts.
@@ -105,7 +105,8 @@ def verdicts(
 
 
 def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    # Smallest slack, flags and doubts, (n,) each, of limits on places: lengths are convex in s, depths linear.
+    # Return smallest slacks, flags and doubts, (n,) each, of limits on places, which the ends decide: lengths are
+    # convex in s, depths linear.
     robot, places = problem.robot, np.stack([starts, ends], axis=1)
     lengths = np.linalg.norm(places[:, :, None] - np.asarray(robot.base_points), axis=3)
     each: dict[str, Any] = {"depth": places[..., 2:], "length": lengths}
@@ -137,7 +138,7 @@ def limits_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np
     alone = {name: fails({name: limit}) for name, limit in limits.items()}
     for row in limits_set(problem.limits):
         flags |= np.where(alone.get(row.name, False), row.flag.value, 0)
-    if len(limits) > 1:  # of two that only fail together one may go
+    if len(limits) > 1:  # of two limits that fail only together, the largest is named
         together = fails(limits) & ~np.any(list(alone.values()), axis=0)
         flags |= np.where(together, Verdict.OVER_TENSION.value, 0)
     return flags
