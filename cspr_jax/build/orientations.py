@@ -11,7 +11,7 @@ def orientations(frame: Frame, points: np.ndarray, angles: np.ndarray) -> np.nda
     """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes.
 
     Args:
-        frame: of the file, whose axes the angles are of.
+        frame: of the file, to whose axes the angles refer.
         points: (n, 3) from the centroid of the spools, z down, m.
         angles: (n, 3) phi, theta, sigma, rad.
 

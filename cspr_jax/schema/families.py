@@ -1,4 +1,4 @@
-"""Table of trajectory families: one row a family.
+"""Table of trajectory families: one row for each.
 
 A new family is a motion (`motions.motion.Motion`), a class that joins poses by it (`motions.leg.Leg`), and a row.
 """
@@ -24,7 +24,7 @@ class Family:
             function.
         any_cables: patterns of the robots that may have more cables than degrees of freedom.
         is_line: whether its motions are straight lines, in the least time of their law.
-        knows_uncertainty: whether its motions are judged by all of an uncertainty.
+        knows_uncertainty: whether its verdicts take all of an uncertainty into account.
     """
 
     name: str

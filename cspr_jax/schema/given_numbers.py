@@ -1,4 +1,4 @@
-"""Numbers as somebody gives them from Python: one check of what is no real number, of shapes and of ranges."""
+"""Numbers that a caller gives from Python: one check of their types, shapes and ranges."""
 
 import dataclasses
 import math
@@ -15,7 +15,7 @@ ANY = None
 
 
 def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
-    """Real numbers that somebody gave.
+    """Real numbers that a caller gave.
 
     Strings, truth values and complex numbers are refused: NumPy would read the first two as numbers, and drop the
     imaginary part of the last.
@@ -45,16 +45,16 @@ def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
 
 
 def whole(key: str, value: Any, least: int, largest: int) -> int:
-    """Integer that somebody gave.
+    """Integer that a caller gave.
 
     Args:
         key: named in errors.
-        value: Python's, NumPy's, or an array of one.
+        value: an integer of Python or NumPy, or an array of one.
         least: smallest that is allowed.
         largest: largest that is allowed.
 
     Returns:
-        Python's integer.
+        a Python integer.
 
     Raises:
         InputError: no integer, or out of the range.
@@ -78,7 +78,7 @@ class Numbers:
         shapes: that are allowed; `ANY` is a length from 1 on. None: all.
         least: smallest number.
         largest: largest number; inf: none, and infinite ones are taken only with `infinite`.
-        above: whether the smallest one itself is refused.
+        above: whether the smallest number itself is refused.
         infinite: whether inf is taken.
         nan: whether NaN is taken, since the function itself says what it allows instead.
     """

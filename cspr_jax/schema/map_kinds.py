@@ -30,16 +30,16 @@ class MapKind:
         description: a phrase for the reference.
         implementation: "module:Class" of its `maps.grid_map.GridMap`.
         quantities: what it gives, all rows of `schema.quantities.QUANTITIES`.
-        stored: those that are stored where the sweep file does not say.
-        stored_with: by key, those that are stored besides where that key is given. A key that came later than its map
-            leaves what is stored without it, and so the identities of older sweeps, as they were.
+        stored: quantities that are stored where the sweep file names none.
+        stored_with: by key, quantities that are stored besides where that key is given. A key that came later than its
+            map thus leaves what is stored without it, and the identities of older sweeps, as they were.
         only_with: quantities, and the keys without which they are no numbers: stored only where one of these is given.
             A condition of a workspace is a key, too: "workspace.conditions.static".
         rows: quantities whose rows here say more about this kind than those of the table; names, units and types are
             the same.
         planned: whether a cell is the motion of a plan of two poses, which `plans.cell_plan` writes.
-        pictured: those of which a picture shows the first that there is, where nobody says which.
-        motionless: those that belong to a place or an instant, not to a motion.
+        pictured: quantities of which a picture shows the first one that is stored, where nobody says which.
+        motionless: quantities that belong to a place or an instant, not to a motion.
         families: trajectory families that it takes; none: its cells are places, and it knows no motion.
         start: where its motions may start. "rest": at rest in P0, `trajectory.from` says so or is absent; "point": as
             `trajectory.from` or the axes from_x, from_y and from_z say; "pose": as `trajectory.from` says, with an

@@ -24,11 +24,11 @@ class Quantity:
         long_name: a short phrase for labels.
         description: one sentence.
         kind: "float" (of the run's dtype) or the NumPy name of an integer type.
-        unflagged: of flags of a verdict: what pictures say where none is set; empty: it is no verdict.
+        unflagged: word of pictures where no flag of a verdict is set; empty: it is no verdict.
         signed: whether either sign is as good as the other, so that zero is in the middle of a picture's colours.
-        meanings: of whole numbers that stand for words: their row of `schema.meanings.MEANINGS`; empty: they do not.
+        meanings: row of `schema.meanings.MEANINGS`, if its whole numbers stand for words; empty: they do not.
         contoured: whether sections of it show where it is a whole number.
-        better: of two cells' numbers, which one is better; empty: neither.
+        better: which of two cells' numbers is better; empty: neither.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Quantity:
 
     @property
     def readable(self) -> tuple[str, ...]:
-        """NumPy names of the types that files have it in, its own first."""
+        """NumPy names of the types in which files hold it, its own first."""
         return ("float64", "float32") if self.kind == "float" else (self.kind, *EARLIER.get(self.kind, ()))
 
 

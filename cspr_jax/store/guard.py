@@ -45,11 +45,11 @@ class ReadableDataset(NamedTuple):
     """A dataset that may be read.
 
     Fields:
-        data: it, open.
+        data: the open dataset.
         shape: its shape.
         dtype: of NumPy.
         size: bytes in memory.
-        chunks: how many.
+        chunks: their number.
         stored: bytes in the file.
     """
 
@@ -61,7 +61,7 @@ class ReadableDataset(NamedTuple):
     stored: int
 
     def values(self) -> np.ndarray:
-        """All of it.
+        """All values of the dataset.
 
         Returns:
             the numbers, C-contiguous.
@@ -90,10 +90,10 @@ def refuse_dense(datasets: Iterable[ReadableDataset], size: int, *, densest: int
     Args:
         datasets: all that would be read.
         size: of the file, bytes.
-        densest: bytes that one of the file may stand for.
+        densest: bytes of data that one byte of the file may stand for.
 
     Raises:
-        DamagedError: they do.
+        DamagedError: the datasets do not fit the file.
     """
     readable = list(datasets)
     total, most = sum(one.size for one in readable), _PLENTY + densest * size

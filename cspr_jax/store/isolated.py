@@ -32,7 +32,7 @@ from cspr_jax.store.shards import LARGEST_SHARD, Layout, Shard, decode
 
 # Hashing that many bytes takes a moment; of larger files it is asked before what they hold.
 _QUICK = 512 << 20
-# Whoever waits that long waits for ever; the limit of processor time comes long before.
+# A reader that has not answered by then never will; the limit of processor time comes long before.
 _PATIENCE = 60.0
 # The package is not taken from the working folder, nor are the libraries; the path of the parent serves last.
 _CODE = """import sys
@@ -62,8 +62,8 @@ class Reader:
     """A process that reads files, started when the first one is asked for, and anew after one on which it failed.
 
     Fields:
-        known: seals of shards that this process has written itself, or that were read without a fault before: it reads
-            their bytes itself.
+        known: seals of shards that this process has written itself, or that were read without a fault before: this
+            process reads their bytes itself.
     """
 
     def __init__(self) -> None:
@@ -190,7 +190,7 @@ class Reader:
         self._idle = True
 
     def _sent(self, path: Path, file: int, words: dict[str, Any]) -> RawIOBase:
-        # One that died unasked, or did not come to its end, is replaced.
+        # A process that died by itself, or has not finished, is replaced.
         if self._child is None or self._child.poll() is not None or not self._idle:
             self._end()
             self._start(path)

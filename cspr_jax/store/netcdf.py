@@ -41,7 +41,7 @@ def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
 
 @contextlib.contextmanager
 def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterator[h5py.File]:
-    """An HDF5 file in an empty file that is open; it is sealed when HDF5 has closed it.
+    """HDF5 file that is written into an open, empty file; it is sealed when HDF5 has closed it.
 
     Yields:
         the open file.

@@ -40,9 +40,9 @@ _INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass
 def serve() -> None:
     """Answer what is asked about one file after the other, until nobody asks any more.
 
-    Standard input is a socket: on it come questions, each with an open file, and go the answers: what was found as
-    JSON, and arrays. The words of the command: two folders of `store.isolated`, and the quantities that the process
-    that asks has registered.
+    Standard input is a socket: questions come in on it, each with an open file; answers go out, as JSON and arrays. The
+    arguments of the command are two folders of `store.isolated`, and the quantities that the asking process has
+    registered.
     """
     for row in json.loads(sys.argv[3]):
         register(Quantity(**row))
@@ -117,7 +117,7 @@ def _content(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
         return
 
     def go_on(datasets: Iterable[guard.ReadableDataset]) -> None:
-        _tell(out, {})  # what takes long begins
+        _tell(out, {})  # the slow part begins
         _grant_for(datasets)
 
     _tell(out, {"content": dataclasses.asdict(content_of(path, go_on))})

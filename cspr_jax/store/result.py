@@ -31,11 +31,11 @@ _BLOCK = 1 << 20
 
 
 class BestPoints(NamedTuple):
-    """An axis of which every cell has its best point.
+    """Axis that was taken out of a map, by choosing its best point for every cell.
 
     Fields:
         points: (n,) of the axis.
-        places: (...) of the best one, of the shape of the quantities.
+        places: (...) of the best point in the axis, of the shape of the quantities.
     """
 
     points: np.ndarray
@@ -74,9 +74,9 @@ class Result:
 
         A cell is feasible if it is so at some point, else undecided if it is so at some point. Among feasible points
         the one with the fewest arcs is chosen (or with the best of what the map is about: the least duration, the
-        largest margin, ...), of these that with the largest margin, then the first. All quantities of a cell are those
-        of the point chosen; where none is feasible, of the best candidate. Where a point is undecided, the verdict
-        keeps the flag that fewer arcs may be possible.
+        largest margin, ...), among equals the one with the largest margin, then the first. All quantities of a cell are
+        those of the chosen point; where none is feasible, those of the best candidate. Where a point is undecided, the
+        verdict keeps the flag that fewer arcs may be possible.
 
         Args:
             axes: names, such as "z0".

@@ -44,7 +44,7 @@ class Shard:
 
     Fields:
         index: of the tile.
-        environment: hash of what computed it.
+        environment: hash of the environment that computed it.
         near_zero: cells whose margin lies within 1e-9 of zero.
         values: (n_1, ..., n_k) for each stored quantity.
         undecided: cells whose answer is not proved; None: the map proves nothing, or an earlier version wrote it.

@@ -46,7 +46,7 @@ class Sweep:
         store: quantities to keep.
         settings: everything that decides the result's numbers.
         text: of the file, as it was read.
-        types: NumPy's name of each stored quantity's type, which processes need that know no rows from outside.
+        types: NumPy name of the type of each stored quantity, for processes that know no rows from outside.
     """
 
     file: Path
@@ -182,7 +182,7 @@ def check_room(sweep: Sweep, directory: Path, done: float) -> None:
 
     Args:
         directory: of the run; it need not be there yet.
-        done: part of the tiles that are there already.
+        done: share of the tiles that are finished.
 
     Raises:
         ConfigError: too little room.

@@ -1,4 +1,4 @@
-"""Protocol between a run and those who compute its tiles."""
+"""Protocol between a run and the executors that compute its tiles."""
 
 import dataclasses
 from collections.abc import Iterable, Iterator
@@ -10,7 +10,7 @@ from cspr_jax.sweep.signals import Stop
 
 @dataclasses.dataclass(frozen=True)
 class Computed:
-    """A tile, and what computed it.
+    """A tile, and the environment that computed it.
 
     Fields:
         shard: its content.
