@@ -171,7 +171,8 @@ def numpy_rate(work: SixCableWork) -> float:
 
 
 def _numpy_checks(task: SixCableWork) -> np.ndarray:
-    # Smallest tension per mass and length of each trajectory: (n,); -inf where the determinant changes its sign.
+    # Return the smallest tension per mass and length of each trajectory: (n,); -inf where the determinant changes its
+    # sign.
     tau, theta = np.linspace(0.0, 1.0, SAMPLES), math.pi * task.arcs[:, None]
     a, a1 = 10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4
     a2, a3 = 60 * tau - 180 * tau**2 + 120 * tau**3, 60 - 360 * tau + 360 * tau**2

@@ -98,7 +98,7 @@ def numpy_rate(work: ThreeCableWork) -> float:
 
 
 def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    # Smallest pseudotension of each segment and number of arcs: (segments, MAX_ARCS).
+    # Return the smallest pseudotension of each segment and number of arcs: (segments, MAX_ARCS).
     tau = (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
     amplitude = (10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4)
     bend = 60 * tau - 180 * tau**2 + 120 * tau**3

@@ -24,9 +24,9 @@ from cspr_jax.workspaces import geometry
 from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# Batches of poses; of twelve cables fewer.
+# Batches of poses, and of poses with twelve cables.
 BATCHES, FEW_BATCHES = 16, 4
-# Poses of one call where cables are held apart, of which tensions are found, and of the others' ways.
+# Poses of one call: for distances of cables, for tensions, and for linear programs and least squares.
 PAIRS_BATCH, TENSIONS, SAMPLE = 65_536, 65_536, 100
 
 
@@ -80,7 +80,7 @@ def margin_rate(
     Args:
         condition: of `workspaces.questions.CONDITIONS`.
         dtype: "float32" or "float64".
-        by_null_space: which of the two ways.
+        by_null_space: by the null space of the wrench matrix; else by its normals.
 
     Returns:
         the rate; s that the first batch takes, mostly of compiling.
@@ -145,10 +145,10 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
 
 
 def rates() -> dict[str, Any]:
-    """Rates of all of these.
+    """Rates of all of this work.
 
     Returns:
-        poses a second by what is asked and by type of numbers; "first_s", what compiling and the first batch take.
+        poses a second by kind of work and by type of numbers; "first_s", time of compiling and of the first batch.
     """
     eight, four, twelve = load_robot("cogiro"), _four_cables(), _twelve_cables()
     rows: dict[str, Any] = {}
@@ -170,7 +170,7 @@ def rates() -> dict[str, Any]:
 
 
 def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
-    # Poses a second of linear programs and of least squares.
+    # Return poses a second of linear programs and of least squares.
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
     poses = _poses(centred_robot, SAMPLE, "float64")

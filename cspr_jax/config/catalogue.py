@@ -6,7 +6,7 @@ from typing import Any
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 # Why a robot of the catalogue cannot hang still with every cable taut. `build.robots.fault_at_rest` finds it, which
-# takes seconds; a test compares them. Robots that are not here can.
+# takes seconds; a test compares the two. Robots that are not listed here can hang still.
 FAULTS: dict[str, str] = {}
 
 

@@ -1,4 +1,4 @@
-"""Robot, plan or sweep: which kind of file it is, so that one given in place of another is told apart."""
+"""Robot, plan or sweep: the kind of a file, so that a file of another kind is refused as a whole."""
 
 from typing import Any
 

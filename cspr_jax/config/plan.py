@@ -179,7 +179,7 @@ def read_plan(text: str, path: Path) -> PlanFile:
 
 
 def kept_plan(text: str, path: Path) -> PlanFile:
-    """A plan as a motion file keeps it: the text of its file, or JSON where there was none.
+    """Plan that a motion file holds: the text of the plan file, or JSON where there was none.
 
     Args:
         path: of the motion file, named in errors.

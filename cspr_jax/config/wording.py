@@ -80,10 +80,11 @@ def name_of(rows: Callable[[], Iterable[str]]) -> PlainValidator:
 
 
 def rank(error: ErrorDetails) -> int:
-    """Place of an error among those of a file: what explains others goes first.
+    """Place of an error among those of a file: an error that explains others goes first.
 
     Returns:
-        the smaller, the earlier: another version of the format, then a misspelt key, which explains a missing one.
+        a number, smaller for earlier places: another version of the format, then a misspelt key, which explains a
+        missing one.
     """
     if error["loc"] == ("schema",) and error["type"] != "missing":
         return 0
@@ -94,7 +95,7 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
     """One error as a line.
 
     Args:
-        model: what the file must be.
+        model: schema of the file.
         at: key under which the data stands.
 
     Returns:
@@ -180,7 +181,7 @@ def _kind_of(value: object) -> str:
 
 
 def _explained(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> str:
-    # A spelling for a table, or what the key is about, where the error is about the whole key.
+    # Return the description of the key, where the error is about the whole key.
     if not parts or isinstance(parts[-1], int):
         return ""
     field = _table_at(model, parts[:-1]).get(str(parts[-1]))
@@ -204,7 +205,7 @@ def _suggestion(model: type[BaseModel], parts: list[Any]) -> str:
 
 
 def _elsewhere(model: type[BaseModel], parts: list[Any]) -> str:
-    # The same key in another table of the file, where it is only misplaced.
+    # Return the key in another table of the file, if it is only misplaced.
     top, name = _table_at(model, []), str(parts[-1])
     if len(parts) > 1 and name in top:
         return f"{name} above the first [table]"
@@ -221,7 +222,7 @@ def _description(model: type[BaseModel], parts: list[Any]) -> str:
 
 
 def _table_at(model: type[BaseModel], parts: list[Any]) -> dict[str, Any]:
-    # Fields, by the key a user writes, of the table in which an error lies.
+    # Return the fields of the table in which an error lies, by the keys that users write.
     for part in parts:
         field = {f.alias or n: f for n, f in model.model_fields.items()}.get(str(part))
         inner = _tables_in(field.annotation) if field else [model]

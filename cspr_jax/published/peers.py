@@ -21,7 +21,7 @@ from cspr_jax.workspaces.geometry import mass_centres
 from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, STATIC, Requirement, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# Poses of which linear programs and least squares are asked as well, evenly over the grid.
+# Poses that linear programs and least squares decide as well, evenly over the grid.
 SAMPLE = 60
 MICRO = 1e6
 
@@ -49,7 +49,7 @@ def _product(*axes: np.ndarray) -> np.ndarray:
 
 
 def _quaternions(angles: np.ndarray) -> np.ndarray:
-    # As CASPR has them: R = Rx Ry Rz.
+    # In the convention of CASPR: R = Rx Ry Rz.
     return Rotation.from_euler("XYZ", angles).as_quat(scalar_first=True)
 
 
@@ -57,7 +57,7 @@ def grids() -> list[PoseGrid]:
     """The studies.
 
     Returns:
-        one a row of the table.
+        one for each row of the table.
     """
     level = _product(np.linspace(-4.0, 4.0, 81), np.linspace(-3.0, 3.0, 61), np.array([2.0, 3.0, 4.0]))
     tilted = np.repeat(_quaternions(np.deg2rad([[30.0, -30.0, 5.0]])), len(level), axis=0)

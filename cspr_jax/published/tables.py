@@ -25,10 +25,10 @@ class TableSource:
     Fields:
         title: of the table, with its source.
         published: known cells as printed, by row, column and variant.
-        compute: () -> computed cells, by row, column and variant; of a `TableSettings`, where there is one.
-        with_choice: whether there is one, of definitions, amplitude functions and step; `compute` takes a number of
-            processes, too, then.
-        by_processes: whether several compute it where nobody says how many.
+        compute: () -> computed cells, by row, column and variant; with a choice, from a `TableSettings` and a number of
+            processes.
+        with_choice: whether there is a choice of definitions, amplitude functions and step.
+        by_processes: whether several processes compute it where the user gives no number.
         transposed: whether the source prints these rows as columns.
         heads: names of rows and columns that mean something else in this source than in the others.
     """
@@ -138,8 +138,8 @@ def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1
 
     Args:
         name: one of `TABLES`.
-        choice: for those that have one; None: the usual one.
-        workers: processes, for those that have a choice.
+        choice: for tables that have one; None: the usual one.
+        workers: number of processes, for tables that have a choice.
 
     Returns:
         its cells, row by row.

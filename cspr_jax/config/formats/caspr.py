@@ -55,7 +55,7 @@ def read(path: Path, cable_set: str | None) -> Body:
         the body.
 
     Raises:
-        ConfigError: no such set, no other file, several links, or what no robot file can say.
+        ConfigError: no such set, no other file, several links, or content that no robot file can express.
     """
     bodies, cables = _both(path)
     joint, body = _body(bodies)
@@ -182,7 +182,7 @@ def _cable(element: Element, k: int, file: Path, centre: list[float], shift: lis
 
 
 def _ends(attachments: Element, file: Path, place: str) -> tuple[Element, Element]:
-    # That on the base, which may be a pulley, and that on the body.
+    # Return the attachment on the base, which may be a pulley, and the one on the body.
     ends = [element for element in attachments if isinstance(element.tag, str)]
     allowed = f"one attachment on link 0, or a <{_PULLEY}>, and one on link 1"
     links = []
