@@ -39,7 +39,7 @@ class Compared(NamedTuple):
         result: a map of a workspace.
         file: its name.
         across: axes that vary.
-        at: of the others, which point.
+        at: index of the point, for each of the other axes.
     """
 
     result: Result
@@ -55,10 +55,10 @@ class Compared(NamedTuple):
 
 
 def comparison_figure(compared: list[Compared], fixed: list[str]) -> Figure:
-    """Outlines of workspaces, one a result, in the sections of the first.
+    """Outlines of workspaces, one for each result, in the sections of the first.
 
     Args:
-        fixed: what is constant, in words.
+        fixed: words for the constants.
 
     Returns:
         the figure.
@@ -167,7 +167,7 @@ def _size(box: np.ndarray, count: int, lines: int) -> tuple[float, float]:
 
 
 def _outline(panel: Axes, sides: BoundarySides, number: int) -> dict[str, Artist]:
-    # Along the end of the grid it is thin: nobody has asked what lies beyond.
+    # The line is thin along the end of the grid, beyond which nothing is known.
     # Margins of different conditions have different scales, so that zeros between their values would not compare: the
     # line runs half-way between points on different sides, as volumes count them, in a band as wide as that step.
     plain, ends = sides._replace(margins=[]), False

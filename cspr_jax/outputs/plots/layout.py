@@ -13,7 +13,7 @@ from cspr_jax.outputs.plots.labels import turned
 
 # Steps between ticks of angles, degrees.
 DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
-# Width, inches, that a panel takes at least of the picture, its part of labels and colour bar included.
+# Least width of a panel, inches, with its share of labels and colour bar.
 LEAST_WIDTH = 1.6
 
 
@@ -21,7 +21,7 @@ def columns_of(count: int) -> int:
     """Number of panels side by side in a picture of the width that `in_style` has set.
 
     Returns:
-        at most three and what the width has room for, in a full rectangle where that is possible.
+        at most three, as many as the width has room for, in a full rectangle where that is possible.
     """
     room = max(1, int(matplotlib.rcParams["figure.figsize"][0] / LEAST_WIDTH))
     return min(room, 2 if count == 4 else min(3, count))
@@ -33,11 +33,11 @@ def panels(
     """Panels with common axes, or common horizontal ones.
 
     Args:
-        count: how many.
+        count: number of panels.
         same: whether their vertical axes are the same.
 
     Returns:
-        all of them, those with nothing below, those at the left.
+        all panels, those with nothing below, and those at the left.
     """
     columns = columns_of(count)
     lines = -(-count // columns)
@@ -54,7 +54,7 @@ def panels(
 
 
 def in_degrees(axis: Axis, span: float) -> None:
-    """Ticks of an angle, without whole turns.
+    """Ticks of an angle, without whole revolutions.
 
     Args:
         span: of its values, degrees.

@@ -36,7 +36,7 @@ def motion_figure(result: Result) -> Figure:
     # The spools and the path of a planar robot lie in one vertical plane y = constant. Old files lack the spools.
     points = np.vstack([position, result.attributes.get("base_points", np.empty((0, 3)))])
     is_planar = np.ptp(points[:, 1]) <= ONE_PLANE * np.ptp(points[:, 0])
-    # A file without P0 is of straight lines, of which the accelerations are worth seeing.
+    # A file without P0 holds straight lines, of which the accelerations are worth seeing.
     z0 = result.attributes.get("z0")
     more = [
         name
@@ -97,7 +97,7 @@ def draw_limits(
 
     Args:
         limits: words and values.
-        values: that the panel shows.
+        values: shown by the panel.
         signed: whether a limit bounds both signs.
     """
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""Pictures of a motion by the names that `--quantity` takes: a row each."""
+"""Pictures of a motion by the names that `--quantity` takes: one row for each."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -21,9 +21,9 @@ class MotionPicture(NamedTuple):
     """A picture of a motion.
 
     Fields:
-        draw: makes it, of the motion, the name of its file, and the instant asked for.
-        needs: quantity of the file without which there is none; empty for none.
-        at_instant: whether it is of an instant, "t".
+        draw: makes it from the motion, the name of its file, and the instant.
+        needs: quantity that the file must have; empty for none.
+        at_instant: whether it shows one instant, "t".
     """
 
     draw: Callable[[Result, str, dict[str, float]], Figure]
@@ -50,12 +50,12 @@ MOTION_PICTURES = {
 
 
 def motion_picture(result: Result, file: str, quantity: str | None, at: dict[str, float]) -> Figure:
-    """The picture of a motion that is asked for.
+    """The requested picture of a motion.
 
     Args:
         file: its name, for errors.
         quantity: a name of `MOTION_PICTURES`; None: path and tensions.
-        at: the instant, as "t", of a picture that is of one.
+        at: the instant, as "t", for a picture of one instant.
 
     Returns:
         the figure.

@@ -1,4 +1,4 @@
-"""Acceleration along straight lines over the way, between its bounds, Boralugoda figure 4.1."""
+"""Acceleration along straight lines over the path, between its bounds, Boralugoda figure 4.1."""
 
 from typing import NamedTuple
 
@@ -28,8 +28,8 @@ class PathSamples(NamedTuple):
         number: of the segment, from 1 on.
         length: of the line, m.
         duration: s.
-        s: (n,) part of the way at each row.
-        rates: (n, 3) s'': the least feasible one, that of the motion, the largest feasible one, 1/s^2.
+        s: (n,) share of the path at each row.
+        rates: (n, 3) s'': the least feasible value, that of the motion, and the largest feasible value, 1/s^2.
     """
 
     number: int
@@ -40,7 +40,7 @@ class PathSamples(NamedTuple):
 
 
 def path_figure(result: Result, file: str) -> Figure:
-    """The acceleration along each line of a motion over the way, at most six of them.
+    """The acceleration along each line of a motion over the path, for at most six lines.
 
     Args:
         result: a motion along straight lines.

@@ -13,7 +13,7 @@ from cspr_jax.schema.limits import LIMITS
 
 
 class Moving(NamedTuple):
-    """A robot on its way, in the axes of its file.
+    """A robot in motion, in the axes of its file.
 
     Fields:
         base: (n_cables, 3) where the cables leave, m.
@@ -29,12 +29,12 @@ class Moving(NamedTuple):
 
 
 def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows: np.ndarray) -> Moving:
-    """The robot at some rows of its motion.
+    """The robot at rows of its motion.
 
     Args:
         columns: by the names of `schema.quantities.TRAJECTORY`.
         robot_file: the robot whose cables have these tensions; None: it is not known, and has no cables here.
-        rows: (n,) which.
+        rows: (n,) their numbers.
 
     Returns:
         the robot.
@@ -64,7 +64,7 @@ def limits_of(robot_file: RobotFile, plan: PlanFile, quantity: str = "tension") 
         quantity: of `schema.limits.LIMITS`.
 
     Returns:
-        words and values, in the axes of the file; each value once, and none that bounds nothing.
+        words and values, in the axes of the file; each finite value once.
     """
     limits = []
     for row in LIMITS:

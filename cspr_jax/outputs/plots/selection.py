@@ -17,7 +17,7 @@ def result_at(path: Path) -> Path:
     """The file to draw.
 
     Args:
-        path: it, or the directory of its run.
+        path: the file, or the directory of its run.
 
     Returns:
         the file.
@@ -58,14 +58,14 @@ def places(words: list[str], option: str = "--at") -> dict[str, float]:
 
 
 def nearest(result: Result, axis: str, coordinate: float, option: str = "--at") -> tuple[int, str]:
-    """The point of an axis that is drawn where a value is asked for.
+    """The point of an axis that is drawn for a coordinate.
 
     Args:
         coordinate: that is asked for, in the unit of the axis.
         option: that gave it, for errors.
 
     Returns:
-        the index of the point, and how the picture says it: with the value where that is another one.
+        the index of the point, and the words of the picture for it, with the coordinate if the point is another one.
 
     Raises:
         InputError: no such axis, or a value out of its range.

@@ -76,7 +76,7 @@ def _cells(result: Result) -> list[list[str]]:
         arcs, duration = int(data["segment_arcs"][k]), data["segment_end"][k] - data["segment_start"][k]
         margin = f"{data['segment_margin'][k]:.4g}" if np.isfinite(data["segment_margin"][k]) else "none"
         number = f"{k + 1}" if count <= SEGMENTS else f"{k + 1} of {count}"
-        # Straight lines and Bezier segments have no arcs; a segment that is not feasible has none that will do.
+        # Straight lines and Bezier segments have no arcs; a segment that is not feasible has no feasible number.
         arcs_text = f"{arcs}" if arcs else "none" if data["segment_verdict"][k] else "-"
         cells.append([number, arcs_text, f"{duration:.4g}", margin, words[int(numbers[0])]])
     return cells

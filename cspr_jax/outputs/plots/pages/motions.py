@@ -1,4 +1,4 @@
-"""Content of a page about a motion: the robot at its rows, its tensions, and what there is of its segments."""
+"""Content of a page about a motion: the robot at its rows, its tensions, and its segments."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-# Names of typed arrays of browsers by NumPy's.
+# Names of the typed arrays of browsers, by NumPy's names.
 TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}
 
 
