@@ -132,7 +132,7 @@ def _dot(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
 
 
 def _positive_roots(tables: list[np.ndarray]) -> np.ndarray:
-    # Roots that rounding has moved off the real axis count: what is between roots is tested anyway.
+    # Roots that rounding has moved off the real axis count: durations between roots are tested anyway.
     roots = np.concatenate([np.roots(table[::-1]) for table in tables if np.isfinite(table).all()])
     near = np.abs(roots.imag) <= 1e-3 * np.abs(roots)
     return np.unique(roots.real[near & (roots.real > 0.0) & np.isfinite(roots)])

@@ -2,7 +2,7 @@
 
 At the release the cables have lengths and rates that miss the plan's; the effector is where the lengths are, and moves
 as the rates say. From there the object flies to the height of its target. A random sample of errors gives a sample of
-landings, and the derivatives of the landing with respect to all errors the covariance of small ones.
+landings, and the derivatives of the landing with respect to all errors the covariance for small errors.
 """
 
 import dataclasses

@@ -23,8 +23,8 @@ class ReleaseBounds(NamedTuple):
     """Bounds of the unknowns: place of the release, m, logarithms of the flight's time and of the duration, s, share.
 
     Fields:
-        low: (6,) smallest ones.
-        high: (6,) largest ones.
+        low: (6,) smallest values.
+        high: (6,) largest values.
     """
 
     low: Any

@@ -1,4 +1,4 @@
-"""The catalogue of robots: where it is, and which robots it has; a list of it needs no check of files."""
+"""The catalogue of robots: its place and its robots; listing it needs no check of files."""
 
 import tomllib
 from pathlib import Path

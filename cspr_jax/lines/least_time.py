@@ -1,8 +1,8 @@
 """Least durations along straight lines from rest to rest: arrays of ends in, arrays out.
 
-Of spools in one plane and without limits, what the S-model's formulas give is feasible by proof: the bounds of every
-face are met all along (see `lines.s_model`), with a margin above rounding. Otherwise, and where p
-or T - p is so short that its digits are lost, every motion has a proof of its own.
+If all spools lie in one plane and there are no limits, the motions that the formulas of the S-model give are feasible
+by proof: the bounds of every face are met all along (see `lines.s_model`), with a margin above rounding. Otherwise, and
+where p or T - p is so short that its digits are lost, every motion has a proof of its own.
 """
 
 import dataclasses

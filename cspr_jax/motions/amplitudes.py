@@ -74,7 +74,7 @@ def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array,
     """A and its derivatives with respect to tau.
 
     Args:
-        tau: (...) normalised time in [0, 1]; at a knot that of the piece on its right.
+        tau: (...) normalised time in [0, 1]; a knot belongs to the piece on its right.
         order: of the highest derivative, at most 5.
 
     Returns:

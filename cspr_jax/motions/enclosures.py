@@ -1,7 +1,7 @@
 """Enclosures of a robot in motion: bounds of its state over a block of time, for all robots that differ a little.
 
-NumPy throughout: blocks are few, and the inverse of the structure matrix is LAPACK's. All vectors are in axes in which
-the attachment points do not move, those of the platform; of a point mass these are the fixed ones.
+NumPy throughout: blocks are few, and the inverse of the structure matrix is LAPACK's. All vectors are in the axes
+of the platform, in which the attachment points do not move; for a point mass, these are the fixed axes.
 """
 
 from typing import NamedTuple

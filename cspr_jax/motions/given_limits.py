@@ -26,7 +26,7 @@ def limits_of(
 
     Args:
         robot: has base_points and z_axis of its file.
-        limits: by name, one number or one a cable each; None: as in `defaults`.
+        limits: by name, one number or one for each cable; None: as in `defaults`.
         defaults: limits of the robot, likewise; None: no limit.
         at: prefix of keys in errors.
         n_cables: number of cables that have the limits; None: as the robot has.
@@ -161,7 +161,7 @@ def limits_over(
 
     Args:
         robot: in its own axes.
-        limits: one number or one a cable each, in the robot's axes; None: those of the robot.
+        limits: one number or one for each cable, in the robot's axes; None: those of the robot.
         any_tensions: whether some of the largest tensions may be infinite.
         families: names of the trajectories, which decide whether an uncertainty is allowed; none: it is not.
 

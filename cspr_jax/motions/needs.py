@@ -1,4 +1,4 @@
-"""Needs of a motion, beside what is allowed: the worst instant of each criterion, in the units of its limit."""
+"""Needs of a motion, beside the allowed values: the worst instant of each criterion, in the units of its limit."""
 
 import dataclasses
 from functools import partial
@@ -49,7 +49,7 @@ class Need(NamedTuple):
 
 
 class _Criterion(NamedTuple):
-    # Over cables, or pairs of them: the flag, the cables of each value, what is allowed of each, the unit.
+    # A criterion over cables, or pairs of cables: its flag, the cables of each value, the allowed values, the unit.
     flag: Verdict
     cables: tuple[tuple[int, ...], ...]
     allowed: np.ndarray

@@ -26,7 +26,7 @@ from cspr_jax.robots.limits import Limits, Uncertainty
 TOLERANCE = 1e-6
 # Blocks of which nothing is known have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
-# Largest error of solving for a deviation, as a part of it, and of the tensions.
+# Largest relative error of solving for a deviation, and of the tensions.
 ROUNDING = 1e-9
 # Rounds in which functionals are corrected, and the relative surplus of each correction.
 ROUNDS, SPARE = 8, 0.01
@@ -38,7 +38,7 @@ class Requirements:
 
     Fields:
         mass: kg.
-        slack: tension per mass and length over the slack of a taut cable, g / (n z0), 1/s^2, one a motion (n,).
+        slack: tension per mass and length over the slack of a taut cable, g / (n z0), 1/s^2, (n,) for each motion.
         limits: the limits, NumPy.
         uncertainty: the uncertainty.
     """
@@ -69,7 +69,7 @@ def requirements_of(problem: Problem, slack: np.ndarray) -> Requirements:
 
 
 class _Share(NamedTuple):
-    # A multiple of an uncertainty, one a block: radii (k,) m, and the factor of the mass.
+    # A multiple of an uncertainty, one for each block: radii (k,) m, and the factor of the mass.
     spools: np.ndarray
     centre: np.ndarray
     factor: np.ndarray

@@ -61,7 +61,7 @@ _PUBLISHED_2_1 = {
     "6": ("0.5425", "6", "7.85"),
 }
 
-# In tables p is the number of arcs; what the S-model calls p, a time, is named.
+# In tables p is the number of arcs; the time that the S-model calls p has a name.
 ACCELERATION = {"p": "acceleration (s)"}
 TABLES = {
     "1.1": TableSource(

@@ -168,7 +168,7 @@ def _place(entry: Path, data: bytes, target: Path) -> None:
 
 @atexit.register
 def hand_over() -> None:
-    """Hand over what this process has compiled; later calls do nothing."""
+    """Hand over the code that this process has compiled; later calls do nothing."""
     while _pending:
         _pending.pop()()
 

@@ -106,7 +106,7 @@ class Workers:
                 process.kill()
 
     def close(self) -> None:
-        """Wait for the end of what is being computed; what has not begun is given up."""
+        """Wait for the end of running work; work that has not begun is given up."""
         self._pool.shutdown(wait=True, cancel_futures=True)
 
 

@@ -25,7 +25,7 @@ from cspr_jax.arithmetic.cores import SHARE, cores, quota
 from cspr_jax.errors import ConfigError, printable, shown
 from cspr_jax.runtime import compile_cache, stages
 
-# Twice as fast where the processor has it; XLA's own choice is half of it.
+# Twice as fast where the processor has such vectors; XLA chooses half their width by itself.
 WIDE, NEEDS = "--xla_cpu_prefer_vector_width=512", "avx512f"
 # Half of the time for compiling, for code that is slower: plans move a few robots, once.
 QUICK = (
@@ -185,7 +185,7 @@ def _readable(name: str) -> str:
 
 
 def _few_arenas() -> None:
-    # The variable is read when a process starts: it is for those that are started from here.
+    # The variable is read when a process starts: it is for processes that are started from here.
     is_set = ARENAS in os.environ or "arena_max" in os.environ.get("GLIBC_TUNABLES", "")
     if is_set or platform.libc_ver()[0] != "glibc":
         return

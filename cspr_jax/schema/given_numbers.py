@@ -23,7 +23,7 @@ def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
     Args:
         key: named in errors.
         value: number or nested sequence.
-        allowed: what is allowed, for errors.
+        allowed: allowed numbers, in words, for errors.
 
     Returns:
         float64 array.

@@ -127,7 +127,7 @@ def content_of(path: Path, begun: Callable[[Iterable[ReadableDataset]], None] = 
         begun: called with all datasets before they are read, which takes long.
 
     Returns:
-        what it holds.
+        its content.
 
     Raises:
         DamagedError: it is not what was written, or was not written by this program.

@@ -140,7 +140,7 @@ class Source(Document):
 
     Fields:
         file: name of the sweep file.
-        text: what it held.
+        text: of the sweep file.
         command: words of the command.
     """
 

@@ -20,7 +20,7 @@ LARGEST_CHUNKS, LARGEST_CHUNK = 100_000, 1 << 24
 # Settings are a sweep file of 1 MB and a robot file of 1 MB as JSON.
 LARGEST_TEXT = 8 << 20
 LARGEST_RANK = 16
-MOST_ROWS = 1000  # of an attribute with a row a cable
+MOST_ROWS = 1000  # of an attribute with a row for each cable
 # Deflate packs at most 1032 bytes into one.
 DENSEST = 1100
 _PLENTY = 64 << 20
@@ -107,7 +107,7 @@ def refuse_dense(datasets: Iterable[ReadableDataset], size: int, *, densest: int
 
 
 def refuse_others(file: h5py.File, objects: int, attributes: int) -> None:
-    """Refuse a file with other objects or attributes than those that were asked for.
+    """Refuse a file with other objects or attributes than the requested ones.
 
     Args:
         file: open.

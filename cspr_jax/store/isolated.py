@@ -30,7 +30,7 @@ from cspr_jax.store.documents import Header
 from cspr_jax.store.seal import DamagedError, check_mark, check_open, open_regular
 from cspr_jax.store.shards import LARGEST_SHARD, Layout, Shard, decode
 
-# Hashing that many bytes takes a moment; of larger files it is asked before what they hold.
+# Hashing so many bytes takes a moment; larger files are inspected before they are hashed.
 _QUICK = 512 << 20
 # A reader that has not answered by then never will; the limit of processor time comes long before.
 _PATIENCE = 60.0
@@ -111,7 +111,7 @@ class Reader:
             follow: whether it may be a link to one.
 
         Returns:
-            what it holds; None for a motion.
+            its content; None for a motion.
 
         Raises:
             DamagedError: it is no file, or damaged.
@@ -148,7 +148,7 @@ class Reader:
         """Header of a shard, of whatever run.
 
         Returns:
-            what it says.
+            the header.
 
         Raises:
             DamagedError: it is no shard, or a damaged one.

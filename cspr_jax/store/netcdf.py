@@ -163,7 +163,7 @@ def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:
 
 
 def reason(error: BaseException) -> str:
-    """The first line of what a library says.
+    """The first line of a library's error.
 
     Returns:
         the line, or the error's name where it says nothing.

@@ -22,9 +22,9 @@ from cspr_jax.store.netcdf import UNREADABLE, reason
 from cspr_jax.store.seal import DamagedError
 from cspr_jax.store.shards import Layout, decode, header_of
 
-# A result is read into memory as a whole; one byte of a file that is more than noise stands for a few of its data.
+# A result is read into memory as a whole. A byte of a file stands for a few bytes of data, unless these are all alike.
 LARGEST_DATA, DENSEST = 8e9, 50
-# Seconds of the processor to find out what a file holds; those that reading it takes on slow machines.
+# Processor seconds to inspect a file; and to read it, for each byte and each chunk, on a slow machine.
 _LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
 # Names of parts of vectors, for other programs.
@@ -38,7 +38,7 @@ _INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass
 
 
 def serve() -> None:
-    """Answer what is asked about one file after the other, until nobody asks any more.
+    """Answer questions about one file after the other, until there are no more.
 
     Standard input is a socket: questions come in on it, each with an open file; answers go out, as JSON and arrays. The
     arguments of the command are two folders of `store.isolated`, and the quantities that the asking process has

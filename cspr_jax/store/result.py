@@ -183,7 +183,7 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
     text = attributes.get(name)
     if text is None:
         raise DamagedError(f"it has no {name}")
-    # Before anything is built of it.
+    # This is checked before anything is built from the text.
     if max(text.count("[") + text.count("{"), text.count(":")) > _MOST_PARTS:
         raise DamagedError(f"its {name} have more parts than cspr writes")
     try:

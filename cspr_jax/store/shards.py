@@ -110,7 +110,7 @@ def decode(
     """A shard, checked in every respect but its seal.
 
     Args:
-        place: the file, or what it holds. HDF5 may fail or hang on one that this process has not written itself:
+        place: the file, or its content. HDF5 may fail or hang on one that this process has not written itself:
             `store.isolated` reads it elsewhere.
         index: of the tile that it must hold.
         begun: called with all datasets before they are read.
@@ -157,7 +157,7 @@ def header_of(file: h5py.File) -> Header:
         file: open.
 
     Returns:
-        what it says.
+        the header.
 
     Raises:
         DamagedError: it is no header of a shard.

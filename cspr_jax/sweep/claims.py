@@ -83,7 +83,7 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
 
 
 def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
-    """Refuse a tile of a worker that differs from what the run was begun with.
+    """Refuse a tile of a worker whose environment differs from that of the run.
 
     Raises:
         RefusedError: with a line for each key that differs.
@@ -140,7 +140,7 @@ def content_at(path: Path, reader: Reader) -> Content | str:
     """Content of a result in a run directory.
 
     Returns:
-        what it holds, or what is wrong with it.
+        its content, or a line about its fault.
 
     Raises:
         StoreError: the system refuses to read anything at the moment.

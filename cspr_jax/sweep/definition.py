@@ -29,7 +29,7 @@ from cspr_jax.sweep.tile_sizes import tile_cells
 
 # Each tile is a file.
 LARGEST_TILES = 100_000
-LARGEST_RESULT = 1 << 46  # bytes; what is free on the disk is looked at when a run starts
+LARGEST_RESULT = 1 << 46  # bytes; the free room on the disk is looked at when a run starts
 LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
 
 
@@ -160,7 +160,7 @@ def _tile(tile: list[int], shape: tuple[int, ...], path: Path) -> tuple[int, ...
 
 
 def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int, ...], needed: int, path: Path) -> None:
-    # Before any memory is taken; `check_room` looks at what is free when the run starts.
+    # This check comes before any memory is taken; `check_room` looks at the free room when the run starts.
     shape, place = tuple(counts.values()), f"axes: {_cells_of(counts)}"
     if needed > LARGEST_RESULT:
         raise ConfigError(path, f"{place} needs {needed / 1e9:.3g} GB: must be at most {LARGEST_RESULT / 1e9:.3g} GB")

@@ -32,7 +32,7 @@ ARCS = 30
 
 
 def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
-    """Estimate what a cell takes on one core.
+    """Estimate the time that a cell takes on one core.
 
     Returns:
         seconds.

@@ -36,7 +36,7 @@ class Executor(Protocol):
         """Compute tiles.
 
         Args:
-            stop: when it is set, what is in progress is finished and nothing is begun.
+            stop: when it is set, tiles in progress are finished and no other one is begun.
 
         Yields:
             the tiles.

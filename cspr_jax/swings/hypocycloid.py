@@ -50,8 +50,8 @@ class Segment:
         rate: () lambda of (2.26), 1/s^2.
         end_curvature: () A''(1) of a transition of chapter 1; 0 for the functions of chapter 2, which meet (2.49).
         tilt: (2,) slope of the plane: depth below the spools over z0 is 1 + tilt . c; 1/m.
-        pull: (n_cables, 2) one row a cable, 1/m.
-        twist: (n_cables,) one a cable, 1/m^2.
+        pull: (n_cables, 2) one row for each cable, 1/m.
+        twist: (n_cables,) one for each cable, 1/m^2.
     """
 
     plane: Array
@@ -79,7 +79,7 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
         axes: (3, n) the directions of the motion, as columns; n is 1 or 2.
 
     Returns:
-        tilt (n,), 1/m; pull (n_cables, n), 1/m, one row a cable; twist (n_cables,), 1/m^2, zero for a line.
+        tilt (n,), 1/m; pull (n_cables, n), 1/m, one row for each cable; twist (n_cables,), 1/m^2, zero for a line.
 
     Raises:
         InputError: more cables than degrees of freedom.

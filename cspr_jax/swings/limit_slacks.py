@@ -30,7 +30,7 @@ from cspr_jax.swings.hypocycloid import Segment, duration, oscillation
 from cspr_jax.swings.slacks import Instant, Stretch, row_bounds
 
 
-class _Now(NamedTuple):
+class _AtInstant(NamedTuple):
     # A segment at one instant: numbers, and (n_cables,) of the cables; derivatives in tau.
     z0: Array
     time: Array
@@ -43,7 +43,7 @@ class _Now(NamedTuple):
     rate_slope: Array
 
 
-class _Over(NamedTuple):
+class _OverInterval(NamedTuple):
     # Bounds over an interval; `square` bounds (rho^2)'' without the division that is in `length`.
     n_cables: int
     z0: Array
@@ -60,28 +60,28 @@ class _Over(NamedTuple):
 
 class _Closed(NamedTuple):
     # Closed form of a limit: its slacks, the bound of their second derivatives, and how many slacks each cable has.
-    slack: Callable[[_Now, Array], Array]
-    curvature: Callable[[_Over, Array], Array]
+    slack: Callable[[_AtInstant, Array], Array]
+    curvature: Callable[[_OverInterval, Array], Array]
     sides: int = 1
 
 
-def _bends(state: _Now, limit: Array) -> Array:
+def _bends(state: _AtInstant, limit: Array) -> Array:
     bend = (state.length**2 * state.rate_slope - state.rate**2) / (limit * state.time**2)
     return jnp.concatenate([state.length**3 - bend, state.length**3 + bend]) / state.z0**3
 
 
-def _lifted(over: _Over, limit: Array) -> Array:
+def _lifted(over: _OverInterval, limit: Array) -> Array:
     whole = over.kappa._replace(value=1.0 + over.kappa.value)
     lift = (whole * over.length).times(1.0 / (over.n_cables * over.z0))
     return (lift + over.eta.times(limit / over.weight)).curvature
 
 
-def _rated(over: _Over, limit: Array) -> Array:
+def _rated(over: _OverInterval, limit: Array) -> Array:
     rate = _rate(over.length, over.pace, over.pull)
     return 0.5 * (over.square + (rate * rate).curvature / (over.time * limit) ** 2) / over.z0**2
 
 
-def _bent(over: _Over, limit: Array) -> Array:
+def _bent(over: _OverInterval, limit: Array) -> Array:
     length, bend = over.length, _bend(over.length, over.pace, over.pull, over.square)
     cube = 6.0 * length.value * over.pace.slope**2 + 3.0 * length.value**2 * over.pace.curvature
     return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
@@ -139,7 +139,7 @@ def limit_slacks(
     rate_slope = jnp.dot(slope, slope) + rays @ curvature
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
     lift = jnp.stack(state.kappa) * length / (len(state.kappa) * z0)
-    here = _Now(z0, time, weight, state.eta, lift, position[2], length, rate, rate_slope)
+    here = _AtInstant(z0, time, weight, state.eta, lift, position[2], length, rate, rate_slope)
     slacks = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in limits_set(limits))
     return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in slacks)
 
@@ -179,7 +179,7 @@ def limit_curvatures(
     length = _length(robot, segment, over, pace, eta)
     depth = row_bounds(segment, arcs, over, segment.plane[2])
     square = 2.0 * (pace.slope**2 + length.value * pace.curvature)
-    here = _Over(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
+    here = _OverInterval(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
     return tuple(jnp.max(CLOSED[row.name].curvature(here, getattr(limits, row.name))) for row in limits_set(limits))
 
 

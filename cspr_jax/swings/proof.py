@@ -2,7 +2,7 @@
 
 A slack f with |f''| <= M on an interval of length h satisfies f >= min(f at its ends) - M h^2 / 8.
 The interval [0, 1] is cut into blocks at the knots of the amplitude function, and each block into 16
-intervals; M comes from the closed form, one a block. A segment is
+intervals; M comes from the closed form, one for each block. A segment is
 
     proved feasible    if this lower bound exceeds the tolerance in every block,
     proved infeasible  if a sample lies below minus the tolerance,

@@ -1,4 +1,4 @@
-"""Margins of transitions: the smallest pseudotension from two functions, instead of one a cable and one of depth."""
+"""Margins of transitions: the smallest pseudotension from two functions, not one for each cable and the depth."""
 
 import math
 

@@ -65,7 +65,7 @@ def _yaml(text: str) -> Any:
 
     try:
         data = load(text)
-    # Its constructors of numbers and dates raise what they happen to, as of "!!int ''" and "!!timestamp x".
+    # Its constructors of numbers and dates raise arbitrary errors, as of "!!int ''" and "!!timestamp x".
     except (yaml.YAMLError, LookupError, AttributeError, ArithmeticError, TypeError) as error:
         raise ValueError(" ".join(str(error).split())[:200]) from error
     if not _size(data, {}) <= LARGEST:

@@ -58,7 +58,7 @@ class AccelerationSet:
 
     @property
     def slacks(self) -> np.ndarray:
-        """Distances of the actual acceleration from the planes of the faces, (n_faces,); inf if a face bounds nothing."""
+        """Distances of the actual acceleration from the faces, (n_faces,); inf of a face that bounds nothing."""
         return self.normals @ self.actual - self.offsets
 
     @property

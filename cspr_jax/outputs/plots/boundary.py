@@ -81,7 +81,7 @@ def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Boundary
 
 
 def boundary(sides: BoundarySides) -> Boundary:
-    """The boundary of what is inside, by marching simplices: six tetrahedra a cell, or two triangles.
+    """The boundary of the inside, by marching simplices: six tetrahedra, or two triangles, for each cell.
 
     It crosses every edge of the grid, and every diagonal of these simplices, between a point inside and one outside,
     and no other, so that it parts the points exactly as their verdicts do. Where margins decide it crosses where the

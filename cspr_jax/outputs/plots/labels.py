@@ -106,7 +106,7 @@ def unit(result: Result, name: str) -> str:
     """The unit that a picture shows.
 
     Args:
-        result: gives that of the file.
+        result: gives the unit of the file.
         name: of the axis or the quantity.
 
     Returns:

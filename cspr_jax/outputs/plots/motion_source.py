@@ -16,7 +16,7 @@ from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.store.result import Result
 
-# Lengths of cables in a table and those of a robot in its poses are the same but for rounding, in parts of the longest.
+# Lengths of cables in a table and of the robot in its poses differ by rounding alone, over the longest one.
 SAME_LENGTH = 1e-6
 
 

@@ -40,7 +40,7 @@ LOOK = {
 METADATA: dict[str, dict] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 INCH = 2.54  # cm
 SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
-# Width and letters of pictures for papers, cm and points; their heights follow from what they show.
+# Width and letters of pictures for papers, cm and points; their heights follow from their content.
 PRESETS = {"column": (8.5, 8.0), "page": (17.5, 9.0)}
 # Panels take at least this share of the height; where they have less the picture gets higher, at most so often.
 LEAST_SHARE, HIGHER, TRIES = 0.5, 1.2, 6

@@ -17,7 +17,7 @@ from cspr_jax.outputs.plots.trajectory import draw_trajectory, legend_of
 from cspr_jax.outputs.plots.verdict_colours import reasons
 from cspr_jax.store.result import Result
 
-# Lines of the table; of a longer plan the first ones.
+# Lines of the table, which shows the first segments of a longer plan.
 SEGMENTS = 8
 WIDTHS = (0.15, 0.12, 0.22, 0.18, 0.33)
 HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
