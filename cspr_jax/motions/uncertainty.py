@@ -88,7 +88,7 @@ class _Reaches(NamedTuple):
     # Reach of k blocks and a multiple of the uncertainty, (k, n_cables) each: displacement of spools across rays, at
     # planned lengths; motion of rays from the middle, over their lengths; effect of the mass centre on tensions.
     off: np.ndarray
-    turned: np.ndarray
+    tilt: np.ndarray
     centre: np.ndarray
 
 
@@ -112,13 +112,13 @@ def _changes(
     shape = (len(vectors), *(1,) * (vectors.ndim - 3), *known.bent.shape[1:])
     whole = np.linalg.norm(vectors, axis=-1)
     units = (known.rays / influence.lengths[..., None]).reshape(*shape, 3)
-    way, bent, off, turned = (
+    way, bent, off, tilt = (
         known.way.reshape(*shape, 3),
-        *(x.reshape(shape) for x in (known.bent, far.off, far.turned)),
+        *(x.reshape(shape) for x in (known.bent, far.off, far.tilt)),
     )
     along = np.sum(vectors * units, axis=-1)
     across = np.sqrt(np.maximum(whole**2 - along**2, 0.0))
-    return np.abs(np.sum(vectors * way, axis=-1)) + whole * bent, off * np.minimum(whole, across + whole * turned)
+    return np.abs(np.sum(vectors * way, axis=-1)) + whole * bent, off * np.minimum(whole, across + whole * tilt)
 
 
 @UNKNOWN

@@ -132,8 +132,8 @@ def _cut(is_in: np.ndarray, simplices: np.ndarray, hand: int) -> np.ndarray:
         inner, outer = ([k for k in range(count) if pattern[k] is side] for side in (True, False))
         matching = simplices[(sides == pattern).all(1)]
         for piece in CUTS.get((len(inner), len(outer)), []):
-            turned = piece if hand * _hand([*inner, *outer]) > 0 else piece[::-1]
-            ends = np.array([[inner[i], outer[j]] for i, j in turned])
+            oriented = piece if hand * _hand([*inner, *outer]) > 0 else piece[::-1]
+            ends = np.array([[inner[i], outer[j]] for i, j in oriented])
             pieces.append(matching[:, ends])
     return np.concatenate(pieces)
 

@@ -140,7 +140,7 @@ def as_drawn(result: Result, name: str, values: np.ndarray) -> np.ndarray:
     return np.degrees(values) if is_angle(result, name) else values
 
 
-def turned(degrees: float) -> float:
+def principal_angle(degrees: float) -> float:
     """An angle without whole revolutions.
 
     Args:
@@ -165,7 +165,7 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
     drawn = float(as_drawn(result, axis, np.asarray(point, float)))
     symbol = unit(result, axis)
     if is_angle(result, axis):
-        drawn = turned(drawn)
+        drawn = principal_angle(drawn)
     # A range that passes zero may miss it by rounding.
     drawn = 0.0 if abs(drawn) <= 1e-12 else drawn
     name = WORDS.get(axis, shortened(axis))

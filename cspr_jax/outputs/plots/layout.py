@@ -9,7 +9,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
-from cspr_jax.outputs.plots.labels import turned
+from cspr_jax.outputs.plots.labels import principal_angle
 
 # Steps between ticks of angles, degrees.
 DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
@@ -61,7 +61,7 @@ def in_degrees(axis: Axis, span: float) -> None:
     """
     step = next((step for step in DEGREES if span <= 7.0 * step), None)
     axis.set_major_locator(MaxNLocator(5) if step is None or span < 2.0 else MultipleLocator(step))
-    axis.set_major_formatter(FuncFormatter(lambda tick, _: f"{turned(tick) + 0.0:.6g}"))
+    axis.set_major_formatter(FuncFormatter(lambda tick, _: f"{principal_angle(tick) + 0.0:.6g}"))
 
 
 def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
@@ -90,7 +90,9 @@ def reach_polar(axes: list[Axes], reach: float, unit: str) -> None:
     for panel in axes:
         panel.set_ylim(0.0, reach)
         panel.set_yticks(ticks, labels=[""] * len(ticks))
-        panel.set_xticks([math.radians(angle) for angle in around], labels=[f"{turned(angle):g}°" for angle in around])
+        panel.set_xticks(
+            [math.radians(angle) for angle in around], labels=[f"{principal_angle(angle):g}°" for angle in around]
+        )
         panel.tick_params(pad=0.0, labelsize="small")
         panel.grid(True, color="black", alpha=0.25, linewidth=0.5)
         panel.set_axisbelow(False)

@@ -205,8 +205,8 @@ def _draw_obstacles(panel: Axes3D, bodies: list[np.ndarray], eye: _Eye, surface:
     for points in bodies:
         faces = faces_of(points)
         normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-        turned = np.abs(normals @ eye.towards) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
-        shades = 1.0 - (1.0 - np.array(to_rgb(OBSTACLE))) * (0.55 + 0.45 * turned[:, None])
+        facing = np.abs(normals @ eye.towards) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+        shades = 1.0 - (1.0 - np.array(to_rgb(OBSTACLE))) * (0.55 + 0.45 * facing[:, None])
         layer = 3.5 if points.mean(0) @ eye.towards > middle else 0.8
         panel.add_collection3d(
             Poly3DCollection(faces, facecolors=shades, edgecolors=shades, linewidths=0.3, zorder=layer)
