@@ -14,11 +14,20 @@ from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, RunTable,
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ExitCode
-from cspr_jax.schema.axes import AXES, BEST
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
-from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT, FLIGHT_DIMS, PARTS, SEGMENTS, TRAJECTORY, columns_of
 from cspr_jax.schema.plan_fields import LAUNCH, SCATTER, SEGMENT, WHOLE
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.quantities import (
+    ACROSS,
+    AXES,
+    BEST,
+    FLIGHT,
+    FLIGHT_DIMS,
+    PARTS,
+    QUANTITIES,
+    SEGMENTS,
+    TRAJECTORY,
+    columns_of,
+)
 from cspr_jax.schema.verdicts import SENTENCES
 
 EXITS = {

@@ -15,7 +15,7 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import motion_files
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import heading, robot_name, value
-from cspr_jax.outputs.plots.motion_source import keeps_plan, kept, with_plan
+from cspr_jax.outputs.plots.motion_source import keeps_plan, robot_and_plan, with_plan
 from cspr_jax.outputs.plots.pages.maps import map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import MOST_ROWS, motion_content
 from cspr_jax.outputs.plots.pages.page import page_of
@@ -107,7 +107,7 @@ def _of_motion(motion: Result | Plan, name: str) -> tuple[str, dict[str, Any], l
     if isinstance(motion, Plan):
         robot, content, feasible = shortened(motion.robot_file.name), _planned(motion, "motion"), motion.feasible
     else:
-        robot_file, keys = kept(motion, name, "report") if keeps_plan(motion) else (None, None)
+        robot_file, keys = robot_and_plan(motion, name, "report") if keeps_plan(motion) else (None, None)
         robot, columns = robot_name(motion), motion.axes | motion.data
         content = motion_content("motion", columns, motion.data, robot_file, keys)
         feasible = bool(motion.attributes.get("feasible", 1))

@@ -23,7 +23,7 @@ def bench(kernels: Path | None = None) -> dict[str, Any]:
         the object that `cspr bench --json` prints: checks per second, best of five.
 
     Raises:
-        ConfigError: there is no compiler, or it refuses a kernel, or that computes something else.
+        ConfigError: there is no compiler, it refuses a kernel, or a kernel computes something else.
     """
     by_hand = None if kernels is None else hand_written.compiled(kernels)
     six, three = six_cables.work(room(six_cables.TRAJECTORIES)), three_cables.work()

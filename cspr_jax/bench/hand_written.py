@@ -57,17 +57,17 @@ def compiled(folder: Path) -> Kernels:
         the functions.
 
     Raises:
-        ConfigError: there is no compiler, or it refuses a kernel, or that does not hold the function it is named after.
+        ConfigError: there is no compiler, it refuses a kernel, or a kernel lacks the function it is named after.
     """
     return Kernels(_compiled(folder / "six_cables.cpp"), _compiled(folder / "three_cables.cpp"))
 
 
 def rates(kernels: Kernels, six: six_cables.SixCableWork, three: three_cables.ThreeCableWork) -> dict[str, float]:
-    """Checks a second of both kernels, on all cores; what they find is compared with the package's.
+    """Checks a second of both kernels, on all cores; their results are compared with the package's.
 
     Args:
         kernels: compiled.
-        three: the work of the other.
+        three: the work of the three-cable kernel.
 
     Returns:
         "six_cable" and "three_cable".

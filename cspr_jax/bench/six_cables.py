@@ -81,19 +81,19 @@ class Batch(NamedTuple):
     segments: PlatformSegment
 
 
-def batches(given: SixCableWork) -> list[Batch]:
+def batches(work: SixCableWork) -> list[Batch]:
     """The work by numbers of arcs.
 
     Returns:
         batches of one shape.
     """
-    half = given.angle[:, None] / 2.0
-    quaternions = np.concatenate([np.cos(half), np.sin(half) * given.axis], axis=1)
+    half = work.angle[:, None] / 2.0
+    quaternions = np.concatenate([np.cos(half), np.sin(half) * work.axis], axis=1)
     portions, lanes = [], room(LANES)
-    for arcs in np.unique(given.arcs):
-        cases = np.flatnonzero(given.arcs == arcs)
-        kernel = partial(_segments, given.robot, np.asarray(arcs % 2 == 1))
-        segments = in_batches(kernel, (quaternions[cases], given.beta_hat[cases]), size=LANES)
+    for arcs in np.unique(work.arcs):
+        cases = np.flatnonzero(work.arcs == arcs)
+        kernel = partial(_segments, work.robot, np.asarray(arcs % 2 == 1))
+        segments = in_batches(kernel, (quaternions[cases], work.beta_hat[cases]), size=LANES)
         for start in range(0, len(cases), lanes):
             portion = jax.tree.map(lambda x, s=start: x[s : s + lanes], segments)
             portions.append(Batch(int(arcs), len(portion.rate), jax.device_put(padded(portion, lanes))))
@@ -111,7 +111,7 @@ def _segments(robot: PlatformRobot, odd, items) -> PlatformSegment:
     return jax.vmap(one)(*items)
 
 
-def rate(robot: PlatformRobot, some: list[Batch], *, single_precision: bool) -> tuple[float, float]:
+def rate(robot: PlatformRobot, portions: list[Batch], *, single_precision: bool) -> tuple[float, float]:
     """Checks a second.
 
     Args:
@@ -124,10 +124,10 @@ def rate(robot: PlatformRobot, some: list[Batch], *, single_precision: bool) -> 
     def call(batch):
         return jax.block_until_ready(tensions(robot, batch, single_precision=single_precision))
 
-    lowest = [np.asarray(call(batch)) for batch in some]
-    total = sum(batch.real for batch in some)
-    taut = sum(int((x[: batch.real] > 0.0).sum()) for x, batch in zip(lowest, some, strict=True))
-    return total * SAMPLES / best(partial(in_threads, call, some)), taut / total
+    lowest = [np.asarray(call(batch)) for batch in portions]
+    total = sum(batch.real for batch in portions)
+    taut = sum(int((x[: batch.real] > 0.0).sum()) for x, batch in zip(lowest, portions, strict=True))
+    return total * SAMPLES / best(partial(in_threads, call, portions)), taut / total
 
 
 def tensions(robot: PlatformRobot, batch: Batch, *, single_precision: bool) -> Array:
@@ -157,21 +157,22 @@ def operations_a_check(robot: PlatformRobot, batch: Batch) -> float | None:
     return operations(lowered, len(batch.segments.rate))
 
 
-def numpy_rate(given: SixCableWork) -> float:
+def numpy_rate(work: SixCableWork) -> float:
     """Checks a second of the NumPy version.
 
     Args:
-        given: the work; a part of it is done.
+        work: a part of it is done.
 
     Returns:
         the rate.
     """
-    first_cases = SixCableWork(given.robot, *(x[:NUMPY_TRAJECTORIES] for x in given[1:]))
+    first_cases = SixCableWork(work.robot, *(x[:NUMPY_TRAJECTORIES] for x in work[1:]))
     return len(first_cases.arcs) * SAMPLES / best(partial(_numpy_checks, first_cases))
 
 
 def _numpy_checks(task: SixCableWork) -> np.ndarray:
-    # Smallest tension per mass and length of each trajectory: (n,); -inf where the determinant changes its sign.
+    # Return the smallest tension per mass and length of each trajectory: (n,); -inf where the determinant changes its
+    # sign.
     tau, theta = np.linspace(0.0, 1.0, SAMPLES), math.pi * task.arcs[:, None]
     a, a1 = 10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4
     a2, a3 = 60 * tau - 180 * tau**2 + 120 * tau**3, 60 - 360 * tau + 360 * tau**2
@@ -181,9 +182,12 @@ def _numpy_checks(task: SixCableWork) -> np.ndarray:
     h = task.beta_hat[:, None]
     beat = ((9 + h) * c - (1 + h) * c3) / 8
     beat1, beat2 = theta * (3 * (1 + h) * s3 - (9 + h) * s) / 8, theta**2 * (9 * (1 + h) * c3 - (9 + h) * c) / 8
-    turn = (sign * task.angle[:, None])[..., None]
-    angle = turn * (a * beat)[..., None]
-    speed, spin = turn * (a1 * beat + a * beat1)[..., None], turn * (a2 * beat + 2 * a1 * beat1 + a * beat2)[..., None]
+    signed_angle = (sign * task.angle[:, None])[..., None]
+    angle = signed_angle * (a * beat)[..., None]
+    angular_speed, angular_acceleration = (
+        signed_angle * (a1 * beat + a * beat1)[..., None],
+        signed_angle * (a2 * beat + 2 * a1 * beat1 + a * beat2)[..., None],
+    )
     reach = (sign * (a * c - a1 * s / theta))[..., None]
     pull = (-sign * ((a * theta**2 + a2) * c + (a1 * theta + a3 / theta) * s) / squared)[..., None]
     rest, far = rest_point(PLACE[2]), np.array([*PLACE[:2], 0.0])
@@ -192,7 +196,7 @@ def _numpy_checks(task: SixCableWork) -> np.ndarray:
     skew = np.cross(np.eye(3), task.axis[:, None, :])[:, None]
     rotation = np.eye(3) + np.sin(angle)[..., None] * skew + (1 - np.cos(angle))[..., None] * skew @ skew
     weight = np.einsum("ntij,jk,nlk->nti", rotation, np.asarray(task.robot.inertia / task.robot.mass), e)
-    moment = (spin * weight + speed**2 * np.cross(e, weight)) / squared[..., None]
+    moment = (angular_acceleration * weight + angular_speed**2 * np.cross(e, weight)) / squared[..., None]
     arms = np.einsum("ntij,kj->ntki", rotation, np.asarray(task.robot.platform_points))
     rays = position[:, :, None] + arms - np.asarray(task.robot.base_points)
     matrix = -np.concatenate([rays, np.cross(arms, rays)], axis=3).swapaxes(2, 3)

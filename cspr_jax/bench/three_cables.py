@@ -57,7 +57,7 @@ def work() -> ThreeCableWork:
     return ThreeCableWork(problem, ends, (parities[0], parities[1]))
 
 
-def rate(given: ThreeCableWork, dtype: str) -> float:
+def rate(work: ThreeCableWork, dtype: str) -> float:
     """Checks a second of the sieve.
 
     Args:
@@ -66,13 +66,13 @@ def rate(given: ThreeCableWork, dtype: str) -> float:
     Returns:
         the rate.
     """
-    pair = jax.tree.map(lambda x: np.asarray(x, dtype), given.segments)
+    pair = jax.tree.map(lambda x: np.asarray(x, dtype), work.segments)
     batches = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::BATCHES], pair)) for i in range(BATCHES)]
 
     def one(batch):
-        return jax.block_until_ready(sieve.upper_bounds(given.problem.amplitude, *batch, max_arcs=MAX_ARCS))
+        return jax.block_until_ready(sieve.upper_bounds(work.problem.amplitude, *batch, max_arcs=MAX_ARCS))
 
-    return checks(len(given.ends)) / best(partial(in_threads, one, batches))
+    return checks(len(work.ends)) / best(partial(in_threads, one, batches))
 
 
 def checks(count: int) -> int:
@@ -84,21 +84,21 @@ def checks(count: int) -> int:
     return count * MAX_ARCS * sieve.SAMPLES
 
 
-def numpy_rate(given: ThreeCableWork) -> float:
+def numpy_rate(work: ThreeCableWork) -> float:
     """Checks a second of the NumPy version.
 
     Args:
-        given: the work; a part of it is done.
+        work: a part of it is done.
 
     Returns:
         the rate.
     """
-    ends = given.ends[:NUMPY_SEGMENTS]
-    return checks(len(ends)) / best(partial(_numpy_checks, np.asarray(given.problem.robot.base_points), ends))
+    ends = work.ends[:NUMPY_SEGMENTS]
+    return checks(len(ends)) / best(partial(_numpy_checks, np.asarray(work.problem.robot.base_points), ends))
 
 
 def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    # Smallest pseudotension of each segment and number of arcs: (segments, MAX_ARCS).
+    # Return the smallest pseudotension of each segment and number of arcs: (segments, MAX_ARCS).
     tau = (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
     amplitude = (10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4)
     bend = 60 * tau - 180 * tau**2 + 120 * tau**3

@@ -1,4 +1,4 @@
-"""Durations of work, and the most that the machine can do."""
+"""Durations of work, and peak rates of the machine."""
 
 import os
 import time
@@ -59,10 +59,10 @@ def operations(lowered: Any, cases: int) -> float | None:
     """Arithmetic operations of a compiled function, as XLA counts them; a loop's are counted once.
 
     Args:
-        cases: how many it computes.
+        cases: number of cases that it computes.
 
     Returns:
-        of each case; None where XLA does not say.
+        the operations of each case; None where XLA does not say.
     """
     costs = lowered.compile().cost_analysis() or {}
     return costs["flops"] / cases if "flops" in costs else None

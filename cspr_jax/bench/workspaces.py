@@ -24,9 +24,9 @@ from cspr_jax.workspaces import geometry
 from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# Batches of poses; of twelve cables fewer.
+# Batches of poses, and of poses with twelve cables.
 BATCHES, FEW_BATCHES = 16, 4
-# Poses of one call where cables are held apart, of which tensions are found, and of the others' ways.
+# Poses of one call: for distances of cables, for tensions, and for linear programs and least squares.
 PAIRS_BATCH, TENSIONS, SAMPLE = 65_536, 65_536, 100
 
 
@@ -35,24 +35,24 @@ class SamplePoses(NamedTuple):
 
     Fields:
         place: three arrays (n,), of the mass centre, m.
-        turn: four arrays (n,), unit quaternions; None of a point mass.
+        quaternion: four arrays (n,), unit quaternions; None of a point mass.
     """
 
     place: tuple[np.ndarray, ...]
-    turn: tuple[np.ndarray, ...] | None
+    quaternion: tuple[np.ndarray, ...] | None
 
 
 def _poses(robot: PointMassRobot | PlatformRobot, count: int, dtype: str) -> SamplePoses:
     rng, base = np.random.default_rng(0), np.asarray(robot.base_points)
     half = np.maximum(0.4 * np.ptp(base, axis=0), 0.5)
-    turns = np.array(IDENTITY) + 0.1 * rng.normal(size=(count, 4))
-    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    quaternions = np.array(IDENTITY) + 0.1 * rng.normal(size=(count, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
 
     def lanes(array):
         return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
     place = lanes(half * rng.uniform(-1.0, 1.0, (count, 3)))
-    return SamplePoses(place, lanes(turns) if isinstance(robot, PlatformRobot) else None)
+    return SamplePoses(place, lanes(quaternions) if isinstance(robot, PlatformRobot) else None)
 
 
 def _four_cables() -> PointMassRobot:
@@ -80,7 +80,7 @@ def margin_rate(
     Args:
         condition: of `workspaces.questions.CONDITIONS`.
         dtype: "float32" or "float64".
-        by_null_space: which of the two ways.
+        by_null_space: by the null space of the wrench matrix; else by its normals.
 
     Returns:
         the rate; s that the first batch takes, mostly of compiling.
@@ -94,7 +94,7 @@ def margin_rate(
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::batches], all_poses)) for i in range(batches)]
 
     def one(poses):
-        return jax.block_until_ready(kernel(poses.place, poses.turn, None))
+        return jax.block_until_ready(kernel(poses.place, poses.quaternion, None))
 
     one(parts[0])
     first = time.perf_counter() - start
@@ -121,7 +121,7 @@ def clearance_rate(dtype: str) -> float:
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::4], all_poses)) for i in range(4)]
 
     def one(poses):
-        lanes = clearance_kernels.PoseLanes(poses.place, poses.turn, None)
+        lanes = clearance_kernels.PoseLanes(poses.place, poses.quaternion, None)
         return jax.block_until_ready(clearance_kernels.of_cables(points, lanes, pairs))
 
     return 4 * size / best(partial(in_threads, one, parts))
@@ -137,18 +137,18 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
     poses = _poses(centred_robot, count, "float64")
-    places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
-    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, turns)) / search.unit[:, None]
-    wrenches = np.repeat(search.required(places[0], turns[0]).corners, count, axis=0)
+    places, quaternions = np.stack(poses.place, 1), np.stack(poses.quaternion or (), 1)
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, quaternions)) / search.unit[:, None]
+    wrenches = np.repeat(search.required(places[0], quaternions[0]).corners, count, axis=0)
     limits = [np.broadcast_to(x, (count, centred_robot.n_cables)) for x in (search.asked.low, search.asked.high)]
     return count / best(lambda: least_norms(matrices, wrenches, *limits))
 
 
 def rates() -> dict[str, Any]:
-    """Rates of all of these.
+    """Rates of all of this work.
 
     Returns:
-        poses a second by what is asked and by type of numbers; "first_s", what compiling and the first batch take.
+        poses a second by kind of work and by type of numbers; "first_s", time of compiling and of the first batch.
     """
     eight, four, twelve = load_robot("cogiro"), _four_cables(), _twelve_cables()
     rows: dict[str, Any] = {}
@@ -170,13 +170,13 @@ def rates() -> dict[str, Any]:
 
 
 def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
-    # Poses a second of linear programs and of least squares.
+    # Return poses a second of linear programs and of least squares.
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
     poses = _poses(centred_robot, SAMPLE, "float64")
-    places, turns = np.stack(poses.place, 1), np.stack(poses.turn or (), 1)
-    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, turns)) / search.unit[:, None]
-    wrench = search.required(places[0], turns[0]).corners[0]
+    places, quaternions = np.stack(poses.place, 1), np.stack(poses.quaternion or (), 1)
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, quaternions)) / search.unit[:, None]
+    wrench = search.required(places[0], quaternions[0]).corners[0]
 
     def rate(way) -> float:
         return SAMPLE / best(lambda: [way(matrix, wrench, search.asked.low, search.asked.high) for matrix in matrices])
@@ -184,17 +184,17 @@ def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
     return {"HiGHS": rate(by_program), "NNLS": rate(by_squares)}
 
 
-def lines(found: dict[str, Any]) -> list[str]:
+def lines(measured: dict[str, Any]) -> list[str]:
     """Lines for people.
 
     Args:
-        found: of `rates`.
+        measured: of `rates`.
 
     Returns:
         the lines.
     """
     text = ["workspaces, poses a second"]
-    for name, row in found.items():
+    for name, row in measured.items():
         words = [f"{key} {value / 1e6:8.3g} M/s" for key, value in row.items() if key != "first_s"]
         text.append(
             f"  {name:26s} {', '.join(words)}" + (f", first {row['first_s']:.1f} s" if "first_s" in row else "")

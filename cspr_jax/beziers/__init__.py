@@ -1,11 +1,11 @@
 """Bezier curves of point masses from rest to rest, and objects that are launched from them.
 
-A Bezier curve of the second order, run through by half a cosine, is at rest at both ends wherever these are. The
+A Bezier curve of the second order, traversed by half a period of a cosine, is at rest at both ends. The
 pseudotensions along it are polynomials of low degree in the cosine of the phase, whose coefficients depend on
 r = (T / pi)^2: their minima are exact, and the durations at which a verdict can change are roots of polynomials. A
-launch releases an object on the segment through the place and with the velocity that its flight to the target asks for.
+launch releases an object on a segment that passes the place of the release with the velocity that the flight requires.
 
-Source: the launch paper, section 3.1 (curve) and what follows it (release and free flight).
+Source: the launch paper, section 3.1 (curve) and the sections after it (release and free flight).
 
 Files, each importing only from those above it:
 
@@ -18,7 +18,7 @@ Files, each importing only from those above it:
     sequences           least sum of the durations of a sequence
     segments            segments one after the other: answers
     launch              free flight, and the segment through a release
-    launches            launches to a target: what is left to choose, and how it is chosen
+    launches            launches to a target, with all that is left open chosen
     release_bounds      bounds within which a release is looked for
     launch_range        releases for many landing places
     landings            scatter of landings

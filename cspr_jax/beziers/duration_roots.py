@@ -1,8 +1,8 @@
 """Durations at which the verdict of a Bezier segment can change: roots of polynomials in r = (T / pi)^2.
 
-Times r, the cubics of `margins` have coefficients that are polynomials in r, if the second control point is
+Multiplied by r, the cubics of `margins` have coefficients that are polynomials in r, if the second control point is
 given or follows from an acceleration at the start, middle = start + r acceleration (15). Their smallest value on
-[-1, 1] can be zero only where an end is, or where two roots in c meet: where the discriminant, of degree 8 in r at
+[-1, 1] can be zero only if the value at an end is, or if two roots in c meet: if the discriminant, of degree 8 in r at
 most, is zero.
 """
 
@@ -15,19 +15,19 @@ from cspr_jax.beziers.motion import powers
 
 
 class Ends(NamedTuple):
-    """Ends of n segments, and what their second control points follow from.
+    """Ends of n segments, and their second control points as functions of r.
 
     Fields:
         start: (n, 3) from the centroid of the spools, z down, m.
         end: (n, 3) likewise.
         middle: (n, 3) second control point for r = 0, m.
-        turn: (n, 3) its change with r: 0, or the acceleration at the start, m/s^2.
+        middle_change: (n, 3) change of the second control point with r: 0, or the acceleration at the start, m/s^2.
     """
 
     start: np.ndarray
     end: np.ndarray
     middle: np.ndarray
-    turn: np.ndarray
+    middle_change: np.ndarray
 
     def middles(self, durations: np.ndarray) -> np.ndarray:
         """Second control points of given durations.
@@ -40,7 +40,7 @@ class Ends(NamedTuple):
         """
         r = (np.asarray(durations) / np.pi) ** 2
         more = (slice(None), *[None] * (r.ndim - 1))
-        return self.middle[more] + self.turn[more] * r[..., None]
+        return self.middle[more] + self.middle_change[more] * r[..., None]
 
 
 def critical_durations(
@@ -66,23 +66,23 @@ def critical_durations(
 
 
 def _vectors(ends: Ends, unit: np.ndarray) -> list[np.ndarray]:
-    # The coefficients A, B, C of (17): (n, 3, 2) each, by powers of r over its unit.
+    # Return the coefficients A, B, C of (17): (n, 3, 2) each, by powers of r over its unit.
     constant = powers(ends.start, ends.middle, ends.end)
-    nothing = np.zeros_like(ends.turn)
-    change = powers(nothing, ends.turn * unit[:, None], nothing)
+    nothing = np.zeros_like(ends.middle_change)
+    change = powers(nothing, ends.middle_change * unit[:, None], nothing)
     return [np.stack(pair, axis=-1) for pair in zip(constant, change, strict=True)]
 
 
 def _of_cables(
     rows: np.ndarray, arms: np.ndarray, gravity: float, unit: np.ndarray, vectors: list[np.ndarray]
 ) -> list[np.ndarray]:
-    # Pseudotensions times r: at both ends, and the discriminants of the cubics.
+    # Return pseudotensions times r at both ends, and the discriminants of the cubics.
     square, slope, rest = vectors
     # r g, z down.
     fall = np.zeros((len(unit), 3, 2))
     fall[:, 2, 1] = gravity * unit
     first = total(2.0 * square, -fall)
-    turned = [
+    moments = [
         _cross(first, rest),
         total(total(-_cross(slope, rest), 2.0 * _cross(square, slope)), -_cross(fall, slope)),
         total(-4.0 * _cross(square, rest), -_cross(fall, square)),
@@ -91,7 +91,7 @@ def _of_cables(
     pulled = [first, -slope, -4.0 * square, 0.0 * square]
     polynomials = []
     for row, arm in zip(rows, arms, strict=True):
-        f = [total(_dot(row, p), _dot(arm, t)) for p, t in zip(pulled, turned, strict=True)]
+        f = [total(_dot(row, p), _dot(arm, t)) for p, t in zip(pulled, moments, strict=True)]
         scale = sum(np.abs(x).max(-1, keepdims=True) for x in f)
         f = [x / np.where(scale > 0.0, scale, 1.0) for x in f]
         even, odd = total(f[0], f[2]), total(f[1], f[3])
@@ -132,7 +132,7 @@ def _dot(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
 
 
 def _positive_roots(tables: list[np.ndarray]) -> np.ndarray:
-    # Roots that rounding has moved off the real axis count: what is between roots is tested anyway.
+    # Roots that rounding has moved off the real axis count: durations between roots are tested anyway.
     roots = np.concatenate([np.roots(table[::-1]) for table in tables if np.isfinite(table).all()])
     near = np.abs(roots.imag) <= 1e-3 * np.abs(roots)
     return np.unique(roots.real[near & (roots.real > 0.0) & np.isfinite(roots)])

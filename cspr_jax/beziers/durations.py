@@ -20,8 +20,8 @@ from cspr_jax.schema.verdicts import Verdict
 
 # Halvings of the stretch between a duration that is feasible and one that is not: as many as float64 has digits.
 HALVINGS = 60
-# Durations tried in each interval of taut ones where limits count, in geometric progression up to so many times the
-# first.
+# Durations tried under limits in each interval that keeps every cable taut, in geometric progression up to so many
+# times the first.
 TRIED, WIDEST = 129, 100.0
 # Longest duration over the time that the largest speed or acceleration of the cables takes for the way.
 AMPLE = 20.0
@@ -38,7 +38,7 @@ def _proved_margins(robot: PointMassRobot, motions: Bezier):
 
 
 def proved_margins(robot: PointMassRobot, ends: Ends, durations: np.ndarray, z0: np.ndarray) -> np.ndarray:
-    """Smallest slacks less their rounding errors: feasible is proved where they are positive.
+    """Smallest slacks less their rounding errors: a segment is proved feasible where they are positive.
 
     Args:
         robot: a point mass on as many cables as it has degrees of freedom; centred.
@@ -61,8 +61,8 @@ def feasible_durations(robot: PointMassRobot, ends: Ends, z0: np.ndarray) -> lis
         z0: (n,) m.
 
     Returns:
-        of each segment (n_intervals, 2), both ends of each interval proved feasible, the last one inf where any longer
-        duration is; s.
+        for each segment (n_intervals, 2) s, both ends of each interval proved feasible; the last end is inf where any
+        longer duration is feasible.
     """
     rows, arms = (np.asarray(x) for x in jax.jit(adjugate)(robot))
     roots = critical_durations(rows, arms, np.asarray(plane_normal(robot)), float(robot.gravity), ends)
@@ -103,7 +103,7 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
     """Least feasible duration of one segment.
 
     Without limits it is the first one that keeps every cable taut. With limits, the first of many durations that meets
-    them is narrowed down; a shorter one between two that do not is not excluded.
+    them is narrowed down; a shorter one between two of them is not excluded.
 
     Args:
         ends: of the segment, leading dimension 1.
@@ -111,8 +111,8 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
         z0: m.
 
     Returns:
-        s; if there is none, of those tried one that keeps every cable taut and breaks the fewest limits, if there is
-        one, else that with the largest margin.
+        s; if none is feasible, the tried duration that keeps every cable taut and breaks the fewest limits; if none
+        keeps them taut, the one with the largest margin.
     """
     if len(intervals) and not limits_set(problem.limits):
         return float(intervals[0, 0])
@@ -140,17 +140,17 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
 
 
 def _nearest(judgements: Verdicts) -> int:
-    # Prefer those that keep cables taut below the spools, then those that break the fewest limits by the least.
+    # Prefer durations that keep cables taut below the spools, then those that break the fewest limits by the least.
     margin = np.nan_to_num(np.minimum(judgements.margin, judgements.room), nan=-np.inf)
     counts = np.sum([(judgements.verdict & flag.value) > 0 for flag in Verdict], axis=0)
     return int(np.lexsort((-margin, counts, ~(judgements.margin > 0.0)))[0])
 
 
 def slowest(problem: Problem, points: np.ndarray) -> float:
-    """Duration that is long enough for what limits the speed of the cables.
+    """Duration that is long enough for the limits of the cables' speeds and accelerations.
 
     Args:
-        points: (n + 1, 3) of the way, m; what is not known yet is NaN.
+        points: (n + 1, 3) of the path, m; NaN where not known yet.
 
     Returns:
         s; 0 without such limits.

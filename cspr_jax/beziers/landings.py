@@ -1,8 +1,8 @@
-"""Scatter of landings: errors of the winches and of the instant of release, thrown many times and to first order.
+"""Scatter of landings: errors of the winches and of the instant of release, by a random sample and to first order.
 
 At the release the cables have lengths and rates that miss the plan's; the effector is where the lengths are, and moves
 as the rates say. From there the object flies to the height of its target. A random sample of errors gives a sample of
-landings, and the derivatives of the landing with respect to all errors the covariance of small ones.
+landings, and the derivatives of the landing with respect to all errors the covariance for small errors.
 """
 
 import dataclasses
@@ -32,7 +32,7 @@ class Throw(NamedTuple):
 
     Fields:
         motion: segment on which the object is released, z down.
-        release: () after its start, s.
+        release: () time after the start of the segment, s.
         target: (3,) m; landings are looked for at its height.
     """
 
@@ -47,9 +47,9 @@ class LaunchErrors:
 
     Fields:
         release: standard deviation of the instant of release, s.
-        cable_length: of the length of each cable at the release, m.
-        cable_speed: of the rate of each cable's length, m/s.
-        encoder: largest error of each length by the resolution of its encoder, m; uniform.
+        cable_length: standard deviation of the length of each cable at the release, m.
+        cable_speed: standard deviation of the rate of that length, m/s.
+        encoder: largest error of each length due to the resolution of its encoder, m; uniform.
         throws: size of the sample.
         seed: of the sample.
     """
@@ -62,7 +62,7 @@ class LaunchErrors:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse sizes that are none."""
+        """Refuse numbers out of their ranges."""
         for name in ("release", "cable_length", "cable_speed", "encoder"):
             Numbers("a number from 0 to 1000", least=0.0, largest=LARGEST_ERROR).array(name, getattr(self, name))
         whole("throws", self.throws, 2, MOST_THROWS)
@@ -116,7 +116,7 @@ def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
         (2,) x and y over those of the target, m; NaN where the object never comes to its height.
     """
     count = robot.n_cables
-    # Before the segment and behind it the effector is at rest there, for an instant.
+    # Before the segment and after it the effector rests at an end.
     share = jnp.clip((throw.release + errors[0]) / throw.motion.time, 0.0, 1.0)
     state = throw.motion.state(share)
     lengths, rates, _ = cable_motion(robot, *state[:3])

@@ -46,8 +46,8 @@ def through(start: Array, position: Array, velocity: Array, share: Array, durati
     Args:
         start: (3,) first control point, m.
         position: (3,) place of the release, m.
-        velocity: (3,) there, m/s.
-        share: () when, over the duration of the segment: in ]0, 1[.
+        velocity: (3,) at the release, m/s.
+        share: () time of the release over the duration of the segment, in ]0, 1[.
         duration: () s.
 
     Returns:

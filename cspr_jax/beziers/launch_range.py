@@ -28,14 +28,15 @@ from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS
 
 UNKNOWNS, POPULATION = 6, 64
-# Margins of the launch of least speed: exact ones of taut cables; limits are sampled, and only then proved.
+# Margins that the launch of least speed must keep in the search: of taut cables they are exact; limits are sampled
+# there, and proved later.
 EXACT, SAMPLED, SAMPLES = (1e-6,), (1e-3, 1e-2), 33
 # Places at a time where the answers are made.
 TOGETHER = 512
 
 
 class LaunchRequirement(NamedTuple):
-    """Questions of n landing places, in the kernels' coordinates.
+    """Starts and targets of n launches, in the kernels' coordinates.
 
     Fields:
         start: (n, 3) where the segment starts at rest, m.
@@ -55,7 +56,7 @@ class Shot(NamedTuple):
         position: (3,) of the release, m.
         velocity: (3,) there, m/s.
         flight_time: () s.
-        share: () of the duration of the segment, when the object is released.
+        share: () time of the release over the duration of the segment.
         motion: the segment.
     """
 
@@ -147,7 +148,8 @@ def launch_range(
         population: of the search; one twice as large takes four times as long.
 
     Returns:
-        the launches, each the best of a search: those found are proved, that there is no other or no slower one is not.
+        the launches, each the best of a search: it is proved feasible, but not that there is no slower one, or none
+        where the search finds none.
     """
     question = LaunchRequirement(starts, targets, depths_of(problem.robot, starts))
     margins = (np.inf, *(SAMPLED if limits_set(problem.limits) else EXACT))
@@ -188,6 +190,6 @@ def _judged(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[
     parts = [slice(i, i + BATCH) for i in range(0, len(motions.time), BATCH)]
     judgements = [verdicts(problem, jax.tree.map(lambda x, s=chunk: x[s], motions)) for chunk in parts]
     verdict = np.concatenate([x.verdict for x in judgements])
-    # Above the spools the room under limits of tensions is not known, and it is the depth that misses.
+    # Above the spools the room under limits of tensions is not known, and the depth decides.
     margin = np.concatenate([np.where(np.isneginf(x.room), x.margin, np.minimum(x.margin, x.room)) for x in judgements])
     return verdict.reshape(shape), np.where(np.isnan(margin), -np.inf, margin).reshape(shape)

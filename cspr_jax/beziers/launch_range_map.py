@@ -39,7 +39,7 @@ class LaunchRangeMap(FromPlacesMap):
         """Refuse starts that are all out of reach, since objects may land anywhere; see `GridMap.refuse_hopeless`.
 
         Raises:
-            ConfigError: what is wrong with all of them.
+            ConfigError: what is wrong with all starts.
         """
         self._refuse_out_of_plane(grid)
         self._refuse_out_of_reach(self._starts(self._corners(grid, _START)), "trajectory.from")

@@ -1,4 +1,4 @@
-"""Launches: the flight to a target, the segment on which an object is released, and what is left to choose of both.
+"""Launches: the flight to a target, the segment on which an object is released, and the choice of what is left open.
 
 The control point and the end of that segment follow from the place and the velocity of release, (29), and the
 accelerations of the whole sequence from that control point.
@@ -21,16 +21,16 @@ EARLIEST, LATEST = 0.05, 0.95
 
 
 class Launch(NamedTuple):
-    """Question of a launch; numbers of NumPy or of jax, None of what is to be chosen.
+    """Requirements of a launch; NumPy or jax numbers, None where a value is to be chosen.
 
     Fields:
-        points: (n + 1, 3) of the sequence, z down, m; that of the end of the launching segment is of no account.
+        points: (n + 1, 3) of the sequence, z down, m; the end of the launching segment is ignored.
         segment: () number of the launching segment.
         target: (3,) m.
         point: (3,) place of the release, m; None: on the parabola of `velocity`.
         velocity: (3,) at the target, m/s; None: as `point` and the time of flight demand.
         time: () of the flight, s; None: to be chosen.
-        release: () after the start of the segment, s; None: to be chosen.
+        release: () time after the start of the segment, s; None: to be chosen.
         z0: () depth at which slacks are normalised, m.
     """
 
@@ -50,10 +50,10 @@ class LaunchSequence(NamedTuple):
     Fields:
         sequence: with the end of the launching segment.
         durations: (n,) s.
-        release: () after the start of the segment, s.
+        release: () time after the start of the segment, s.
         time: () of the flight, s.
         position: (3,) at the release, m.
-        velocity: (3,) likewise, m/s.
+        velocity: (3,) at the release, m/s.
     """
 
     sequence: Anchored

@@ -1,8 +1,8 @@
 """Smallest slacks of limits along Bezier segments, with a proof.
 
-In c = cos(pi tau) everything that a limit bounds is made of polynomials: squares of cable lengths, of their rates times
-the lengths, pseudotensions, the depth. Over a block of c each of them, and its derivatives, has bounds by its Bernstein
-coefficients; interval jets carry these to the slacks.
+In c = cos(pi tau) every quantity that a limit bounds is made of polynomials: squares of cable lengths, of their rates
+times the lengths, pseudotensions, the depth. Over a block of c each of them, and its derivatives, has bounds by its
+Bernstein coefficients; interval jets carry these to the slacks.
 """
 
 from collections.abc import Callable
@@ -67,7 +67,7 @@ def _of_limit(slack: Callable[[Items], Any], ends: list[Items], during: Items) -
 
 
 def _tables(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.ndarray) -> dict[str, np.ndarray]:
-    # By powers of c: (n, n_cables, d) or (n, 1, d).
+    # Return coefficients by powers of c: (n, n_cables, d) or (n, 1, d).
     a = np.asarray(problem.robot.base_points)
     square, slope, rest = powers(motions.start, motions.middle, motions.end)
     u = ((np.pi / motions.time) ** 2)[:, None, None]

@@ -27,8 +27,8 @@ class Margins(NamedTuple):
     Fields:
         taut: (n_cables,) smallest pseudotension over its value at rest in P0.
         below: () smallest depth below the spools over z0.
-        taut_rounding: (n_cables,) rounding error of these.
-        below_rounding: () likewise.
+        taut_rounding: (n_cables,) bound of the rounding error of `taut`.
+        below_rounding: () likewise of `below`.
     """
 
     taut: Array
@@ -52,7 +52,7 @@ def cubics(robot: PointMassRobot, motion: Bezier) -> Array:
     u = (np.pi / motion.time) ** 2
     fall = jnp.zeros_like(square).at[2].set(robot.gravity)
     first = 2.0 * u * square - fall
-    turned = jnp.stack(
+    moments = jnp.stack(
         [
             jnp.cross(first, rest),
             -u * jnp.cross(slope, rest) + 2.0 * u * jnp.cross(square, slope) - jnp.cross(fall, slope),
@@ -61,7 +61,7 @@ def cubics(robot: PointMassRobot, motion: Bezier) -> Array:
         ]
     )
     pulled = jnp.stack([first, -u * slope, -4.0 * u * square, jnp.zeros_like(square)])
-    return (rows @ pulled.T + arms @ turned.T) / _at_rest(robot, motion.z0)[:, None]
+    return (rows @ pulled.T + arms @ moments.T) / _at_rest(robot, motion.z0)[:, None]
 
 
 @jax.jit
@@ -103,14 +103,14 @@ def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
 
 
 def depths_of(robot: PointMassRobot, starts: np.ndarray) -> np.ndarray:
-    """Depths that slacks are taken over where there is no P0: those of the starts.
+    """Depths by which slacks are normalised where there is no P0: those of the starts.
 
     Args:
         robot: a point mass on any number of cables; centred.
         starts: (n, 3) m.
 
     Returns:
-        (n,) below the spools, m; of starts that are not below them the size of the robot.
+        (n,) below the spools, m; for a start that is not below them the size of the robot.
     """
     depth = starts @ np.asarray(plane_normal(robot))
     return np.where(depth > 0.0, depth, float(spool_radius(robot)))
@@ -119,7 +119,7 @@ def depths_of(robot: PointMassRobot, starts: np.ndarray) -> np.ndarray:
 def smallest_cubic(powers_of_c: Array) -> Array:
     """Smallest value of cubics on [-1, 1].
 
-    Its slope's zeros are found without cancellation; where one is not in the interval, an end stands in for it.
+    The zeros of the slope are found without cancellation; where one is not in the interval, an end stands in for it.
 
     Args:
         powers_of_c: (4, ...) coefficients, the constant first.

@@ -1,4 +1,4 @@
-"""Bezier curves of the second order run through by half a cosine, from rest to rest (launch paper, section 3.1).
+"""Bezier curves of the second order, traversed by half a period of a cosine (launch paper, section 3.1).
 
 With c = cos(pi tau), from 1 to -1, the position is A c^2 + B c + C, (17), and with w = pi / T the acceleration
 w^2 (2 A - B c - 4 A c^2), (18). At the start it is w^2 (middle - start), at the end w^2 (middle - end): where two
@@ -24,8 +24,8 @@ class Bezier:
 
     Fields:
         start: (3,) first control point, from the centroid of the spools, z down, m.
-        middle: (3,) second one, which the curve does not pass in general, m.
-        end: (3,) third one, m.
+        middle: (3,) second control point, which the curve does not pass in general, m.
+        end: (3,) third control point, m.
         time: () duration T, s.
         z0: () depth at which slacks are normalised, m.
     """
@@ -50,7 +50,7 @@ class Bezier:
         return State(square * c**2 + slope * c + rest, velocity, acceleration)
 
     def breaks(self) -> Array:
-        """None; see `Motion.breaks`."""
+        """No breaks; see `Motion.breaks`."""
         return jnp.zeros(0)
 
 
@@ -63,7 +63,7 @@ def powers(start: Any, middle: Any, end: Any) -> tuple[Any, Any, Any]:
         end: (..., 3) third one.
 
     Returns:
-        those of c^2, c and 1, (..., 3) each, m.
+        coefficients of c^2, c and 1, (..., 3) each, m.
     """
     return 0.25 * (start - 2.0 * middle + end), 0.5 * (start - end), 0.25 * (start + 2.0 * middle + end)
 

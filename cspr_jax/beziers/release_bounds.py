@@ -23,8 +23,8 @@ class ReleaseBounds(NamedTuple):
     """Bounds of the unknowns: place of the release, m, logarithms of the flight's time and of the duration, s, share.
 
     Fields:
-        low: (6,) smallest ones.
-        high: (6,) largest ones.
+        low: (6,) smallest values.
+        high: (6,) largest values.
     """
 
     low: Any
@@ -38,7 +38,7 @@ def bounds_of(
 
     Args:
         problem: gives the size of the robot.
-        releases: of x, y and z of the release in that file's axes the least and the largest, m; None: as far aside as
+        releases: least and largest x, y and z of the release, in the axes of the robot file, m; None: as far aside as
             `ASIDE`, and as deep as `DEEP`, times the size of the robot.
         longest: largest duration of the segment, s; None: that of all searches.
 

@@ -20,10 +20,10 @@ class BezierAnswers(Answers):
 
     Fields:
         control_points: (n, 3, 3) start, middle and end; m.
-        taut_durations: (n,) of each segment, those that keep every cable taut, with the segments before it as they
-            are: [[least, largest], ...] in s, inf where any longer duration does.
-        release: (n,) when an object is released, after the start of the segment, s; NaN where none is.
-        flight_time: (n,) time of its flight, s; NaN likewise.
+        taut_durations: (n,) for each segment, the durations that keep every cable taut, with the segments before it
+            unchanged: [[least, largest], ...] in s, inf where any longer duration does.
+        release: (n,) time of the release of an object, after the start of the segment, s; NaN without a release.
+        flight_time: (n,) time of the flight of the object, s; NaN likewise.
     """
 
     control_points: np.ndarray
@@ -49,7 +49,7 @@ class BezierAnswers(Answers):
 
 
 class Joined(NamedTuple):
-    """Segments, each with what its duration was chosen from.
+    """Segments, each with the intervals from which its duration was chosen.
 
     Fields:
         motions: NumPy leaves with a leading dimension n.
@@ -89,8 +89,8 @@ def joined_segments(
         motions.append(Bezier(ends.start, middle, ends.end, np.array([time]), depth))
         intervals.append(taut_durations)
         if i + 1 < len(durations):
-            turn = end_acceleration(middle, ends.end, time)
-            ends = Ends(ends.end, points[i + 2 : i + 3], ends.end, turn)
+            acceleration = end_acceleration(middle, ends.end, time)
+            ends = Ends(ends.end, points[i + 2 : i + 3], ends.end, acceleration)
     return Joined(jax.tree.map(lambda *rows: np.concatenate(rows), *motions), intervals)
 
 

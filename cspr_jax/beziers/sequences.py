@@ -23,7 +23,7 @@ from cspr_jax.robots.point_mass import spool_radius
 
 # Shortest and longest duration looked at, over that of a fall by the robot's size.
 SHORTEST, LONGEST = 0.1, 40.0
-# Instants of a segment at which limits are asked for; they are proved afterwards.
+# Instants of a segment at which limits are sampled; they are proved afterwards.
 SAMPLES = 65
 
 
@@ -69,7 +69,7 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
     Args:
         problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
         segments: leaves with a leading dimension n.
-        samples: instants of a segment at which limits are asked for.
+        samples: instants of a segment at which limits are sampled.
 
     Returns:
         (n * n_slacks,) without a unit.
@@ -106,7 +106,7 @@ def duration_bounds(problem: Problem, points: np.ndarray) -> tuple[float, float]
 
     Args:
         problem: gives the size of the robot, and limits of its speed.
-        points: (n + 1, 3) of the sequence, m; what is not known yet is NaN.
+        points: (n + 1, 3) of the sequence, m; NaN where not known yet.
 
     Returns:
         of s.
@@ -136,9 +136,9 @@ def least_total(problem: Problem, sequence: Anchored, durations: list[float | No
     free = np.array([i for i, time in enumerate(durations) if time is None])
 
     def times(x: np.ndarray) -> np.ndarray:
-        every_duration = known.copy()
-        every_duration[free] = np.exp(x)
-        return every_duration
+        all_durations = known.copy()
+        all_durations[free] = np.exp(x)
+        return all_durations
 
     bounds = duration_bounds(problem, np.asarray(sequence.points))
     shortest, longest = (np.full(len(free), bound) for bound in bounds)

@@ -8,7 +8,7 @@ from cspr_jax.robots.limits import Limits
 
 
 def build_limits(robot_file: RobotFile, keys: LimitKeys, file: object) -> Limits:
-    """Limits of the file over those of the robot.
+    """Limits of the file, with those of the robot where it gives none.
 
     Args:
         keys: of the plan or sweep.

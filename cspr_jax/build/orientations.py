@@ -11,7 +11,7 @@ def orientations(frame: Frame, points: np.ndarray, angles: np.ndarray) -> np.nda
     """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes.
 
     Args:
-        frame: of the file, whose axes the angles are of.
+        frame: of the file, to whose axes the angles refer.
         points: (n, 3) from the centroid of the spools, z down, m.
         angles: (n, 3) phi, theta, sigma, rad.
 
@@ -35,8 +35,8 @@ def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> 
     Raises:
         ConfigError: not of unit length.
     """
-    turn = np.asarray(IDENTITY if quaternion is None else quaternion)
-    size = float(np.linalg.norm(turn))
+    unit_quaternion = np.asarray(IDENTITY if quaternion is None else quaternion)
+    size = float(np.linalg.norm(unit_quaternion))
     if abs(size - 1.0) > UNIT_TOLERANCE:
         raise ConfigError(file, f"{key} = {shown(quaternion)}: must have length 1 (it has {size:.7g})")
-    return turn / size
+    return unit_quaternion / size

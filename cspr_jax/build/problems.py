@@ -24,9 +24,9 @@ def build_amplitude(
     Args:
         keys: of the plan or sweep.
         file: named in errors.
-        epsilon: stands in for "best".
+        epsilon: value in place of "best".
         at: prefix of the key in errors.
-        for_bounds: whether "ideal" will do, which is no motion.
+        for_bounds: whether "ideal" is allowed, which is no motion.
 
     Returns:
         the function.
@@ -67,7 +67,7 @@ def build_problem(
 
     Args:
         file: named in errors.
-        epsilon: stands in for an amplitude function's "best".
+        epsilon: value in place of the "best" of an amplitude function.
         at: prefix of keys of the trajectory in errors.
         for_bounds: whether the amplitude function may be "ideal", which is no motion.
         any_cables: whether there may be more cables than degrees of freedom.

@@ -144,7 +144,7 @@ def fault_at_rest(robot_file: RobotFile) -> str | None:
 
 
 def is_redundant_platform(robot: PointMassRobot | PlatformRobot) -> bool:
-    """Tell whether margins of tensions judge a robot, which know cables without a largest one.
+    """Tell whether a robot is judged by margins of tensions, for which largest tensions may be infinite.
 
     Returns:
         whether it is a platform on more cables than degrees of freedom.

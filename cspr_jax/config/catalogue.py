@@ -1,4 +1,4 @@
-"""The catalogue of robots: where it is, and which robots it has; a list of it needs no check of files."""
+"""The catalogue of robots: its place and its robots; listing it needs no check of files."""
 
 import tomllib
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 CATALOGUE = Path(__file__).parent.parent / "catalogue"
 # Why a robot of the catalogue cannot hang still with every cable taut. `build.robots.fault_at_rest` finds it, which
-# takes seconds; a test compares them. Robots that are not here can.
+# takes seconds; a test compares the two. Robots that are not listed here can hang still.
 FAULTS: dict[str, str] = {}
 
 

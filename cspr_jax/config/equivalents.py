@@ -1,4 +1,4 @@
-"""Which robot a plan or a sweep moves: that of its file, or the point mass on three cables that it is."""
+"""Choice of the robot that a plan or a sweep moves: that of its file, or an equivalent point mass on three cables."""
 
 from collections.abc import Collection, Iterable
 
@@ -12,7 +12,7 @@ def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> Robo
     """The robot as trajectory families, or a kind of map, move it.
 
     Args:
-        patterns: for each of them, patterns of motion of the robots that it moves.
+        patterns: for each family or kind of map, the patterns of motion of the robots that it moves.
 
     Returns:
         a platform's equivalent, if it says that it only translates, or if some of them move no platforms and it has
@@ -24,15 +24,15 @@ def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> Robo
         return robot_file
     try:
         return robot_file.equivalent()
-    except InputError:  # who refuses the platform adds `no_equivalent`
+    except InputError:  # the function that refuses the platform adds `no_equivalent`
         return robot_file
 
 
 def no_equivalent(robot_file: RobotFile) -> str:
-    """Why a platform is not moved as a point mass, to go on with in a line that refuses it.
+    """Reason why a platform is not moved as a point mass, to be appended to a line that refuses it.
 
     Returns:
-        the reason; empty of other robots.
+        the reason; empty for other robots.
     """
     try:
         if robot_file.is_platform:

@@ -12,7 +12,7 @@ from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import shown
 from cspr_jax.robots.spool_plane import in_plane
 
-# Cameras over stadiums hang from spools up to 250 m apart; what is larger, such as the cabin of a radio telescope,
+# Cameras over stadiums hang from spools up to 250 m apart; a larger robot, such as the cabin of a radio telescope,
 # weighs tonnes.
 LARGEST_SPAN, LARGEST_MASS = 300.0, 1000.0  # m, kg
 # A body's radius of gyration is near its size. Grams for kilograms or millimetres for metres miss by 1e3 at least.
@@ -22,7 +22,7 @@ ROUNDING = 1e-3
 
 
 def robot_hints(robot_file: RobotFile) -> list[str]:
-    """Likely mistakes in the units of a robot, and what was left out of a file of another program.
+    """Likely mistakes in the units of a robot, and items that were left out of a file of another program.
 
     Returns:
         one line each.
@@ -55,7 +55,7 @@ def _unbalanced(robot_file: RobotFile) -> list[str]:
         [0, 2] if robot_file.is_planar else [0, 1, 2],
     )
     points = np.asarray(robot_file.platform_points)
-    if robot_file.own_pattern == "3R":  # the joint holds it too
+    if robot_file.own_pattern == "3R":  # the joint holds the body too
         points = np.vstack([points, np.zeros(3)])
     extent = float(np.ptp(points, axis=0).max())
     away = _distance_to_hull((points - centre)[:, axes] / extent) * extent if extent > 0.0 else 0.0
@@ -71,7 +71,7 @@ def _distance_to_hull(points: np.ndarray) -> float:
     # Return how far the origin is from the hull of points (n, axes), of size 1. One heavy row holds the sum of weights.
     if np.linalg.norm(points.mean(axis=0)) <= ROUNDING:
         return 0.0
-    from scipy.optimize import nnls  # takes long to import, and the mean mostly answers
+    from scipy.optimize import nnls  # takes long to import, and the mean mostly suffices
 
     heavy = 1e3
     rows = np.vstack([points.T, np.full(len(points), heavy)])
@@ -132,7 +132,7 @@ def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) ->
         targets: [x, y, z] in the file's axes, m.
 
     Returns:
-        what to look at, if every target is above every spool; else nothing.
+        a line about the axis, if every target is above every spool; else nothing.
     """
     frame = frame_of(robot_file.base_points, robot_file.z_axis)
     depths, spools = (frame.depth([point[2] for point in points]) for points in (targets, robot_file.base_points))
@@ -141,7 +141,7 @@ def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) ->
 
 
 def axis_question(z_axis: str) -> str:
-    """Question to the user where everything is above the spools.
+    """Question to the user where all targets are above the spools.
 
     Args:
         z_axis: "down" or "up", as the robot file has it.

@@ -1,4 +1,4 @@
-"""Robot, plan or sweep: which kind of file it is, so that one given in place of another is told apart."""
+"""Robot, plan or sweep: the kind of a file, so that a file of another kind is refused as a whole."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ _MARKS = {
     "plan": ("pose",),
     "robot": ("base_points", "platform_points", "mass", "inertia"),
 }
-_WANTED = {
+_EXPECTED = {
     "sweep": "a sweep file, with map, [axes] and [trajectory]",
     "plan": "a plan file, with [[pose]] tables",
     "robot": "a robot file, with base_points and mass",
@@ -22,20 +22,20 @@ _PLACES = {
 }
 
 
-def refuse_other_kinds(data: dict[str, Any], wanted: str, file: object) -> None:
+def refuse_other_kinds(data: dict[str, Any], expected: str, file: object) -> None:
     """Refuse a file of another kind, rather than every key of it.
 
     Args:
-        wanted: "sweep", "plan" or "robot".
+        expected: "sweep", "plan" or "robot".
         file: named in errors.
 
     Raises:
         ConfigError: it has keys of another kind and none of its own.
     """
-    if any(key in data for key in _MARKS[wanted]):
+    if any(key in data for key in _MARKS[expected]):
         return
     for kind, marks in _MARKS.items():
         theirs = [key for key in marks if key in data]
         if theirs:
             keys = ", ".join(theirs)
-            raise ConfigError(file, f"is a {kind} file (it has {keys}): must be {_WANTED[wanted]}; {_PLACES[kind]}")
+            raise ConfigError(file, f"is a {kind} file (it has {keys}): must be {_EXPECTED[expected]}; {_PLACES[kind]}")

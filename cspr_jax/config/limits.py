@@ -80,7 +80,7 @@ def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
     return keys
 
 
-# Their fields are rows of `schema.limits.LIMITS`; of a base that it does not know mypy asks nothing.
+# Their fields are rows of `schema.limits.LIMITS`; mypy asks nothing of a base that it does not know.
 _Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=True))
 
 

@@ -1,4 +1,4 @@
-"""Files that are given as dictionaries: what their TOML would hold, with NumPy's numbers and arrays taken too."""
+"""Files that are given as dictionaries: the content of their TOML, with NumPy's numbers and arrays allowed too."""
 
 import json
 import os
@@ -9,7 +9,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 
-# Deeper than any file of ours is nested; what holds itself is deeper than everything.
+# Deeper than any of our files is nested; a value that holds itself is deeper still.
 DEEPEST = 32
 
 

@@ -1,4 +1,4 @@
-"""Hint of places that are P0 but for their last digits."""
+"""Hint about places that are P0 except for their last digits."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,16 +14,16 @@ NEAR_P0 = 1e-3
 
 
 def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure: str = "rest = true") -> str:
-    """Tell whether a place is P0 but for its last digits.
+    """Tell whether a place is P0 except for its last digits.
 
     Args:
         place: (3,) in the robot's axes, m; not said to be at rest.
         z0: depth of P0 below the centroid of the spools, m.
         robot: its `base_points` and `z_axis`.
-        cure: what would say that it is at rest.
+        cure: key that would say that it is at rest.
 
     Returns:
-        what to look at, if it is so near to P0 and not at rest there; else nothing.
+        a line about the place, if it is so near to P0; else nothing.
     """
     spools = np.asarray(robot.base_points)
     rest = frame_of(spools, robot.z_axis).outward(np.array([0.0, 0.0, z0]))

@@ -9,10 +9,9 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.launch import LaunchTable, Seconds
 from cspr_jax.config.limits import LimitTable, Point, Positive
-from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml
 from cspr_jax.config.trajectory import BetaHat, FamilyName, Quaternion, TiltTorsion, TrajectoryKeys
-from cspr_jax.config.wording import fault
+from cspr_jax.config.wording import fault, name_of
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
 from cspr_jax.schema.limits import LARGEST_MAX_ARCS
@@ -193,7 +192,7 @@ def read_plan(text: str, path: Path) -> PlanFile:
 
 
 def kept_plan(text: str, path: Path) -> PlanFile:
-    """A plan as a motion file keeps it: the text of its file, or JSON where there was none.
+    """Plan that a motion file holds: the text of the plan file, or JSON where there was none.
 
     Args:
         path: of the motion file, named in errors.

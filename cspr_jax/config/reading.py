@@ -16,12 +16,12 @@ from cspr_jax.errors import ConfigError
 LARGEST_FILE = 1 << 20
 # The time that tomllib takes grows with the square of a key's parts.
 LONGEST_KEY = 64
-MOST_LINES = 1000  # of one file's faults
+MOST_LINES = 1000  # faults of one file
 _PART = r"""(?:"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+'|[\w-]++)"""
 _PLACE = re.compile(r"\(at line (\d+), column (\d+)\)$")
 _STRING = re.compile(r"""\"[^"\n]*"|'[^'\n]*'""")
 _MARKS = (
-    (codecs.BOM_UTF32_LE, "UTF-32"),  # begins as that of UTF-16 does
+    (codecs.BOM_UTF32_LE, "UTF-32"),  # begins like the mark of UTF-16
     (codecs.BOM_UTF32_BE, "UTF-32"),
     (codecs.BOM_UTF16_LE, "UTF-16"),
     (codecs.BOM_UTF16_BE, "UTF-16"),

@@ -69,8 +69,8 @@ class RobotFile(LimitKeys):
     mass: Positive = Field(description="mass of the effector, kg, at most 1e9")
     gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
     z_axis: Literal["down", "up"] = Field("down", description='direction of the z axis, "down" or "up"')
-    _file: Path | None = PrivateAttr(None)  # it was read from; None for a table of another file
-    # Of a point mass on three cables that stand for the pairs of six: the robot that it is the equivalent of.
+    _file: Path | None = PrivateAttr(None)  # file that it was read from; None for a table of another file
+    # If this is a point mass on three cables that stand for pairs of six: the robot to which it is equivalent.
     _platform: "RobotFile | None" = PrivateAttr(None)
     cable_diameter: Annotated[float, Field(ge=0, le=LARGEST_LENGTH)] | None = Field(
         None, description="diameter of the cables, for their distances, m (default 0)"
@@ -84,7 +84,7 @@ class RobotFile(LimitKeys):
         description="axes about which pulleys swivel, in the direction in which the cables enter them: one vector "
         "[x, y, z], or one per cable (default: straight up)",
     )
-    _notes: tuple[str, ...] = PrivateAttr(())  # of what a file of another program says besides
+    _notes: tuple[str, ...] = PrivateAttr(())  # about items of a file of another program
     source: str = Field("", description='where the numbers come from; "placeholder..." marks invented ones')
 
     @property
@@ -192,7 +192,7 @@ class RobotFile(LimitKeys):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Plain values of what decides about motions: the file's keys; of an equivalent, translation_only too."""
+        """Plain values that decide about motions: the file's keys, and translation_only of an equivalent."""
         return self.as_written.model_dump(mode="json", exclude_none=True)
 
     def equivalent(self) -> "RobotFile":
@@ -311,10 +311,10 @@ def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, I
         cable_set: which set of cables, where the file has several; None: its default.
 
     Returns:
-        the robot, and what it was read from.
+        the robot, with the content that it was read from.
 
     Raises:
-        ConfigError: a mistake in it, or what no robot file can say.
+        ConfigError: a mistake in it, or content that no robot file can express.
     """
     imported = read(path, cable_set)
     robot_file = checked(RobotFile, imported.keys, path)

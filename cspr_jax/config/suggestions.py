@@ -5,7 +5,7 @@ import re
 import unicodedata
 from collections.abc import Iterable
 
-# Words that users write for those of the keys.
+# Words that users write, with the words of the keys that they mean.
 _SYNONYMS = {
     "maximum": "max",
     "largest": "max",
@@ -30,17 +30,17 @@ _SYNONYMS = {
 }
 # A height names the floor only where it cannot be a depth of P0 or a coordinate of targets.
 _HEIGHT = frozenset({"z0", "z"})
-ALIKE = 0.8  # of letters, for two words to be one that is misspelt
-ENOUGH = 0.5  # of all words of both keys
+ALIKE = 0.8  # share of letters with which two words count as one that is misspelt
+ENOUGH = 0.5  # share of all words of both keys
 LETTERS = 0.6
-LONGEST = 100  # letters of what somebody may have meant to be a key
-# What word processors and web pages put in place of plain characters.
+LONGEST = 100  # letters of the longest text that is compared
+# Characters that word processors and web pages put in place of plain ones.
 _LOOK_ALIKES = {
     '"': "\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb\uff02",
     "'": "\u2018\u2019\u201a\u201b\u2032\u2039\u203a\u00b4\uff07",
     "-": "\u2212\u2010\u2011\u2012\u2013\u2014\u2015\ufe63\uff0d",
     "a plain space": "\u00a0\u2002\u2003\u2007\u2008\u2009\u200a\u202f\u205f\u3000",
-    "": "\u200b\u200c\u200d\u200e\u200f\u2060\ufeff\u00ad",  # nothing to be seen
+    "": "\u200b\u200c\u200d\u200e\u200f\u2060\ufeff\u00ad",  # invisible characters
     "=": "\uff1d",
     ",": "\uff0c",
     ".": "\uff0e",
@@ -48,25 +48,25 @@ _LOOK_ALIKES = {
 _PLAIN = {character: plain for plain, characters in _LOOK_ALIKES.items() for character in characters}
 
 
-def nearest(given: str, allowed: Iterable[str]) -> str | None:
+def nearest(text: str, allowed: Iterable[str]) -> str | None:
     """The allowed name that a user probably meant.
 
     Returns:
         one of them; None if none is near.
     """
     names = list(allowed)
-    if len(given) > LONGEST:
+    if len(text) > LONGEST:
         return None
-    words = _words(given)
+    words = _words(text)
     if "height" in words and _HEIGHT.isdisjoint(names):
         words = [word.replace("height", "floor") for word in words]
     if words:
-        # Among equals the one with the same letters.
-        ranked = [(_problem(words, _words(name)), _letters(given, name), name) for name in names]
+        # Among equals, prefer the name with the most similar letters.
+        ranked = [(_problem(words, _words(name)), _letters(text, name), name) for name in names]
         best = max(ranked, default=(0.0, 0.0, ""))
         if best[0] > ENOUGH:
             return best[2]
-    near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=LETTERS)
+    near = difflib.get_close_matches(text.lower(), names, n=1, cutoff=LETTERS)
     return near[0] if near else None
 
 
@@ -86,13 +86,13 @@ def look_alike(text: str) -> str:
     return f": did you mean {plain} in place of {name}?" if plain else f": it holds {name}, which cannot be seen"
 
 
-def did_you_mean(given: str, allowed: Iterable[str]) -> str:
+def did_you_mean(text: str, allowed: Iterable[str]) -> str:
     """The question for an error's line.
 
     Returns:
         "did you mean NAME? ", or nothing.
     """
-    near = nearest(given, allowed)
+    near = nearest(text, allowed)
     return f"did you mean {near}? " if near else ""
 
 
@@ -107,7 +107,7 @@ def _letters(first: str, second: str) -> float:
 
 
 def _problem(first: list[str], second: list[str]) -> float:
-    # Words that both have, over all words of both.
+    # Return the share of words that both have, in all words of both.
     left, count = list(second), 0
     for word in first:
         near = difflib.get_close_matches(word, left, n=1, cutoff=ALIKE)

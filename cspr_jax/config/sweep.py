@@ -7,10 +7,9 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.limits import Coordinate, LimitTable, Point
-from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
-from cspr_jax.config.wording import either
+from cspr_jax.config.wording import either, name_of
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES

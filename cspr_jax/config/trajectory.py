@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from cspr_jax.config.limits import Positive
-from cspr_jax.config.names import name_of
 from cspr_jax.config.reading import Table
+from cspr_jax.config.wording import name_of
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.limits import LARGEST_MAX_ARCS
 

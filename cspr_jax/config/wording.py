@@ -2,10 +2,10 @@
 
 import datetime
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, PlainValidator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from cspr_jax.config.suggestions import look_alike, nearest
@@ -63,11 +63,28 @@ def either(names: Iterable[str]) -> str:
     return f"{', '.join(others)} or {last}" if others else last
 
 
-def rank(error: ErrorDetails) -> int:
-    """Place of an error among those of a file: what explains others goes first.
+def name_of(rows: Callable[[], Iterable[str]]) -> PlainValidator:
+    """Validator of a key whose values are names of rows of a table, which may grow.
 
     Returns:
-        the smaller, the earlier: another version of the format, then a misspelt key, which explains a missing one.
+        the validator; its error is that of a Literal of the names.
+    """
+
+    def check(value: Any) -> str:
+        names = list(rows())
+        if value not in names:
+            raise PydanticCustomError("literal_error", "{expected}", {"expected": either(names).replace('"', "'")})
+        return value
+
+    return PlainValidator(check)
+
+
+def rank(error: ErrorDetails) -> int:
+    """Place of an error among those of a file: an error that explains others goes first.
+
+    Returns:
+        a number, smaller for earlier places: another version of the format, then a misspelt key, which explains a
+        missing one.
     """
     if error["loc"] == ("schema",) and error["type"] != "missing":
         return 0
@@ -78,7 +95,7 @@ def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
     """One error as a line.
 
     Args:
-        model: what the file must be.
+        model: schema of the file.
         at: key under which the data stands.
 
     Returns:
@@ -164,7 +181,7 @@ def _kind_of(value: object) -> str:
 
 
 def _explained(model: type[BaseModel], error: ErrorDetails, parts: list[Any]) -> str:
-    # A spelling for a table, or what the key is about, where the error is about the whole key.
+    # Return the description of the key, where the error is about the whole key.
     if not parts or isinstance(parts[-1], int):
         return ""
     field = _table_at(model, parts[:-1]).get(str(parts[-1]))
@@ -188,7 +205,7 @@ def _suggestion(model: type[BaseModel], parts: list[Any]) -> str:
 
 
 def _elsewhere(model: type[BaseModel], parts: list[Any]) -> str:
-    # The same key in another table of the file, where it is only misplaced.
+    # Return the key in another table of the file, if it is only misplaced.
     top, name = _table_at(model, []), str(parts[-1])
     if len(parts) > 1 and name in top:
         return f"{name} above the first [table]"
@@ -205,7 +222,7 @@ def _description(model: type[BaseModel], parts: list[Any]) -> str:
 
 
 def _table_at(model: type[BaseModel], parts: list[Any]) -> dict[str, Any]:
-    # Fields, by the key a user writes, of the table in which an error lies.
+    # Return the fields of the table in which an error lies, by the keys that users write.
     for part in parts:
         field = {f.alias or n: f for n, f in model.model_fields.items()}.get(str(part))
         inner = _tables_in(field.annotation) if field else [model]

@@ -20,10 +20,10 @@ from cspr_jax.motions.amplitudes import Amplitude, derivatives
 # Samples of a piece of the S-model, and of half of another law.
 SAMPLES = 33
 HALF = 2 * SAMPLES
-# Ratios looked at first, as logits; then so often between the neighbours of the best one, in parts of their distance.
+# Ratios tried first, as logits; then, in each round, these shares of the distance from the best one to its neighbours.
 LOGITS = np.linspace(-6.0, 6.0, 33)
 FINER, ROUNDS = np.linspace(-2.0, 2.0, 5) / 3.0, 14
-# Parts by which the duration of a search is made longer, one after the other, until it is proved.
+# Shares by which the duration of a search is made longer, one after the other, until it is proved.
 LONGER = (1e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
 # The acceleration of a cable has a peak where the cable is short: samples lie at so many of its shortest lengths to
 # both sides of that place, on the line; halvings find their instants.
@@ -36,9 +36,10 @@ class Gain(NamedTuple):
     Fields:
         high: () largest q, 1/s^2; not above 0 if there is none.
         low: () smallest q, 1/s^2: 0 unless places are passed at which the robot could not rest.
-        up: number of what bounds it in the first half: a face of taut cables, the same face as smallest tensions shift
-            it, as largest ones do, the rows of the other limits in their order, and at last the largest acceleration.
-        down: likewise in the second.
+        up: number of the row that bounds q in the first half: faces of taut cables come first, then the same faces as
+            smallest tensions shift them, then as largest tensions do, the rows of the other limits in their order, and
+            last the largest acceleration.
+        down: likewise in the second half.
     """
 
     high: Array
@@ -99,7 +100,7 @@ def _above(most: Array, needed: Array, is_known: Array) -> Array:
 
 
 def _near_spools(line: LineSlacks, law: Amplitude) -> tuple[Array, Array]:
-    """Largest q by the limits of motion beside where each cable is shortest.
+    """Largest q under the limits of motion, near the place where each cable is shortest.
 
     Args:
         line: of one line, its leaves without dimensions in front.
@@ -127,7 +128,7 @@ def _near_spools(line: LineSlacks, law: Amplitude) -> tuple[Array, Array]:
 
 
 def _with_peaks(q_range: Gain, halves: list[Array], peaks: tuple[Array, Array], middle: Array, first_row: int) -> Gain:
-    # Name the row that holds back either half, and how far it does, with the peaks beside spools.
+    # Take in the peaks beside spools: they may bound q more, and then their row is named for its half.
     above, tau = peaks
     numbers = jnp.broadcast_to(jnp.arange(above.shape[-1])[None, None] + first_row, above.shape).ravel()
     sides = [jnp.where(half, above, jnp.inf) for half in (tau <= middle, tau > middle)]

@@ -33,11 +33,11 @@ class Durations:
     """Durations of n lines, (n,) each.
 
     Fields:
-        duration: T, s; not finite where there is none.
+        duration: T, s; not finite where there is no motion.
         ratio: p / T.
         least: no motion along the line is faster, s; 0 where nothing is known.
-        rest: smaller one of the margins of rest at both ends, m/s^2.
-        depth: smaller one of the depths of both ends below the spools' plane, m; inf if they have none.
+        rest: smaller margin of rest of the two ends, m/s^2.
+        depth: smaller depth of the two ends below the plane of the spools, m; inf if the spools have no common plane.
         is_bounded: whether anything bounds the acceleration.
         up: number of the bound that holds back the acceleration, in the order of `names_of`.
         down: likewise of the braking.
@@ -52,25 +52,25 @@ class Durations:
     up: np.ndarray
     down: np.ndarray
 
-    def part(self, wanted: np.ndarray) -> "Durations":
+    def part(self, rows: np.ndarray) -> "Durations":
         """Durations of some of the lines.
 
         Args:
-            wanted: (n,) whether, or numbers of lines.
+            rows: a mask (n,), or numbers of lines.
 
         Returns:
-            theirs.
+            the durations of these lines.
         """
-        return Durations(**{name: value[wanted] for name, value in vars(self).items()})
+        return Durations(**{name: value[rows] for name, value in vars(self).items()})
 
-    def replace(self, which: np.ndarray, part: "Durations") -> None:
-        """Put other durations in place of some.
+    def replace(self, rows: np.ndarray, part: "Durations") -> None:
+        """Replace the durations of some of the lines.
 
         Args:
-            which: numbers of the lines.
+            rows: numbers of the lines.
         """
         for name, values in vars(part).items():
-            getattr(self, name)[which] = values
+            getattr(self, name)[rows] = values
 
 
 def moving(limits: Limits) -> tuple[str, ...]:
@@ -80,7 +80,7 @@ def moving(limits: Limits) -> tuple[str, ...]:
         limits: the limits, without tracers.
 
     Returns:
-        names of those that are given; a smallest tension of zero is what taut cables ask for anyway.
+        names of those that are set; a smallest tension of zero is left out, since taut cables keep it anyway.
     """
     known = [name for name in MOVING if getattr(limits, name) is not None]
     return tuple(name for name in known if name != "tension_min" or np.asarray(limits.tension_min).any())
@@ -111,7 +111,7 @@ def by_formula(
         max_acceleration: largest size of the acceleration, m/s^2.
 
     Returns:
-        what formulas give; no durations of spools that are not in one plane.
+        the durations that formulas give; NaN if the spools are not in one plane.
     """
     in_plane, largest = in_one_plane(robot), np.full(len(starts), float(max_acceleration))
     kernel = partial(_by_formula, robot, law=law, rule=rule, in_plane=in_plane)
@@ -155,19 +155,19 @@ def by_cells(problem: Problem, starts: np.ndarray, ends: np.ndarray, max_acceler
 
 
 def by_search(
-    problem: Problem, starts: np.ndarray, ends: np.ndarray, found: Durations, *, law: str, max_acceleration: float
+    problem: Problem, starts: np.ndarray, ends: np.ndarray, timings: Durations, *, law: str, max_acceleration: float
 ) -> Durations:
     """Least durations along straight lines under any limits, of spools in any layout.
 
     Args:
         starts: (n, 3) m; at rest.
         ends: (n, 3) m, elsewhere; at rest.
-        found: of `by_formula`.
+        timings: of `by_formula`.
         law: one of `lines.motion.LAWS`.
         max_acceleration: largest size of the acceleration, m/s^2.
 
     Returns:
-        what a search gives, the rest as it was.
+        the timings, with durations that a search gives.
     """
     moving_problem = problem._replace(
         limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)})
@@ -176,7 +176,7 @@ def by_search(
     least = in_batches(partial(_by_search, moving_problem, law=law), (starts, ends, largest), size=BATCH_OF_SEARCH)
     rows = _bounds_of_rows(moving_problem)
     return dataclasses.replace(
-        found, duration=least.duration, ratio=least.ratio, up=rows[least.up], down=rows[least.down]
+        timings, duration=least.duration, ratio=least.ratio, up=rows[least.up], down=rows[least.down]
     )
 
 
@@ -191,7 +191,7 @@ def _by_formula(robot: PointMassRobot, arguments, *, law: str, rule: str, in_pla
             least = fastest.least_s_curve(bounds)
         else:
             least = fastest.thesis_s_curve(bounds)
-        sizes = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.turn, axis=1) for t in (0.0, 1.0)])
+        sizes = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.normal_change, axis=1) for t in (0.0, 1.0)])
         resting = -jnp.stack([faces.offset, faces.offset + faces.slope]) / jnp.where(sizes > 0.0, sizes, 1.0)
         there = faces.bounds[None] & jnp.stack([faces.first <= 0.0, faces.last >= 1.0])
         rest = jnp.min(jnp.where(there, resting, jnp.inf))
@@ -218,7 +218,7 @@ def _by_search(problem: Problem, arguments, *, law: str):
 
 
 def _bounds_of_rows(problem: Problem) -> np.ndarray:
-    # Numbers in `names_of` of what bounds a search, see `any_limits.Gain`; faces are of both sides.
+    # Return the number in `names_of` of each row that can bound a search, see `any_limits.Gain`; faces have two sides.
     robot, names = problem.robot, names_of(problem.robot, problem.limits)
     faces, limit_names = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
     counts = {"tension_min": faces, "tension_max": faces, "cable_speed_max": robot.n_cables}
@@ -228,5 +228,5 @@ def _bounds_of_rows(problem: Problem) -> np.ndarray:
         if name in limit_names:
             rows.append(np.full(count, names.index(name)))
         elif name.startswith("tension"):
-            rows.append(np.full(count, -1))  # none is shifted so
+            rows.append(np.full(count, -1))  # no face is shifted by a tension without a limit
     return np.concatenate([*rows, [names.index("max_acceleration")]])

@@ -3,8 +3,8 @@
 On the line X0 + D s the normal to two cables' directions, times their lengths, is affine in s, and its product with D
 does not depend on s at all: n(s) . D = n(0) . D, since each of its changes is normal to D. So every face of the cone of
 feasible accelerations is a straight boundary in the plane of s and s'', Boralugoda (15) to (21), here for any spools.
-The product of n(s) with another cable's ray is affine too: a face bounds the cone from where all of them are positive
-to where one no longer is. Of spools in one plane that is everywhere or nowhere below them.
+The product of n(s) with another cable's ray is affine too: a face bounds the cone where all these products are
+positive. If the spools lie in one plane, that is so everywhere below them or nowhere.
 """
 
 import dataclasses
@@ -28,16 +28,17 @@ IN_PLANE = 1e-9
 class LineFaces:
     """Half-planes steepness * s'' >= offset + slope * s in which a motion along a line stays.
 
-    Over the length of the normal at s, normal + turn * s, a slack is the distance of the acceleration from the face.
+    A slack over the length of the normal at s, normal + normal_change * s, is the distance of the acceleration from the
+    face.
 
     Fields:
         steepness: (..., n_faces) n . D.
         offset: (..., n_faces) n . g at the start.
         slope: (..., n_faces) change of n . g from start to end.
         normal: (..., n_faces, 3) n at the start, to the side of the other cables.
-        turn: (..., n_faces, 3) change of n from start to end.
+        normal_change: (..., n_faces, 3) change of n from start to end.
         along: (..., n_faces, n_cables) product of n with each ray to a spool at the start; 0 of rays in the face.
-        along_turn: (..., n_faces, n_cables) its change from start to end.
+        along_change: (..., n_faces, n_cables) its change from start to end.
         first: (..., n_faces) s from which on it bounds the accelerations of taut cables.
         last: (..., n_faces) s up to which it does; not above `first` if it bounds none.
     """
@@ -46,9 +47,9 @@ class LineFaces:
     offset: Array
     slope: Array
     normal: Array
-    turn: Array
+    normal_change: Array
     along: Array
-    along_turn: Array
+    along_change: Array
     first: Array
     last: Array
 
@@ -62,7 +63,7 @@ def in_one_plane(robot: PointMassRobot) -> bool:
     """Tell whether the spools lie in one plane, those of a planar robot on one line.
 
     Returns:
-        the claim.
+        whether they do.
     """
     points = np.asarray(robot.base_points)
     if robot.n_cables <= robot.dof:
@@ -113,15 +114,15 @@ def line_faces(robot: PointMassRobot, start: Array, end: Array, *, in_plane: boo
         normal, at_end, along, along_end = (jnp.concatenate([x, -x]) for x in (normal, at_end, along, along_end))
         first, last = _bounding(along, along_end)
     free_fall = -relative_acceleration(robot, jnp.zeros_like(start))
-    turn = at_end - normal
+    normal_change = at_end - normal
     return LineFaces(
         steepness=normal @ (end - start),
         offset=normal @ free_fall,
-        slope=turn @ free_fall,
+        slope=normal_change @ free_fall,
         normal=normal,
-        turn=turn,
+        normal_change=normal_change,
         along=along,
-        along_turn=along_end - along,
+        along_change=along_end - along,
         first=first,
         last=last,
     )
@@ -139,7 +140,7 @@ def _bounding(start: Array, end: Array) -> tuple[Array, Array]:
 
 
 class Sides(NamedTuple):
-    """Bounds of s'' from above, and of -s'' from above seen from the end of the line: lines in s, and in 1 - s.
+    """Upper bounds of s'', as lines in s, and of -s'', as lines in 1 - s from the end of the line.
 
     Fields:
         up: (..., n_faces + 1) largest s'' at the start; inf of a face that does not bound it.

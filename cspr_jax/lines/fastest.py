@@ -26,12 +26,12 @@ Rows = TypeVar("Rows", Durations, Verdicts)
 SAME_PLACE = 1e-12
 # Lines that pass a spool nearer than this, over the size of the robot, go through it.
 THROUGH = 1e-9
-# Flags that rest at an end already raises: no motion avoids the first ones there, and none starts with the second.
+# Flags that rest at an end raises: no motion avoids `OF_PLACES` there, and no motion starts with `NO_MOTION`.
 OF_PLACES = sum({row.flag.value for row in LIMITS if not row.of_motion})
 NO_MOTION = (Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.SINGULAR).value
-# Times that a weight takes to fall by the size of a robot, after which a motion counts as standing still.
+# Duration from which on a motion counts as standing still, over the time of a fall by the size of the robot.
 STILL = 1e4
-# Parts of a duration below which the formulas lose the digits of these parts.
+# Shares of a duration below which the formulas lose the digits of these shares.
 SHORT = 1e-6
 
 
@@ -68,7 +68,7 @@ def fastest(
         law: one of `lines.motion.LAWS`.
         rule: of the S-model: "thesis" knows no limits, and spools in one plane only.
         max_acceleration: largest size of the acceleration, m/s^2.
-        sharp: whether margins are wanted, and not verdicts only.
+        sharp: whether margins must be sharp; else only verdicts count.
 
     Returns:
         the motions.
@@ -164,7 +164,7 @@ def _without_motion(
     timings: Durations,
     before: np.ndarray,
 ) -> np.ndarray:
-    # Flags of lines along which a search finds no motion: what one breaks that is as slow as if it stood still, else
+    # Return the flags of lines along which a search finds no motion: those of a motion that nearly stands still, else
     # those of the motion by formulas.
     flags, rows = before.copy(), np.flatnonzero(~np.isfinite(timings.duration))
     if len(rows):

@@ -1,8 +1,8 @@
 """Least durations along straight lines from rest to rest: arrays of ends in, arrays out.
 
-Of spools in one plane and without limits, what the S-model's formulas give is feasible by proof: the bounds of every
-face are met all along (see `lines.s_model`), with a margin above rounding. Otherwise, and where p
-or T - p is so short that its digits are lost, every motion has a proof of its own.
+If all spools lie in one plane and there are no limits, the motions that the formulas of the S-model give are feasible
+by proof: the bounds of every face are met all along (see `lines.s_model`), with a margin above rounding. Otherwise, and
+where p or T - p is so short that its digits are lost, every motion has a proof of its own.
 """
 
 import dataclasses
@@ -25,11 +25,11 @@ class LeastTimes(Columns):
         duration: T, s; NaN where there is none, 0 where both ends are one place.
         acceleration_time: p, s.
         least_duration: no motion along the line is faster, s.
-        duration_ratio: of the two.
-        rest_margin: smaller one of the margins of rest at both ends, m/s^2; NaN where an end is not below the spools.
+        duration_ratio: duration over least duration.
+        rest_margin: smaller margin of rest of the two ends, m/s^2; NaN where an end is not below the spools.
         active_up: number of the bound that holds back the acceleration, from 1 on in the order of `names_of`; 0: none.
         active_down: likewise of the braking.
-        names: of the bounds, the first one's first.
+        names: of the bounds, in the order of their numbers.
     """
 
     verdict: np.ndarray

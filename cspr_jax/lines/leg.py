@@ -18,7 +18,7 @@ class TimedLines(Leg):
     """Any places, joined by straight lines in the least time of their law; see `Leg`."""
 
     def __init__(self, stops: Waypoints) -> None:
-        """Refuse what a line knows nothing of."""
+        """Refuse numbers of arcs, which a line does not have."""
         super().__init__(stops)
         for i, pose in enumerate(stops.poses[1:], start=1):
             if pose.arcs is not None:

@@ -2,7 +2,7 @@
 
 The line is cut into cells. Over each, faces, cable rates and their limits bound s'', -s'' and s' by constants from
 above, by interval arithmetic; nothing is faster than to accelerate at these bounds, keep the largest speed, and brake.
-That the limit of the cables' accelerations takes from fast motions is left out, which makes the bound lower.
+The limit of the cables' accelerations restricts fast motions further; that is left out, which makes the bound lower.
 """
 
 import jax
@@ -87,10 +87,10 @@ def _reach(line: LineSlacks, name: str, s: Jet, shortness: Jet) -> np.ndarray:
     # Bound s'' or -s'' by each face over the cells, (n, CELLS, n_faces): inf if the face bounds nothing there.
     first, last = s.value
     free = [line.offset + line.slope * x for x in (first, last)]
-    along = (s.expanded(-1) * line.along_turn + line.along) * shortness.expanded(-2)
+    along = (s.expanded(-1) * line.along_change + line.along) * shortness.expanded(-2)
     ends = np.stack(
         [
-            (line.along + line.along_turn * x[..., None])
+            (line.along + line.along_change * x[..., None])
             * ((x - line.nearest) ** 2 * line.square[..., None] + line.apart)[..., None, :] ** -0.5
             for x in (first, last)
         ]

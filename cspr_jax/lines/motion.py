@@ -31,7 +31,7 @@ def s_curve(ratio: Array) -> Amplitude:
     ratio = jnp.asarray(ratio, float)
     rest, zero, one = 1.0 - ratio, jnp.zeros_like(ratio), jnp.ones_like(ratio)
     up, down = 4.0 / (3.0 * ratio**2), 4.0 / (3.0 * rest**2)
-    # The pieces are about the beginning, the fastest instant from either side, and the end.
+    # The pieces are expanded about the start, the fastest instant from either side, and the end.
     pieces = [
         [zero, zero, zero, up],
         [ratio, 2.0 * one, zero, -up],

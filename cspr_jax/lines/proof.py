@@ -1,9 +1,9 @@
 """Smallest slacks of motions along straight lines, with a proof.
 
-Between knots a law of time is a polynomial, and slacks are smooth functions of it, but for tensions of which one or the
-other is the least: one of them, kept over a block, bounds the slack from below. Of each block the ends are looked at,
-and a bound of the second derivative by interval arithmetic says how far below their chord a slack can lie. Blocks whose
-bound lies below what is attained elsewhere are halved until the two agree.
+Between knots a law of time is a polynomial, and slacks are smooth functions of it, except where the tensions that pull
+least change: one choice of tensions, kept over a block, bounds the slack from below. Slacks are computed at both ends
+of a block, and a bound of the second derivative by interval arithmetic says how far below their chord a slack can lie.
+Blocks whose bound lies below a slack that is attained elsewhere are halved until the two agree.
 """
 
 import math
@@ -34,7 +34,7 @@ def smallest_slacks(
         enough: bounds above this one, of distances over gravity, need not be sharp.
 
     Returns:
-        by `LineSlacks.names`; those of faces in m/s^2, of speeds 1 - (rate / limit)^2.
+        slacks in the order of `LineSlacks.names`: of faces in m/s^2, of speeds 1 - (rate / limit)^2.
     """
     scales = np.array([gravity if name in lines.low else 1.0 for name in lines.names])
     size = max(TOGETHER // max(lines.along[0].size, 1), 1)

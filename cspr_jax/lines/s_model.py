@@ -3,7 +3,7 @@
 With the ratio r = p / T the S-model has s = r S(x) and s'' = A(x) / (r T^2) while it accelerates, x from 0 to 1, with
 A = 8 x and S = 4/3 x^3 up to the middle. A bound s'' <= b + m s is met while 1 / T^2 <= min of r (b + m r S) / A over
 x, which has a closed form; braking is the same from the end with 1 - r. The first grows with r and the second falls,
-so that the longest 1 / T^2 is where they meet. Whatever the law, nothing is faster than to accelerate at the bound and
+so that 1 / T^2 is largest where they meet. Whatever the law, nothing is faster than to accelerate at the bound and
 then to brake at it.
 """
 
@@ -21,7 +21,7 @@ from cspr_jax.motions.amplitudes import Amplitude, derivatives
 ROUNDS = 24
 # Samples of half a motion by a law without a parameter, and golden sections between two of them.
 SAMPLES, SECTIONS = 128, 48
-# Parts of a duration by which the least one is made longer, so that its margin is not zero but for rounding.
+# Share by which a least duration is made longer, so that its margin is above rounding.
 LONGER = 1e-8
 
 
@@ -145,7 +145,7 @@ def least_time(sides: Sides, *, everywhere: bool = True) -> Array:
 
     Args:
         sides: bounds of a line, those at its ends positive and finite.
-        everywhere: whether each bound is known to hold on all of the line, or nowhere.
+        everywhere: whether each bound is known to hold either on the whole line or nowhere.
 
     Returns:
         () s; 0 where on a part of the line nothing bounds the acceleration, or a place can be passed only in motion.

@@ -36,8 +36,8 @@ class LineSlacks:
         offset: (n_faces,) n . g at the start, likewise; -inf of what bounds nothing.
         slope: (n_faces,) change of n . g, likewise.
         along: (n_faces, n_cables) n . r of the rays at the start, likewise.
-        along_turn: (n_faces, n_cables) its change, likewise.
-        turning: (n_faces,) size of the change of n, likewise.
+        along_change: (n_faces, n_cables) its change, likewise.
+        normal_change_square: (n_faces,) square of the size of the change of n, likewise.
         narrowest: (n_faces,) s at which n is smallest, beyond the ends too.
         least_size: (n_faces,) square of the size of n there, likewise.
         spans: (n_faces,) whether the cables of the face span it.
@@ -53,8 +53,8 @@ class LineSlacks:
     offset: Array
     slope: Array
     along: Array
-    along_turn: Array
-    turning: Array
+    along_change: Array
+    normal_change_square: Array
     narrowest: Array
     least_size: Array
     spans: Array
@@ -90,12 +90,12 @@ def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
     rays = robot.base_points - start[None]
     nearest = rays @ direction / square
     apart = jnp.sum((rays - nearest[:, None] * direction[None]) ** 2, axis=1)
-    change = jnp.sum(faces.turn**2, axis=1)
-    narrowest = -jnp.sum(faces.normal * faces.turn, axis=1) / jnp.where(change > 0.0, change, 1.0)
-    least = jnp.sum((faces.normal + narrowest[:, None] * faces.turn) ** 2, axis=1)
+    change = jnp.sum(faces.normal_change**2, axis=1)
+    narrowest = -jnp.sum(faces.normal * faces.normal_change, axis=1) / jnp.where(change > 0.0, change, 1.0)
+    least = jnp.sum((faces.normal + narrowest[:, None] * faces.normal_change) ** 2, axis=1)
     at = jnp.clip(narrowest, 0.0, 1.0)
-    size = jnp.linalg.norm(faces.normal + at[:, None] * faces.turn, axis=1)
-    spans = (size > 0.0) & ((faces.along != 0.0) | (faces.along_turn != 0.0)).any(1)
+    size = jnp.linalg.norm(faces.normal + at[:, None] * faces.normal_change, axis=1)
+    spans = (size > 0.0) & ((faces.along != 0.0) | (faces.along_change != 0.0)).any(1)
     over = jnp.where(spans, size, 1.0)
     low, high = _tensions(problem)
     return LineSlacks(
@@ -106,8 +106,8 @@ def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
         offset=jnp.where(spans, faces.offset / over, -jnp.inf),
         slope=faces.slope / over,
         along=faces.along / over[:, None],
-        along_turn=faces.along_turn / over[:, None],
-        turning=change / over**2,
+        along_change=faces.along_change / over[:, None],
+        normal_change_square=change / over**2,
         narrowest=narrowest,
         least_size=least / over**2,
         spans=spans,
@@ -122,7 +122,7 @@ def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
 
 
 def _tensions(problem: Problem) -> tuple[dict[str, Array], dict[str, Array]]:
-    # The largest tension is asked for together with the smallest.
+    # The group of the largest tension keeps the smallest tension too.
     robot, none = problem.robot, jnp.zeros(problem.robot.n_cables)
     least, most = tension_range(robot, problem.limits)
     low, high = {TAUT: none}, {TAUT: none + jnp.inf}
@@ -171,15 +171,15 @@ def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> A
     slack = at.bend * line.steepness - at.s * line.slope - line.offset
     if tensions is not None:
         slack = slack - _pulled(line, at.s, length2**-0.5, tensions)
-    size2 = (at.s - line.narrowest) ** 2 * line.turning + line.least_size
+    size2 = (at.s - line.narrowest) ** 2 * line.normal_change_square + line.least_size
     return slack * size2**-0.5
 
 
 def _pulled(line: LineSlacks, s: Any, shortness: Any, tensions: Any) -> Any:
     # Return the pull of the cables towards the inside of each face, over the mass.
     if isinstance(s, Jet):
-        return ((s.expanded(-1) * line.along_turn + line.along) * shortness.expanded(-2) * tensions).summed()
-    return ((line.along + line.along_turn * s[..., None]) * tensions * shortness[..., None, :]).sum(-1)
+        return ((s.expanded(-1) * line.along_change + line.along) * shortness.expanded(-2) * tensions).summed()
+    return ((line.along + line.along_change * s[..., None]) * tensions * shortness[..., None, :]).sum(-1)
 
 
 def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
@@ -194,7 +194,7 @@ def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
     """
     xp = np if isinstance(s, np.ndarray) else jnp
     low, high = line.low[name][..., None, :], line.high[name][..., None, :]
-    along = line.along + line.along_turn * s[..., None]
+    along = line.along + line.along_change * s[..., None]
     return xp.where(along > 0.0, low, xp.where(along < 0.0, high, 0.0))
 
 
@@ -211,7 +211,7 @@ def tensions_over(line: LineSlacks, name: str, first: np.ndarray, last: np.ndarr
         the tensions, (n, n_faces, n_cables) over the mass; (n, n_faces) whether a face bounds nothing on the stretch.
     """
     low, high = line.low[name][:, None, :], line.high[name][:, None, :]
-    ends = [line.along + line.along_turn * s[..., None] for s in (first, last)]
+    ends = [line.along + line.along_change * s[..., None] for s in (first, last)]
     endless = ~np.isfinite(high)
     beyond = ((ends[0] < 0.0) & (ends[1] < 0.0) & endless).any(-1)
     return np.where((ends[0] + ends[1] < 0.0) & ~endless, high, low), np.asarray(beyond | ~line.spans)

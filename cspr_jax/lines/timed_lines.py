@@ -22,9 +22,8 @@ class LineAnswers(Answers):
     Fields:
         acceleration_time: (n,) p, s.
         least_duration: (n,) no motion along the line is faster, s.
-        active: (n, 2) number of the bound that holds back the acceleration, and of that which holds back the braking:
-            from 1 on; 0: none.
-        names: of these bounds, the first one's first.
+        active: (n, 2) numbers, from 1 on, of the bounds that hold back the acceleration and the braking; 0: none.
+        names: of the bounds, in the order of their numbers.
     """
 
     acceleration_time: np.ndarray
@@ -99,7 +98,7 @@ def motions_of(answers: LineAnswers, starts: np.ndarray, ends: np.ndarray, *, la
         law: one of `lines.motion.LAWS`.
 
     Returns:
-        one each; not finite where there is none.
+        one for each line; not finite where there is no motion.
     """
     with np.errstate(invalid="ignore"):
         ratios = answers.acceleration_time / answers.duration

@@ -22,7 +22,7 @@ from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# Margins nearer to zero, over gravity or a limit's size, are undecided, and rest with a smaller margin is none.
+# Margins nearer to zero, over gravity or a limit's size, are undecided; rest with a smaller margin does not count.
 TOLERANCE = 1e-12
 
 
@@ -48,7 +48,7 @@ def laws_of(law: str, ratios: np.ndarray) -> Amplitude:
 
 
 def acceleration_slack(
-    starts: np.ndarray, ends: np.ndarray, found: Durations, *, law: str, max_acceleration: float
+    starts: np.ndarray, ends: np.ndarray, timings: Durations, *, law: str, max_acceleration: float
 ) -> np.ndarray:
     """Slack of the largest acceleration along lines: a closed form, since the peak of s'' of each law is known.
 
@@ -60,16 +60,16 @@ def acceleration_slack(
     Returns:
         (n,) 1 - (largest acceleration) / max_acceleration; NaN without a duration.
     """
-    largest = np.linalg.norm(ends - starts, axis=1) * largest_bend(law, found.ratio)
+    largest = np.linalg.norm(ends - starts, axis=1) * largest_bend(law, timings.ratio)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return 1.0 - largest / found.duration**2 / max_acceleration
+        return 1.0 - largest / timings.duration**2 / max_acceleration
 
 
 def verdicts(
     problem: Problem,
     starts: np.ndarray,
     ends: np.ndarray,
-    found: Durations,
+    timings: Durations,
     *,
     law: str,
     max_acceleration: float,
@@ -80,9 +80,9 @@ def verdicts(
     Args:
         starts: (n, 3) m.
         ends: (n, 3) m, elsewhere.
-        found: finite durations.
+        timings: finite durations.
         max_acceleration: largest size of the acceleration, m/s^2; a motion beyond it is undecided.
-        sharp: whether margins are wanted, and not verdicts only.
+        sharp: whether margins must be sharp; else only verdicts count.
 
     Returns:
         the verdicts.
@@ -90,7 +90,7 @@ def verdicts(
     gravity = float(np.asarray(problem.robot.gravity))
     lines = lines_of(problem, starts, ends)
     enough = np.inf if sharp else TOLERANCE
-    proved = smallest_slacks(lines, laws_of(law, found.ratio), found.duration, gravity, enough=enough)
+    proved = smallest_slacks(lines, laws_of(law, timings.ratio), timings.duration, gravity, enough=enough)
     doubt = TOLERANCE * np.array([gravity if name in lines.low else 1.0 for name in lines.names])
     own_flags = {row.name: row.flag.value for row in LIMITS} | {TAUT: Verdict.SLACK_CABLE.value}
     flags = np.where(proved.attained < -doubt, [own_flags[name] for name in lines.names], 0)
@@ -98,14 +98,15 @@ def verdicts(
     for name, values in zip(lines.names[1:], proved.attained.T[1:], strict=True):
         room = np.minimum(room, plain_slack(name, values / gravity if name.startswith("tension") else values))
     broken |= np.bitwise_or.reduce(flags, axis=1)
-    is_within = acceleration_slack(starts, ends, found, law=law, max_acceleration=max_acceleration) > TOLERANCE
+    is_within = acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > TOLERANCE
     is_open = ~(proved.bound > doubt).all(1) | doubtful | ~is_within
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(FLAGS)
     return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
 
 
 def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    # Smallest slack, flags and doubts, (n,) each, of limits on places: lengths are convex in s, depths linear.
+    # Return smallest slacks, flags and doubts, (n,) each, of limits on places, which the ends decide: lengths are
+    # convex in s, depths linear.
     robot, places = problem.robot, np.stack([starts, ends], axis=1)
     lengths = np.linalg.norm(places[:, :, None] - np.asarray(robot.base_points), axis=3)
     each: dict[str, Any] = {"depth": places[..., 2:], "length": lengths}
@@ -137,7 +138,7 @@ def limits_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np
     alone = {name: fails({name: limit}) for name, limit in limits.items()}
     for row in limits_set(problem.limits):
         flags |= np.where(alone.get(row.name, False), row.flag.value, 0)
-    if len(limits) > 1:  # of two that only fail together one may go
+    if len(limits) > 1:  # of two limits that fail only together, the largest is named
         together = fails(limits) & ~np.any(list(alone.values()), axis=0)
         flags |= np.where(together, Verdict.OVER_TENSION.value, 0)
     return flags

@@ -14,7 +14,7 @@ class FromPlacesMap(PointMassMap):
     """The map of motions of a point mass from given places; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse starts that are none."""
+        """Refuse starts that are no places."""
         super().__init__(robot_file, keys, file)
         start = keys.trajectory.start
         if robot_file.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:

@@ -1,7 +1,7 @@
 """Base of all maps of a sweep: robot, limits, amplitude function, and the targets of a grid."""
 
 import abc
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class GridMap(abc.ABC):
 
     Fields:
         any_cables: whether the robot may have more cables than degrees of freedom.
-        proves: whether the verdicts of its motions are proofs, but for those that say that they are none.
+        proves: whether the verdicts of its motions are proofs, except those that say otherwise.
 
     Raises:
         ConfigError: the robot, the amplitude function or the limits cannot be used.
@@ -47,8 +47,15 @@ class GridMap(abc.ABC):
         """Build what all tiles share."""
         self._keys, self._file = keys, file
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
-        options: dict[str, Any] = {"at": "trajectory.", "for_bounds": for_bounds, "any_cables": self.any_cables}
-        self._problem = build_problem(robot_file, keys.trajectory, keys.limits, file, **options)
+        self._problem = build_problem(
+            robot_file,
+            keys.trajectory,
+            keys.limits,
+            file,
+            at="trajectory.",
+            for_bounds=for_bounds,
+            any_cables=self.any_cables,
+        )
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -87,7 +94,7 @@ class GridMap(abc.ABC):
         """Refuse a grid in which no cell can have an answer, as where all targets are out of reach.
 
         Raises:
-            ConfigError: what is wrong with all of them.
+            ConfigError: what is wrong with all cells.
         """
         self._refuse_out_of_reach(self._targets(self._corners(grid, _OF_TARGETS)), "axes")
 
@@ -104,8 +111,8 @@ class GridMap(abc.ABC):
         return np.c_[self._frame.turned(level)[:, :2], self._frame.depth(cells["z"])]
 
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-        # Cells among which depths and heights have their extremes. Of azimuths the one down the slope of the spool
-        # plane stands for all: no other target is deeper below it.
+        # Return cells among which depths and heights have their extremes. Among azimuths the one down the slope of the
+        # spool plane stands for all: no other target is deeper below it.
         slope = self._frame.turned(plane_normal(self._problem.robot))
         axes = {
             name: np.array([points.min(), points.max()]) if name != "azimuth" else np.arctan2(slope[1:2], slope[:1])

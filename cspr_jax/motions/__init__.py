@@ -1,8 +1,8 @@
-"""Motions: what every trajectory family gives, and what any motion is asked.
+"""Motions: what every trajectory family provides, and what can be computed of any motion.
 
 A motion is a pytree that gives its duration and the state at each instant (`motion`). Slacks, demands and needs take
 any motion of any robot; blocks of time, answers, uncertainty, legs and way-points are what families have in common.
-Nothing here knows a family.
+No file here knows a family.
 
 Files, each importing only from those above it:
 
@@ -10,22 +10,22 @@ Files, each importing only from those above it:
     amplitudes          amplitude functions A(tau), with bounds of their derivatives
     swing_plane         the plane in which an effector swings between two points
     platform_kind       kinds of motions of platforms, known when a function is compiled
-    limits              which limits are given, what they bound, and their slacks
-    given_limits        limits as somebody gives them, checked
+    limits              which limits are set, the quantities that they bound, and their slacks
+    given_limits        limits of a file or a caller, checked
     problem             robot, limits and amplitude function
     slacks              slacks of any motion at one instant
-    needs               what a motion needs, beside what is allowed
+    needs               what a motion needs at its worst instants, and what is allowed
     demands             extremes of tensions, heights, lengths and speeds along a motion
     acceleration_sets   feasible accelerations of a point mass
     answers             the record that every family returns
-    fewest_limits       the limit that alone stands in the way
+    fewest_limits       the limit that alone refuses a motion
     proved_verdicts     verdicts that rest on a proof
     sampled             answers of motions that are only sampled
-    blocks              parts of arcs, halved where open
-    enclosures          what is known of one block of time
+    blocks              parts of arcs, halved while they are undecided
+    enclosures          bounds of a robot's state over a block of time
     cable_rates         speeds and accelerations of cables over blocks
     uncertainty         verdicts about all robots within an uncertainty
-    tolerances          the largest multiple of an uncertainty that a motion stands
+    tolerances          the largest multiple of an uncertainty that a motion tolerates
     waypoints           consecutive poses of a plan, as points of the kernels
     outcome             what comes of a leg beyond its motion
     leg                 consecutive poses that one family joins

@@ -1,7 +1,7 @@
 """Feasible accelerations of a point mass on any number of cables: verdicts, margins, and how large they can be.
 
-A place belongs to the static workspace if rest there needs no push, to the wrench-feasible workspace if it keeps the
-limits of the tensions too, to the wrench-closure workspace if the cables can resist any force.
+A place belongs to the static workspace if no cable has to push at rest there, to the wrench-feasible workspace if the
+tensions at rest also keep their limits, to the wrench-closure workspace if the cables can resist any force.
 """
 
 import itertools
@@ -71,7 +71,7 @@ class AccelerationReach(NamedTuple):
     """Feasible accelerations at one place, and how large they are; () each.
 
     Fields:
-        verdict: of rest, flags of `Verdict`.
+        verdict: of rest at the place, flags of `Verdict`.
         acceleration_margin: distance of rest from the nearest face, m/s^2: of the wrench-feasible workspace.
         static_margin: the same without limits of the tensions, m/s^2: of the static workspace.
         closure_margin: of the wrench-closure workspace, a pure number.
@@ -107,7 +107,7 @@ def reach(robot: PointMassRobot, limits: Limits, position: Array) -> Acceleratio
     slack, margin = faces.slacks(still), faces.margin(still)
 
     def until(steepness: Array) -> Array:
-        # Return how far from rest a direction leads, or all directions that approach the faces so steeply.
+        # Return the largest acceleration along a direction, or along all directions that are so steep to the faces.
         distance = jnp.where(steepness > LEVEL, slack / jnp.where(steepness > LEVEL, steepness, 1.0), jnp.inf)
         return jnp.where(margin > 0.0, jnp.maximum(jnp.min(distance), 0.0), 0.0)
 
@@ -134,14 +134,14 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
     p, q = (jnp.where(crosses, offset[indices], 0.0) for indices in (first, second))
     corner = jnp.stack([p * b[:, 1] - q * a[:, 1], a[:, 0] * q - b[:, 0] * p], 1)
     corner = corner / jnp.where(crosses, determinant, 1.0)[:, None]
-    # In a plane corners are points of the line itself.
+    # The level section of a planar robot is part of a line; each of its corners lies on a single face.
     size = jnp.linalg.norm(normal, axis=1)
     is_line = jnp.isfinite(offset) & (size > LEVEL)
     alone = normal * (jnp.where(is_line, offset, 0.0) / jnp.where(is_line, size, 1.0) ** 2)[:, None]
     points, counts = jnp.concatenate([corner, alone]), jnp.concatenate([crosses, is_line])
     room = TOLERANCE * (1.0 + jnp.linalg.norm(points, axis=1))
     inside = counts & (points @ normal.T - offset[None] >= -room[:, None]).all(1)
-    # The section is unbounded if a way along the edge of a face is ended by no other face.
+    # The section is unbounded if one can go along the edge of a face without end.
     if planar:
         along = jnp.array([[1.0, 0.0], [-1.0, 0.0]])
     else:
@@ -163,7 +163,7 @@ def along(robot: PointMassRobot, limits: Limits, position: Array, direction: Arr
         direction: (3,) of unit length.
 
     Returns:
-        (2,) the smallest and the largest one, m/s^2; infinite where nothing bounds them, NaN where there is none.
+        (2,) the smallest and the largest acceleration, m/s^2; infinite where nothing bounds it, NaN if there is none.
     """
     faces = faces_at(robot, limits, position)
     steep = faces.normals @ direction

@@ -1,8 +1,7 @@
 """Amplitude functions A(tau): how the size of the swing grows from its start to its end.
 
-Every one of them is a piecewise polynomial, kept as such: values and derivatives are exact, a new
-one is a row of coefficients, and the largest value of any derivative is known, which is what a
-certificate between samples needs.
+Each is a piecewise polynomial: values and derivatives are exact, a new function is a row of coefficients, and the
+largest value of any derivative is known, which proofs between samples need.
 """
 
 import dataclasses
@@ -24,7 +23,7 @@ BOUNDARY_TOLERANCE = 1e-9
 # Shorter ends ask for accelerations that no robot has, and lose the digits of A'' to rounding.
 SMALLEST_EPSILON = 1e-3
 LARGEST_COEFFICIENT = 1e9
-# Tables have at least this many columns: functions of few shapes are compiled once, and zeros change no bit.
+# Tables have at least this many columns, so that few shapes have to be compiled; zeros change no bit.
 COLUMNS = 6
 # Coefficients below this part of the largest one do not change where a function is stationary.
 NEGLIGIBLE = 1e-100
@@ -53,7 +52,7 @@ class Amplitude:
     name: str = ""
 
     def at(self, tau, order: int = 0) -> Array:
-        """Value of A, or of a derivative of it with respect to tau.
+        """Value of A, or of one of its derivatives with respect to tau.
 
         Args:
             tau: (...) normalised time in [0, 1].
@@ -65,7 +64,7 @@ class Amplitude:
         return derivatives(self, jnp.asarray(tau, float), order=order)[order]
 
 
-# The name stays outside: compiled functions do not see it, and are not compiled again for another one.
+# The name is not part of the pytree: a function of another name is not compiled again.
 _FIELDS = [field.name for field in dataclasses.fields(Amplitude)]
 jax.tree_util.register_dataclass(Amplitude, _FIELDS[:-1], [], drop_fields=["name"])
 
@@ -75,8 +74,8 @@ def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array,
     """A and its derivatives with respect to tau.
 
     Args:
-        tau: (...) normalised time in [0, 1]; at a knot the piece on its right answers.
-        order: the highest derivative wanted, at most 5.
+        tau: (...) normalised time in [0, 1]; a knot belongs to the piece on its right.
+        order: of the highest derivative, at most 5.
 
     Returns:
         (A, A', ..., A^(order)), each (...), in the dtype of `tau`.
@@ -98,8 +97,8 @@ def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array,
 def local_bounds(amplitude: Amplitude, middle: Array, radius: Array) -> tuple[Array, ...]:
     """Upper bounds of |A|, |A'|, ..., |A''''| on an interval that holds no knot inside.
 
-    The value in the middle plus the radius times the largest next derivative (mean value
-    theorem), and never more than the largest over [0, 1].
+    Each bound is the value in the middle plus the radius times the largest next derivative (mean value theorem), and
+    never more than the largest value over [0, 1].
 
     Args:
         middle: (...) middle of the interval.
@@ -116,7 +115,7 @@ def local_bounds(amplitude: Amplitude, middle: Array, radius: Array) -> tuple[Ar
 def from_pieces(
     name: str, knots: Sequence[float], origins: Sequence[float], pieces: Sequence[Sequence[float]]
 ) -> Amplitude:
-    """Amplitude function from its pieces, with its extreme values found.
+    """Amplitude function from its pieces, with its extreme values computed.
 
     Args:
         knots: (n_pieces - 1,) increasing, inside ]0, 1[.
@@ -142,7 +141,8 @@ def from_pieces(
 
 
 def _extremes(curve: np.polynomial.Polynomial, start: float, stop: float) -> tuple[float, float]:
-    # Roots are found by dividing by the highest coefficient: one so small has roots far away alone, and would overflow.
+    # Finding roots divides by the highest coefficient, which overflows for one that is as good as zero; such a
+    # coefficient only adds roots far away.
     slope = curve.deriv().trim(NEGLIGIBLE * float(np.abs(curve.coef).max()))
     stationary = slope.roots() if slope.degree() > 0 else np.zeros(0)
     # A double root may come out as a close complex pair: its real part is near enough to evaluate.
@@ -155,7 +155,7 @@ def named(name: str, epsilon: float | None = None) -> Amplitude:
     """One of the amplitude functions of the thesis.
 
     "A1", "quintic" (also "A2"), "A3": thesis (1.101) and (2.50). "effective": (1.110), a cubic-like
-    start, a straight middle and the mirrored end. "effective-c3": the same idea with
+    start, a straight middle and the mirrored end. "effective-c3": the same shape with
     A'' = k tau (epsilon - tau)^2 at the start, whose third derivative does not jump. "ideal": (1.103), A = tau,
     which meets no boundary condition and serves for bounds.
 
@@ -198,14 +198,14 @@ def _with_straight_middle(name: str, epsilon: float) -> Amplitude:
         k = 12.0 * slope / e**4
         start = (0.0, 0.0, 0.0, k * e**2 / 6, -k * e / 6, k / 20)
     at_knot = sum(c * e**i for i, c in enumerate(start))
-    # The end is the start turned by half a turn: A(tau) = 1 - start(1 - tau), in powers of tau - 1.
+    # The end is the start rotated by 180 degrees: A(tau) = 1 - start(1 - tau), in powers of tau - 1.
     end = (1.0, *(-c * (-1) ** i for i, c in enumerate(start) if i > 0))
     label = f"{name} (epsilon {e:g})"
     return from_pieces(label, (e, 1.0 - e), (0.0, e, 1.0), (start, (at_knot, slope), end))
 
 
 def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
-    """A user's own amplitude function, c[0] + c[1] tau + c[2] tau^2 + ...
+    """Amplitude function of a user, c[0] + c[1] tau + c[2] tau^2 + ...
 
     Args:
         coefficients: at least one finite number, lowest power first, at most 20.
@@ -225,7 +225,7 @@ def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str
     """The conditions of thesis (2.49) that a function breaks: A(0) = 0, A(1) = 1, A' and A'' zero at both ends.
 
     Args:
-        free_end: whether A''(1) may be anything: then they are (1.27) and (1.28), of a transition.
+        free_end: whether A''(1) may be anything: then the conditions are (1.27) and (1.28), those of a transition.
 
     Returns:
         one text such as "A''(1) = -12, must be 0" for each broken condition.

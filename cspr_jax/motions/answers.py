@@ -12,20 +12,20 @@ AnyAnswers = TypeVar("AnyAnswers", bound="Answers")
 
 @dataclasses.dataclass(frozen=True)
 class Answers(Columns):
-    """One answer a segment.
+    """One answer for each segment.
 
     Fields:
-        arcs: (n,) smallest number of arcs proved feasible, on more than six cables found so at samples; 0: none.
-        tried_arcs: (n,) the number of arcs that duration and margins belong to: `arcs`, else that of the candidate that
-            a limit alone refuses, if there is one, else of that with the largest margin.
+        arcs: (n,) smallest number of arcs proved feasible, on more than six cables feasible at samples; 0: none.
+        tried_arcs: (n,) number of arcs of the motion that duration and margins belong to: `arcs`; if that is 0, the
+            candidate that a single limit refuses; if there is none, the candidate with the largest margin.
         verdict: (n,) `Verdict` flags; 0 is feasible.
         duration: (n,) s.
         margin: (n,) smallest normalised pseudotension, or depth below the spools over z0.
-        margin_bound: (n,) proved lower bound of the same; NaN where nothing is proved, as on more than six cables.
-        limit_margin: (n,) smallest slack of the limits; inf where none is given.
-        feasible_at_infinity: (n,) left-hand side of (2.55).
-        tolerated: (n,) largest multiple of the uncertainty that the motion is proved to stand; NaN where none is given.
-        not_tolerated: (n,) smallest one found that it does not.
+        margin_bound: (n,) proved lower bound of the margin; NaN where nothing is proved, as on more than six cables.
+        limit_margin: (n,) smallest slack of the limits; inf without limits.
+        feasible_at_infinity: (n,) left-hand side of (2.55); positive if enough arcs make the segment feasible.
+        tolerated: (n,) largest multiple of the uncertainty that the motion is proved to tolerate; NaN without one.
+        not_tolerated: (n,) smallest multiple for which a robot was found that fails.
     """
 
     arcs: np.ndarray
@@ -41,7 +41,7 @@ class Answers(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Tell whether each segment is feasible, (n,): proved, on more than six cables found at samples."""
+        """Tell whether each segment is feasible, (n,): proved, on more than six cables at samples."""
         return self.arcs > 0
 
     def details(self, i: int) -> dict[str, Any]:
@@ -57,12 +57,12 @@ class Answers(Columns):
 
 
 def joined(parts: list[AnyAnswers]) -> AnyAnswers:
-    """Answers side by side.
+    """Answers of several parts as one record.
 
     Args:
         parts: at least one.
 
     Returns:
-        one for all.
+        the answers, those of one part after the other.
     """
     return type(parts[0])(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})

@@ -1,4 +1,4 @@
-"""Blocks of motions: parts of arcs, cut at the knots of the amplitude function, and halved where open."""
+"""Blocks of motions: parts of arcs, cut at the knots of the amplitude function, and halved while undecided."""
 
 import itertools
 import math
@@ -8,16 +8,16 @@ import numpy as np
 
 from cspr_jax.motions.amplitudes import Amplitude
 
-# A piece between knots does not get one more block for a remainder of up to this part of a block.
+# A remainder of up to this share of a block does not add a block to a piece between knots.
 SLIVER = 0.3
-INSTANTS = 1025  # at which parts along a motion are told
+INSTANTS = 1025  # at which the number of parts of an arc is tabulated
 
 
 class Blocks(NamedTuple):
     """Blocks of motions.
 
     Fields:
-        row: (k,) whose block it is.
+        row: (k,) number of the motion that the block belongs to.
         start: (k,) tau where it starts.
         stop: (k,) tau where it stops; no knot inside.
     """
@@ -26,15 +26,15 @@ class Blocks(NamedTuple):
     start: np.ndarray
     stop: np.ndarray
 
-    def some(self, which: np.ndarray) -> "Blocks":
+    def part(self, rows: np.ndarray) -> "Blocks":
         """Blocks chosen by indices, or by a mask (k,)."""
-        return Blocks(*(x[which] for x in self))
+        return Blocks(*(x[rows] for x in self))
 
     def instants(self, places: np.ndarray) -> np.ndarray:
         """Instants at the same places of each block.
 
         Args:
-            places: (m, 1), or (m, k) of each block's own, from -1 at its start to 1 at its stop.
+            places: (m, 1) for all blocks, or (m, k) for each its own, from -1 at the start to 1 at the stop.
 
         Returns:
             (m, k) tau.
@@ -52,21 +52,19 @@ class Blocks(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """How many parts an arc has, at instants tau from 0 to 1, equally far apart.
+    """Number of parts that an arc is cut into, at equidistant instants tau from 0 to 1.
 
     Fields:
-        at_cusps: (m,) if there is a cusp at the instant.
-        at_middles: (m,) if it is halfway between two. Elsewhere it is between, as the squared sine of the phase.
+        at_cusps: (m,) the number if there is a cusp at the instant.
+        at_middles: (m,) the number if the instant is halfway between two cusps. In between it follows the squared sine
+            of the phase.
     """
 
     at_cusps: np.ndarray
     at_middles: np.ndarray
 
     def of(self, arcs: int) -> np.ndarray:
-        """Parts of arcs along a motion.
-
-        Args:
-            arcs: how many it has.
+        """Number of parts of an arc, along a motion of so many arcs.
 
         Returns:
             (m,).
@@ -76,10 +74,10 @@ class Parts(NamedTuple):
 
 
 def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tuple[float, float]) -> Parts:
-    """Parts of an arc along a motion from rest, more of them where it swings farther.
+    """Number of parts of an arc along a motion from rest: more where it swings farther.
 
     Args:
-        at_cusps: how many where A is 0, and where it is 1; in between linear, beyond as at the nearer one.
+        at_cusps: numbers at a cusp where A is 0, and where A is 1; linear in between, constant beyond.
         at_middles: likewise halfway between two cusps.
 
     Returns:
@@ -93,20 +91,20 @@ def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tup
 
 
 def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: float | Parts) -> Blocks:
-    """Parts of all arcs of motions.
+    """Cut all arcs of motions into blocks.
 
     Args:
         arcs: (n,) number of arcs of each motion, 1 or more.
-        knots: of the amplitude function, inside ]0, 1[.
-        parts: how many an arc, or nearly.
+        knots: (n_knots,) of the amplitude function, inside ]0, 1[.
+        parts: number of blocks of an arc, which the knots may change a little.
 
     Returns:
-        the blocks, those of a motion side by side, in time.
+        the blocks, motion by motion, in the order of time.
     """
     numbers, group = np.unique(arcs, return_inverse=True)
     edges = [_edges(int(p), [0.0, *knots.tolist(), 1.0], parts) for p in numbers]
     lengths = np.array([len(x) for x in edges], int)
-    # All edges in one row: where those of each motion begin, and which of them each block begins with.
+    # All edges lie in one row. Find where those of each motion begin in it, and the edge at which each block starts.
     begins, counts = (np.cumsum(lengths) - lengths)[group], (lengths - 1)[group]
     row = np.repeat(np.arange(len(arcs)), counts)
     first = np.arange(len(row)) + np.repeat(begins - (np.cumsum(counts) - counts), counts)

@@ -6,25 +6,25 @@ from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence, unit_vect
 from cspr_jax.robots.limits import Limits
 
 
-def rates_hold(known: Enclosure, found: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
-    """Blocks in which every cable of every robot keeps its limits of speed and acceleration: proved.
+def rates_hold(known: Enclosure, influence: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
+    """Prove that every cable of every robot keeps its limits of speed and acceleration within blocks.
 
     Args:
-        spools: (k,) largest displacement, m.
+        spools: (k,) largest displacement of a spool, m.
 
     Returns:
-        (k,).
+        (k,) whether it is proved.
     """
     is_met, largest = np.ones(len(spools), bool), _limits_of_rates(limits)
     if largest is None:
         return is_met
-    # Within the block every ray of every robot is in a ball around the planned one of the middle.
-    ball = np.minimum((known.moved + spools[:, None]) / found.lengths, 1.0)
-    units, rates = known.rays / found.lengths[..., None], known.rates
+    # Within the block every ray of every robot lies in a ball around the planned ray in the middle.
+    ball = np.minimum((known.moved + spools[:, None]) / influence.lengths, 1.0)
+    units, rates = known.rays / influence.lengths[..., None], known.rates
     slowest, fastest = _along(units, rates.velocity, ball)
     least, most = _along(units, rates.acceleration, ball)
     pace = np.linalg.norm(rates.velocity, axis=2)
-    short, long = found.lengths * (1.0 - ball), found.lengths * (1.0 + ball)
+    short, long = influence.lengths * (1.0 - ball), influence.lengths * (1.0 + ball)
     speed = np.maximum(np.abs(slowest), np.abs(fastest)) + rates.velocity_change
     low = np.where(slowest * fastest > 0.0, np.minimum(np.abs(slowest), np.abs(fastest)), 0.0) - rates.velocity_change
     across = (pace + rates.velocity_change) ** 2 - np.maximum(low, 0.0) ** 2
@@ -52,13 +52,13 @@ def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np
     return size * np.cos(np.minimum(inclination + angle, np.pi)), size * np.cos(np.maximum(inclination - angle, 0.0))
 
 
-def rates_fail(known: Enclosure, found: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
-    """Blocks in whose middles a cable of some robot breaks a limit of speed or acceleration.
+def rates_fail(known: Enclosure, influence: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
+    """Tell whether a cable of some robot breaks a limit of speed or acceleration in the middle of each block.
 
-    Spools are displaced along their rays, and across them in the way of the velocity or the acceleration.
+    Spools are displaced along their rays, and across them in the direction of the velocity or the acceleration.
 
     Args:
-        spools: (k,) displacement, m.
+        spools: (k,) displacement of the spools, m.
 
     Returns:
         (k,).
@@ -66,7 +66,7 @@ def rates_fail(known: Enclosure, found: Influence, limits: Limits, spools: np.nd
     broken, largest = np.zeros(len(spools), bool), _limits_of_rates(limits)
     if largest is None:
         return broken
-    units, (velocity, acceleration, _, _) = known.rays / found.lengths[..., None], known.rates
+    units, (velocity, acceleration, _, _) = known.rays / influence.lengths[..., None], known.rates
     ways = [units]
     for vectors in (velocity, acceleration):
         ways.append(unit_vectors(vectors - np.sum(vectors * units, axis=2, keepdims=True) * units))

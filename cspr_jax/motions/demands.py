@@ -54,7 +54,7 @@ class Demands:
     samples: np.ndarray
 
 
-# Largest values are smallest ones of the negative.
+# A largest value is the smallest value of the negative.
 _SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0])
 _NAMES = [field.name for field in dataclasses.fields(Demands)][:-1]
 
@@ -97,9 +97,9 @@ def demands(
     Args:
         robot: centred.
         motions: n of them, from the centroid of the spools, z down.
-        samples: of each motion, equidistant instants from 0 to 1 to begin with.
+        samples: for each motion, the number of equidistant instants from 0 to 1 to begin with.
         limits: from which the tensions of redundant cables keep away.
-        rule: that chooses these tensions, a name of `robots.tension_rule_table`.
+        rule: that chooses the tensions of redundant cables, a name of `robots.tension_rule_table`.
 
     Returns:
         the demands.

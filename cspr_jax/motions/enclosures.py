@@ -1,14 +1,14 @@
-"""Enclosures of a robot on its way: what is known of one block of time, for bounds over robots that differ a little.
+"""Enclosures of a robot in motion: bounds of its state over a block of time, for all robots that differ a little.
 
-NumPy throughout: blocks are few, and the inverse of the structure matrix is LAPACK's. All vectors are in axes in which
-the attachment points do not move, those of the platform; of a point mass these are the fixed ones.
+NumPy throughout: blocks are few, and the inverse of the structure matrix is LAPACK's. All vectors are in the axes
+of the platform, in which the attachment points do not move; for a point mass, these are the fixed axes.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-# Part of a limit by which it may be touched.
+# Share of a limit by which it may be missed, so that a limit that is just touched counts as met.
 TOUCHED = 2e-6
 
 
@@ -17,13 +17,13 @@ class Distances(NamedTuple):
 
     Fields:
         bound: (k, m) lower bounds in the middle of each block, along some unit vectors.
-        change: (k, m) by how much these can be less within it.
-        tilt: (k, m) by how much they are more, per displacement, along vectors tilted against spools that move.
-        slope: (k, m) of that tilt, 1/m; bounds are less by the cosine of its angle.
-        swing: (k, m) by how much the tilted ones can be less within a block besides, per displacement.
-        spools: (m,) by how many times the largest displacement of a spool each can shrink.
+        change: (k, m) by how much the distances can shrink within the block.
+        tilt: (k, m) gain of the bounds, per displacement of the spools, along vectors tilted against it.
+        slope: (k, m) sine of the angle of that tilt per displacement, 1/m; the bounds shrink by its cosine.
+        swing: (k, m) what the tilted bounds can lose besides within the block, per displacement.
+        spools: (m,) largest loss of each distance, per largest displacement of a spool.
         here: (k, l) distances in the middle.
-        here_spools: (k, l) by how many times the displacement these shrink if the spools move as is worst.
+        here_spools: (k, l) loss of the distances in the middle for the worst displacements, per displacement.
     """
 
     bound: np.ndarray
@@ -50,7 +50,7 @@ class Distances(NamedTuple):
         return ((low > self.spools * far) & (far * self.slope < 1.0)).all(1)
 
     def fail(self, spools: np.ndarray) -> np.ndarray:
-        """Tell whether some distances are lost in the middles of blocks where spools move as is worst.
+        """Tell whether the worst displacements of the spools use up a distance in the middle of each block.
 
         Args:
             spools: (k,) largest displacement, m.
@@ -67,8 +67,8 @@ class Rates(NamedTuple):
     Fields:
         velocity: (k, n_cables, 3) in the middle, m/s.
         acceleration: (k, n_cables, 3) m/s^2.
-        velocity_change: (k, n_cables) by how much it differs at most within the block, m/s.
-        acceleration_change: (k, n_cables) m/s^2.
+        velocity_change: (k, n_cables) largest change of the velocity from the middle, within the block, m/s.
+        acceleration_change: (k, n_cables) likewise of the acceleration, m/s^2.
     """
 
     velocity: np.ndarray
@@ -78,21 +78,21 @@ class Rates(NamedTuple):
 
 
 class Enclosure(NamedTuple):
-    """Middle states and bounds of k blocks of motions; "in the middle" is at the middle instant.
+    """Middle states and bounds of k blocks of motions; "in the middle" means at the middle instant.
 
     Fields:
         rays: (k, n_cables, 3) from spool to attachment point in the middle, m.
         arms: (n_cables, 3) attachment points from the mass centre, m; zero of a point mass.
-        force: (k, 3) that the cables supply per mass, in the middle, m/s^2.
-        moment: (k, 3) about the mass centre, per mass, m^2/s^2.
-        whirl: (k, 3, 3) acceleration of points of the platform relative to the mass centre, over their place, 1/s^2.
+        force: (k, 3) that the cables supply, per mass, in the middle, m/s^2.
+        moment: (k, 3) that they supply about the mass centre, per mass, in the middle, m^2/s^2.
+        whirl: (k, 3, 3) maps a point of the platform, from the mass centre, to its relative acceleration, 1/s^2.
         way: (k, n_cables, 3) how far the tangents of the rays lead from the middle to the stop, m.
-        bent: (k, n_cables) by how much rays differ from their tangents at most within the block, m.
-        force_change: (k,) by how much the force does, m/s^2.
-        whirl_change: (k,) 1/s^2.
-        low: (k, n_cables) tensions per mass and length within the block: at least, 1/s^2.
-        high: (k, n_cables) at most.
-        distances: those that shrink.
+        bent: (k, n_cables) largest distance of the rays from their tangents within the block, m.
+        force_change: (k,) largest change of the force from the middle, within the block, m/s^2.
+        whirl_change: (k,) likewise of `whirl`, 1/s^2.
+        low: (k, n_cables) lower bounds of the tensions per mass and length within the block, 1/s^2.
+        high: (k, n_cables) upper bounds of them, 1/s^2.
+        distances: that shrink as spools move.
         rates: of the attachment points.
     """
 
@@ -112,22 +112,22 @@ class Enclosure(NamedTuple):
 
     @property
     def moved(self) -> np.ndarray:
-        """By how much rays differ at most within the block, (k, n_cables) m."""
+        """Largest change of the rays from the middle, within the block, (k, n_cables) m."""
         return largest_moves(self.way, self.bent)
 
-    def some(self, which: np.ndarray) -> "Enclosure":
+    def part(self, rows: np.ndarray) -> "Enclosure":
         """Blocks chosen by indices, or by a mask (k,)."""
         distances = self.distances._replace(
-            **{name: value[which] for name, value in self.distances._asdict().items() if name != "spools"}
+            **{name: value[rows] for name, value in self.distances._asdict().items() if name != "spools"}
         )
-        rates = Rates(*(x[which] for x in self.rates))
+        rates = Rates(*(x[rows] for x in self.rates))
         fields = {
-            name: value[which] for name, value in self._asdict().items() if name not in ("arms", "distances", "rates")
+            name: value[rows] for name, value in self._asdict().items() if name not in ("arms", "distances", "rates")
         }
         return self._replace(**fields, distances=distances, rates=rates)
 
     def middle(self, mu: np.ndarray) -> "Enclosure":
-        """Return the enclosure of the middles alone: blocks without a length.
+        """Enclosure of the middle instants alone, as if blocks had no length.
 
         Args:
             mu: (k, n_cables) tensions per mass and length there, 1/s^2.
@@ -144,11 +144,11 @@ class Enclosure(NamedTuple):
 
 
 def largest_moves(way: np.ndarray, bent: np.ndarray) -> np.ndarray:
-    """Largest differences of rays from those in the middles of blocks.
+    """Largest changes of rays from the middles of blocks.
 
     Args:
-        way: (..., 3) how far their tangents lead, m.
-        bent: (...) by how much they differ from these, m.
+        way: (..., 3) how far the tangents lead, m.
+        bent: (...) largest distance from the tangents, m.
 
     Returns:
         (...) m.
@@ -157,7 +157,7 @@ def largest_moves(way: np.ndarray, bent: np.ndarray) -> np.ndarray:
 
 
 def unit_vectors(vectors: np.ndarray) -> np.ndarray:
-    """Vectors of length 1, or of length 0.
+    """Vectors scaled to length 1; a zero vector stays zero.
 
     Args:
         vectors: (..., 3).
@@ -174,7 +174,7 @@ def structure(rays: np.ndarray, arms: np.ndarray, *, is_platform: bool) -> np.nd
 
     Args:
         rays: (k, n_cables, 3) from spool to attachment point, m.
-        arms: (n_cables, 3) m.
+        arms: (n_cables, 3) attachment points from the mass centre, m.
 
     Returns:
         (k, 6 or 3, n_cables).
@@ -186,17 +186,17 @@ def structure(rays: np.ndarray, arms: np.ndarray, *, is_platform: bool) -> np.nd
 
 
 class Influence(NamedTuple):
-    """First-order influence of a displaced spool and mass centre on tensions in the middle of k blocks, and lengths.
+    """First-order influence of displaced spools, and of a displaced mass centre, on tensions in the middle of k blocks.
 
     With e_j the displacement of spool j and delta that of the mass centre,
     mu_k changes by -(sum over j of g_kj . e_j mu_j) + h_k . delta.
 
     Fields:
         spools: (k, n_cables, n_cables, 3) g_kj, 1/m.
-        across: likewise, the part of g_kj across ray j: along it a displacement changes no tension.
+        across: likewise, the part of g_kj across ray j: a displacement along the ray changes no tension.
         centre: (k, n_cables, 3) h_k, 1/(m s^2).
         forces: (k, n_cables, 3) mu_k for unit forces per mass, 1/m.
-        moments: (k, n_cables, 3) for unit moments per mass, 1/m^2.
+        moments: (k, n_cables, 3) mu_k for unit moments per mass, 1/m^2.
         lengths: (k, n_cables) of the cables, m.
         mu: (k, n_cables) tensions per mass and length, 1/s^2.
     """
@@ -209,9 +209,9 @@ class Influence(NamedTuple):
     lengths: np.ndarray
     mu: np.ndarray
 
-    def some(self, which: np.ndarray) -> "Influence":
+    def part(self, rows: np.ndarray) -> "Influence":
         """Blocks chosen by indices, or by a mask (k,)."""
-        return Influence(*(x[which] for x in self))
+        return Influence(*(x[rows] for x in self))
 
 
 def influence(known: Enclosure) -> Influence:
@@ -234,13 +234,13 @@ def influence(known: Enclosure) -> Influence:
 
 
 def inverted(matrices: np.ndarray) -> np.ndarray:
-    """Inverses, and of two cables in the plane y = 0, which know no force across it, pseudo-inverses; NaN without any.
+    """Inverse matrices; pseudo-inverses for two cables in the plane y = 0, which supply no force across it.
 
     Args:
         matrices: (k, m, n), m = n, or 3 and 2.
 
     Returns:
-        (k, n, m).
+        (k, n, m); NaN where there is no inverse.
     """
     if matrices.shape[1] == matrices.shape[2]:
         is_regular = np.isfinite(matrices).all((1, 2)) & (np.linalg.det(matrices) != 0.0)

@@ -1,11 +1,11 @@
 """Why no candidate is feasible: the limit that alone stands in the way, if there is one.
 
 A limit can be raised, but a cable cannot push, and two cables cannot pass through each other. So candidates that only
-limits refuse come first. Of these the first one that breaks a single limit, and is proved but for that, says what is
-missing: rather one that keeps the smallest tension, for a cable that is called slack is to be slack with any other
-limit. Where there is none, the one that breaks the fewest does; of several limits those that all candidates break are
-named, if these are more than one. Where limits alone refuse no candidate, what is no limit is the reason, and with it
-the limits that every number of arcs breaks.
+limits refuse come first. Among them, the first one that breaks a single limit, and is proved otherwise, tells which
+limit to raise; candidates that keep the smallest tension are preferred, so that a cable is called slack only if no
+other limit is to blame. If each candidate breaks several limits, the one that breaks the fewest is taken; if more than
+one limit is broken by all candidates, these limits are named. If every candidate breaks another criterion, that is the
+reason, together with the limits that every number of arcs breaks.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ class Refused(NamedTuple):
 
     Fields:
         arcs: (n,) number of arcs of the candidate; 0: there is none.
-        broken: (n, n_criteria) limits that stand in its way.
+        broken: (n, n_criteria) limits that it breaks.
     """
 
     arcs: np.ndarray
@@ -36,7 +36,7 @@ def rank(flags: Sequence[Verdict], broken: np.ndarray) -> np.ndarray:
         broken: (n, n_criteria) the limits.
 
     Returns:
-        (n,) twice their number, and one more if a tension is below the smallest one: the less, the better.
+        (n,) twice their number, and one more if a tension is below the smallest one; the smaller, the better.
     """
     is_slack = np.array([flag == Verdict.SLACK_CABLE for flag in flags])
     return 2 * broken.sum(1) + (broken & is_slack).any(1)
@@ -71,14 +71,14 @@ class FewestLimits:
 
     @property
     def is_best(self) -> np.ndarray:
-        """Tell whether one limit at most refuses a candidate, and no other one is better, (n,)."""
+        """Tell for each motion whether its candidate breaks one limit at most, so that none can be better, (n,)."""
         return self._least <= 2
 
     def refused(self) -> Refused:
-        """Return the candidates that were found, and what refuses them.
+        """Candidates that break the fewest limits, and the limits to name.
 
         Returns:
-            the candidates, and what is named.
+            the candidates.
         """
         is_common = (self._common.sum(1) > 1) & (self._arcs > 0)
         return Refused(self._arcs, np.where(is_common[:, None], self._common, self._broken))

@@ -1,4 +1,4 @@
-"""Limits as somebody gives them, checked, in the kernels' axes."""
+"""Limits of a file or a caller, checked, in the kernels' axes."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -20,16 +20,16 @@ from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
 
 
 def limits_of(
-    robot: Any, given: Mapping[str, Any], own: Mapping[str, Any], at: str, n_cables: int | None = None
+    robot: Any, limits: Mapping[str, Any], defaults: Mapping[str, Any], at: str, n_cables: int | None = None
 ) -> Limits:
-    """Limits that are given over those of a robot.
+    """Limits, with those of a robot where none are given.
 
     Args:
         robot: has base_points and z_axis of its file.
-        given: by name, one number or one a cable each; None: as in `own`.
-        own: likewise; None: no limit.
+        limits: by name, one number or one for each cable; None: as in `defaults`.
+        defaults: limits of the robot, likewise; None: no limit.
         at: prefix of keys in errors.
-        n_cables: of which the limits are; None: those of the robot.
+        n_cables: number of cables that have the limits; None: as the robot has.
 
     Returns:
         the limits, the floor as a depth; some of the largest tensions may be infinite.
@@ -40,16 +40,16 @@ def limits_of(
     """
     n_cables, values = n_cables or len(robot.base_points), dict[str, Any]()
     for row in LIMITS:
-        value = given.get(row.name)
-        value = own.get(row.name) if value is None else value
+        value = limits.get(row.name)
+        value = defaults.get(row.name) if value is None else value
         values[row.name] = None if value is None else _limit(row, value, n_cables, at)
     low, high = values["tension_min"], values["tension_max"]
     if low is not None and high is not None and not (low < high).all():
         raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
     if values["floor"] is not None:
         values["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
-    uncertain = given.get("uncertainty")
-    uncertain = own.get("uncertainty") if uncertain is None else uncertain
+    uncertain = limits.get("uncertainty")
+    uncertain = defaults.get("uncertainty") if uncertain is None else uncertain
     return Limits(**values, uncertainty=None if uncertain is None else _uncertainty(uncertain, f"{at}uncertainty."))
 
 
@@ -85,7 +85,7 @@ def check_bounded(limits: Limits) -> None:
 def check_certain(
     robot: PointMassRobot | PlatformRobot, limits: Limits, families: tuple[str, ...], *, in_pairs: bool = False
 ) -> None:
-    """Refuse an uncertainty where motions are not judged by it.
+    """Refuse an uncertainty where verdicts do not take it into account.
 
     Args:
         limits: with an uncertainty, or without.
@@ -157,13 +157,13 @@ def limits_over(
     any_tensions: bool = False,
     families: tuple[str, ...] = (),
 ) -> Limits:
-    """Limits that are given over those of a robot, as the kernels take them.
+    """Limits, with those of a robot where none are given, as the kernels take them.
 
     Args:
         robot: in its own axes.
-        limits: one number or one a cable each, in the robot's axes; None: those of the robot.
+        limits: one number or one for each cable, in the robot's axes; None: those of the robot.
         any_tensions: whether some of the largest tensions may be infinite.
-        families: of the trajectories that are judged by all of an uncertainty; none: there may be none.
+        families: names of the trajectories, which decide whether an uncertainty is allowed; none: it is not.
 
     Returns:
         the limits.

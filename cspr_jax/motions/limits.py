@@ -1,4 +1,4 @@
-"""Limits of a state: which are given, the quantities that they bound, and the slacks that follow."""
+"""Limits of a state: which are set, the quantities that they bound, and the slacks that follow."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from cspr_jax.schema.limits import LIMITS, Limit
 
 
 def limits_set(limits: Limits) -> tuple[Limit, ...]:
-    """Rows of the limits that are given, in the order of their slacks.
+    """Rows of the limits that are set, in the order of their slacks.
 
     Returns:
         the rows.
@@ -29,8 +29,8 @@ class Values(NamedTuple):
         tension: (n_cables,) N.
         depth: () z, z down, m.
         length: (n_cables,) of the cables, m.
-        speed: (n_cables,) size of its rate, m/s.
-        acceleration: (n_cables,) size of the rate's rate, m/s^2.
+        speed: (n_cables,) size of the rate of the length, m/s.
+        acceleration: (n_cables,) size of its second derivative, m/s^2.
     """
 
     tension: Array
@@ -55,14 +55,14 @@ def values(robot: AnyRobot, state: State) -> Values:
 
 
 def scales(n_cables: int, weight: Array, z0: Array) -> dict[str, tuple[float, Array]]:
-    """Numbers over which slacks are taken; a quantity that has none is taken over its limit.
+    """Scales that make slacks dimensionless; the slack of a quantity that has none is relative to its limit.
 
     Args:
         weight: () N.
         z0: (...) m.
 
     Returns:
-        for each quantity a factor and a divisor: the weight a cable of tensions, z0 of depths.
+        by quantity, a factor and a divisor: of tensions n_cables and the weight, of depths 1 and z0.
     """
     return {"tension": (float(n_cables), weight), "depth": (1.0, z0)}
 
@@ -71,9 +71,9 @@ def slack(row: Limit, limit: Array, value: Array, scale: Mapping[str, tuple[floa
     """Slack of a limit: positive exactly while it is met, and free of units.
 
     Args:
-        limit: (...) its value.
+        limit: (...) value of the limit.
         value: (...) of the quantity.
-        scale: of `scales`.
+        scale: as `scales` returns it.
 
     Returns:
         (...).

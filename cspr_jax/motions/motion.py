@@ -1,10 +1,11 @@
-"""Motion of an effector: what every trajectory family gives, and what plans, margins, demands and files take.
+"""Motion of an effector: what every trajectory family provides, and what plans, margins, demands and files take.
 
 A motion is a pytree that holds its own amplitude function, number of arcs and depth of P0, so that it can be jitted,
 vmapped and differentiated. Normalised time tau runs from 0 to 1.
 """
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any, Generic, Protocol, TypeVar
 
 import jax
@@ -119,7 +120,7 @@ class Placed(Generic[Kind]):
 
 
 def inward(frame: Frame, state: State) -> State:
-    """State of the axes of a robot file in those of the kernels.
+    """State in the kernels' axes, from the axes of a robot file.
 
     Args:
         state: in the axes of the file; leaves (..., 3), (..., 4) or (..., 3, 3).
@@ -127,7 +128,7 @@ def inward(frame: Frame, state: State) -> State:
     Returns:
         the state, from the centroid of the spools, z down.
     """
-    # Turning is its own inverse.
+    # The rotation between the axes is its own inverse.
     place: Any = frame.inward(state.position)
     return outward(frame, state)._replace(position=place)
 
@@ -141,10 +142,7 @@ def outward(frame: Frame, state: State) -> State:
     Returns:
         the state.
     """
-    turned: dict[str, Any] = {"position": frame.outward(state.position)}
-    turned |= {name: frame.turned(getattr(state, name)) for name in ("velocity", "acceleration")}
-    if state.rotation is not None:
-        turned["quaternion"] = None if state.quaternion is None else frame.turned_quaternions(state.quaternion)
-        turned["rotation"] = frame.turned_tensor(state.rotation)
-        turned |= {name: frame.turned(getattr(state, name)) for name in ("angular_velocity", "angular_acceleration")}
-    return State(**turned)
+    vector, tensor, quaternion = frame.turned, frame.turned_tensor, frame.turned_quaternions
+    # In the order of the fields of a state; a point mass has no orientation.
+    changes: tuple[Callable[..., Any], ...] = (frame.outward, vector, vector, tensor, vector, vector, quaternion)
+    return State(*(value if value is None else change(value) for change, value in zip(changes, state, strict=True)))

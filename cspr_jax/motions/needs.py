@@ -1,4 +1,4 @@
-"""Needs of a motion, beside what is allowed: the worst instant of each criterion, in the units of its limit."""
+"""Needs of a motion, beside the allowed values: the worst instant of each criterion, in the units of its limit."""
 
 import dataclasses
 from functools import partial
@@ -27,10 +27,10 @@ BATCH = 512
 
 
 class Need(NamedTuple):
-    """Need of a motion at the instant at which it breaks a criterion by most, or comes nearest to it.
+    """Need of a motion at the instant at which it breaks a criterion most, or comes nearest to it.
 
     Fields:
-        criterion: the flag that says that it is broken.
+        criterion: flag that says that the criterion is broken.
         cables: numbers from 0 on: of one cable, of two that touch, or none.
         tau: the instant, normalised time.
         needed: what the motion has there, in `unit`.
@@ -49,7 +49,7 @@ class Need(NamedTuple):
 
 
 class _Criterion(NamedTuple):
-    # Over cables, or pairs of them: the flag, the cables of each value, what is allowed of each, the unit.
+    # A criterion over cables, or pairs of cables: its flag, the cables of each value, the allowed values, the unit.
     flag: Verdict
     cables: tuple[tuple[int, ...], ...]
     allowed: np.ndarray
@@ -89,7 +89,7 @@ def needs(problem: Problem, motion: Motion, samples: int) -> list[Need]:
 
 
 def _with_tensions(robot: AnyRobot, limits: Limits) -> Limits:
-    # Cables may not push where no smallest tension is given; redundant ones leave a choice.
+    # Without a smallest tension, cables may still not push. A motion does not determine tensions of redundant cables.
     if robot.n_cables > robot.dof:
         return dataclasses.replace(limits, tension_min=None, tension_max=None)
     if limits.tension_min is not None:

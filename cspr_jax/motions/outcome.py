@@ -36,5 +36,5 @@ class LegOutcome(abc.ABC):
         """Datasets that the outcome adds to a motion file.
 
         Returns:
-            by the names of `schema.motion_quantities.FLIGHT`.
+            by the names of `schema.quantities.FLIGHT`.
         """

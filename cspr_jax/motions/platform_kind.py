@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class PlatformMotionKind(NamedTuple):
-    """Kind of motions; known when a function is compiled.
+    """Kind of motions of a platform: a static argument of compiled functions.
 
     Fields:
         variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.

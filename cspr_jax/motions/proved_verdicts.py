@@ -13,7 +13,7 @@ class Verdicts:
         verdict: flags of `Verdict`; 0 if proved.
         margin: smallest slack of taut cables that is attained: of lines a distance from faces, m/s^2; of Bezier
             segments without a unit, the depth below the spools included.
-        bound: proved lower bound of it.
+        bound: proved lower bound of the margin.
         room: smallest slack of the limits, without a unit; inf without limits.
     """
 
@@ -22,21 +22,21 @@ class Verdicts:
     bound: np.ndarray
     room: np.ndarray
 
-    def replace(self, which: np.ndarray, part: "Verdicts") -> None:
-        """Put other verdicts in place of some.
+    def replace(self, rows: np.ndarray, part: "Verdicts") -> None:
+        """Replace the verdicts of some of the motions.
 
         Args:
-            which: numbers of the motions.
+            rows: numbers of the motions.
         """
         for name, values in vars(part).items():
-            getattr(self, name)[which] = values
+            getattr(self, name)[rows] = values
 
 
 def plain_slack(name: str, values: np.ndarray) -> np.ndarray:
     """Slack of a limit as it is shown.
 
     Args:
-        values: (...) as it is proved: of speeds 1 - (rate / limit)^2.
+        values: (...) slack as it is proved: of speeds 1 - (rate / limit)^2.
 
     Returns:
         (...) of speeds 1 - rate / limit.

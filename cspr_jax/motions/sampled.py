@@ -66,7 +66,7 @@ def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400)
 
 
 def _by_flag(slack_flags: tuple[Verdict, ...], slack: np.ndarray) -> list[tuple[Verdict, np.ndarray]]:
-    # The smallest slack of each flag, so that no flag is counted twice.
+    # Return the smallest slack of each flag, so that no flag is counted twice.
     return [
         (flag, slack[:, [slack_flag is flag for slack_flag in slack_flags]].min(1))
         for flag in dict.fromkeys(slack_flags)

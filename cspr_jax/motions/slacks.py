@@ -6,7 +6,7 @@ order, with n the number of cables, kappa_k the tension of cable k over its leng
     taut       kappa_k over its value at rest, of a point mass with the pseudotension; of a platform n z0 mu_k / g
     regular    of a platform: normalised determinant of the structure matrix over its value at rest
     below      depth of the mass centre below the spool plane over z0
-    limits     that are given, one for each cable, of the floor one: `motions.limits.slack`
+    limits     of each limit that is set, one slack for each cable, of the floor one: `motions.limits.slack`
 """
 
 import jax
@@ -75,9 +75,10 @@ def _of_platform(robot: PlatformRobot, state: State, z0: Array) -> list[Array]:
 
 
 def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array:
-    """Smallest slack at equidistant instants of a motion: positive says that no sample refutes it, and no more.
+    """Smallest slack at equidistant instants of a motion.
 
-    Its gradient is that of the smallest slack at the instant where it is smallest.
+    If it is positive, no sample refutes the motion, but nothing is proved. Its gradient is that of the smallest slack,
+    at the instant where it is smallest.
 
     Args:
         motion: from the centroid of the spools, z down.

@@ -1,4 +1,4 @@
-"""The plane in which the effector swings between two points, and how the ellipse of its swing turns in it."""
+"""The plane in which the effector swings between two points, and the precession of the ellipse of its swing in it."""
 
 import math
 
@@ -23,7 +23,8 @@ def swing_plane(v1: Array, v2: Array, size: Array, normal: Array, odd: Array) ->
     Args:
         v1: (3,) from p0 to the start, m.
         v2: (3,) from p0 to the end, m.
-        size: () of the robot, m: points nearer to p0 than `AT_P0` of it are p0, and nearer to a line through p0 on it.
+        size: () of the robot, m: a point nearer to p0 than `AT_P0` times it counts as p0; as near to a line through p0,
+            it counts as on that line.
         normal: (3,) of the spool plane.
         odd: () whether the number of arcs is odd.
 

@@ -1,7 +1,7 @@
-"""Largest multiple of an uncertainty that motions are proved to stand, with one that they do not.
+"""Largest multiple of an uncertainty that motions are proved to tolerate, and the smallest that is refuted.
 
-Blocks of a motion are proved for a multiple or halved (`uncertainty.holds`); a robot that breaks something in the
-middle of one bounds the multiple from above (`uncertainty.fails`).
+Blocks of a motion are proved for a multiple or halved (`uncertainty.holds`); a robot that breaks a criterion in the
+middle of a block bounds the multiple from above (`uncertainty.fails`).
 """
 
 import dataclasses
@@ -15,16 +15,16 @@ from cspr_jax.motions.enclosures import Enclosure, Influence, influence
 from cspr_jax.motions.uncertainty import Requirements, WorstDisplacements, fails, holds, worst
 from cspr_jax.schema.limits import LARGEST_MULTIPLE
 
-# Multiples that are tried first, one after the other; then they are divided, down to the first one or less.
+# `ROW` is tried first, in its order. A multiple that fails is then divided by `RATIO` while it fails, down to `FIRST`.
 RATIO, FIRST = 8.0, 1e-6
 ROW = (1.0, 8.0, 64.0, 512.0, LARGEST_MULTIPLE)
-# Ratio that the two multiples of an answer are to reach, and steps in which each is found.
+# Ratio that the proved and the refuted multiple are to reach, and bisections that find each.
 NEAR, STEPS = 0.99, 12
-# Largest number of times that a block is halved, and of blocks of an arc that may be open.
+# Most halvings of a block, and most open blocks of an arc.
 HALVINGS, OPEN = 14, 256
-# Factor of the wanted multiple where more blocks are open, and how often it is applied in a row.
+# Factor by which a target is lowered where more blocks are open, and how often it is applied in a row.
 LESS, LESSER = 0.95, 8
-# Levels of halving down to which a robot that fails is looked for where the bounds cannot hold.
+# Levels of halving at which a robot that fails is still looked for once the bounds cannot hold.
 MORE = 3
 
 
@@ -32,8 +32,8 @@ class Tolerated(NamedTuple):
     """Multiples of an uncertainty, of n motions.
 
     Fields:
-        proved: (n,) every robot within this multiple meets everything: proved; 0 where nothing is.
-        refuted: (n,) a robot within this multiple breaks something; infinite where none was found.
+        proved: (n,) every robot within this multiple is proved to meet all criteria; 0 where nothing is proved.
+        refuted: (n,) a robot within this multiple breaks a criterion; infinite where none was found.
     """
 
     proved: np.ndarray
@@ -42,114 +42,119 @@ class Tolerated(NamedTuple):
 
 @dataclasses.dataclass
 class _Open:
-    # Blocks that are looked at, and what is known of them.
+    # Blocks that are not settled, and what is known of them.
     blocks: Blocks
     known: Enclosure
-    found: Influence
+    influence: Influence
     worst: WorstDisplacements
-    asked: Requirements
+    requirements: Requirements
 
-    def some(self, rows: np.ndarray) -> "_Open":
+    def part(self, rows: np.ndarray) -> "_Open":
         worst = WorstDisplacements(*(x[:, rows] for x in self.worst))
-        requirements = dataclasses.replace(self.asked, slack=self.asked.slack[rows])
-        return _Open(self.blocks.some(rows), self.known.some(rows), self.found.some(rows), worst, requirements)
+        requirements = dataclasses.replace(self.requirements, slack=self.requirements.slack[rows])
+        return _Open(self.blocks.part(rows), self.known.part(rows), self.influence.part(rows), worst, requirements)
 
     def middles(self) -> "_Open":
         """The same, as if blocks had no length."""
-        return dataclasses.replace(self, known=self.known.middle(self.found.mu))
+        return dataclasses.replace(self, known=self.known.middle(self.influence.mu))
 
     def fail(self, multiple: np.ndarray) -> np.ndarray:
-        return fails(self.known, self.found, self.worst, self.asked, multiple)
+        return fails(self.known, self.influence, self.worst, self.requirements, multiple)
 
     def hold(self, multiple: np.ndarray) -> np.ndarray:
-        return holds(self.known, self.found, self.asked, multiple)
+        return holds(self.known, self.influence, self.requirements, multiple)
 
 
 def tolerated(
-    blocks: Blocks, arcs: np.ndarray, asked: Requirements, enclose: Callable[[Blocks], Enclosure], *, whole: bool = True
+    blocks: Blocks,
+    arcs: np.ndarray,
+    requirements: Requirements,
+    enclose: Callable[[Blocks], Enclosure],
+    *,
+    whole: bool = True,
 ) -> Tolerated:
-    """Multiples of an uncertainty that motions stand, and that they do not.
+    """Multiples of an uncertainty that motions tolerate, and that they do not.
 
     Args:
-        blocks: of n motions, whole motions, each feasible as it is planned.
+        blocks: of n whole motions, each feasible as planned.
         arcs: (n,) numbers of arcs.
-        enclose: what is known of blocks.
-        whole: whether the multiples are wanted as near to each other as can be; else only whether they are below 1.
+        enclose: gives the enclosure of blocks.
+        whole: True: find multiples as near to each other as can be; False: only decide on which side of 1 they lie.
 
     Returns:
         the multiples.
     """
     if not len(arcs):
         return Tolerated(np.zeros(0), np.zeros(0))
-    pool, search = _looked_at(blocks, asked, enclose), _MultipleSearch(arcs, whole=whole)
+    pool, search = _looked_at(blocks, requirements, enclose), _MultipleSearch(arcs, whole=whole)
     search.refuted = (
         _refuted_first(pool, len(arcs)) if whole else _refuted_below(pool, search.refuted, np.ones(len(arcs)))
     )
-    search.wanted = _targets(search.refuted, whole=whole)
+    search.targets = _targets(search.refuted, whole=whole)
     for level in range(HALVINGS + 1):
         pool = search.left(pool)
         is_open = search.open_blocks(pool, level)
         if not is_open.any():
             break
-        pool = _looked_at(pool.blocks.some(is_open).halves(), asked, enclose)
+        pool = _looked_at(pool.blocks.part(is_open).halves(), requirements, enclose)
         search.refute(pool)
     return Tolerated(search.proved, search.refuted)
 
 
 class _MultipleSearch:
-    # State of the search for n motions: multiples that are refuted, wanted and, where it is settled, proved.
+    # State of the search for n motions: refuted multiples, targets and, of motions that are settled, proved multiples.
 
     def __init__(self, arcs: np.ndarray, *, whole: bool) -> None:
         self._arcs, self._whole, self._count = arcs, whole, len(arcs)
-        self.refuted, self.wanted = np.full(len(arcs), np.inf), np.ones(len(arcs))
+        self.refuted, self.targets = np.full(len(arcs), np.inf), np.ones(len(arcs))
         self.proved, self._is_hopeless = np.full(len(arcs), np.nan), np.zeros(len(arcs), bool)
 
     def left(self, pool: _Open) -> _Open:
         # Return the blocks of motions that are not settled.
         if self._whole:
-            self.wanted = _reachable(pool, self.wanted)
-        self.proved = np.where(np.isnan(self.proved) & (self.wanted == 0.0), 0.0, self.proved)
-        return pool.some(np.isnan(self.proved)[pool.blocks.row])
+            self.targets = _reachable(pool, self.targets)
+        self.proved = np.where(np.isnan(self.proved) & (self.targets == 0.0), 0.0, self.proved)
+        return pool.part(np.isnan(self.proved)[pool.blocks.row])
 
     def open_blocks(self, pool: _Open, level: int) -> np.ndarray:
-        # Return the blocks that are to be halved; settle motions without any, and those of which too much is open.
+        # Return the blocks to be halved; settle motions without any, and motions with too many.
         row = pool.blocks.row
-        is_open = ~pool.hold(self.wanted[row])
+        is_open = ~pool.hold(self.targets[row])
         is_open = self._lessened(pool, is_open) if self._whole else self._hopeful(pool, is_open)
         many = np.bincount(row[is_open], minlength=self._count)
         ends = (many > OPEN * self._arcs) | ((many > 0) & (level == HALVINGS))
         ends |= self._is_hopeless & (many > 0) & (level >= MORE)
         left = is_open & ends[row]
         if left.any():
-            self.proved[ends] = _held(pool.some(left), self.wanted)[ends] if self._whole else 0.0
+            self.proved[ends] = _held(pool.part(left), self.targets)[ends] if self._whole else 0.0
         done = np.isnan(self.proved) & (many == 0)
-        self.proved[done] = np.where(self._is_hopeless, 0.0, self.wanted)[done]
+        self.proved[done] = np.where(self._is_hopeless, 0.0, self.targets)[done]
         return is_open & ~ends[row]
 
     def _lessened(self, pool: _Open, is_open: np.ndarray) -> np.ndarray:
-        # Less is wanted where too much is open.
+        # Lower the targets of motions of which too many blocks are open.
         row = pool.blocks.row
         for _ in range(LESSER):
             much = np.bincount(row[is_open], minlength=self._count) > OPEN * self._arcs
             if not much.any():
                 break
-            self.wanted = np.where(much, LESS * self.wanted, self.wanted)
+            self.targets = np.where(much, LESS * self.targets, self.targets)
             indices = np.flatnonzero(is_open & much[row])
-            is_open[indices] = ~pool.some(indices).hold(self.wanted[row[indices]])
+            is_open[indices] = ~pool.part(indices).hold(self.targets[row[indices]])
         return is_open
 
     def _hopeful(self, pool: _Open, is_open: np.ndarray) -> np.ndarray:
-        # If the middle of a block itself cannot hold, nothing is proved for the motion any more, and a robot that fails
-        # is looked for in such middles alone.
+        # Once the middle of a block cannot hold, nothing can be proved for its motion: only look for a robot that
+        # fails, in such middles.
         row = pool.blocks.row
-        is_bad = is_open & ~pool.middles().hold(self.wanted[row])
+        is_bad = is_open & ~pool.middles().hold(self.targets[row])
         self._is_hopeless |= _any(row, is_bad, self._count)
         return is_open & (is_bad | ~self._is_hopeless[row])
 
     def refute(self, pool: _Open) -> None:
         # Take in the multiples that the middles of new blocks refute.
-        self.refuted = _refuted_below(pool, self.refuted, NEAR * self.refuted if self._whole else self.wanted)
-        self.wanted = np.minimum(self.wanted, _targets(self.refuted, whole=self._whole))
+        self.refuted = _refuted_below(pool, self.refuted, NEAR * self.refuted if self._whole else self.targets)
+        self.targets = np.minimum(self.targets, _targets(self.refuted, whole=self._whole))
 
 
 def _reachable(pool: _Open, multiples: np.ndarray) -> np.ndarray:
@@ -158,7 +163,7 @@ def _reachable(pool: _Open, multiples: np.ndarray) -> np.ndarray:
     fails = ~middles.hold(multiples[row])
     if not fails.any():
         return multiples
-    failing = middles.some(fails)
+    failing = middles.part(fails)
     least = _held(failing, multiples)
     return np.where(least < multiples, _near(least), multiples)
 
@@ -190,21 +195,21 @@ def _refuted_first(pool: _Open, count: int) -> np.ndarray:
     # Find the least multiple of a coarse row that the middles refute, then narrow it down.
     high, row = np.full(count, np.inf), pool.blocks.row
     for multiple in ROW:
-        left = pool.some(np.isinf(high)[row])
+        left = pool.part(np.isinf(high)[row])
         broken = left.fail(np.full(len(left.blocks.row), multiple))
         high[_any(left.blocks.row, broken, count)] = multiple
-    bad = pool.some(np.isfinite(high)[row])
-    bad = bad.some(bad.fail(high[bad.blocks.row]))
+    bad = pool.part(np.isfinite(high)[row])
+    bad = bad.part(bad.fail(high[bad.blocks.row]))
     while len(bad.blocks.row):
         broken = bad.fail(high[bad.blocks.row] / RATIO)
         lower = _any(bad.blocks.row, broken, count) & (high > FIRST)
         high = np.where(lower, high / RATIO, high)
-        bad = bad.some(broken & lower[bad.blocks.row])
+        bad = bad.part(broken & lower[bad.blocks.row])
     return _narrowed(pool, high / RATIO, high)
 
 
 def _refuted_below(pool: _Open, refuted: np.ndarray, multiples: np.ndarray) -> np.ndarray:
-    # Return the least multiples that are refuted, with those of the wanted multiples that the blocks refute.
+    # Try the multiples on the blocks, narrow down those that they refute, and return the least refuted multiples.
     multiples = np.minimum(multiples, LARGEST_MULTIPLE)
     is_new = _any(pool.blocks.row, pool.fail(multiples[pool.blocks.row]), len(refuted)) & (multiples > 0.0)
     high = np.where(is_new, multiples, np.inf)
@@ -213,8 +218,8 @@ def _refuted_below(pool: _Open, refuted: np.ndarray, multiples: np.ndarray) -> n
 
 def _narrowed(pool: _Open, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     # Narrow `high`, which some middle refutes where it is finite, down towards `low`: some middle refutes it still.
-    pool = pool.some(np.isfinite(high)[pool.blocks.row])
-    pool = pool.some(pool.fail(high[pool.blocks.row]))
+    pool = pool.part(np.isfinite(high)[pool.blocks.row])
+    pool = pool.part(pool.fail(high[pool.blocks.row]))
     low, high = low.copy(), high.copy()
     for _ in range(STEPS):
         if not len(pool.blocks.row):
@@ -223,12 +228,12 @@ def _narrowed(pool: _Open, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         broken = pool.fail(middle[pool.blocks.row])
         lower = _any(pool.blocks.row, broken, len(high))
         low, high = np.where(lower, low, middle), np.where(lower, middle, high)
-        pool = pool.some(broken | ~lower[pool.blocks.row])
+        pool = pool.part(broken | ~lower[pool.blocks.row])
     return high
 
 
 def _held(left: _Open, multiples: np.ndarray) -> np.ndarray:
-    # Find the largest multiples that hold in all of some blocks, (n,); motions without any keep the wanted one.
+    # Find the largest multiple that holds in all blocks of each motion, (n,); motions without blocks keep theirs.
     row = left.blocks.row
     low, high = np.zeros(len(row)), multiples[row]
     for _ in range(STEPS):

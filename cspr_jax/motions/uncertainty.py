@@ -6,9 +6,9 @@ the tensions mu' of another robot differ from the planned ones mu at the same in
 
     |d| <= A |d| + B mu + b,    so |d| <= (1 - A)^-1 (B mu + b)  where the spectral radius of A = G + B is below 1,
 
-component by component: G_kj is |g_kj . the way of ray j| and |g_kj| times what the ray leaves its tangent, B_kj is
-|g_kj across ray j| times the largest displacement of spool j, b is what the mass centre does: docs/theory.md. Then no
-such robot is singular either.
+component by component. G_kj is |g_kj . the way of ray j| plus |g_kj| times the distance of the ray from its tangent,
+B_kj is |g_kj across ray j| times the largest displacement of spool j, and b is the effect of the mass centre:
+docs/theory.md. Then no such robot is singular either.
 """
 
 import dataclasses
@@ -26,9 +26,9 @@ from cspr_jax.robots.limits import Limits, Uncertainty
 TOLERANCE = 1e-6
 # Blocks of which nothing is known have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
-# Largest error of solving for a deviation, as a part of it, and of the tensions.
+# Largest relative error of solving for a deviation, and of the tensions.
 ROUNDING = 1e-9
-# Rounds in which functionals are corrected, and by how much more than is known to be needed.
+# Rounds in which functionals are corrected, and the relative surplus of each correction.
 ROUNDS, SPARE = 8, 0.01
 
 
@@ -38,7 +38,7 @@ class Requirements:
 
     Fields:
         mass: kg.
-        slack: tension per mass and length over the slack of a taut cable, g / (n z0), 1/s^2, one a motion (n,).
+        slack: tension per mass and length over the slack of a taut cable, g / (n z0), 1/s^2, (n,) for each motion.
         limits: the limits, NumPy.
         uncertainty: the uncertainty.
     """
@@ -69,7 +69,7 @@ def requirements_of(problem: Problem, slack: np.ndarray) -> Requirements:
 
 
 class _Share(NamedTuple):
-    # A multiple of an uncertainty, one a block: radii (k,) m, and the factor of the mass.
+    # A multiple of an uncertainty, one for each block: radii (k,) m, and the factor of the mass.
     spools: np.ndarray
     centre: np.ndarray
     factor: np.ndarray
@@ -85,10 +85,10 @@ def _share(requirements: Requirements, multiple: np.ndarray) -> _Share:
 
 
 class _Reaches(NamedTuple):
-    # By how much rays differ within k blocks and a multiple of the uncertainty: across ray j, at the planned length
-    # (k, n_cables); as parts of lengths from the middle; and what the mass centre does to each tension.
+    # Reach of k blocks and a multiple of the uncertainty, (k, n_cables) each: displacement of spools across rays, at
+    # planned lengths; motion of rays from the middle, over their lengths; effect of the mass centre on tensions.
     off: np.ndarray
-    turned: np.ndarray
+    tilt: np.ndarray
     centre: np.ndarray
 
 
@@ -112,17 +112,17 @@ def _changes(
     shape = (len(vectors), *(1,) * (vectors.ndim - 3), *known.bent.shape[1:])
     whole = np.linalg.norm(vectors, axis=-1)
     units = (known.rays / influence.lengths[..., None]).reshape(*shape, 3)
-    way, bent, off, turned = (
+    way, bent, off, tilt = (
         known.way.reshape(*shape, 3),
-        *(x.reshape(shape) for x in (known.bent, far.off, far.turned)),
+        *(x.reshape(shape) for x in (known.bent, far.off, far.tilt)),
     )
     along = np.sum(vectors * units, axis=-1)
     across = np.sqrt(np.maximum(whole**2 - along**2, 0.0))
-    return np.abs(np.sum(vectors * way, axis=-1)) + whole * bent, off * np.minimum(whole, across + whole * turned)
+    return np.abs(np.sum(vectors * way, axis=-1)) + whole * bent, off * np.minimum(whole, across + whole * tilt)
 
 
 @UNKNOWN
-def deviations(known: Enclosure, found: Influence, spools: np.ndarray, centre: np.ndarray) -> np.ndarray:
+def deviations(known: Enclosure, influence: Influence, spools: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Largest differences between tensions of robots and the planned ones, at the same instant of a block.
 
     Args:
@@ -130,10 +130,10 @@ def deviations(known: Enclosure, found: Influence, spools: np.ndarray, centre: n
         centre: (k,) likewise of the mass centre, m.
 
     Returns:
-        (k, n_cables) per mass and length, 1/s^2; infinite where nothing is known, also that no robot is singular.
+        (k, n_cables) per mass and length, 1/s^2; infinite where nothing is known, not even that no robot is singular.
     """
-    far = _reaches(known, found, spools, centre)
-    within, displaced = _changes(known, found, found.spools, far)
+    far = _reaches(known, influence, spools, centre)
+    within, displaced = _changes(known, influence, influence.spools, far)
     rest = (displaced @ known.high[..., None])[..., 0] + ROUNDING * known.high + far.centre
     return _solved(within + displaced, rest)
 
@@ -153,7 +153,7 @@ class Changes(NamedTuple):
 @UNKNOWN
 def closer_changes(
     known: Enclosure,
-    found: Influence,
+    influence: Influence,
     spools: np.ndarray,
     centre: np.ndarray,
     off: np.ndarray,
@@ -161,11 +161,11 @@ def closer_changes(
     *,
     upwards: bool,
 ) -> Changes:
-    """Largest changes of tensions, which are less as long as none is below its smallest value.
+    """Closer bounds of the changes of tensions, which hold as long as no tension falls below its smallest value.
 
-    On the way from the planned robot to another one, the first tension that comes to its smallest value finds all
-    others above theirs, all of them at least 0. With c_j the terms of row k of B, it has changed by no more than the
-    largest sum of c_j mu'_j that such tensions can have, its own of them known. That is at most y . w for every
+    Change the planned robot into another one little by little, until a first tension mu'_k reaches its smallest value.
+    All others are then above theirs, and at least 0. With c_j the terms of row k of B, mu'_k has changed by at most
+    the largest sum of c_j mu'_j over such tensions, in which mu'_k itself is known. That sum is at most y . w for every
     functional y of wrenches whose products with the columns of the other robot's W are at least c_j.
 
     Args:
@@ -175,15 +175,16 @@ def closer_changes(
         least: (k, n_cables) smallest tensions per mass and length, at least 0, 1/s^2.
 
     Returns:
-        the changes; infinite where they would lead below the smallest tensions, or nothing is known, or wanted.
+        the changes; infinite where they would lead below the smallest tensions, where nothing is known, and upwards
+        unless `upwards`.
     """
-    far = _reaches(known, found, spools, centre)
-    within, displaced = _changes(known, found, found.spools, far)
+    far = _reaches(known, influence, spools, centre)
+    within, displaced = _changes(known, influence, influence.spools, far)
     diagonal = np.eye(displaced.shape[1])[None] * displaced
     rest = np.sum(within * off[:, None], axis=2) + far.centre + ROUNDING * known.high
-    down = _largest_sum(known, found, displaced - diagonal, far) + rest + np.sum(diagonal, axis=2) * least
+    down = _largest_sum(known, influence, displaced - diagonal, far) + rest + np.sum(diagonal, axis=2) * least
     is_valid = (known.low - down > least).all(1)
-    up = _largest_sum(known, found, displaced, far) + rest if upwards else np.full_like(down, np.inf)
+    up = _largest_sum(known, influence, displaced, far) + rest if upwards else np.full_like(down, np.inf)
     return Changes(*(np.where(is_valid[:, None], x, np.inf) for x in (down, up)))
 
 
@@ -194,7 +195,7 @@ def _largest_sum(known: Enclosure, influence: Influence, weights: np.ndarray, fa
         functional = np.einsum("kij,kjlx->kilx", weights + more, influence.spools)
         moved, shifted = _changes(known, influence, functional, far)
         more, last = (moved + shifted) * (1.0 + SPARE) + ROUNDING * np.max(weights, axis=2, keepdims=True), more
-    # The last one was enough for the functional of the one before; it must be for its own.
+    # The last correction is enough for the functional of the round before; it must be enough for its own.
     functional = np.einsum("kij,kjlx->kilx", weights + last, influence.spools)
     moved, shifted = _changes(known, influence, functional, far)
     total = np.sum((weights + last) * (known.high + far.centre)[:, None] + moved * known.high[:, None], axis=2)
@@ -215,28 +216,29 @@ def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 @UNKNOWN
-def holds(known: Enclosure, found: Influence, asked: Requirements, multiple: np.ndarray) -> np.ndarray:
-    """Blocks in which every robot within a multiple of the uncertainty meets everything: proved.
+def holds(known: Enclosure, influence: Influence, requirements: Requirements, multiple: np.ndarray) -> np.ndarray:
+    """Prove that every robot within a multiple of the uncertainty meets all criteria within blocks.
 
     Args:
-        asked: its slack is that of each block, (k,).
+        requirements: its slack is that of each block, (k,).
         multiple: (k,).
 
     Returns:
         (k,).
     """
-    share = _share(asked, multiple)
+    share = _share(requirements, multiple)
     is_met = np.ones(len(multiple), bool)
-    if float(asked.uncertainty.spool_positions) > 0.0:
+    if float(requirements.uncertainty.spool_positions) > 0.0:
         is_met &= known.distances.hold(share.spools)
-        is_met &= rates_hold(known, found, asked.limits, share.spools)
-    off = deviations(known, found, share.spools, share.centre)
-    is_taut = _tensions_hold(known, found, asked, share, Changes(off, off))
+        is_met &= rates_hold(known, influence, requirements.limits, share.spools)
+    off = deviations(known, influence, share.spools, share.centre)
+    is_taut = _tensions_hold(known, influence, requirements, share, Changes(off, off))
     again = np.flatnonzero(is_met & ~is_taut & np.isfinite(off).all(1))
     if len(again):
-        part = known.some(again), found.some(again)
-        part_share, less = _Share(*(x[again] for x in share)), dataclasses.replace(asked, slack=asked.slack[again])
-        upwards = asked.limits.tension_max is not None
+        part = known.part(again), influence.part(again)
+        part_share = _Share(*(x[again] for x in share))
+        less = dataclasses.replace(requirements, slack=requirements.slack[again])
+        upwards = requirements.limits.tension_max is not None
         closer = closer_changes(
             *part, part_share.spools, part_share.centre, off[again], _least(*part, less, part_share), upwards=upwards
         )
@@ -275,12 +277,12 @@ def _unit(requirements: Requirements) -> np.ndarray:
 
 
 class WorstDisplacements(NamedTuple):
-    """Robots that are worst to first order in the middles of k blocks, per displacement.
+    """Unit displacements that are worst, to first order, in the middles of k blocks.
 
     Fields:
-        spools: (1 or 2, k, n_cables, 3) unit displacements: of the cable that falls slack first and, where a largest
-            tension is given, of the one that comes to it first.
-        centre: (1 or 2, k, 3) likewise.
+        spools: (1 or 2, k, n_cables, 3) of the spools: worst for the cable that falls slack first and, where a largest
+            tension is given, for the cable that reaches it first.
+        centre: (1 or 2, k, 3) of the mass centre, likewise.
     """
 
     spools: np.ndarray
@@ -288,55 +290,55 @@ class WorstDisplacements(NamedTuple):
 
 
 @UNKNOWN
-def worst(known: Enclosure, found: Influence, asked: Requirements) -> WorstDisplacements:
-    """Robots that are worst to first order.
+def worst(known: Enclosure, influence: Influence, requirements: Requirements) -> WorstDisplacements:
+    """Displacements that are worst to first order.
 
     Returns:
         the displacements.
     """
-    uncertainty, rows = asked.uncertainty, np.arange(len(found.mu))
-    size = np.sum(np.linalg.norm(found.across, axis=3) * np.abs(found.mu)[:, None], axis=2)
+    uncertainty, rows = requirements.uncertainty, np.arange(len(influence.mu))
+    size = np.sum(np.linalg.norm(influence.across, axis=3) * np.abs(influence.mu)[:, None], axis=2)
     change = float(uncertainty.spool_positions) * size
-    change += float(uncertainty.mass_centre) * np.linalg.norm(found.centre, axis=2)
-    limits, pull = asked.limits, asked.mass * found.lengths
+    change += float(uncertainty.mass_centre) * np.linalg.norm(influence.centre, axis=2)
+    limits, pull = requirements.limits, requirements.mass * influence.lengths
     low = 0.0 if limits.tension_min is None else limits.tension_min / pull
-    rooms = [(found.mu - low, 1.0)]
+    rooms = [(influence.mu - low, 1.0)]
     if limits.tension_max is not None:
-        rooms.append((np.asarray(limits.tension_max) / pull - found.mu, -1.0))
+        rooms.append((np.asarray(limits.tension_max) / pull - influence.mu, -1.0))
     spools, centre = [], []
     for room, sign in rooms:
         cable = np.argmin(np.nan_to_num(room / change, nan=np.inf), axis=1)
-        spools.append(sign * unit_vectors(found.across[rows, cable] * np.sign(found.mu)[..., None]))
-        centre.append(-sign * unit_vectors(found.centre[rows, cable]))
+        spools.append(sign * unit_vectors(influence.across[rows, cable] * np.sign(influence.mu)[..., None]))
+        centre.append(-sign * unit_vectors(influence.centre[rows, cable]))
     return WorstDisplacements(np.stack(spools), np.stack(centre))
 
 
 @UNKNOWN
 def fails(
-    known: Enclosure, found: Influence, worst: WorstDisplacements, asked: Requirements, multiple: np.ndarray
+    known: Enclosure, influence: Influence, worst: WorstDisplacements, requirements: Requirements, multiple: np.ndarray
 ) -> np.ndarray:
-    """Blocks in whose middles one of the worst robots within a multiple of the uncertainty breaks something.
+    """Tell whether a worst robot within a multiple of the uncertainty breaks a criterion in the middle of each block.
 
     Args:
-        asked: its slack is that of each block, (k,).
+        requirements: its slack is that of each block, (k,).
         multiple: (k,).
 
     Returns:
         (k,).
     """
-    share, limits = _share(asked, multiple), asked.limits
+    share, limits = _share(requirements, multiple), requirements.limits
     broken = np.zeros(len(multiple), bool)
     for spools, centre in zip(*worst, strict=True):
         mu, lengths = tensions(known, share.spools[:, None, None] * spools, share.centre[:, None] * centre)
-        broken |= (mu < -TOLERANCE * asked.slack[:, None]).any(1)
-        pull, unit = asked.mass * mu * lengths, _unit(asked)[:, None]
+        broken |= (mu < -TOLERANCE * requirements.slack[:, None]).any(1)
+        pull, unit = requirements.mass * mu * lengths, _unit(requirements)[:, None]
         if limits.tension_min is not None:
             broken |= (pull / share.factor[:, None] < limits.tension_min - unit).any(1)
         if limits.tension_max is not None:
             broken |= (pull * share.factor[:, None] > limits.tension_max * (1.0 + TOUCHED) + unit).any(1)
-    if float(asked.uncertainty.spool_positions) > 0.0:
+    if float(requirements.uncertainty.spool_positions) > 0.0:
         broken |= known.distances.fail(share.spools)
-        broken |= rates_fail(known, found, limits, share.spools)
+        broken |= rates_fail(known, influence, limits, share.spools)
     return broken
 
 
@@ -348,7 +350,7 @@ def tensions(known: Enclosure, spools: np.ndarray, centre: np.ndarray) -> tuple[
         centre: (k, 3) of the mass centre, m.
 
     Returns:
-        (k, n_cables) per mass and length of the other robot, 1/s^2; these lengths, m.
+        (k, n_cables) tensions per mass and length, 1/s^2, and lengths of the cables, m, of the other robots.
     """
     rays, is_platform = known.rays - spools, bool(known.arms.any())
     extra = np.einsum("kij,kj->ki", known.whirl, centre)

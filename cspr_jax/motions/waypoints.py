@@ -22,8 +22,8 @@ class Waypoints:
         path: of the plan, named in errors.
         frame: of the robot.
         family: name of the family that joins them.
-        first: number of the first of them among the poses of the plan.
-        last: number of the last of them.
+        first: number of their first pose among those of the plan.
+        last: number of their last pose.
     """
 
     robot_file: RobotFile
@@ -65,7 +65,7 @@ class Waypoints:
         return f"pose[{self.first + i}]"
 
     def points(self, z0) -> np.ndarray:
-        """Places of the poses; those at rest are P0.
+        """Places of the poses; poses at rest are in P0.
 
         Args:
             z0: (...) m.

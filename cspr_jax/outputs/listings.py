@@ -10,8 +10,7 @@ from cspr_jax.config.catalogue import FAULTS, catalogue_keys, catalogue_names
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.motion_quantities import FLIGHT, SEGMENTS, TRAJECTORY
-from cspr_jax.schema.quantities import AXES, QUANTITIES
+from cspr_jax.schema.quantities import AXES, FLIGHT, QUANTITIES, SEGMENTS, TRAJECTORY
 
 PLACEHOLDER = "placeholder"
 

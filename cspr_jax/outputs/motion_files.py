@@ -23,7 +23,7 @@ from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
 from cspr_jax.schema.identity import canonical_json
-from cspr_jax.schema.motion_quantities import (
+from cspr_jax.schema.quantities import (
     ACROSS,
     FLIGHT,
     FLIGHT_DIMS,
@@ -31,8 +31,8 @@ from cspr_jax.schema.motion_quantities import (
     SEGMENTS,
     TRAJECTORY,
     columns_of,
+    flag_attributes,
 )
-from cspr_jax.schema.quantities import flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish

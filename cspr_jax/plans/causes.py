@@ -89,7 +89,7 @@ def cause_columns(each: Sequence[tuple[Cause, ...]]) -> dict[str, np.ndarray]:
         each: causes of n segments, the worst one first.
 
     Returns:
-        (n,) by the names of `schema.motion_quantities.SEGMENTS`.
+        (n,) by the names of `schema.quantities.SEGMENTS`.
     """
     worst = [segment_causes[0] if segment_causes else Cause("feasible") for segment_causes in each]
     return {

@@ -49,14 +49,14 @@ class Swing(NamedTuple):
         acceleration: m/s^2.
         turn: rows of the rotation matrix.
         squared_speed: of the rotation, (n,) rad^2/s^2.
-        spin: angular acceleration about the axis, (n,) rad/s^2.
+        angular_acceleration: about the axis, (n,) rad/s^2.
     """
 
     position: Vector
     acceleration: Vector
     turn: Matrix
     squared_speed: Array
-    spin: Array
+    angular_acceleration: Array
 
 
 def swings(segments: PlatformSegment) -> Swings:

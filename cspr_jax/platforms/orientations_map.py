@@ -7,9 +7,8 @@ import numpy as np
 from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.platforms.accessible import accessible
 from cspr_jax.platforms.places_map import DIGITS, AttainabilityMap
-from cspr_jax.schema.axes import TILT_TORSION
 from cspr_jax.schema.map_kinds import MAP_KINDS
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.quantities import QUANTITIES, TILT_TORSION
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 # These quantities have no value where nothing is accessible.

@@ -129,7 +129,7 @@ class PlaceCertifier:
             is_clear = np.asarray(bounds.clear) > touch
             doubtful = np.flatnonzero(~is_clear)
             if level >= NEAR_CONTACT and len(doubtful):
-                doubtful_blocks = part.some(doubtful)
+                doubtful_blocks = part.part(doubtful)
                 cables = self._cables(doubtful_blocks, np.asarray(bounds.bends)[:, doubtful], (segments, arcs))
                 base, between = np.asarray(self._problem.robot.base_points), doubtful_blocks.instants(MIDDLES[:, None])
                 for flag, step in (

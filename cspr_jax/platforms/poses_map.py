@@ -14,7 +14,7 @@ from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.platforms.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
 from cspr_jax.robots.reference_pose import reference_pose
-from cspr_jax.schema.axes import TILT_TORSION
+from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
 
 

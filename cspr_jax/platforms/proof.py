@@ -137,7 +137,7 @@ class Certifier:
             open_ones = np.flatnonzero(_rounding_matters(bounds) & ~(bounds.bound > TOLERANCE).all(0))
             if not len(open_ones):
                 break
-            better = self.bounds(k, blocks.some(open_ones), motions, margins=margins, least=not margins)
+            better = self.bounds(k, blocks.part(open_ones), motions, margins=margins, least=not margins)
             # Replace values of nodes too: where such cables are in one plane they are rounding, and could refute.
             surer = better.rounding < bounds.rounding[open_ones]
             bounds.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
@@ -186,7 +186,7 @@ class Certifier:
         low, high = np.full((count, CABLES), -np.inf), np.full((count, CABLES), np.inf)
         remaining = np.arange(count)
         for k, order in enumerate(self._orders):
-            problem, items = self._items(k, blocks.some(remaining), motions)
+            problem, items = self._items(k, blocks.part(remaining), motions)
             kernel = partial(tension_ranges, problem._replace(limits=Limits()), np.ones(()), kind=self._kind)
             bounds = in_batches(kernel, items, size=self._batch, axis=-1)
             index = np.ix_(remaining, np.array(order.cables))

@@ -76,7 +76,7 @@ class WorkList:
             is_open &= ~self.is_stuck[blocks.row]
             if not is_open.any():
                 break
-            blocks = blocks.some(is_open)
+            blocks = blocks.part(is_open)
             for _ in range(more):
                 blocks = blocks.halves()
             halved += more

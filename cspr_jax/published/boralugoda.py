@@ -76,7 +76,7 @@ def table_4_1() -> dict[Key, float | None]:
     """All solutions of (28) and (29) for T and p.
 
     Returns:
-        cells; of imaginary solutions the imaginary parts.
+        cells; for imaginary solutions the imaginary parts.
     """
     (b, m), (low, slope), _ = _active()
     brake = -(low + slope)
@@ -134,7 +134,7 @@ def table_4_3() -> dict[Key, float | None]:
 
 
 def _passed(upper: PublishedLine, lower: PublishedLine, largest: float) -> tuple[np.ndarray, np.ndarray]:
-    # Return for each duration and p by how much s'' is above its boundary at most, and from p on below the other.
+    # Return for each duration and p how far s'' passes its upper boundary at most, and from p on its lower one.
     time, p = (grid.ravel() for grid in np.meshgrid(TIMES, PERIODS, indexing="ij"))
     laws = jax.tree.map(np.asarray, _laws(jnp.asarray(p / time)))
     edges = np.concatenate([np.zeros_like(time)[:, None], laws.knots, np.ones_like(time)[:, None]], axis=1)
@@ -156,8 +156,8 @@ def _passed(upper: PublishedLine, lower: PublishedLine, largest: float) -> tuple
 def _largest(curve: np.ndarray, spans: np.ndarray) -> np.ndarray:
     # Return the largest values of cubics without a square, (4, n, n_pieces), over their spans, (2, n, n_pieces).
     square = -curve[1] / np.where(curve[3] != 0.0, 3.0 * curve[3], np.inf)
-    turn = np.sqrt(np.maximum(square, 0.0))
-    places = np.clip(np.stack([spans[0], spans[1], turn, -turn]), spans[0], spans[1])
+    stationary = np.sqrt(np.maximum(square, 0.0))
+    places = np.clip(np.stack([spans[0], spans[1], stationary, -stationary]), spans[0], spans[1])
     return (curve[0] + places * (curve[1] + places**2 * curve[3])).max(0)
 
 

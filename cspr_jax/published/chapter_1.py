@@ -22,7 +22,7 @@ from cspr_jax.swings.envelope_oscillations import (
 )
 from cspr_jax.swings.transition import transition, weights
 
-Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one
+Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one reading
 DISTANCE = 4.0  # of Table 1.1, in radii of the spools
 _READINGS = {"w_max = 5 sqrt(3)": 5.0 * math.sqrt(3.0), "w_max = 10": 10.0}
 

@@ -49,9 +49,9 @@ class TableSettings:
     Fields:
         definitions: of the accessible set, of `platforms.accessible.DEFINITIONS`.
         amplitudes: of `AMPLITUDES`.
-        finer: how many times as fine the step is as pi / 32.
+        finer: factor by which the step is finer than pi / 32.
         max_arcs: largest number of arcs tried.
-        values: of beta-hat tried at each orientation.
+        values: number of values of beta-hat tried at each orientation.
     """
 
     definitions: tuple[str, ...] = ("scan",)
@@ -104,37 +104,45 @@ def attained(
 
     Args:
         checker: of `checker_of`.
-        sets: of each set its place (3,), m, and its orientations (n, 3): tilt and torsion in the cylindrical frame,
+        sets: for each set its place (3,), m, and its orientations (n, 3): tilt and torsion in the cylindrical frame,
             rad.
         choice: largest number of arcs, and number of values of beta-hat.
         tried: which of these values, as for `platforms.attainable.attained`.
 
     Returns:
-        (n,) of each.
+        (n,) of each set, whether each orientation is attained.
     """
     sizes = [len(angles) for _, angles in sets]
     places = np.repeat([place for place, _ in sets], sizes, axis=0)
     symmetry = symmetries(checker.problem.robot)
     orientations = np.concatenate([angles for _, angles in sets])
     z0 = places[:, 2]
-    how = {"max_arcs": choice.max_arcs, "values": choice.values}
-    good = attainable.attained(checker, places, orientations, z0, tried=tried, symmetry=symmetry, **how)
+    good = attainable.attained(
+        checker,
+        places,
+        orientations,
+        z0,
+        tried=tried,
+        symmetry=symmetry,
+        max_arcs=choice.max_arcs,
+        values=choice.values,
+    )
     return np.split(good, np.cumsum(sizes)[:-1])
 
 
-def accessible_there(amplitude: str, definition: str, asked: list[tuple[np.ndarray, int]]) -> list[Accessible]:
+def accessible_there(amplitude: str, definition: str, grids: list[tuple[np.ndarray, int]]) -> list[Accessible]:
     """Accessible orientations of places, in whichever process.
 
     Args:
         amplitude: key of `AMPLITUDES`.
         definition: of `platforms.accessible.DEFINITIONS`.
-        asked: of each its place (3,), m, and its divisions of pi.
+        grids: for each set its place (3,), m, and its divisions of pi.
 
     Returns:
         the orientations of each.
     """
     with double_precision():
-        return accessible_sets(checker_of(amplitude).problem.robot, asked, definition)
+        return accessible_sets(checker_of(amplitude).problem.robot, grids, definition)
 
 
 def attained_there(
@@ -164,7 +172,7 @@ def sizes(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
         sets: as for `attained`.
 
     Returns:
-        one number a set.
+        one number for each set.
     """
     return [len(angles) for _, angles in sets]
 

@@ -21,7 +21,7 @@ from cspr_jax.workspaces.geometry import mass_centres
 from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, STATIC, Requirement, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# Poses of which linear programs and least squares are asked as well, evenly over the grid.
+# Poses that linear programs and least squares decide as well, evenly over the grid.
 SAMPLE = 60
 MICRO = 1e6
 
@@ -48,8 +48,8 @@ def _product(*axes: np.ndarray) -> np.ndarray:
     return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
 
 
-def _turns(angles: np.ndarray) -> np.ndarray:
-    # As CASPR has them: R = Rx Ry Rz.
+def _quaternions(angles: np.ndarray) -> np.ndarray:
+    # In the convention of CASPR: R = Rx Ry Rz.
     return Rotation.from_euler("XYZ", angles).as_quat(scalar_first=True)
 
 
@@ -57,21 +57,23 @@ def grids() -> list[PoseGrid]:
     """The studies.
 
     Returns:
-        one a row of the table.
+        one for each row of the table.
     """
     level = _product(np.linspace(-4.0, 4.0, 81), np.linspace(-3.0, 3.0, 61), np.array([2.0, 3.0, 4.0]))
-    turned = np.repeat(_turns(np.deg2rad([[30.0, -30.0, 5.0]])), len(level), axis=0)
+    tilted = np.repeat(_quaternions(np.deg2rad([[30.0, -30.0, 5.0]])), len(level), axis=0)
     studies = [
-        PoseGrid(f"{name}, closure", robot, CLOSURE, level, turned)
+        PoseGrid(f"{name}, closure", robot, CLOSURE, level, tilted)
         for name, robot in (("IPAnema 2", "ipanema-2"), ("IPAnema 2, set IROS 2016", "ipanema-2-iros"))
     ]
     ends, steps = np.array([2.0, 1.5, 1.0, 0.5, 0.5, 0.1]), (11, 11, 11, 5, 5, 3)
     poses = _product(*[np.linspace(-end, end, count) for end, count in zip(ends, steps, strict=True)])
     poses[:, 2] += 1.0
     for condition in (FEASIBLE, STATIC, CLOSURE):
-        studies.append(PoseGrid(f"IPAnema 1, {condition}", "ipanema-1", condition, poses[:, :3], _turns(poses[:, 3:])))
+        studies.append(
+            PoseGrid(f"IPAnema 1, {condition}", "ipanema-1", condition, poses[:, :3], _quaternions(poses[:, 3:]))
+        )
     cube = _product(np.linspace(-6.0, 6.0, 10), np.linspace(-4.0, 4.0, 10), np.linspace(0.0, 4.0, 10))
-    still = np.repeat(_turns(np.zeros((1, 3))), len(cube), axis=0)
+    still = np.repeat(_quaternions(np.zeros((1, 3))), len(cube), axis=0)
     studies += [PoseGrid(f"CoGiRo, {condition}", "cogiro", condition, cube, still) for condition in (FEASIBLE, STATIC)]
     return studies
 
@@ -96,16 +98,16 @@ def _row(grid: PoseGrid) -> dict[str, float]:
     robot = load_robot(grid.robot)
     centred_robot, frame = centred(robot)
     demand = requirement(centred_robot, grid.condition, robot.limits if grid.condition == FEASIBLE else Limits())
-    turns = frame.turned_quaternions(grid.quaternions)
-    places = mass_centres(centred_robot, np.asarray(frame.inward(grid.positions)), turns)
+    quaternions = frame.turned_quaternions(grid.quaternions)
+    places = mass_centres(centred_robot, np.asarray(frame.inward(grid.positions)), quaternions)
     start = time.perf_counter()
     search = WorkspaceSearch(centred_robot, demand)
-    answers = search(places, turns)
+    answers = search(places, quaternions)
     count, seconds = len(places), time.perf_counter() - start
     sample = np.linspace(0, count - 1, min(SAMPLE, count)).astype(int)
-    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places[sample], turns[sample]))
+    matrices = np.asarray(geometry.wrench_matrices(centred_robot, places[sample], quaternions[sample]))
     matrices = matrices / search.unit[:, None]
-    wrench = search.required(places[0], turns[0]).corners[0]
+    wrench = search.required(places[0], quaternions[0]).corners[0]
     limits = (None, None) if grid.condition == CLOSURE else (demand.low, demand.high)
     inside, clear = answers.verdict[sample] == 0, np.abs(answers.margin[sample]) > CLOSE * _size(demand)
     numbers = {

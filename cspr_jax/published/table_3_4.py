@@ -39,12 +39,12 @@ def smallest_proportions(
     Other values of beta-hat than the preferred one are tried only at places that could have the smallest one.
 
     Args:
-        attained: gives those of sets that some values of beta-hat attain, as `chapter_3.attained` does.
+        attained: tells which orientations of sets some values of beta-hat attain, as `chapter_3.attained` does.
         annuli: sets of the places of each, as there.
         values: of beta-hat that there are.
 
     Returns:
-        a part an annulus.
+        one proportion for each annulus.
     """
     preferred, likely, rest = attainable.turns(values)
     sets = [one for annulus in annuli for one in annulus]
@@ -52,7 +52,7 @@ def smallest_proportions(
     good = attained(sets, preferred)
     shares = np.array([mask.mean() for mask in good])
     smallest = np.ones(len(annuli))
-    # All values are tried at the place of each annulus with the smallest share so far; then, turn by turn, where less
+    # All values are tried at the place of each annulus with the smallest share so far; then, round by round, where less
     # is attained than there. All annuli go together, so that no process waits for the end of one.
     all_sets, rising = np.arange(len(sets)), np.argsort(shares, kind="stable")
     only = rising[np.unique(owner[rising], return_index=True)[1]]

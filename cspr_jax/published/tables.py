@@ -25,10 +25,10 @@ class TableSource:
     Fields:
         title: of the table, with its source.
         published: known cells as printed, by row, column and variant.
-        compute: () -> computed cells, by row, column and variant; of a `TableSettings`, where there is one.
-        with_choice: whether there is one, of definitions, amplitude functions and step; `compute` takes a number of
-            processes, too, then.
-        by_processes: whether several compute it where nobody says how many.
+        compute: () -> computed cells, by row, column and variant; with a choice, from a `TableSettings` and a number of
+            processes.
+        with_choice: whether there is a choice of definitions, amplitude functions and step.
+        by_processes: whether several processes compute it where the user gives no number.
         transposed: whether the source prints these rows as columns.
         heads: names of rows and columns that mean something else in this source than in the others.
     """
@@ -61,7 +61,7 @@ _PUBLISHED_2_1 = {
     "6": ("0.5425", "6", "7.85"),
 }
 
-# In tables p is the number of arcs; what the S-model calls p, a time, is named.
+# In tables p is the number of arcs; the time that the S-model calls p has a name.
 ACCELERATION = {"p": "acceleration (s)"}
 TABLES = {
     "1.1": TableSource(
@@ -138,8 +138,8 @@ def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1
 
     Args:
         name: one of `TABLES`.
-        choice: for those that have one; None: the usual one.
-        workers: processes, for those that have a choice.
+        choice: for tables that have one; None: the usual one.
+        workers: number of processes, for tables that have a choice.
 
     Returns:
         its cells, row by row.
@@ -183,11 +183,11 @@ def table_for_people(name: str, cells: list[Cell]) -> Any:
     return grid(TABLES[name].title, cells, transposed=TABLES[name].transposed, heads=TABLES[name].heads)
 
 
-def chosen(name: str, given: dict[str, Any]) -> TableSettings | None:
+def chosen(name: str, options: dict[str, Any]) -> TableSettings | None:
     """Settings of a table, from the options of the command line.
 
     Args:
-        given: values of --definition, --amplitude, --fine, --max-arcs, --values and --workers, None where absent.
+        options: values of --definition, --amplitude, --fine, --max-arcs, --values and --workers, None where absent.
 
     Returns:
         the choice; None for a table that has none.
@@ -196,14 +196,14 @@ def chosen(name: str, given: dict[str, Any]) -> TableSettings | None:
         ConfigError: an option given with such a table, or a value that it does not have.
     """
     if not TABLES[name].with_choice:
-        for option, value in given.items():
+        for option, value in options.items():
             if value is not None:
                 raise ConfigError(option, f"must be absent with table {name}")
         return None
     usual = TableSettings()
 
     def values_of(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
-        value, known = given[option], tuple(names)
+        value, known = options[option], tuple(names)
         if value not in (None, "all", *known):
             raise ConfigError(option, f"{shown(value)}: must be one of {', '.join(known)}, all")
         return otherwise if value is None else known if value == "all" else (value,)
@@ -211,9 +211,9 @@ def chosen(name: str, given: dict[str, Any]) -> TableSettings | None:
     return TableSettings(
         values_of("--definition", chapter_3.DEFINITIONS, usual.definitions),
         values_of("--amplitude", chapter_3.AMPLITUDES, usual.amplitudes),
-        2 if given["--fine"] else 1,
-        _count("--max-arcs", given["--max-arcs"], usual.max_arcs, LARGEST_ARCS),
-        _count("--values", given["--values"], usual.values, LARGEST_VALUES),
+        2 if options["--fine"] else 1,
+        _count("--max-arcs", options["--max-arcs"], usual.max_arcs, LARGEST_ARCS),
+        _count("--values", options["--values"], usual.values, LARGEST_VALUES),
     )
 
 

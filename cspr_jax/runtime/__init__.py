@@ -1,1 +1,1 @@
-"""Processes: XLA's settings, compiled code, workers, what is being done, and how it is shown."""
+"""Processes: XLA's settings, compiled code, workers, stages of the work, and how they are shown."""

@@ -2,7 +2,7 @@
 
 jax writes an entry straight to its name, and never again: a run that is killed then would leave half an entry for ever.
 So each run has a folder of its own, with links to all whole entries (copies, where the disk has no links), and hands
-its new ones over when it ends. What is kept bears a checksum in its name: an entry that was damaged is removed before
+its new ones over when it ends. Kept entries bear a checksum in their names: an entry that was damaged is removed before
 jax sees it. Entries are code that is executed: a folder in which others can place some is refused.
 """
 
@@ -30,14 +30,14 @@ MAX_SIZE = "JAX_COMPILATION_CACHE_MAX_SIZE"
 _ENTRY, _USED = "-cache", "-atime"
 _OWN, _MARK = "run", "~"
 _TROUBLE = re.compile(r"Error (reading|writing) persistent compilation cache entry")
-# The list holds the callable that hands over the entries of this process, once.
+# This list holds the function that hands over the entries of this process, if there is one.
 _pending: list[Callable[[], None]] = []
 # Whatever the umask says, others write into none of our folders.
 PRIVATE = 0o700
 
 
 def opened(folder: Path, warn: Callable[[str], None]) -> Path:
-    """The folder of this run, with all that is known; what it adds is handed over at the end of the process.
+    """The folder of this run, with all entries so far; its new entries are handed over at the end of the process.
 
     Args:
         warn: called with a line for people, once, where something there is damaged or nothing can be written.
@@ -54,7 +54,7 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
     check_owner(folder)
     whole.mkdir(mode=PRIVATE, exist_ok=True)
     check_owner(whole)
-    _sweep(folder)
+    _remove_leftovers(folder)
     shutil.rmtree(run_folder, ignore_errors=True)  # of a process of the same number
     run_folder.mkdir(mode=PRIVATE)
     damaged = _take(whole, run_folder)
@@ -131,7 +131,7 @@ def largest_size() -> int:
 
 
 def _take(whole: Path, run_folder: Path) -> int:
-    # Entries into the folder of this run; the number of damaged ones, which are removed.
+    # Bring entries into the folder of this run; return the number of damaged ones, which are removed.
     damaged, is_bounded = 0, largest_size() >= 0
     for entry in whole.iterdir():
         name, _, checksum = entry.name.rpartition(_MARK)
@@ -168,7 +168,7 @@ def _place(entry: Path, data: bytes, target: Path) -> None:
 
 @atexit.register
 def hand_over() -> None:
-    """Hand over what this process has compiled; later calls do nothing."""
+    """Hand over the code that this process has compiled; later calls do nothing."""
     while _pending:
         _pending.pop()()
 
@@ -246,7 +246,7 @@ def _is_whole_zstd(zstd, data: bytes) -> bool:
     return bool(reader.eof)
 
 
-def _sweep(folder: Path) -> None:
+def _remove_leftovers(folder: Path) -> None:
     # Runs of this machine that were killed have left these folders behind.
     for place in folder.glob(f"{_OWN}-{socket.gethostname()}-*"):
         process = place.name.rpartition("-")[2]

@@ -1,7 +1,7 @@
-"""Worker processes of this machine: each computes on its share of the cores, and none outlives who started it.
+"""Worker processes of this machine: each computes on its share of the cores, and none outlives its parent.
 
-Threads of one process do what is outside of XLA one after the other, and XLA's own wait for work in loops: where much
-is outside, as many processes as cores, each with one thread, do more.
+Threads of one process run work outside of XLA one after the other, while XLA's own threads wait in loops: if much of
+the work is outside of XLA, one process for each core, with one thread, is faster.
 """
 
 import concurrent.futures
@@ -21,34 +21,34 @@ from cspr_jax.errors import ConfigError, ResourceError
 from cspr_jax.runtime.surroundings import check_threads_of_jax
 
 SAFE_PATH = "PYTHONSAFEPATH"
-# So many workers at most; and where nobody says how many, since each takes a GB.
+# Most workers; and most where the user does not say how many, since each takes a GB.
 LARGEST, MOST = 256, 8
-GROUPS = 6  # for each worker: who is done first takes another
+GROUPS = 6  # for each worker: the first one that is done takes another
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
 
 
 def check_count(count: int | None) -> None:
-    """Refuse a number of workers that cannot be.
+    """Refuse an impossible number of workers.
 
     Args:
         count: the number; None: the usual one.
 
     Raises:
-        ConfigError: it is none, or too many.
+        ConfigError: it is below 1, or too large.
     """
     if count is not None and not (isinstance(count, int) and 1 <= count <= LARGEST):
         raise ConfigError("--workers", f"{count}: must be an integer from 1 to {LARGEST}")
 
 
 def usual_count(parts: int) -> int:
-    """Number of processes for work that gains by them, where nobody says how many.
+    """Number of processes for work that gains by them, where the user gives none.
 
     Args:
         parts: into which the work can be divided.
 
     Returns:
-        one a core, and no more than parts; 1 on a GPU, which they would have to share.
+        one for each core, and no more than parts; 1 on a GPU, which they would have to share.
     """
     import jax
 
@@ -58,18 +58,18 @@ def usual_count(parts: int) -> int:
 class Workers:
     """Worker processes, started when there is work for them.
 
-    They are told nothing by Ctrl-C and SIGTERM, which reach the whole group: who started them decides.
+    They ignore Ctrl-C and SIGTERM, which reach the whole group: the process that started them decides.
 
     Args:
-        count: how many.
-        begin: called first in each; None: nothing is.
-        given: what it is called with.
+        count: number of processes.
+        begin: function that each calls first; None: no function.
+        arguments: those of `begin`.
 
     Raises:
         ResourceError: their threads could not be started.
     """
 
-    def __init__(self, count: int, begin: Callable[..., None] | None = None, *given: Any) -> None:
+    def __init__(self, count: int, begin: Callable[..., None] | None = None, *arguments: Any) -> None:
         """Start nothing yet."""
         check_threads_of_jax(count)
         # A second Ctrl-C ends everything at once; what then cleans up behind Python need not complain about it.
@@ -83,20 +83,20 @@ class Workers:
                 count,
                 mp_context=multiprocessing.get_context("spawn"),
                 initializer=_start,
-                initargs=(os.getpid(), begin, given),
+                initargs=(os.getpid(), begin, arguments),
             )
 
-    def submit(self, function: Callable, *given: Any) -> concurrent.futures.Future:
+    def submit(self, function: Callable, *arguments: Any) -> concurrent.futures.Future:
         """Have a worker call a function.
 
         Args:
-            given: what it is called with.
+            arguments: those of the function.
 
         Returns:
             its result, when there is one.
         """
-        with _signals_blocked(), _environment(self._settings):  # workers inherit both, from their first moment on
-            return self._pool.submit(function, *given)
+        with _signals_blocked(), _environment(self._settings):  # workers inherit both from the start
+            return self._pool.submit(function, *arguments)
 
     def kill(self) -> None:
         """End all workers now."""
@@ -106,7 +106,7 @@ class Workers:
                 process.kill()
 
     def close(self) -> None:
-        """Wait for the end of what is being computed; what has not begun is given up."""
+        """Wait for the end of running work; work that has not begun is given up."""
         self._pool.shutdown(wait=True, cancel_futures=True)
 
 
@@ -136,11 +136,11 @@ class Spread:
         """Results of a function, in order.
 
         Args:
-            function: gives of a list of items one result each; it can be pickled.
-            sizes: how long each takes, in any unit.
+            function: returns one result for each of a list of items; it can be pickled.
+            sizes: time that each item takes, in any unit.
 
         Returns:
-            one result an item.
+            one result for each item.
 
         Raises:
             ResourceError: a worker died.

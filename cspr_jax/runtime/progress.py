@@ -1,4 +1,4 @@
-"""Progress: how far a sweep is, or what is being done. A terminal shows it all the time, a log once a minute."""
+"""Progress: how far a sweep is, or the stage of the work. A terminal shows it all the time, a log once a minute."""
 
 import contextlib
 import datetime
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from cspr_jax.errors import printable
 from cspr_jax.runtime import stages
 
-# Between two lines where standard error is no terminal.
+# Time between two lines where standard error is no terminal.
 LINE_SECONDS = 60.0
 
 
@@ -22,7 +22,7 @@ class Pace:
 
     Fields:
         rate: cells a second; None before the first tile.
-        ends: when it will be done, by that clock; None before the first tile.
+        ends: time of the clock at which it will be done; None before the first tile.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -32,7 +32,7 @@ class Pace:
         self.rate: float | None = None
         self.ends: float | None = None
 
-    def told(self, done: int, total: int) -> None:
+    def advance(self, done: int, total: int) -> None:
         """Take note of a finished tile; the first call says how many cells an earlier run has left."""
         instant = self._clock()
         self._tiles += 1
@@ -62,7 +62,7 @@ def progress() -> Iterator[Callable[[int, int], None]]:
     """Show how far a sweep is: in a bar at a terminal, elsewhere by a line a minute on standard error.
 
     Yields:
-        what is to be told the cells done and all cells.
+        a function to be called with the number of cells done and of all cells.
     """
     if not sys.stderr.isatty():
         with _lines() as on_tile:
@@ -83,7 +83,7 @@ def progress() -> Iterator[Callable[[int, int], None]]:
         task = bar.add_task("starting", total=None)
 
         def on_tile(done: int, total: int) -> None:
-            pace.told(done, total)
+            pace.advance(done, total)
             bar.update(task, completed=done, total=total)
 
         with stages.heard(lambda text: bar.update(task, description=printable(text) or "computing")):
@@ -95,7 +95,7 @@ def _lines() -> Iterator[Callable[[int, int], None]]:
     pace, cells, over = Pace(), [(0, 0)], threading.Event()
 
     def on_tile(done: int, total: int) -> None:
-        pace.told(done, total)
+        pace.advance(done, total)
         cells.append((done, total))
 
     def write_lines() -> None:
@@ -118,7 +118,7 @@ def _lines() -> Iterator[Callable[[int, int], None]]:
 
 @contextlib.contextmanager
 def waiting() -> Iterator[None]:
-    """Show what is being done while the block runs, where somebody looks; nothing may be printed meanwhile.
+    """Show the stage of the work while the block runs, on a terminal; nothing may be printed meanwhile.
 
     Yields:
         nothing.

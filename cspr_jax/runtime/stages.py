@@ -1,4 +1,4 @@
-"""Stages of the work, for people who wait. They are said here, and shown by whoever listens; nothing is printed."""
+"""Stages of the work, for people who wait. They are announced here, and shown by a listener; nothing is printed."""
 
 import contextlib
 import threading
@@ -21,7 +21,7 @@ class _Board:
         if listener is None:
             return
         parts = [*self.around, self.now]
-        # Most often the one that has begun last is waited for longest.
+        # Mostly the function whose compilation began last is waited for longest.
         parts += [f"compiling {name}" for name in list(self.compiling.values())[-1:]]
         listener(": ".join(part for part in parts if part))
 
@@ -30,7 +30,7 @@ _board = _Board()
 
 
 def stage(text: str) -> None:
-    """Say what is being done from now on.
+    """Announce the stage that begins now.
 
     Args:
         text: a few words, such as "arcs 5 of 20".
@@ -41,7 +41,7 @@ def stage(text: str) -> None:
 
 @contextlib.contextmanager
 def within(text: str) -> Iterator[None]:
-    """Say of what the stages of a block are a part.
+    """Announce work of which the stages of a block are parts.
 
     Args:
         text: a few words, such as "table 3.2: quintic".
@@ -59,7 +59,7 @@ def within(text: str) -> Iterator[None]:
 
 
 def compiling(name: str | None) -> None:
-    """Say what this thread compiles.
+    """Announce the function that this thread compiles.
 
     Args:
         name: of the function; None: it compiles nothing any more.
@@ -72,7 +72,7 @@ def compiling(name: str | None) -> None:
 
 @contextlib.contextmanager
 def heard(listener: Listener) -> Iterator[None]:
-    """Hear what is being done while the block runs.
+    """Listen to the stages while the block runs.
 
     Args:
         listener: called with a line, from any thread.

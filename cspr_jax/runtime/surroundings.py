@@ -12,8 +12,8 @@ from pathlib import Path
 from cspr_jax.arithmetic.cores import cores
 from cspr_jax.errors import ConfigError, ResourceError
 
-# Threads that a command needs whatever it does: for signals, and those of NumPy's library, one a core. Then for jax: of
-# XLA's own pools some have one a core.
+# Threads that every command needs: for signals, and those of NumPy's library, one for each core. Then threads for jax:
+# some pools of XLA have one for each core.
 FEW, OF_JAX, OF_JAX_PER_CORE = 4, 16, 4
 _SMALL_STACK = 1 << 16  # bytes
 _LARGER = "or the limit of a container or a job, must be larger"
@@ -28,7 +28,7 @@ def settle() -> None:
     The command line opens no window, and its pictures do not depend on matplotlib's settings.
     """
     os.environ["MPLBACKEND"] = "Agg"
-    os.environ["MATPLOTLIBRC"] = os.devnull  # an empty file: theirs may be one that ends the import of matplotlib
+    os.environ["MATPLOTLIBRC"] = os.devnull  # an empty file: one of the user's may end the import of matplotlib
     logging.getLogger("matplotlib").setLevel(logging.CRITICAL)
     try:
         Path.home()
@@ -66,10 +66,10 @@ def check_matplotlibrc() -> None:
 
 
 def check_threads(count: int = 0) -> None:
-    """Refuse to begin where libraries could not start their threads: they end the process, or send it a Ctrl-C.
+    """Refuse to begin where libraries could not start their threads: they would end the process, or send it a Ctrl-C.
 
     Args:
-        count: how many more than every command needs.
+        count: number of threads besides those that every command needs.
 
     Raises:
         ResourceError: they cannot be started.
@@ -94,7 +94,7 @@ def check_threads_of_jax(processes: int = 0) -> None:
     """Refuse to begin where jax could not start its threads.
 
     Args:
-        processes: how many share the cores, each with a jax of its own; 0: this process computes.
+        processes: number of processes that share the cores, each with a jax of its own; 0: this process computes.
 
     Raises:
         ResourceError: they cannot be started.
@@ -104,7 +104,7 @@ def check_threads_of_jax(processes: int = 0) -> None:
 
 
 def shortage(error: Exception) -> str | None:
-    """Name what the machine lacks, if that is why something failed.
+    """Name the resource that the machine lacks, if that is why something failed.
 
     Returns:
         a line; None for any other failure.
@@ -120,7 +120,7 @@ def shortage(error: Exception) -> str | None:
 
 
 def quiet_scheduler() -> None:
-    """Keep the log of dask.distributed from standard error: what matters of it becomes a line of ours."""
+    """Keep the log of dask.distributed from standard error: its important messages become lines of ours."""
     with contextlib.suppress(ImportError):
         import distributed  # sets its loggers up when it is imported
 

@@ -1,6 +1,6 @@
-"""Text on a terminal, or where its output goes: signs that its encoding lacks, tables, and what others have written.
+"""Text on a terminal, or where its output goes: signs that its encoding lacks, tables, and text from others.
 
-Whoever writes a name decides neither what a terminal does nor how a table looks: all of it passes
+A name that somebody wrote must neither control a terminal nor change how a table looks: all text passes
 `cspr_jax.errors.printable`, and none of it is parsed as markup.
 """
 
@@ -61,7 +61,7 @@ def cell(*lines: object, style: str = "") -> "Text":
     Returns:
         the text.
     """
-    from rich.text import Text  # only a terminal needs it
+    from rich.text import Text  # imported only where tables are printed
 
     return Text("\n".join(map(printable, lines)), style=style)
 

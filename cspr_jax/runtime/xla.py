@@ -1,7 +1,7 @@
 """Settings that the command line makes before jax starts: vector width, place of compiled code, device, memory arenas.
 
-It is in environment variables, which processes that are started from here inherit; arenas are set for this one too.
-What the user has set wins. The library itself comes here only where its user asks it to keep compiled code.
+They are environment variables, which processes that are started from here inherit; arenas are set for this process too.
+Settings of the user win. The library itself comes here only where its user asks it to keep compiled code.
 """
 
 import ctypes
@@ -25,7 +25,7 @@ from cspr_jax.arithmetic.cores import SHARE, cores, quota
 from cspr_jax.errors import ConfigError, printable, shown
 from cspr_jax.runtime import compile_cache, stages
 
-# Twice as fast where the processor has it; XLA's own choice is half of it.
+# Twice as fast where the processor has such vectors; XLA chooses half their width by itself.
 WIDE, NEEDS = "--xla_cpu_prefer_vector_width=512", "avx512f"
 # Half of the time for compiling, for code that is slower: plans move a few robots, once.
 QUICK = (
@@ -49,17 +49,17 @@ _listeners: list[Any] = []
 _ONLY_FATAL = ("TF_CPP_MIN_LOG_LEVEL", "3")
 CACHE = "JAX_COMPILATION_CACHE_DIR"
 _KEPT = {
-    # Else the name of the folder is part of what entries are known by.
+    # Else the name of the folder is part of the key of each entry.
     "JAX_PERSISTENT_CACHE_ENABLE_XLA_CACHES": "none",
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.05",
     "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
 }
-# The same for a jax that is there already.
+# The same settings for a jax that is imported already.
 _VALUES = {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": 0.05, "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": -1}
 
 
 def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line: None, *, quick: bool = False) -> None:
-    """Set what jax reads when it is imported; nothing if it has been.
+    """Set the variables that jax reads when it is imported; nothing if it has been imported.
 
     Args:
         device: "cpu"; "gpu" and None leave the choice to jax, but where little is computed None is the CPU, since a GPU
@@ -72,7 +72,7 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
     """
     if "jax" in sys.modules:
         return
-    if device != "gpu":  # who asks for a GPU sees why there is none
+    if device != "gpu":  # a user who asks for a GPU sees why there is none
         os.environ.setdefault(*_ONLY_FATAL)
     if device == "cpu":
         os.environ["JAX_PLATFORMS"] = "cpu"
@@ -94,7 +94,7 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
 def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
     """Keep compiled code from one Python process to the next, as the command line does.
 
-    Call it once, before or after jax was imported; what was compiled before is not kept. What was set for jax wins.
+    Call it once, before or after jax was imported; code compiled before is not kept. Settings that jax has already win.
 
     Args:
         folder: where; None: `CSPR_CACHE_DIR`, or ~/.cache/cspr_jax.
@@ -115,7 +115,7 @@ def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
             loaded.config.update(name.lower(), _VALUES.get(name, os.environ[name]))
         from jax.experimental.compilation_cache import compilation_cache
 
-        compilation_cache.reset_cache()  # else who has compiled without one goes on without
+        compilation_cache.reset_cache()  # else a jax that has compiled without a folder goes on without
     return run_folder
 
 
@@ -164,7 +164,7 @@ def check_device(device: str | None) -> None:
 
 
 def tell_compiling() -> None:
-    """Let those who wait know which function is compiled; imports jax."""
+    """Announce each function that jax compiles, for people who wait; imports jax."""
     import jax
 
     def listen(event: str, duration_secs: float, **keywords: str | int) -> None:
@@ -185,7 +185,7 @@ def _readable(name: str) -> str:
 
 
 def _few_arenas() -> None:
-    # The variable is read when a process starts: it is for those that are started from here.
+    # The variable is read when a process starts: it is for processes that are started from here.
     is_set = ARENAS in os.environ or "arena_max" in os.environ.get("GLIBC_TUNABLES", "")
     if is_set or platform.libc_ver()[0] != "glibc":
         return
@@ -241,7 +241,7 @@ def _flags(folder: Path, settings: str, *, quick: bool = False) -> str:
     if settings.strip() and not settings.lstrip().startswith("-"):
         return settings
     # If a flag is set twice, XLA takes the last setting: the user's. Ours is then left out, since all of the words
-    # are part of what compiled code is known by.
+    # are part of the key of compiled code.
     ours = [WIDE] if NEEDS in _processor() else []
     named = [word.partition("=")[0] for word in settings.split()]
     ours = [flag for flag in (*ours, *(QUICK if quick else ())) if flag.partition("=")[0] not in named]

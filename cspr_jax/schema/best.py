@@ -1,8 +1,8 @@
-"""Best points of an axis that may be chosen freely, such as z0: whether any will do, which, and what it gives.
+"""Best points of an axis that may be chosen freely, such as z0.
 
 Every cell of the other axes takes all of its quantities from one point of that axis: a feasible one if there is one,
-else an undecided one; of those that with the fewest arcs, or what else the map is about; of these that with the largest
-margin.
+else an undecided one; among several, the one with the fewest arcs, or the best in what else the map is about; among
+equals, the one with the largest margin.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cspr_jax.errors import InputError
-from cspr_jax.schema.axes import AXES, BEST, best_name
 from cspr_jax.schema.meanings import CELL_SIDES
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.quantities import AXES, BEST, QUANTITIES, best_name
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 # These quantities tell first which of two points is better, if the kind of map does not say; then any other that can.
@@ -57,7 +56,7 @@ def best_of(
 
     Args:
         data: (..., n, ...) by names of the table of quantities; further dimensions may follow.
-        points: (n,) of it.
+        points: (n,) of the axis.
         place: of the axis among the dimensions.
         pictured: quantities that the map is about, the first one first.
 
@@ -94,21 +93,21 @@ def ranked(names: Mapping[str, np.ndarray], pictured: Sequence[str] = ()) -> lis
         pictured: as in `best_of`.
 
     Returns:
-        those of them whose row says which numbers are better.
+        the quantities whose row says which numbers are better.
     """
     order = dict.fromkeys((*pictured, *FIRST, *QUANTITIES))
     return [name for name in order if name in names and QUANTITIES[name].better]
 
 
 def _unfitness(verdict: np.ndarray) -> np.ndarray:
-    # 0: feasible, if not surely with the fewest arcs; 1: undecided; 2: not feasible; 3: not even accessible.
+    # Return 0: feasible, if not surely with the fewest arcs; 1: undecided; 2: not feasible; 3: not even accessible.
     flags = verdict.astype(np.int64)
     rank = np.where(flags & Verdict.UNDECIDED.value, 1, np.where(flags & Verdict.NOT_ACCESSIBLE.value, 3, 2))
     return np.where(flags & ~Verdict.FEWER_ARCS_UNDECIDED.value, rank, 0)
 
 
 def _badness(name: str, values: np.ndarray) -> np.ndarray:
-    # The smaller, the better; infinite where there is none.
+    # Return a number that is smaller for a better value; infinite without a value.
     drawn = values.astype(float)
     worse = drawn if QUANTITIES[name].better == "smaller" else -drawn
     is_none = np.isnan(drawn) | ((drawn <= 0.0) if name in COUNTS else False)

@@ -1,4 +1,4 @@
-"""Answers whose fields are columns. The tables of quantities are imported only where somebody asks for their words."""
+"""Answers whose fields are columns. The tables of quantities are imported only where their words are needed."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any

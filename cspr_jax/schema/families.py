@@ -1,4 +1,4 @@
-"""Table of trajectory families: one row a family.
+"""Table of trajectory families: one row for each.
 
 A new family is a motion (`motions.motion.Motion`), a class that joins poses by it (`motions.leg.Leg`), and a row.
 """
@@ -26,7 +26,7 @@ class Family:
         is_line: whether its motions are straight lines, in the least time of their law.
         keys: keys of a plan that only this family takes, and others that name them too.
         takes_durations: whether a pose may give the duration of the segment that ends there.
-        knows_uncertainty: whether its motions are judged by all of an uncertainty.
+        knows_uncertainty: whether its verdicts take all of an uncertainty into account.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Numbers as somebody gives them from Python: one check of what is no real number, of shapes and of ranges."""
+"""Numbers that a caller gives from Python: one check of their types, shapes and ranges."""
 
 import dataclasses
 import math
@@ -14,16 +14,16 @@ from cspr_jax.errors import InputError
 ANY = None
 
 
-def numbers(key: str, given: Any, allowed: str) -> np.ndarray:
-    """Real numbers that somebody gave.
+def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
+    """Real numbers that a caller gave.
 
     Strings, truth values and complex numbers are refused: NumPy would read the first two as numbers, and drop the
     imaginary part of the last.
 
     Args:
         key: named in errors.
-        given: number or nested sequence.
-        allowed: what is allowed, for errors.
+        value: number or nested sequence.
+        allowed: allowed numbers, in words, for errors.
 
     Returns:
         float64 array.
@@ -32,40 +32,40 @@ def numbers(key: str, given: Any, allowed: str) -> np.ndarray:
         InputError: no real numbers, or rows of several lengths.
     """
     try:
-        values = np.asarray(given)
+        values = np.asarray(value)
         if values.dtype.kind in "iuf":
             return values.astype(float)
         if values.dtype.kind == "V" and values.dtype.names is None and np.can_cast(values.dtype, float):
             return values.astype(float)  # bfloat16 and its like
-        if values.dtype.kind == "O" and all(_is_real(value) for value in values.flat):
-            return np.array([float(value) for value in values.flat]).reshape(values.shape)
+        if values.dtype.kind == "O" and all(_is_real(entry) for entry in values.flat):
+            return np.array([float(entry) for entry in values.flat]).reshape(values.shape)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
-        raise InputError(key, given, allowed) from error
-    raise InputError(key, given, allowed)
+        raise InputError(key, value, allowed) from error
+    raise InputError(key, value, allowed)
 
 
-def whole(key: str, given: Any, least: int, largest: int) -> int:
-    """Integer that somebody gave.
+def whole(key: str, value: Any, least: int, largest: int) -> int:
+    """Integer that a caller gave.
 
     Args:
         key: named in errors.
-        given: Python's, NumPy's, or an array of one.
+        value: an integer of Python or NumPy, or an array of one.
         least: smallest that is allowed.
         largest: largest that is allowed.
 
     Returns:
-        Python's integer.
+        a Python integer.
 
     Raises:
         InputError: no integer, or out of the range.
     """
     allowed = f"an integer from {least} to {largest}"
     try:
-        number = operator.index(given)
+        number = operator.index(value)
     except TypeError as error:
-        raise InputError(key, given, allowed) from error
-    if isinstance(given, bool) or not least <= number <= largest:
-        raise InputError(key, given, allowed)
+        raise InputError(key, value, allowed) from error
+    if isinstance(value, bool) or not least <= number <= largest:
+        raise InputError(key, value, allowed)
     return number
 
 
@@ -78,7 +78,7 @@ class Numbers:
         shapes: that are allowed; `ANY` is a length from 1 on. None: all.
         least: smallest number.
         largest: largest number; inf: none, and infinite ones are taken only with `infinite`.
-        above: whether the smallest one itself is refused.
+        above: whether the smallest number itself is refused.
         infinite: whether inf is taken.
         nan: whether NaN is taken, since the function itself says what it allows instead.
     """
@@ -91,12 +91,12 @@ class Numbers:
     infinite: bool = False
     nan: bool = False
 
-    def array(self, key: str, given: Any) -> np.ndarray:
+    def array(self, key: str, value: Any) -> np.ndarray:
         """The numbers.
 
         Args:
             key: named in errors.
-            given: number or nested sequence.
+            value: number or nested sequence.
 
         Returns:
             float64 array.
@@ -104,10 +104,10 @@ class Numbers:
         Raises:
             InputError: no real numbers, another shape, or a number out of the range.
         """
-        values = numbers(key, given, self.allowed)
+        values = numbers(key, value, self.allowed)
         if self.shapes is not None and not any(_fits(values.shape, shape) for shape in self.shapes):
             if not values.ndim:
-                raise InputError(key, given, self.allowed)
+                raise InputError(key, value, self.allowed)
             raise InputError(key, None, f"must be {self.allowed}", fault=f"an array of shape {values.shape}")
         inside = (values > self.least if self.above else values >= self.least) & (values <= self.largest)
         inside &= ~np.isnan(values) if self.infinite else np.isfinite(values)

@@ -9,8 +9,7 @@ import numpy as np
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
-from cspr_jax.schema.motion_quantities import ACROSS, FLIGHT_DIMS, PARTS, SEGMENTS
-from cspr_jax.schema.quantities import EVERY, flag_attributes
+from cspr_jax.schema.quantities import ACROSS, EVERY, FLIGHT_DIMS, PARTS, SEGMENTS, flag_attributes
 
 if TYPE_CHECKING:
     import xarray
@@ -21,7 +20,7 @@ CONTROL_POINTS = ("start", "middle", "end")
 
 
 def need_xarray() -> None:
-    """Refuse to begin what would end in a dataset where there is no xarray.
+    """Refuse to begin the computation of a dataset where xarray is missing.
 
     Raises:
         ConfigError: it is not installed.
@@ -38,7 +37,7 @@ def dataset(
     attributes: Mapping[str, Any] | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> "xarray.Dataset":
-    """A dataset whose variables and axes bear what the table of quantities says of them.
+    """A dataset whose variables and axes carry the attributes of the table of quantities.
 
     Args:
         variables: names of dimensions and values by name.
@@ -116,12 +115,15 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
     }
     data = dataset(variables, axes | both | third)
     if "beta_hat" in data and both:
-        data["beta_hat"].attrs = {"units": "1", "long_name": "beta-hat"}  # the table's is at the target alone
+        data["beta_hat"].attrs = {
+            "units": "1",
+            "long_name": "beta-hat",
+        }  # the table describes the value at the target alone
     return data
 
 
 def axes_of(dims: Mapping[str, Any], count: int) -> tuple[dict[str, np.ndarray], tuple[int, ...]]:
-    """Return the dimensions whose product some answers are.
+    """Return the dimensions whose product the answers cover.
 
     Args:
         dims: coordinates by name, the last one varying fastest.

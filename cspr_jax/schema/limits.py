@@ -17,7 +17,7 @@ class Uncertain:
 
     Fields:
         name: key in files, and field of `robots.limits.Uncertainty`.
-        unit: of it.
+        unit: of its values.
         least: smallest value, of a robot without this uncertainty.
         largest: largest value.
         description: for the reference.
@@ -53,8 +53,8 @@ class Limit:
         quantity: of `motions.limits.Values`.
         unit: of both.
         per_cable: whether each cable has a value of its own.
-        of_motion: whether the quantity depends on how the effector moves, and not on where it is alone.
-        from_zero: whether 0 is allowed, and not only what is greater; of no account for coordinates.
+        of_motion: whether the quantity depends on how the effector moves, not only on where it is.
+        from_zero: whether 0 is allowed, besides positive values; ignored for coordinates.
         description: for the reference.
     """
 

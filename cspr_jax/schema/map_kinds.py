@@ -15,10 +15,8 @@ from typing import Any, Literal
 from cspr_jax.errors import InputError
 from cspr_jax.schema import map_columns as columns
 from cspr_jax.schema import workspace_columns as of_workspaces
-from cspr_jax.schema.pose_quantities import POSE_VERDICT
-from cspr_jax.schema.quantities import EVERY, QUANTITIES
+from cspr_jax.schema.quantities import EVERY, POSE_VERDICT, QUANTITIES, Quantity
 from cspr_jax.schema.quantities import register as register_quantity
-from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.tiles import LARGEST_TILE, ORDINARY_COST, CellCost
 
 
@@ -32,15 +30,16 @@ class MapKind:
         description: a phrase for the reference.
         implementation: "module:Class" of its `maps.grid_map.GridMap`.
         quantities: what it gives, all rows of `schema.quantities.QUANTITIES`.
-        stored: those that are stored where the sweep file does not say.
-        stored_with: by key, those that are stored besides where that key is given. A key that came later than its map
-            leaves what is stored without it, and so the identities of older sweeps, as they were.
+        stored: quantities that are stored where the sweep file names none.
+        stored_with: by key, quantities that are stored besides where that key is given. A key that came later than its
+            map thus leaves what is stored without it, and the identities of older sweeps, as they were.
         only_with: quantities, and the keys without which they are no numbers: stored only where one of these is given.
             A condition of a workspace is a key, too: "workspace.conditions.static".
-        own: rows of quantities that say of this kind more than those of the table; names, units and types are the same.
+        rows: quantities whose rows here say more about this kind than those of the table; names, units and types are
+            the same.
         planned: whether a cell is the motion of a plan of two poses, which `plans.cell_plan` writes.
-        pictured: those of which a picture shows the first that there is, where nobody says which.
-        motionless: those that belong to a place or an instant, not to a motion.
+        pictured: quantities of which a picture shows the first one that is stored, where nobody says which.
+        motionless: quantities that belong to a place or an instant, not to a motion.
         families: trajectory families that it takes; none: its cells are places, and it knows no motion.
         start: where its motions may start. "rest": at rest in P0, `trajectory.from` says so or is absent; "point": as
             `trajectory.from` or the axes from_x, from_y and from_z say; "pose": as `trajectory.from` says, with an
@@ -78,7 +77,7 @@ class MapKind:
     patterns: tuple[str, ...] = ()
     stored_with: tuple[tuple[str, tuple[str, ...]], ...] = ()
     only_with: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = ()
-    own: tuple[Quantity, ...] = ()
+    rows: tuple[Quantity, ...] = ()
     planned: bool = False
     by_processes: bool = False
 
@@ -250,7 +249,7 @@ MAP_KINDS: dict[str, MapKind] = {
             cost=CellCost(limits=0.0),
             quantities=columns.OF_ACCELERATIONS,
             stored=columns.OF_ACCELERATIONS,
-            own=(POSE_VERDICT,),
+            rows=(POSE_VERDICT,),
             pictured=("acceleration_margin",),
             motionless=columns.OF_ACCELERATIONS,
             families=(),
@@ -309,7 +308,7 @@ MAP_KINDS: dict[str, MapKind] = {
             stored=of_workspaces.STORED,
             stored_with=of_workspaces.STORED_WITH,
             only_with=of_workspaces.ONLY_WITH,
-            own=(POSE_VERDICT,),
+            rows=(POSE_VERDICT,),
             pictured=("wrench_margin", "closure_margin", "clearance", "verdict"),
             motionless=of_workspaces.QUANTITIES,
             families=(),
@@ -329,15 +328,15 @@ def quantity_of(kind: object, name: str) -> Quantity:
     Returns:
         the row.
     """
-    quantities = MAP_KINDS[kind].own if isinstance(kind, str) and kind in MAP_KINDS else ()
+    quantities = MAP_KINDS[kind].rows if isinstance(kind, str) and kind in MAP_KINDS else ()
     return next((row for row in quantities if row.name == name), EVERY[name])
 
 
-def register(kind: MapKind, *own: Quantity) -> None:
+def register(kind: MapKind, *quantities: Quantity) -> None:
     """Add a kind of map from outside of the package; a second time changes nothing.
 
     Args:
-        own: rows of those of its quantities that are not in the table yet.
+        quantities: rows that are not in the table yet.
 
     Raises:
         InputError: another kind, quantity or axis has such a name, or the row names quantities that it does not give,
@@ -346,36 +345,36 @@ def register(kind: MapKind, *own: Quantity) -> None:
     if MAP_KINDS.get(kind.name, kind) != kind:
         raise InputError("map", kind.name, "a name that no other kind of map has")
     for name in kind.quantities:
-        if name not in QUANTITIES and name not in [quantity.name for quantity in own]:
+        if name not in QUANTITIES and name not in [quantity.name for quantity in quantities]:
             raise InputError("quantities", name, "a row of schema.quantities.QUANTITIES")
     rows = [("stored", kind.stored), ("pictured", kind.pictured), ("motionless", kind.motionless)]
     rows += [("stored_with", names) for _, names in kind.stored_with]
     rows += [("only_with", names) for names, _ in kind.only_with]
-    for key, names in [*rows, ("own", tuple(row.name for row in kind.own))]:
+    for key, names in [*rows, ("rows", tuple(row.name for row in kind.rows))]:
         for name in names:
             if name not in kind.quantities:
                 raise InputError(key, name, "one of the quantities of the map")
-    for quantity in own:
+    for quantity in quantities:
         register_quantity(quantity)
     MAP_KINDS[kind.name] = kind
 
 
 @contextlib.contextmanager
-def registered(kind: MapKind, *own: Quantity) -> Iterator[None]:
+def registered(kind: MapKind, *quantities: Quantity) -> Iterator[None]:
     """Add a kind of map for as long as a block lasts; see `register`.
 
     Args:
-        own: rows of its own quantities.
+        quantities: rows that are not in the table yet.
 
     Yields:
         nothing.
     """
-    register(kind, *own)
+    register(kind, *quantities)
     try:
         yield
     finally:
         del MAP_KINDS[kind.name]
-        for quantity in own:
+        for quantity in quantities:
             del QUANTITIES[quantity.name]
 
 

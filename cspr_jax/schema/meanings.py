@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.quantity import Quantity
+from cspr_jax.schema.quantities import Quantity
 
 
 def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
@@ -23,7 +23,7 @@ def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
     count = 3 if robot.get("translation_only") else len(robot["base_points"])
     chosen = itertools.combinations(range(1, count + 1), 1 if robot.get("planar") else 2)
     limit_values = {row.name: limits.get(row.name, robot.get(row.name)) for row in LIMITS if row.of_motion}
-    # A smallest tension of zero is what taut cables ask for anyway.
+    # A smallest tension of zero is left out, since taut cables keep it anyway.
     moving = [name for name, value in limit_values.items() if value is not None and np.any(value)]
     return ("none", *("cables " + ", ".join(map(str, row)) for row in chosen), "max_acceleration", *moving)
 

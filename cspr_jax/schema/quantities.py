@@ -1,17 +1,252 @@
 """The one table of everything that a result file can hold: it gives names, units, labels and docs."""
 
+import dataclasses
 from collections import ChainMap
+from typing import Literal
 
 import numpy as np
 
 from cspr_jax.errors import InputError
-from cspr_jax.schema.axes import AXES, BEST
 from cspr_jax.schema.limits import LARGEST_MULTIPLE
-from cspr_jax.schema.motion_quantities import FLIGHT, HOW, MARGIN, SEGMENTS, TRAJECTORY
-from cspr_jax.schema.pose_quantities import POSES
-from cspr_jax.schema.quantity import Quantity
 from cspr_jax.schema.verdicts import FLAGS, SENTENCES, Verdict
 
+# Narrower types, by the type of today, in which earlier versions stored the same numbers.
+EARLIER = {"uint32": ("uint16",)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """A dataset of a result file, or a coordinate of its axes.
+
+    Fields:
+        name: of the dataset.
+        units: as in UDUNITS; "1" for a pure number.
+        long_name: a short phrase for labels.
+        description: one sentence.
+        kind: "float" (of the run's dtype) or the NumPy name of an integer type.
+        unflagged: word of pictures where no flag of a verdict is set; empty: it is no verdict.
+        signed: whether either sign is as good as the other, so that zero is in the middle of a picture's colours.
+        meanings: row of `schema.meanings.MEANINGS`, if its whole numbers stand for words; empty: they do not.
+        contoured: whether sections of it show where it is a whole number.
+        better: which of two cells' numbers is better; empty: neither.
+    """
+
+    name: str
+    units: str
+    long_name: str
+    description: str
+    kind: Literal["float", "uint32", "uint16", "int16"] = "float"
+    unflagged: str = ""
+    signed: bool = False
+    meanings: str = ""
+    contoured: bool = False
+    better: Literal["", "smaller", "larger"] = ""
+
+    @property
+    def readable(self) -> tuple[str, ...]:
+        """NumPy names of the types in which files hold it, its own first."""
+        return ("float64", "float32") if self.kind == "float" else (self.kind, *EARLIER.get(self.kind, ()))
+
+
+# Coordinates of the axes of maps.
+AXES = {
+    q.name: q
+    for q in (
+        Quantity("x", "m", "x of the target", "Horizontal coordinate of the target."),
+        Quantity("y", "m", "y of the target", "Horizontal coordinate of the target."),
+        Quantity("radius", "m", "distance from the central vertical", "From the vertical through the centroid."),
+        Quantity("azimuth", "rad", "azimuth", "Direction of the target from the central vertical, from x to y."),
+        Quantity("z", "m", "z of the target", "Vertical coordinate of the target; see z_axis."),
+        Quantity(
+            "tilt_azimuth",
+            "rad",
+            "azimuth phi of the tilt",
+            "From the direction of the target, in workspaces from x; tilt and torsion.",
+        ),
+        Quantity("tilt", "rad", "tilt theta", "Angle between the platform's normal and the vertical."),
+        Quantity("torsion", "rad", "torsion sigma", "Of tilt and torsion, Z_phi X_theta Z_(sigma - phi)."),
+        Quantity("z0", "m", "depth of P0 below the centroid", "The point P0 about which the effector swings."),
+        Quantity(
+            "inclination",
+            "1",
+            "inclination",
+            "How much deeper below the spools the target is than P0, over z0: v of thesis (1.31).",
+        ),
+        Quantity("tau", "1", "normalised time", "Time since the start of the segment over its duration."),
+        Quantity("cable", "1", "cable", "Number of a cable, in cable order from 1 on."),
+        Quantity("from_x", "m", "x of the start point", "Horizontal coordinate of the start point."),
+        Quantity("from_y", "m", "y of the start point", "Horizontal coordinate of the start point."),
+        Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
+    )
+}
+# Axes that give an orientation together.
+TILT_TORSION = ("tilt_azimuth", "tilt", "torsion")
+# Axes without a best point: a motion passes all of its instants, and a robot has all of its cables.
+_NO_CHOICES = ("tau", "cable")
+
+
+def best_name(axis: str) -> str:
+    """The quantity that says which point of an axis is the best one.
+
+    Returns:
+        its name.
+    """
+    return f"best_{axis}"
+
+
+# A map holds these too once the best point of an axis is chosen for each cell of the other axes; no file has them.
+BEST = {
+    q.name: q
+    for q in (
+        Quantity(
+            best_name(axis.name),
+            axis.units,
+            f"best {axis.long_name}",
+            f"With `--best {axis.name}`: the point of this axis that the other quantities of the cell belong to; NaN "
+            "where none will do.",
+        )
+        for axis in AXES.values()
+        if axis.name not in _NO_CHOICES
+    )
+}
+
+# These texts say what verdicts rest on, and what the margin is.
+HOW = ", proved, but sampled for platforms on more than six cables"
+MARGIN = (
+    "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
+    "or depth below the spools over z0; platforms on more cables: how far all tensions can keep from their limits, "
+    "divided by the weight per cable."
+)
+TRAJECTORY = {
+    q.name: q
+    for q in (
+        Quantity("t", "s", "time", "Time since the start of the plan."),
+        Quantity("position", "m", "position", "Position of the effector (x, y, z)."),
+        Quantity("velocity", "m s-1", "velocity", "Velocity of the effector (x, y, z)."),
+        Quantity("acceleration", "m s-2", "acceleration", "Acceleration of the effector (x, y, z)."),
+        Quantity("quaternion", "1", "orientation", "Unit quaternion of the platform (w, x, y, z)."),
+        Quantity("omega", "rad s-1", "angular velocity", "Angular velocity of the platform, fixed axes (x, y, z)."),
+        Quantity("omega_dot", "rad s-2", "angular acceleration", "Its derivative in time, fixed axes (x, y, z)."),
+        Quantity("length", "m", "cable length", "Length of each cable, in cable order."),
+        Quantity("rate", "m s-1", "cable rate", "Rate of each cable's length; positive pays out."),
+        Quantity(
+            "tension",
+            "N",
+            "cable tension",
+            "Tension of each cable, in cable order; of redundant cables those of the rule of the plan, `tensions`; "
+            "where it finds none within their limits, those of least norm.",
+        ),
+        Quantity(
+            "tension_residual",
+            "1",
+            "residual of the tensions",
+            "Of redundant cables: |W t - w| / (1 N + |w|), with W t the wrench that the tensions give and w the one "
+            "that the motion requires; moments divided by the platform's size.",
+        ),
+        Quantity(
+            "tension_each",
+            "N",
+            "tension of each of six cables",
+            "Of a platform that only translates, in cable order: the shares of `tension`, which is then, as `length` "
+            "and `rate`, that of each pair with its winch, in the order of the first cable of each.",
+        ),
+        Quantity(
+            "tension_couple",
+            "N",
+            "tension couple",
+            "Joint pull of two neighbouring cables seen along the line of their spools, Boralugoda (30) to (33).",
+        ),
+        Quantity(
+            "path_acceleration",
+            "m s-2",
+            "acceleration along the line",
+            "Along a straight line: the least feasible one at that place, that of the motion, and the largest feasible "
+            "one; infinite where nothing bounds it.",
+        ),
+    )
+}
+# A motion file holds these for each segment of its plan, and `TRAJECTORY` for each of its rows over time.
+SEGMENTS = {
+    q.name: q
+    for q in (
+        Quantity("segment", "1", "segment", "Number of a segment, in the order of the plan from 1 on.", "int16"),
+        Quantity("segment_start", "s", "start of the segment", "Time since the start of the plan."),
+        Quantity("segment_end", "s", "end of the segment", "Time since the start of the plan."),
+        Quantity(
+            "segment_arcs",
+            "1",
+            "smallest number of arcs",
+            f"Smallest number of feasible arcs, or the plan's own if feasible{HOW}; 0: none.",
+            "int16",
+        ),
+        Quantity(
+            "segment_tried_arcs",
+            "1",
+            "number of arcs of the motion",
+            "Equal to `segment_arcs` where it is positive, else that of the motion that comes nearest.",
+            "int16",
+        ),
+        Quantity("segment_verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint32"),
+        Quantity("segment_margin", "1", "margin", MARGIN),
+        Quantity("segment_cause", "1", "cause", "Flag of the worst of what stands in the way; 0: nothing.", "uint32"),
+        Quantity(
+            "segment_cause_cable", "1", "cable of the cause", "In cable order from 1 on; 0: no single cable.", "int16"
+        ),
+        Quantity(
+            "segment_cause_time", "s", "time of the cause", "Since the start of the segment; NaN where it is not known."
+        ),
+        Quantity("segment_needed", "1", "needed", "What the segment has there: N, m, m/s or m/s^2, by its cause."),
+        Quantity("segment_allowed", "1", "allowed", "The most, or the least, that is allowed, in the same unit."),
+    )
+}
+# A motion file holds these for an object that the plan releases; the dimensions of each follow.
+FLIGHT = {
+    q.name: q
+    for q in (
+        Quantity("flight_t", "s", "time of the flight", "Time since the start of the plan, from the release on."),
+        Quantity("flight_position", "m", "position of the object", "Position of the released object (x, y, z)."),
+        Quantity("throw", "1", "throw", "Number of a throw of the sample of errors, from 1 on."),
+        Quantity(
+            "landing",
+            "m",
+            "landing",
+            "Place (x, y) at the height of the target of each throw of the sample, over that of the target; NaN where "
+            "the object never comes there.",
+        ),
+    )
+}
+FLIGHT_DIMS = {
+    "flight_t": ("flight_t",),
+    "flight_position": ("flight_t", "axis"),
+    "throw": ("throw",),
+    "landing": ("throw", "level"),
+}
+# Second dimensions of the quantities over time, and the parts along them.
+ACROSS = {
+    **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot"), "axis"),
+    "quaternion": "component",
+    **dict.fromkeys(("length", "rate", "tension"), "cable"),
+    "tension_each": "each",
+    "tension_couple": "couple",
+    "path_acceleration": "bound",
+}
+PARTS = {
+    "each": tuple("123456"),
+    "axis": tuple("xyz"),
+    "level": tuple("xy"),
+    "component": tuple("wxyz"),
+    "couple": ("12", "23", "34", "41"),
+    "bound": ("least", "actual", "largest"),
+}
+# Maps of poses have this row in place of the verdict of motions.
+POSE_VERDICT = Quantity(
+    "verdict",
+    "1",
+    "verdict of the pose",
+    "Bit flags of what keeps the robot from resting there under all conditions; 0: nothing does.",
+    "uint32",
+    unflagged="inside",
+)
 # Why accessible orientations are not attained, by the best candidate's flags.
 REFUSALS = {
     "refused_slack": Verdict.SLACK_CABLE,
@@ -229,7 +464,105 @@ QUANTITIES = {
             signed=True,
             better="larger",
         ),
-        *POSES,
+        Quantity(
+            "wrench_margin",
+            "N",
+            "margin of the tensions",
+            "Largest distance that tensions which supply all wrenches can keep from their finite limits; negative "
+            "outside of the workspace, infinite where nothing bounds it, -inf where the cables do not span the "
+            "wrenches.",
+            signed=True,
+            better="larger",
+        ),
+        Quantity(
+            "capacity_margin",
+            "N",
+            "capacity margin",
+            "Distance of the wrenches that must be supplied from the faces of all that the cables can supply, moments "
+            "over `workspace.capacity_length`; negative outside of the workspace, -inf where the cables do not span "
+            "the wrenches.",
+            signed=True,
+        ),
+        Quantity(
+            "clearance",
+            "m",
+            "clearance",
+            "Smallest distance of all checked pairs: of cables without a common point, and of cables and platform "
+            "from obstacles and of cables from the platform where the sweep has these; less the cables' thickness.",
+            signed=True,
+            better="larger",
+        ),
+        Quantity(
+            "clearance_cables",
+            "m",
+            "clearance of the cables from each other",
+            "Smallest distance between cables without a common point, less their diameter.",
+            signed=True,
+        ),
+        Quantity(
+            "clearance_obstacles",
+            "m",
+            "clearance of cables and platform from obstacles",
+            "Smallest distance of a cable's surface or the platform from an obstacle; of a platform and a box the "
+            "largest gap between their shadows on a line, which is never more.",
+            signed=True,
+        ),
+        Quantity(
+            "clearance_platform",
+            "m",
+            "clearance of the cables from the platform",
+            "Smallest distance of a cable's surface from the platform; ten diameters of each cable next to its "
+            "attachment point, or a hundredth of the platform if that is more, are left out, so that it is at most so "
+            "large.",
+            signed=True,
+        ),
+        Quantity(
+            "nearest_bodies",
+            "1",
+            "what is nearest",
+            "Which pair `clearance` belongs to: 1: two cables; 2: a cable and an obstacle; 3: a cable and the "
+            "platform; 4: the platform and an obstacle; 0: nothing can meet, or not requested.",
+            "int16",
+            meanings="nearest-bodies",
+        ),
+        Quantity(
+            "floor_margin",
+            "m",
+            "height above the floor",
+            "Height above the floor of the mass centre, or of the joint of a body that turns about one; negative "
+            "below it.",
+            signed=True,
+        ),
+        Quantity(
+            "length_margin",
+            "m",
+            "margin of the cable lengths",
+            "Smallest of the largest lengths less the lengths of the cables.",
+            signed=True,
+        ),
+        Quantity(
+            "speed_margin",
+            "m s-1",
+            "margin of the cable speeds",
+            "Smallest of the largest speeds less the greatest speeds of the cables that the velocities asked for need.",
+            signed=True,
+        ),
+        Quantity(
+            "cell_side",
+            "1",
+            "side of the whole cell",
+            "1: every position of the cell, the box half-way to the next points, is proved inside; 2: every one is "
+            "proved outside; 0: not decided, or not requested.",
+            "int16",
+            meanings="cell-sides",
+        ),
+        Quantity(
+            "orientation_fraction",
+            "1",
+            "part of the orientations",
+            "Part of a set of orientations, by volume, that is inside the workspace at a place; of one pose 0 or 1.",
+            better="larger",
+        ),
         Quantity(
             "level_acceleration",
             "m s-2",
@@ -334,6 +667,21 @@ QUANTITIES = {
 }
 EVERY = ChainMap(AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT)
 _OWN = frozenset(QUANTITIES)
+
+
+def columns_of(name: str, count: int) -> list[str]:
+    """Columns of a quantity of a motion in a CSV file.
+
+    Args:
+        name: of the quantity, a row of `TRAJECTORY`.
+        count: of its numbers at an instant.
+
+    Returns:
+        their heads.
+    """
+    if name not in ACROSS:
+        return [name]
+    return [f"{name}_{part}" for part in PARTS.get(ACROSS[name], [str(k + 1) for k in range(count)])]
 
 
 def register(quantity: Quantity) -> None:

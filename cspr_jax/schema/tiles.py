@@ -16,7 +16,7 @@ class CellCost(NamedTuple):
     Fields:
         seconds: without limits, and with 30 arcs.
         orientation: further seconds for each orientation of a place's set.
-        limits: what limits cost, over what they cost a point mass along arcs (`sweep.tile_sizes`).
+        limits: cost of limits, over their cost for a point mass along arcs (`sweep.tile_sizes`).
     """
 
     seconds: float = 1e-5
@@ -68,7 +68,7 @@ class Tiling:
         """Place of a tile.
 
         Returns:
-            one slice an axis.
+            one slice for each axis.
         """
         corner = [int(i) * t for i, t in zip(np.unravel_index(index, self.counts), self.tile, strict=True)]
         return tuple(slice(a, min(a + t, n)) for a, t, n in zip(corner, self.tile, self.shape, strict=True))

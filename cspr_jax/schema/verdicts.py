@@ -37,7 +37,7 @@ class Verdict(enum.IntFlag):
         return "+".join(flag.name.lower() for flag in type(self) if flag & self and flag.name) or "feasible"
 
 
-# Flags that do not say what stands in the way.
+# Flags that do not name the criterion that is broken.
 NO_REASON = Verdict.FEWER_ARCS_UNDECIDED | Verdict.NO_ARCS
 # Flags that leave a verdict open.
 OPEN = Verdict.UNDECIDED | Verdict.NOT_FINITE
@@ -64,13 +64,13 @@ SENTENCES = {
 
 
 def conjunction(flags: np.ndarray) -> np.ndarray:
-    """Verdict of several conditions that must all be met: one that is broken decides, whatever others leave open.
+    """Verdict of several conditions that must all be met: a broken one decides, whatever the others leave open.
 
     Args:
         flags: (...) flags of all conditions together.
 
     Returns:
-        (...) the same, without the flags that leave it open where another one is set.
+        (...) the flags, without those that leave a verdict open where any other is set.
     """
     refuted = flags & ~flags.dtype.type(OPEN.value)
     return np.where(refuted != 0, refuted, flags)

@@ -41,8 +41,8 @@ class Content:
     Fields:
         identity: of the sweep.
         settings: of the sweep.
-        cells: how many.
-        tiles: how many.
+        cells: their number.
+        tiles: their number.
         near_zero: cells whose margin lies within 1e-9 of zero.
         mixed: whether its shards come from different environments.
         proved: part of the cells whose answer is proved; None: not said.
@@ -71,7 +71,7 @@ def consolidate(
 
     Args:
         grid: its axes and tiles.
-        shards: one a tile, in order, verified.
+        shards: one for each tile, in order, verified.
         attributes: of the file; must hold "environment" and "settings".
         between: called before each tile; may raise.
 
@@ -120,14 +120,14 @@ def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[]
 
 
 def content_of(path: Path, begun: Callable[[Iterable[ReadableDataset]], None] = lambda _: None) -> Content:
-    """All of a result, read and compared with its checksums, but for its seal.
+    """Content of a result, all of it read and compared with its checksums, but for its seal.
 
     Args:
         path: the file. HDF5 may fail or hang on it: `store.isolated` reads it in another process.
         begun: called with all datasets before they are read, which takes long.
 
     Returns:
-        what it holds.
+        its content.
 
     Raises:
         DamagedError: it is not what was written, or was not written by this program.
@@ -162,7 +162,7 @@ def _text(file: h5py.File, name: str) -> str:
 
 
 def _stored_datasets(file: h5py.File, axes: list[str], store: list[str]) -> dict[str, ReadableDataset]:
-    # All datasets that the settings name, and no others; each looked at before anything is read.
+    # Open all datasets that the settings name, and no others; each is checked before anything is read.
     names = [*axes, *store]
     if len({*names}) < len(names) or not {*axes} <= AXES.keys() or not {*store} <= QUANTITIES.keys():
         raise DamagedError("its settings name other quantities than cspr has")

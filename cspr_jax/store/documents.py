@@ -1,7 +1,7 @@
 """JSON that a run directory holds: its record, the lines of its log, the headers of its shards; one schema for all.
 
-Anybody can write a text with a right checksum. What is read here is of known types and sizes, so that whoever uses it
-needs no look of their own.
+Anybody can write a text with a right checksum. What is read here is of known types and sizes, so that no
+user has to check it again.
 """
 
 import json
@@ -18,7 +18,7 @@ from cspr_jax.schema.tiles import LARGEST_TILE, Tiling
 from cspr_jax.store.guard import LARGEST_CHUNKS, LARGEST_RANK
 from cspr_jax.store.seal import DamagedError
 
-# Settings nest some six deep; what walks through them may call itself.
+# Settings nest some six deep; functions that walk through them may be recursive.
 DEEPEST = 32
 LONGEST_NAME = 255
 _LARGEST_COUNT = 10_000_000
@@ -59,7 +59,7 @@ class Header(Document):
     Fields:
         identity: of the sweep.
         tile: index of the tile.
-        environment: hash of what computed it.
+        environment: hash of the environment that computed it.
         near_zero: cells whose margin lies within 1e-9 of zero.
         undecided: cells whose answer is not proved; None: the map proves nothing, or an earlier version wrote it.
     """
@@ -75,7 +75,7 @@ class Entry(Document):
     """A line of the log; it may say more.
 
     Fields:
-        time: of the clock on the wall.
+        time: of the wall clock.
         event: what happened.
     """
 
@@ -140,7 +140,7 @@ class Source(Document):
 
     Fields:
         file: name of the sweep file.
-        text: what it held.
+        text: of the sweep file.
         command: words of the command.
     """
 
@@ -154,8 +154,8 @@ class Record(Document):
 
     Fields:
         identity: of the sweep.
-        settings: resolved, what the identity is the hash of.
-        environment: what computes.
+        settings: resolved, of which the identity is the hash.
+        environment: of the computation.
         source: name and text of the sweep file, and the command; no decision uses them.
     """
 
@@ -208,7 +208,7 @@ def plain_json(text: str | bytes) -> Any:
 
 
 def document(kind: type[Known], value: Any, what: str) -> Known:
-    """JSON as the document that it must be.
+    """Document that JSON holds, checked against its schema.
 
     Args:
         value: from `plain_json`.

@@ -52,7 +52,7 @@ class RunFolder:
         return self.shards / f"{index:05d}.h5"
 
     def shard_names(self) -> dict[Path, int]:
-        """Names of shards that are present; other names in their folder are nobody's business.
+        """Names of shards that are present; other names in their folder are ignored.
 
         Returns:
             the index that each name says, sorted.
@@ -99,7 +99,7 @@ class RunFolder:
                 raise StoreError(printable(f"{path}: cannot be locked: {error.strerror}: {_NO_LOCKS}")) from error
             if not _HOLDER.fullmatch(os.pread(file, 400, 0)):
                 raise RefusedError(f"{path}: is somebody's file, not a lock of cspr: choose another -o")
-            with contextlib.suppress(OSError):  # it only serves the message of others
+            with contextlib.suppress(OSError):  # it only serves error messages of other processes
                 os.ftruncate(file, 0)
                 os.pwrite(file, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
             self._held = os.fstat(file)
@@ -136,13 +136,13 @@ class RunFolder:
         """Files that processes have begun to write and not finished.
 
         Returns:
-            the files; what is no file, such as a link, is none of ours.
+            the files; anything else, such as a link, is left alone.
         """
         pattern = re.compile(rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5){PART}")
         parts = [part for folder in (self.path, self.shards) for part in sorted(folder.glob(".*.part"))]
         return [part for part in parts if pattern.fullmatch(part.name) and _is_file(part)]
 
-    def sweep_leftovers(self) -> None:
+    def remove_leftovers(self) -> None:
         """Remove what dead processes left unfinished; only under the lock.
 
         Raises:

@@ -20,7 +20,7 @@ LARGEST_CHUNKS, LARGEST_CHUNK = 100_000, 1 << 24
 # Settings are a sweep file of 1 MB and a robot file of 1 MB as JSON.
 LARGEST_TEXT = 8 << 20
 LARGEST_RANK = 16
-MOST_ROWS = 1000  # of an attribute with a row a cable
+MOST_ROWS = 1000  # of an attribute with a row for each cable
 # Deflate packs at most 1032 bytes into one.
 DENSEST = 1100
 _PLENTY = 64 << 20
@@ -45,11 +45,11 @@ class ReadableDataset(NamedTuple):
     """A dataset that may be read.
 
     Fields:
-        data: it, open.
+        data: the open dataset.
         shape: its shape.
         dtype: of NumPy.
         size: bytes in memory.
-        chunks: how many.
+        chunks: their number.
         stored: bytes in the file.
     """
 
@@ -61,7 +61,7 @@ class ReadableDataset(NamedTuple):
     stored: int
 
     def values(self) -> np.ndarray:
-        """All of it.
+        """All values of the dataset.
 
         Returns:
             the numbers, C-contiguous.
@@ -84,18 +84,18 @@ def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, ReadableDataset
     return {name: _dataset(file, name) for name in names if file.id.links.exists(name.encode())}
 
 
-def refuse_dense(wanted: Iterable[ReadableDataset], size: int, *, densest: int = DENSEST) -> None:
+def refuse_dense(datasets: Iterable[ReadableDataset], size: int, *, densest: int = DENSEST) -> None:
     """Refuse datasets that hold much more than their file can, or much less than it has.
 
     Args:
-        wanted: all that would be read.
+        datasets: all that would be read.
         size: of the file, bytes.
-        densest: bytes that one of the file may stand for.
+        densest: bytes of data that one byte of the file may stand for.
 
     Raises:
-        DamagedError: they do.
+        DamagedError: the datasets do not fit the file.
     """
-    readable = list(wanted)
+    readable = list(datasets)
     total, most = sum(one.size for one in readable), _PLENTY + densest * size
     if total > most:
         raise DamagedError(
@@ -107,7 +107,7 @@ def refuse_dense(wanted: Iterable[ReadableDataset], size: int, *, densest: int =
 
 
 def refuse_others(file: h5py.File, objects: int, attributes: int) -> None:
-    """Refuse a file with other objects or attributes than those that were asked for.
+    """Refuse a file with other objects or attributes than the requested ones.
 
     Args:
         file: open.

@@ -30,9 +30,9 @@ from cspr_jax.store.documents import Header
 from cspr_jax.store.seal import DamagedError, check_mark, check_open, open_regular
 from cspr_jax.store.shards import LARGEST_SHARD, Layout, Shard, decode
 
-# Hashing that many bytes takes a moment; of larger files it is asked before what they hold.
+# Hashing so many bytes takes a moment; larger files are inspected before they are hashed.
 _QUICK = 512 << 20
-# Whoever waits that long waits for ever; the limit of processor time comes long before.
+# A reader that has not answered by then never will; the limit of processor time comes long before.
 _PATIENCE = 60.0
 # The package is not taken from the working folder, nor are the libraries; the path of the parent serves last.
 _CODE = """import sys
@@ -62,8 +62,8 @@ class Reader:
     """A process that reads files, started when the first one is asked for, and anew after one on which it failed.
 
     Fields:
-        known: seals of shards that this process has written itself, or that were read without a fault before: it reads
-            their bytes itself.
+        known: seals of shards that this process has written itself, or that were read without a fault before: this
+            process reads their bytes itself.
     """
 
     def __init__(self) -> None:
@@ -111,7 +111,7 @@ class Reader:
             follow: whether it may be a link to one.
 
         Returns:
-            what it holds; None for a motion.
+            its content; None for a motion.
 
         Raises:
             DamagedError: it is no file, or damaged.
@@ -148,7 +148,7 @@ class Reader:
         """Header of a shard, of whatever run.
 
         Returns:
-            what it says.
+            the header.
 
         Raises:
             DamagedError: it is no shard, or a damaged one.
@@ -190,7 +190,7 @@ class Reader:
         self._idle = True
 
     def _sent(self, path: Path, file: int, words: dict[str, Any]) -> RawIOBase:
-        # One that died unasked, or did not come to its end, is replaced.
+        # A process that died by itself, or has not finished, is replaced.
         if self._child is None or self._child.poll() is not None or not self._idle:
             self._end()
             self._start(path)

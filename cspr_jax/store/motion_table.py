@@ -10,7 +10,7 @@ import numpy as np
 
 from cspr_jax.config.limits import MOST_CABLES
 from cspr_jax.errors import printable, shown
-from cspr_jax.schema.motion_quantities import ACROSS, PARTS, TRAJECTORY
+from cspr_jax.schema.quantities import ACROSS, PARTS, TRAJECTORY
 from cspr_jax.store.netcdf import file_size
 from cspr_jax.store.seal import DamagedError, unreadable
 
@@ -23,7 +23,7 @@ def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Columns of a table of a motion.
 
     Returns:
-        attributes, and arrays by the names of `schema.motion_quantities.TRAJECTORY`: (n,), or (n, k) of vectors.
+        attributes, and arrays by the names of `schema.quantities.TRAJECTORY`: (n,), or (n, k) of vectors.
 
     Raises:
         DamagedError: it is not what `cspr plan` writes.

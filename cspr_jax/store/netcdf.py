@@ -12,8 +12,7 @@ import numpy as np
 
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
-from cspr_jax.schema.quantities import AXES, QUANTITIES, flag_attributes
-from cspr_jax.schema.quantity import Quantity
+from cspr_jax.schema.quantities import AXES, QUANTITIES, Quantity, flag_attributes
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import new_file
 from cspr_jax.store.seal import seal_file
@@ -42,7 +41,7 @@ def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
 
 @contextlib.contextmanager
 def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterator[h5py.File]:
-    """An HDF5 file in an empty file that is open; it is sealed when HDF5 has closed it.
+    """HDF5 file that is written into an open, empty file; it is sealed when HDF5 has closed it.
 
     Yields:
         the open file.
@@ -164,7 +163,7 @@ def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:
 
 
 def reason(error: BaseException) -> str:
-    """The first line of what a library says.
+    """The first line of a library's error.
 
     Returns:
         the line, or the error's name where it says nothing.

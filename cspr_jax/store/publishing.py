@@ -13,7 +13,7 @@ from pathlib import Path
 from cspr_jax.errors import StoreError, printable
 from cspr_jax.store.disk import USUAL, Disk, write_all
 
-# Ending of what is not whole: of this version, and of earlier ones, which named their process.
+# Endings of unfinished files: of this version, and of earlier ones, which named their process.
 PART = r"\.(?:[0-9a-f]{12}|\d+)\.part"
 
 

@@ -15,18 +15,16 @@ import h5py
 import numpy as np
 
 from cspr_jax.errors import StoreError
-from cspr_jax.schema.motion_quantities import FLIGHT, SEGMENTS, TRAJECTORY
-from cspr_jax.schema.quantities import AXES, QUANTITIES, register
-from cspr_jax.schema.quantity import Quantity
+from cspr_jax.schema.quantities import AXES, FLIGHT, QUANTITIES, SEGMENTS, TRAJECTORY, Quantity, register
 from cspr_jax.store import guard
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.netcdf import UNREADABLE, reason
 from cspr_jax.store.seal import DamagedError
 from cspr_jax.store.shards import Layout, decode, header_of
 
-# A result is read into memory as a whole; one byte of a file that is more than noise stands for a few of its data.
+# A result is read into memory as a whole. A byte of a file stands for a few bytes of data, unless these are all alike.
 LARGEST_DATA, DENSEST = 8e9, 50
-# Seconds of the processor to find out what a file holds; those that reading it takes on slow machines.
+# Processor seconds to inspect a file; and to read it, for each byte and each chunk, on a slow machine.
 _LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
 # Names of parts of vectors, for other programs.
@@ -40,11 +38,11 @@ _INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass
 
 
 def serve() -> None:
-    """Answer what is asked about one file after the other, until nobody asks any more.
+    """Answer questions about one file after the other, until there are no more.
 
-    Standard input is a socket: on it come questions, each with an open file, and go the answers: what was found as
-    JSON, and arrays. The words of the command: two folders of `store.isolated`, and the quantities that the process
-    that asks has registered.
+    Standard input is a socket: questions come in on it, each with an open file; answers go out, as JSON and arrays. The
+    arguments of the command are two folders of `store.isolated`, and the quantities that the asking process has
+    registered.
     """
     for row in json.loads(sys.argv[3]):
         register(Quantity(**row))
@@ -119,7 +117,7 @@ def _content(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
         return
 
     def go_on(datasets: Iterable[guard.ReadableDataset]) -> None:
-        _tell(out, {})  # what takes long begins
+        _tell(out, {})  # the slow part begins
         _grant_for(datasets)
 
     _tell(out, {"content": dataclasses.asdict(content_of(path, go_on))})

@@ -14,8 +14,7 @@ from cspr_jax.errors import ConfigError, InputError, StoreError, printable, show
 from cspr_jax.schema import labelled
 from cspr_jax.schema.best import best_of, check_axis
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
-from cspr_jax.schema.motion_quantities import FLIGHT_DIMS, PARTS, SEGMENTS
-from cspr_jax.schema.quantities import AXES, EVERY, QUANTITIES
+from cspr_jax.schema.quantities import AXES, EVERY, FLIGHT_DIMS, PARTS, QUANTITIES, SEGMENTS
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.isolated import Reader
 from cspr_jax.store.motion_table import read_table
@@ -32,11 +31,11 @@ _BLOCK = 1 << 20
 
 
 class BestPoints(NamedTuple):
-    """An axis of which every cell has its best point.
+    """Axis that was taken out of a map, by choosing its best point for every cell.
 
     Fields:
         points: (n,) of the axis.
-        places: (...) of the best one, of the shape of the quantities.
+        places: (...) of the best point in the axis, of the shape of the quantities.
     """
 
     points: np.ndarray
@@ -75,9 +74,9 @@ class Result:
 
         A cell is feasible if it is so at some point, else undecided if it is so at some point. Among feasible points
         the one with the fewest arcs is chosen (or with the best of what the map is about: the least duration, the
-        largest margin, ...), of these that with the largest margin, then the first. All quantities of a cell are those
-        of the point chosen; where none is feasible, of the best candidate. Where a point is undecided, the verdict
-        keeps the flag that fewer arcs may be possible.
+        largest margin, ...), among equals the one with the largest margin, then the first. All quantities of a cell are
+        those of the chosen point; where none is feasible, those of the best candidate. Where a point is undecided, the
+        verdict keeps the flag that fewer arcs may be possible.
 
         Args:
             axes: names, such as "z0".
@@ -184,7 +183,7 @@ def _json(attributes: dict[str, Any], name: str) -> dict[str, Any]:
     text = attributes.get(name)
     if text is None:
         raise DamagedError(f"it has no {name}")
-    # Before anything is built of it.
+    # This is checked before anything is built from the text.
     if max(text.count("[") + text.count("{"), text.count(":")) > _MOST_PARTS:
         raise DamagedError(f"its {name} have more parts than cspr writes")
     try:

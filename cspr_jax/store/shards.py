@@ -13,7 +13,7 @@ import numpy as np
 
 from cspr_jax.errors import printable
 from cspr_jax.schema.identity import canonical_json
-from cspr_jax.schema.quantity import EARLIER
+from cspr_jax.schema.quantities import EARLIER
 from cspr_jax.store import guard
 from cspr_jax.store.documents import Header, document, plain_json
 from cspr_jax.store.guard import ReadableDataset
@@ -44,7 +44,7 @@ class Shard:
 
     Fields:
         index: of the tile.
-        environment: hash of what computed it.
+        environment: hash of the environment that computed it.
         near_zero: cells whose margin lies within 1e-9 of zero.
         values: (n_1, ..., n_k) for each stored quantity.
         undecided: cells whose answer is not proved; None: the map proves nothing, or an earlier version wrote it.
@@ -110,7 +110,7 @@ def decode(
     """A shard, checked in every respect but its seal.
 
     Args:
-        place: the file, or what it holds. HDF5 may fail or hang on one that this process has not written itself:
+        place: the file, or its content. HDF5 may fail or hang on one that this process has not written itself:
             `store.isolated` reads it elsewhere.
         index: of the tile that it must hold.
         begun: called with all datasets before they are read.
@@ -157,7 +157,7 @@ def header_of(file: h5py.File) -> Header:
         file: open.
 
     Returns:
-        what it says.
+        the header.
 
     Raises:
         DamagedError: it is no header of a shard.

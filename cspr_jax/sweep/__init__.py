@@ -1,1 +1,1 @@
-"""Sweeps: what a file asks, who computes its tiles, and how a run goes on after it was stopped."""
+"""Sweeps: the definition in a file, executors of its tiles, and runs that go on after they were stopped."""

@@ -1,4 +1,4 @@
-"""Checks that each kind of map makes of its sweep file, beyond the schema; its row in `schema.map_kinds` says it."""
+"""Checks that each kind of map makes of its sweep file, beyond the schema, as its row in `schema.map_kinds` says."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ _SPECIAL = (
     *("trajectory.max_acceleration", "trajectory.rule"),
     *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace"),
 )
-# More kinds than these are no hint.
+# A hint names at most so many kinds.
 _FEW = 3
 
 
@@ -112,7 +112,7 @@ def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
 
 
 def check_store(kind: MapKind, keys: SweepFile, robot: RobotFile, path: Path) -> None:
-    """Refuse to store what the map does not give, or what nobody asks for.
+    """Refuse to store quantities that the map does not give, or that the sweep does not ask for.
 
     Raises:
         ConfigError: such a quantity.
@@ -131,7 +131,7 @@ def _as_written(name: str) -> str:
 
 
 def _missing(keys: SweepFile, name: str) -> str | None:
-    # Return the words for a dotted key that is not given; None: it is.
+    # Return the words for a dotted key that is missing; None if it is given.
     table: Table = keys
     for part in name.split("."):
         inner = getattr(table, part)

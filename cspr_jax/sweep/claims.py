@@ -1,4 +1,4 @@
-"""Whose a run directory is, and what may go on in it."""
+"""Ownership of a run directory, and what may be continued in it."""
 
 import contextlib
 import os
@@ -27,7 +27,7 @@ def refuse_other_sweep(sweep: Sweep, folder: RunFolder, reader: Reader) -> None:
         if record.identity != sweep.identity:
             raise RefusedError(*differing(sweep, folder, record.settings))
         return
-    # Without a record that can be believed, shards and results say whose they are.
+    # Without a valid record, shards and results say to which sweep they belong.
     for path in sorted(folder.path.glob("*.h5")):
         content = content_at(path, reader)
         if isinstance(content, Content) and content.identity != sweep.identity:
@@ -65,7 +65,7 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
     """Refuse to go on with another program, library or machine than began.
 
     Args:
-        accept: whether it may be mixed in.
+        accept: whether results of another environment may be mixed in.
 
     Raises:
         RefusedError: with a line for each key that differs.
@@ -83,7 +83,7 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
 
 
 def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
-    """Refuse a tile of a worker that differs from what the run was begun with.
+    """Refuse a tile of a worker whose environment differs from that of the run.
 
     Raises:
         RefusedError: with a line for each key that differs.
@@ -111,7 +111,7 @@ def damage(path: Path) -> str | None:
 
 
 def own_record(sweep: Sweep, folder: RunFolder, environment: dict[str, Any], command: tuple[str, ...]) -> Record:
-    """The record of a directory that is the sweep's, written if it is not there.
+    """Record of a directory that belongs to the sweep, written if it is missing.
 
     Returns:
         the record.
@@ -140,7 +140,7 @@ def content_at(path: Path, reader: Reader) -> Content | str:
     """Content of a result in a run directory.
 
     Returns:
-        what it holds, or what is wrong with it.
+        its content, or a line about its fault.
 
     Raises:
         StoreError: the system refuses to read anything at the moment.

@@ -29,7 +29,7 @@ from cspr_jax.sweep.tile_sizes import tile_cells
 
 # Each tile is a file.
 LARGEST_TILES = 100_000
-LARGEST_RESULT = 1 << 46  # bytes; what is free on the disk is looked at when a run starts
+LARGEST_RESULT = 1 << 46  # bytes; the free room on the disk is looked at when a run starts
 LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
 
 
@@ -46,7 +46,7 @@ class Sweep:
         store: quantities to keep.
         settings: everything that decides the result's numbers.
         text: of the file, as it was read.
-        types: NumPy's name of each stored quantity's type, which processes need that know no rows from outside.
+        types: NumPy name of the type of each stored quantity, for processes that know no rows from outside.
     """
 
     file: Path
@@ -160,7 +160,7 @@ def _tile(tile: list[int], shape: tuple[int, ...], path: Path) -> tuple[int, ...
 
 
 def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int, ...], needed: int, path: Path) -> None:
-    # Before any memory is taken; `check_room` looks at what is free when the run starts.
+    # This check comes before any memory is taken; `check_room` looks at the free room when the run starts.
     shape, place = tuple(counts.values()), f"axes: {_cells_of(counts)}"
     if needed > LARGEST_RESULT:
         raise ConfigError(path, f"{place} needs {needed / 1e9:.3g} GB: must be at most {LARGEST_RESULT / 1e9:.3g} GB")
@@ -182,7 +182,7 @@ def check_room(sweep: Sweep, directory: Path, done: float) -> None:
 
     Args:
         directory: of the run; it need not be there yet.
-        done: part of the tiles that are there already.
+        done: share of the tiles that are finished.
 
     Raises:
         ConfigError: too little room.

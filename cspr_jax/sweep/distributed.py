@@ -127,7 +127,7 @@ class Scheduler:
         """Compute tiles in any order.
 
         Args:
-            stop: when it is set, what is in progress is finished and nothing is begun.
+            stop: when it is set, tiles in progress are finished and no other one is begun.
 
         Yields:
             the tiles.
@@ -166,6 +166,6 @@ class Scheduler:
             ) from error
 
     def close(self) -> None:
-        """Leave the scheduler; what is in flight there is given up."""
+        """Leave the scheduler; tiles in flight there are given up."""
         with contextlib.suppress(OSError, TimeoutError):
             self._client.close()

@@ -49,17 +49,17 @@ class Outcome:
     Fields:
         result: path of the finished file.
         computed: number of tiles computed now.
-        kept: number of tiles found finished.
+        reused: number of tiles found finished.
     """
 
     result: Path
     computed: int
-    kept: int
+    reused: int
 
 
 @dataclasses.dataclass
 class Hooks:
-    """Hooks by which a run tells and asks while it goes.
+    """Hooks by which a run reports, and asks whether to go on.
 
     Fields:
         stop: set when it shall end after the tile in progress.
@@ -78,7 +78,7 @@ class Run:
     Args:
         directory: the run's own folder; made if absent.
         options: how it goes on.
-        hooks: what it tells and asks.
+        hooks: by which it reports, and asks whether to go on.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Run:
         self._tiling = sweep.grid.tiling
 
     def finished(self) -> Path | None:
-        """The result, if it is complete and holds what was written; nothing is computed and jax is not needed.
+        """The result, if it is complete and undamaged; nothing is computed and jax is not needed.
 
         Returns:
             its path, or None.
@@ -147,7 +147,7 @@ class Run:
             if (reason := claims.damage(self._folder.record)) is not None:
                 self._quarantine(self._folder.record, reason)
             claims.refuse_other_environment(self._folder, environment, accept, self._reader)
-            self._folder.sweep_leftovers()
+            self._folder.remove_leftovers()
             record = claims.own_record(self._sweep, self._folder, environment, self._options.command)
             if self._is_whole():  # another process finished it meanwhile
                 if self._options.prune:
@@ -174,7 +174,7 @@ class Run:
         return self._reader.shard(self._folder.shard(index), self._sweep.layout, index, self._tiling.extent(index))
 
     def _verified(self, environment: str) -> list[int]:
-        # Tiles whose shard is there and is what was written; anything else under their names is set aside.
+        # Return the tiles whose shard is there and undamaged; anything else under their names is set aside.
         whole_tiles = []
         for path, index in self._folder.shard_names().items():
             try:
@@ -263,5 +263,5 @@ class Run:
 
 
 def _as_generator(tiles: Iterator[Computed]) -> Generator[Computed, None, None]:
-    # An iterator that can be closed, so that workers end when publishing fails.
+    # Return an iterator that can be closed, so that workers end when publishing fails.
     yield from tiles

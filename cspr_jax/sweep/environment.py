@@ -74,7 +74,7 @@ def _git() -> dict[str, Any]:
 
 
 def _processor() -> tuple[str, str]:
-    # Name, and a hash of the instruction sets, which compilers choose by.
+    # Return the name, and a hash of the instruction sets, by which compilers choose code.
     try:
         lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
     except OSError:

@@ -41,7 +41,7 @@ class ThisProcess:
         """Compute tiles in order.
 
         Args:
-            stop: when it is set, what is in progress is finished and nothing is begun.
+            stop: when it is set, tiles in progress are finished and no other one is begun.
 
         Yields:
             the tiles.
@@ -96,7 +96,7 @@ class Processes:
         """Compute tiles in any order; one whose worker died is computed again.
 
         Args:
-            stop: when it is set, what is in progress is finished and nothing is begun.
+            stop: when it is set, tiles in progress are finished and no other one is begun.
 
         Yields:
             the tiles.

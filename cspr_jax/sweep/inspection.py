@@ -1,4 +1,4 @@
-"""Content of a run directory: looked at without the lock, and without writing anything."""
+"""Content of a run directory: read without the lock, and without writing anything."""
 
 import contextlib
 import datetime
@@ -32,7 +32,7 @@ def status(directory: Path) -> dict[str, Any]:
 
     Returns:
         plain values: "identity", "tiles", "shards", "quarantined", "unfinished", "result", "last" (of log.jsonl),
-        "cells", "cells_done", "cells_per_second" and "seconds_left" (None where nothing tells).
+        "cells", "cells_done", "cells_per_second" and "seconds_left" (None where unknown).
 
     Raises:
         StoreError: no run directory.

@@ -15,7 +15,7 @@ from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
 from cspr_jax.sweep.work import Computed
 
-# Margins so near zero can change sign with the processor; how many there are stands in the result.
+# Margins so near zero can change sign with the processor; the result holds their number.
 NEAR_ZERO = 1e-9
 
 
@@ -27,7 +27,7 @@ class TileMap:
     """
 
     def __init__(self, sweep: Sweep) -> None:
-        """Refuse what cannot be computed."""
+        """Refuse a sweep that cannot be computed."""
         self._sweep = sweep
         with double_precision():
             self._cells: GridMap = sweep.kind.load()(sweep.robot, sweep.keys, sweep.file)

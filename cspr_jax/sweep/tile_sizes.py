@@ -1,7 +1,7 @@
 """Number of cells of a tile, by what they cost.
 
-What a killed run loses, and how long it is silent, is a tile. The costs are a table that was measured once, and not
-measured again in each run: the shape of the tiles is part of a sweep's identity, on every machine the same.
+A killed run loses at most a tile, and a run is silent for as long as a tile takes. The costs are a table that was
+measured once: the shape of the tiles is part of a sweep's identity, which must be the same on every machine.
 """
 
 import math
@@ -13,7 +13,7 @@ from cspr_jax.sweep.checks import is_given
 
 # Work of a tile on one core; two cores share it, and a slow one takes twice as long.
 TILE_SECONDS = 40.0
-# So many tiles a run has at least, unless these would take less than a few seconds: each pads its last batches, and a
+# A run has at least so many tiles, unless these would take less than a few seconds: each pads its last batches, and a
 # tile of a platform's poses takes half a second whatever it holds.
 FEWEST_TILES, SHORTEST_SECONDS = 20, 5.0
 # Seconds that proofs of limits take a cell of a map of arcs, with 30 arcs.
@@ -26,13 +26,13 @@ LIMIT_SECONDS = {
     "cable_acceleration_max": 2e-3,
     "uncertainty": 1e-2,
 }
-# Likewise of a workspace: what else is asked of each cell.
+# Likewise for a workspace, by what else is computed for each cell.
 WORKSPACE_SECONDS = {"prove": 2e-4, "obstacle": 5e-5, "platform_hull": 5e-5, "platform_box": 5e-5}
 ARCS = 30
 
 
 def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
-    """Estimate what a cell takes on one core.
+    """Estimate the time that a cell takes on one core.
 
     Returns:
         seconds.

@@ -1,4 +1,4 @@
-"""Protocol between a run and those who compute its tiles."""
+"""Protocol between a run and the executors that compute its tiles."""
 
 import dataclasses
 from collections.abc import Iterable, Iterator
@@ -10,7 +10,7 @@ from cspr_jax.sweep.signals import Stop
 
 @dataclasses.dataclass(frozen=True)
 class Computed:
-    """A tile, and what computed it.
+    """A tile, and the environment that computed it.
 
     Fields:
         shard: its content.
@@ -36,7 +36,7 @@ class Executor(Protocol):
         """Compute tiles.
 
         Args:
-            stop: when it is set, what is in progress is finished and nothing is begun.
+            stop: when it is set, tiles in progress are finished and no other one is begun.
 
         Yields:
             the tiles.

@@ -1,6 +1,6 @@
 """Smallest number of arcs of many segments, with duration, margin and verdict.
 
-A sieve bounds the margin of every number of arcs from above; `answers` decides about the survivors.
+A sieve bounds the margin of every number of arcs from above; `swings.decide` decides about the survivors.
 """
 
 from functools import partial
@@ -87,7 +87,7 @@ def minimum_arcs(
         points = (starts[rows], ends[rows], z0[rows])
         return arcs_and_segments(problem, *points, max_arcs=max_arcs, arcs=fixed, dtype=dtype)[0]
 
-    # Two batches are not made where one has room for all.
+    # Segments that fit into one batch are not divided.
     return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(sieve.BATCH) else part(slice(None))
 
 
@@ -130,10 +130,10 @@ def arcs_and_segments(
 
 
 def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
-    """Refuse what no search can use.
+    """Refuse arguments that no search can use.
 
     Args:
-        robot: that is to be centred.
+        robot: must be centred.
         z0: (n,) m.
         max_arcs: largest number of arcs tried.
 
@@ -156,7 +156,8 @@ def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
 
 
 def _sieved(problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype: str) -> tuple[np.ndarray, np.ndarray]:
-    # Upper bounds (n, max_arcs) of the sieve, and slacks (n, n_criteria) at the two ends, where every one is known.
+    # Return the upper bounds (n, max_arcs) of the sieve, and the slacks (n, n_criteria) at the two ends, which are the
+    # same for all numbers of arcs.
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
     kernel = partial(sieve.upper_bounds, max_arcs=max_arcs)
     upper = in_batches(lambda pair: kernel(problem.amplitude, *pair), cast, size=sieve.BATCH).astype(float)

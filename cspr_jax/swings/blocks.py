@@ -16,7 +16,7 @@ STEP = 32
 
 
 def blocks(amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Edges of blocks, for each number of arcs p: some density (p + 4) blocks, none across a knot.
+    """Edges of about density (p + 4) blocks for each number of arcs p, none across a knot.
 
     Args:
         max_arcs: largest number of arcs.
@@ -53,7 +53,8 @@ def over_blocks(edges: Array, counts: Array, arcs: Array, first, step):
         counts: (n_rows,).
         arcs: (n,) number of arcs of each segment.
         first: state to start from.
-        step: (state, start, stop) -> state, with start and stop (n,). A segment with fewer blocks sees its last again.
+        step: (state, start, stop) -> state, with start and stop (n,). A segment with fewer blocks sees its last block
+            again.
 
     Returns:
         the last state.

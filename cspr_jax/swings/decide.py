@@ -1,9 +1,9 @@
 """Answers from upper bounds of the margin, one for each number of arcs: proofs first, margins after.
 
-The candidates of a point mass that the bounds leave are proved or refuted in increasing order, until one is proved
-feasible. Never by bisection: more arcs can lose margin (tests). Where none is feasible, `swings.refusals` says which
-limits refuse those whose cables stay taut, and one of these is reported; where there is none, the candidate with the
-largest margin is. Answers of platforms are those of `platforms.answers`.
+The candidates that the bounds leave are proved or refuted in increasing order, until one is proved feasible. Bisection
+would be wrong: more arcs can lose margin (tests). Where none is feasible, `swings.refusals` names the limits that
+refuse the candidates whose cables stay taut, and one of these candidates is reported; if there is none, the candidate
+with the largest margin. `platforms.answers` does the same for platforms.
 """
 
 from collections.abc import Callable
@@ -39,7 +39,7 @@ def _durations(arguments) -> jax.Array:
 
 
 class Known(NamedTuple):
-    """Numbers of arcs proved feasible by other means than the certificate.
+    """Numbers of arcs proved feasible by other means than `swings.proof`.
 
     Fields:
         arcs: (n,) one for each segment; 0: none.
@@ -70,7 +70,7 @@ def decided(
         at_ends: (n, n_criteria) of `end_slacks`.
         infinity: (n,) left-hand side of (2.55).
         arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
-        known: what is proved already; None: nothing.
+        known: numbers of arcs that are proved already; None: none.
         measure: finds the margins, as `margins` does.
 
     Returns:
@@ -128,14 +128,14 @@ def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
 
 
 def only(upper: np.ndarray, arcs) -> np.ndarray:
-    """Upper bounds where the number of arcs of some segments is fixed.
+    """Upper bounds, without those that a fixed number of arcs rules out.
 
     Args:
         upper: (n, max_arcs).
         arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
 
     Returns:
-        (n, max_arcs), -inf at numbers of arcs that are not wanted.
+        (n, max_arcs), -inf at other numbers of arcs than a fixed one.
     """
     if arcs is None:
         return upper
@@ -182,7 +182,7 @@ def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, k
 
 
 class _Shown(NamedTuple):
-    # Numbers of arcs that are shown (n,), their smallest slacks, and what stands in the way, (n, n_criteria) each.
+    # Numbers of arcs that are reported (n,), their smallest slacks, and the criteria that they break, (n, n_criteria).
     tried: np.ndarray
     slack: np.ndarray
     broken: np.ndarray
@@ -196,9 +196,10 @@ def _shown(
     basic: np.ndarray,
     measure: Callable,
 ) -> _Shown:
-    # Upper bounds (n, max_arcs) of all criteria, and of those that are no limits.
+    # Choose what is reported; `with_limits` and `basic` are upper bounds (n, max_arcs) of the margin over all criteria,
+    # and over the criteria that are no limits.
     fixed, by_cables = search.smallest.copy(), np.zeros(len(with_limits), bool)
-    # Without limits, or near to zero, the largest margin says enough.
+    # Without limits, or with an undecided candidate, the largest margin says enough.
     is_refused = (fixed == 0) & ~search.doubtful & ~search.is_planned
     refused = np.flatnonzero(is_refused & bool(limits_set(problem.limits)))
     why = refusals(problem, rows_of(parities, refused), basic[refused])
@@ -223,8 +224,8 @@ def _best(
     by_cables: np.ndarray,
     measure: Callable,
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Slacks at the fixed number of arcs, else at that with the largest margin, of the cables alone or of all criteria;
-    # upper bounds say where to look next.
+    # Return the fixed number of arcs, else the one with the largest margin, over the cables alone or over all criteria,
+    # and its slacks; upper bounds say where to look next.
     def margin(slack: np.ndarray, rows) -> np.ndarray:
         return np.where(by_cables[rows], slack[:, :BASIC].min(1), slack.min(1))
 

@@ -12,7 +12,7 @@ def _depths(robot: Robot, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
 
 
 def mean_depth(robot: Robot, targets: np.ndarray) -> float:
-    """Mean height of the targets, as chosen in thesis section 2.9.
+    """Mean depth of the targets, the choice of thesis section 2.9.
 
     Args:
         robot: centred.
@@ -28,7 +28,7 @@ def least_depth(robot: Robot, targets: np.ndarray) -> float:
     """Bound (2.59): below it some target cannot be reached with many arcs, though perhaps with few.
 
     Args:
-        robot: any robot; the depth is measured below their plane, along the vertical.
+        robot: any robot; depths are measured below the plane of its spools, along the vertical.
         targets: (n, 3) from the centroid of the spools, z down, m.
 
     Returns:

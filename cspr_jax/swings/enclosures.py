@@ -1,4 +1,4 @@
-"""Enclosures of a point mass on its way, for bounds over robots that differ a little."""
+"""Enclosures of a point mass in motion, for bounds over robots that differ a little."""
 
 from functools import partial
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ PARTS, BATCH = 4, 1024
 
 
 class _Known(NamedTuple):
-    # Values of one block: of the middle, then within it.
+    # Values of one block: the first three in its middle, then bounds within it.
     rays: Array
     velocity: Array
     acceleration: Array
@@ -77,7 +77,7 @@ def _durations(items) -> Array:
 
 
 def enclosure(problem: Problem, segments: Segment, arcs: np.ndarray, blocks: Blocks) -> Enclosure:
-    """Return the enclosure of blocks of motions.
+    """Enclosure of blocks of motions.
 
     Args:
         problem: robot, limits and amplitude; the robot has as many cables as degrees of freedom.
@@ -119,7 +119,7 @@ def enclosure(problem: Problem, segments: Segment, arcs: np.ndarray, blocks: Blo
 def tolerated_by_point_masses(
     problem: Problem, segments: Segment, arcs: np.ndarray, *, whole: bool = True
 ) -> Tolerated:
-    """Multiples of the uncertainty that motions of a point mass stand.
+    """Multiples of the uncertainty that motions of a point mass tolerate.
 
     Args:
         problem: robot, limits with an uncertainty, amplitude.

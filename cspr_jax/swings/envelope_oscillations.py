@@ -6,7 +6,7 @@ With Omega = 4 pi^2 N - A''(1), N = n^2, the normalised pseudotension of cable k
 
 c = A'' - A A''(1). It is positive whatever the phase if C^2 + S^2 < 1, (1.39): a quadratic in
 Omega. Its largest root, the largest over tau and over the cables, is what N must exceed. That
-is enough for taut cables and not necessary. n is a real number here: a motion takes the next integer.
+is sufficient for taut cables, not necessary. n is a real number here: a motion takes the next integer.
 """
 
 import math
@@ -35,7 +35,7 @@ LARGEST_INCLINATION = 1.0 - 1e-9
 
 
 def squared_oscillations_at(amplitude: Amplitude, weight: Array, inclination: Array, tau: Array) -> Array:
-    """N_k(v, tau) of (1.44): what keeps one cable taut at one instant, whatever the phase.
+    """N_k(v, tau) of (1.44): square of the oscillations that keep a cable taut at an instant, whatever the phase.
 
     Args:
         weight: () w_k.
@@ -55,7 +55,7 @@ def _squared(omega: Array, end: Array) -> Array:
 
 
 def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]) -> Array:
-    # The largest root Omega of the envelope, for A, A', A'' at an instant.
+    # Return the largest root Omega of the envelope, for A, A', A'' at an instant.
     size, slope, bend = values
     c, swung = bend - size * end, inclination * size
     d = (1.0 - swung) * (1.0 + swung)
@@ -135,8 +135,8 @@ def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, 
 
 
 def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
-    # The largest value, not negative, near the only peak between two places. Where |v A| comes near to 1 it is sharp,
-    # but its reciprocal is smooth: parabolas are laid through that, where it is not too large.
+    # Return the largest value, not negative, near the only peak between two places. Where |v A| comes near to 1 it is
+    # sharp, but its reciprocal is smooth: parabolas are laid through that, where it is not too large.
     middle, width = _golden(lambda t: -function(t), low, high, STEPS), 0.5 * (high - low) * GOLDEN**STEPS
 
     def narrow(_, state):

@@ -40,7 +40,7 @@ def lower_envelope(amplitude: Amplitude, weight: Array, inclination: Array, n: A
 
 
 def _squared(load: Array, inclination: Array, n: Array, omega: Array, end: Array, values: tuple[Array, ...]) -> Array:
-    # C^2 + S^2 of (1.33) and (1.34), for A, A', A''.
+    # Return C^2 + S^2 of (1.33) and (1.34), for A, A', A''.
     size, slope, bend = values
     cosine = load * (bend - size * end) / omega - inclination * size
     sine = 4.0 * math.pi * n * load * slope / omega
@@ -65,7 +65,7 @@ def _stretches(amplitude: Amplitude) -> _Stretch:
 
 
 def proved_envelope(amplitude: Amplitude, weights: Array, inclination: Array, n: Array) -> Array:
-    """A number that no pseudotension, and no depth below the spools over z0, goes below on a whole transition.
+    """Lower bound of all pseudotensions, and of the depth below the spools over z0, on a whole transition.
 
     Args:
         amplitude: A, which meets (1.27) and (1.28).

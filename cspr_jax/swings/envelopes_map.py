@@ -1,4 +1,4 @@
-"""Maps of what each instant of a transition asks for."""
+"""Maps of the oscillations that each instant of a transition needs, and of the envelopes there."""
 
 from functools import partial
 
@@ -64,7 +64,7 @@ class TransitionEnvelopesMap(MinimumOscillationsMap):
         }
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse cables that the robot has not; see `GridMap.refuse_hopeless`."""
+        """Refuse cables that the robot does not have; see `GridMap.refuse_hopeless`."""
         n_cables = self._problem.robot.n_cables
         if "cable" in grid.axes and not np.isin(grid.axes["cable"], np.arange(1, n_cables + 1)).all():
             raise ConfigError(self._file, f"axes.cable: must be numbers of cables, from 1 to {n_cables}")

@@ -28,8 +28,8 @@ from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.swing_plane import swing_plane
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
-from cspr_jax.swings.couplings import couplings
 
 
 @jax.tree_util.register_dataclass
@@ -50,8 +50,8 @@ class Segment:
         rate: () lambda of (2.26), 1/s^2.
         end_curvature: () A''(1) of a transition of chapter 1; 0 for the functions of chapter 2, which meet (2.49).
         tilt: (2,) slope of the plane: depth below the spools over z0 is 1 + tilt . c; 1/m.
-        pull: (n_cables, 2) one row a cable, 1/m.
-        twist: (n_cables,) one a cable, 1/m^2.
+        pull: (n_cables, 2) one row for each cable, 1/m.
+        twist: (n_cables,) one for each cable, 1/m^2.
     """
 
     plane: Array
@@ -65,6 +65,38 @@ class Segment:
     tilt: Array
     pull: Array
     twist: Array
+
+
+def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Array, Array]:
+    """Coefficients that couple a motion p = p0 + axes c, in a plane or on a line through p0, to the pseudotensions.
+
+    With d = c + c'' / lambda and lambda = gravity / z0, from (2.12) to (2.14) divided by their value
+    at rest in p0: cable k has the normalised pseudotension 1 + tilt . c + pull_k . d + twist_k (c x d).
+
+    Args:
+        robot: centred; a point mass on three cables, any triangle; or on two, then the motion is a line in their plane.
+        hub: (3,) p0 from the centroid of the spools, m.
+        axes: (3, n) the directions of the motion, as columns; n is 1 or 2.
+
+    Returns:
+        tilt (n,), 1/m; pull (n_cables, n), 1/m, one row for each cable; twist (n_cables,), 1/m^2, zero for a line.
+
+    Raises:
+        InputError: more cables than degrees of freedom.
+    """
+    check_determined(robot)
+    if point_mass.is_planar(robot):
+        half = robot.base_points[:, 0]
+        tilt = axes[2] / hub[2]
+        return tilt, axes[:1] / half[:, None] - tilt[None], jnp.zeros_like(half)  # (1.15), (1.16)
+    a = robot.base_points
+    area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
+    scale = 3.0 / (area[2] * hub[2])
+    opposite = jnp.roll(a, -1, axis=0) - jnp.roll(a, -2, axis=0)  # a2 - a3, a3 - a1, a1 - a2
+    tilt = point_mass.plane_normal(robot) @ axes / hub[2]
+    pull = -scale * (jnp.cross(hub, opposite) + area[None] / 3.0) @ axes
+    twist = scale * (opposite @ jnp.cross(axes[:, 0], axes[:, -1]))
+    return tilt, pull, twist
 
 
 @jax.jit

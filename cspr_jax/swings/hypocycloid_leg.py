@@ -17,7 +17,7 @@ class Hypocycloids(Leg):
     """Any points, joined by standard hypocycloids; see `Leg`."""
 
     def __init__(self, stops: Waypoints) -> None:
-        """Refuse what belongs to transitions."""
+        """Refuse a key that belongs to transitions."""
         if stops.keys.inclination is not None:
             raise ConfigError(stops.path, 'inclination: must be absent unless family = "transition"')
         super().__init__(stops)

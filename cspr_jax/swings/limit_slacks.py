@@ -30,7 +30,7 @@ from cspr_jax.swings.hypocycloid import Segment, duration, oscillation
 from cspr_jax.swings.slacks import Instant, Stretch, row_bounds
 
 
-class _Now(NamedTuple):
+class _AtInstant(NamedTuple):
     # A segment at one instant: numbers, and (n_cables,) of the cables; derivatives in tau.
     z0: Array
     time: Array
@@ -43,8 +43,8 @@ class _Now(NamedTuple):
     rate_slope: Array
 
 
-class _Over(NamedTuple):
-    # Bounds over an interval; `square` of (rho^2)'', without rho's own division.
+class _OverInterval(NamedTuple):
+    # Bounds over an interval; `square` bounds (rho^2)'' without the division that is in `length`.
     n_cables: int
     z0: Array
     time: Array
@@ -59,29 +59,29 @@ class _Over(NamedTuple):
 
 
 class _Closed(NamedTuple):
-    # A limit's slacks, how many a cable (or one of a height), and the bound of their second derivatives.
-    slack: Callable[[_Now, Array], Array]
-    curvature: Callable[[_Over, Array], Array]
+    # Closed form of a limit: its slacks, the bound of their second derivatives, and how many slacks each cable has.
+    slack: Callable[[_AtInstant, Array], Array]
+    curvature: Callable[[_OverInterval, Array], Array]
     sides: int = 1
 
 
-def _bends(state: _Now, limit: Array) -> Array:
+def _bends(state: _AtInstant, limit: Array) -> Array:
     bend = (state.length**2 * state.rate_slope - state.rate**2) / (limit * state.time**2)
     return jnp.concatenate([state.length**3 - bend, state.length**3 + bend]) / state.z0**3
 
 
-def _lifted(over: _Over, limit: Array) -> Array:
+def _lifted(over: _OverInterval, limit: Array) -> Array:
     whole = over.kappa._replace(value=1.0 + over.kappa.value)
     lift = (whole * over.length).times(1.0 / (over.n_cables * over.z0))
     return (lift + over.eta.times(limit / over.weight)).curvature
 
 
-def _rated(over: _Over, limit: Array) -> Array:
+def _rated(over: _OverInterval, limit: Array) -> Array:
     rate = _rate(over.length, over.pace, over.pull)
     return 0.5 * (over.square + (rate * rate).curvature / (over.time * limit) ** 2) / over.z0**2
 
 
-def _bent(over: _Over, limit: Array) -> Array:
+def _bent(over: _OverInterval, limit: Array) -> Array:
     length, bend = over.length, _bend(over.length, over.pace, over.pull, over.square)
     cube = 6.0 * length.value * over.pace.slope**2 + 3.0 * length.value**2 * over.pace.curvature
     return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
@@ -109,43 +109,43 @@ def count(row: Limit, n_cables: int) -> int:
     """Number of smooth functions of which the slack of a limit is the smallest.
 
     Returns:
-        one of a height, one a cable, or two a cable for either sign.
+        one for a height; one for each cable, or two for either sign.
     """
     return CLOSED[row.name].sides * (n_cables if row.per_cable else 1)
 
 
 @jax.jit
 def limit_slacks(
-    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, now: Instant
+    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, state: Instant
 ) -> tuple[list[Array], ...]:
-    """The slacks of each limit, at one instant: smooth functions, one a cable or more.
+    """The slacks of each limit, at one instant: smooth functions, one or two for each cable.
 
     Args:
         robot: a point mass on three cables.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
         tau: () normalised time.
-        now: the state at `tau`.
+        state: the state at `tau`.
 
     Returns:
         a list of () for each limit of `limits_set`, as long as `count` says.
     """
     if not limits_set(limits):
         return ()
-    position, slope, curvature = _path(segment, arcs, tau, now)
+    position, slope, curvature = _path(segment, arcs, tau, state)
     rays = position[None] - robot.base_points
     length = jnp.linalg.norm(rays, axis=1)
     rate = rays @ slope
     rate_slope = jnp.dot(slope, slope) + rays @ curvature
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
-    lift = jnp.stack(now.kappa) * length / (len(now.kappa) * z0)
-    here = _Now(z0, time, weight, now.eta, lift, position[2], length, rate, rate_slope)
+    lift = jnp.stack(state.kappa) * length / (len(state.kappa) * z0)
+    here = _AtInstant(z0, time, weight, state.eta, lift, position[2], length, rate, rate_slope)
     slacks = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in limits_set(limits))
     return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in slacks)
 
 
 def _path(segment: Segment, arcs: Array, tau: Array, state: Instant) -> tuple[Array, Array, Array]:
-    # Position and its first two derivatives in tau.
+    # Return the position and its first two derivatives in tau.
     ratio, steady, period = oscillation(segment, arcs)
     span = segment.end_radius - segment.start_radius
     r, r1 = segment.start_radius + span * state.amplitude_values[0], span * state.amplitude_values[1]
@@ -166,7 +166,7 @@ def limit_curvatures(
         robot: a point mass on three cables.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
-        kappa: bounds of the variable part of the pseudotensions over it, leaves (n_cables,).
+        kappa: bounds of the variable part of the pseudotensions over the interval, leaves (n_cables,).
 
     Returns:
         one () for each limit of `limits_set`, the largest over the cables.
@@ -179,7 +179,7 @@ def limit_curvatures(
     length = _length(robot, segment, over, pace, eta)
     depth = row_bounds(segment, arcs, over, segment.plane[2])
     square = 2.0 * (pace.slope**2 + length.value * pace.curvature)
-    here = _Over(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
+    here = _OverInterval(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
     return tuple(jnp.max(CLOSED[row.name].curvature(here, getattr(limits, row.name))) for row in limits_set(limits))
 
 
@@ -191,19 +191,19 @@ def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, B
         arcs: () number of arcs, a float.
 
     Returns:
-        the bounds, () each: of the distance from P0 and of its first two derivatives, m; of the second derivative and
-        of its first two.
+        the bounds, () each: of the position from P0 and of its first two derivatives, m; of the second derivative and
+        of its first two derivatives.
     """
     ratio, steady, period = oscillation(segment, arcs)
     omega, gain = math.pi * arcs, steady / period
-    turn = math.pi * segment.precession
+    precession = math.pi * segment.precession
     one = jnp.ones_like(omega)
     wave = Bounds(one, omega, omega**2)
     rho = (over.bend + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
-    c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(turn)
+    c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(precession)
     d_r = rho * wave + (over.growth * wave).times(2.0 * gain / omega)
     d_t = ((rho + over.size.times(2.0 * gain)) * wave).times(ratio)
-    return c, (d_r.combined(d_t).turned(turn) + c).times(period)  # c'' = T^2 lambda (d - c)
+    return c, (d_r.combined(d_t).turned(precession) + c).times(period)  # c'' = T^2 lambda (d - c)
 
 
 def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Bounds:

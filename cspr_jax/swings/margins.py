@@ -44,7 +44,7 @@ def _lowest(estimates: Array, places: Array) -> tuple[Array, Array]:
 
 def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[Array, Array]:
     # Keep the candidates in order, the new one in its place; leaves (CANDIDATES, n_values, n). A segment with fewer
-    # blocks than others sees its last block again: what is known is not new.
+    # blocks than others sees its last block again: a place that is known is not new.
     estimate = jnp.where((best[1] == place[None]).any(0), jnp.inf, estimate)
     estimates, places = [], []
     for old_estimate, old_place in zip(*best, strict=True):
@@ -58,8 +58,8 @@ def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[A
 def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array) -> Array:
     """Smallest value of a continuous function near an estimated minimum, by ever narrower parabolas.
 
-    A parabola is believed only where its middle is the lowest of its three points; else they move to the lowest. So a
-    minimum that is steep on one side, or a kink beside it, is found too.
+    A parabola is believed only where its middle is the lowest of its three points; else the points move to the lowest.
+    So a minimum that is steep on one side, or a kink beside it, is found too.
 
     Args:
         function: of one instant, () to ().
@@ -88,7 +88,7 @@ def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array)
 
 
 class Functions(NamedTuple):
-    """Smooth functions of one instant in groups, whose smallest values are wanted.
+    """Smooth functions of one instant in groups, each with one smallest value to be found.
 
     Fields:
         evaluate: (robot, limits, amplitude, segment, arcs, tau) -> numbers (), group by group; hashable.

@@ -25,6 +25,7 @@ from cspr_jax.swings.arcs import check_numbers
 from cspr_jax.swings.decide import BATCH, Known, decided, end_slacks
 from cspr_jax.swings.envelopes import proved_envelope
 from cspr_jax.swings.hypocycloid import Segment
+from cspr_jax.swings.margins import margins
 from cspr_jax.swings.proof import tolerance
 from cspr_jax.swings.transition_margins import transition_margins
 
@@ -35,13 +36,13 @@ ROUNDING = 1e-12
 
 @dataclasses.dataclass(frozen=True)
 class OscillationAnswers(Answers):
-    """One answer a transition; arcs are two an oscillation.
+    """One answer for each transition; an oscillation has two arcs.
 
     Fields:
         oscillations: (n,) smallest number of oscillations proved feasible; 0: none.
         tried_oscillations: (n,) the number that duration and margins belong to.
         envelope_oscillations: (n,) smallest integer that keeps the envelopes positive; 0: none up to the largest tried.
-        least_oscillations: (n,) the real number that they ask for; NaN where |v A| reaches 1, so that none will do.
+        least_oscillations: (n,) smallest real number that does; NaN where |v A| reaches 1, so that none does.
         inclination_gain: (n,) oscillations, a real number, that the inclination saves over a horizontal transition.
         used_inclination: (n,) v.
         used_z0: (n,) depth of p0 below the centroid of the spools, m.
@@ -158,7 +159,7 @@ def _proofs(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
 def _known(
     problem: Problem, segments: Segment, of_targets: tuple[np.ndarray, np.ndarray], allowed: np.ndarray
 ) -> Known:
-    # Whole numbers of oscillations that the envelopes prove.
+    # Return the whole numbers of oscillations that the envelopes prove.
     n = np.where(np.isfinite(allowed), allowed, 1.0)
     kernel = partial(_proofs, problem.amplitude)
     bound, near = in_batches(kernel, (segments, *of_targets, n), size=BATCH)
@@ -178,7 +179,8 @@ def minimum_oscillations(
         z0: (n,) depth of p0 below the centroid of the spools, m; positive.
         max_arcs: twice the largest number of oscillations tried, at least 2.
         arcs: (n,) a fixed, even number of arcs for each transition, 0 where free; None: all free.
-        steady: (n,) whether it is no transition but the swing of one size that it ends in; None: nowhere.
+        steady: (n,) whether the segment is no transition but the swing of constant size that one ends in; None:
+            nowhere.
 
     Returns:
         the answers.
@@ -204,13 +206,10 @@ def minimum_oscillations(
     infinity = 1.0 - np.abs(v) * max(abs(float(problem.amplitude.lowest)), float(problem.amplitude.highest))
     allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
     parities = {0: segments, 1: segments}
-    if steady is None:
-        is_plain = not limits_set(problem.limits) and problem.limits.uncertainty is None
-        known = _known(problem, segments, (weights, v), allowed) if is_plain else None
-        how: dict[str, Any] = {"known": known, "measure": transition_margins}
-    else:
-        how = {}
-    answers, _ = decided(problem, parities, upper, at_ends, infinity, arcs=arcs, **how)
+    is_plain = steady is None and not limits_set(problem.limits) and problem.limits.uncertainty is None
+    known = _known(problem, segments, (weights, v), allowed) if is_plain else None
+    measure = transition_margins if steady is None else margins
+    answers, _ = decided(problem, parities, upper, at_ends, infinity, arcs=arcs, known=known, measure=measure)
     return OscillationAnswers(
         **vars(answers),
         oscillations=answers.arcs // 2,

@@ -23,7 +23,7 @@ class MinimumOscillationsMap(PointMassMap):
     proves = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
-        """Build what all tiles share; bounds may be asked for."""
+        """Build what all tiles share; an amplitude function for bounds is allowed."""
         super().__init__(robot_file, keys, file, for_bounds=True)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -7,7 +7,7 @@ from cspr_jax.swings.hypocycloid import Segment
 
 
 def pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Segment:
-    """Some segments, each of the parity of its number of arcs.
+    """Pick segments, each of the parity of its number of arcs.
 
     Args:
         parities: as `segments_between` gives them.
@@ -28,7 +28,7 @@ def pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Se
 
 
 def rows_of(parities: dict[int, Segment], rows: np.ndarray) -> dict[int, Segment]:
-    """Some segments, of both parities.
+    """Pick segments, of both parities.
 
     Args:
         parities: as `segments_between` gives them.

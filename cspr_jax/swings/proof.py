@@ -2,7 +2,7 @@
 
 A slack f with |f''| <= M on an interval of length h satisfies f >= min(f at its ends) - M h^2 / 8.
 The interval [0, 1] is cut into blocks at the knots of the amplitude function, and each block into 16
-intervals; M comes from the closed form, one a block. A segment is
+intervals; M comes from the closed form, one for each block. A segment is
 
     proved feasible    if this lower bound exceeds the tolerance in every block,
     proved infeasible  if a sample lies below minus the tolerance,
@@ -45,7 +45,7 @@ class Proof:
         met: (n, n_criteria) the criterion is met at every instant; False where that is not known.
         broken: (n, n_criteria) the criterion is broken at some instant; False where that is not known.
         sampled: (n, n_criteria) smallest slack that a sample of a first look attains.
-        bound: (n, n_criteria) what a first look proves that no slack falls below.
+        bound: (n, n_criteria) lower bound of the slack that a first look proves.
     """
 
     feasible: np.ndarray
@@ -156,7 +156,7 @@ def is_met_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> 
 
 
 def _looked_at(problem: Problem, segments: Segment, arcs: np.ndarray, table) -> tuple[np.ndarray, ...]:
-    # Smallest samples and proved bounds (n, n_criteria), tolerances (n,).
+    # Return the smallest samples and the proved bounds (n, n_criteria), and the tolerances (n,).
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
@@ -173,8 +173,8 @@ def _allowance(n_criteria: int, near: np.ndarray) -> np.ndarray:
 def _cut(
     problem: Problem, segments: Segment, arcs: np.ndarray, near: np.ndarray, counted: np.ndarray, table
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Which segments are proved (n,), and which criteria that count are broken (n, n_criteria). Items are
-    # blocks of segments that are still open: owner, start, stop.
+    # Return which segments are proved (n,), and which criteria that count are broken (n, n_criteria). Items are blocks
+    # of segments that are still open: owner, start, stop.
     edges, counts = table
     broken, stuck = np.zeros(counted.shape, bool), np.zeros(len(arcs), bool)
     count = counts[arcs.astype(int)]

@@ -40,7 +40,7 @@ def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray) 
 def _limits_of(
     problem: Problem, segments: Segment, arcs: np.ndarray, is_limit: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Which candidates are proved but for the limits that they break, and these limits (n, n_criteria).
+    # Return which candidates are proved but for the limits that they break, and these limits (n, n_criteria).
     proof = prove(problem, segments, arcs, ignored=np.tile(is_limit, (len(arcs), 1)))
     is_proved, broken = proof.feasible.copy(), proof.broken & is_limit
     unclear = np.flatnonzero(is_proved & (~broken & ~proof.met).any(1))
@@ -61,10 +61,10 @@ def unavoidable(problem: Problem, parities: dict[int, Segment], upper: np.ndarra
     Args:
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
         upper: (n, max_arcs) -inf at numbers of arcs that are out of the question.
-        suspects: (n, n_criteria) criteria that are asked about, which some number of arcs breaks.
+        suspects: (n, n_criteria) criteria to be tested, each broken by some number of arcs.
 
     Returns:
-        (n, n_criteria), proved.
+        (n, n_criteria) which of them every number of arcs breaks: proved.
     """
     suspects, left = suspects.copy(), upper > -np.inf
     while True:

@@ -34,7 +34,7 @@ ROUNDING = 256.0
 
 
 def sample_table(amplitude: Amplitude, arcs: np.ndarray, tau: np.ndarray, dtype) -> Array:
-    """Table of what a check needs that does not depend on the points: of the phase pi p tau and of A.
+    """Table of the factors of a check that do not depend on the points: of the phase pi p tau and of A.
 
     Args:
         arcs: (n_arcs,) numbers of arcs.
@@ -86,7 +86,7 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
             eta = 1.0 + tilt[0] * c0 + tilt[1] * c1
             pulls = [row[0] * d0 + row[1] * d1 + row[2] * cross for row in rows]
             # kappa_k = eta + pull_k; eta itself is the depth ratio
-            # A NaN may be forgotten, which leaves an upper bound: what decides is the certificate.
+            # A NaN may be forgotten, which leaves an upper bound: `swings.proof` decides.
             lowest = lesser(lesser(pulls[0], pulls[1]), lesser(pulls[2], jnp.zeros_like(eta)))
             return lesser(smallest, eta + lowest)
 
@@ -96,7 +96,8 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
                 smallest = check(UNROLL * j + i, smallest)
             return smallest
 
-        # Not carried from one to the next: what a loop stacks XLA leaves on one core, as its caller's threads want it.
+        # The minimum is not carried from one sample to the next: XLA leaves on one core what a loop stacks, as the
+        # threads of the caller need it.
         smallest = row_by_row(several, jnp.arange(len(tau) // UNROLL)).min(0)
         return jnp.where(exists, smallest, -jnp.inf)
 

@@ -6,7 +6,7 @@ depth below the spools over z0, both along the vertical:
     taut               kappa_k        thesis (2.12) to (2.14)
     below the spools   eta
 
-`limit_slacks` adds those of the limits that are given. Beside each slack stands a bound of its second
+`limit_slacks` adds the slacks of the limits that are set. Beside each slack stands a bound of its second
 derivative over an interval, from the closed form: it is what makes a verdict hold between samples.
 """
 
@@ -139,7 +139,7 @@ def stretch(segment: Segment, amplitude: Amplitude, arcs: Array, start: Array, s
 
 
 def _components(segment: Segment, vector: Array, over: Stretch) -> tuple[Bounds, Bounds]:
-    # vector . e_r and vector . e_t: they turn into each other at the rate of the precession.
+    # Bound vector . e_r and vector . e_t, which turn into each other at the rate of the precession.
     lateral, axial = sincospi(segment.sense * segment.precession * over.middle)
     length = jnp.hypot(vector[0], vector[1])
     rate = math.pi * segment.precession
@@ -189,7 +189,7 @@ def row_bounds(
 
 
 def _oscillating(cosine: Bounds, sine: Bounds, omega: Array) -> Bounds:
-    # Bounds of f cos(omega tau) + g sin(omega tau): the derivative's factors, joined at their worst phase.
+    # Bound f cos(omega tau) + g sin(omega tau) and its derivatives, with their factors joined at the worst phase.
     return Bounds(
         jnp.hypot(cosine.value, sine.value),
         jnp.hypot(cosine.slope + omega * sine.value, sine.slope + omega * cosine.value),

@@ -5,8 +5,8 @@ grows like the amplitude function A: p = p0 + u A cos(2 pi n tau), (1.20), (1.21
 duration (1.29) its end acceleration is that of a pendulum hung from the centroid of the spools.
 
 It is a segment of chapter 2 from rest with an even number of arcs p = 2 n, but for A''(1), which
-need not vanish here. Backwards in time it is the way back to rest, (1.56) to (1.58). At one size it
-is a swing that stays between the target and its opposite point.
+need not vanish here. Backwards in time it is the way back to rest, (1.56) to (1.58). At constant
+size it is a swing that stays between the target and its opposite point.
 """
 
 import dataclasses
@@ -41,7 +41,7 @@ def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: A
 
 @jax.jit
 def steady(segment: Segment) -> Segment:
-    """The swing of one size that a transition ends in.
+    """The swing of constant size that a transition ends in.
 
     Returns:
         the segment between the target and itself, for even numbers of arcs.
@@ -52,7 +52,7 @@ def steady(segment: Segment) -> Segment:
 
 
 def inclination(segment: Segment) -> Array:
-    """Extra depth of the target below the spools, against p0, over z0: v of (1.31).
+    """Depth of the target below the spools, less that of p0, over z0: v of (1.31).
 
     Args:
         segment: a transition; leaves (...).

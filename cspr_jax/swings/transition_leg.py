@@ -17,7 +17,7 @@ from cspr_jax.swings.transition import steady
 
 
 class Transitions(Leg):
-    """Rest and targets, joined by transitions and by swings of one size; see `Leg`."""
+    """Rest and targets, joined by transitions and by swings of constant size; see `Leg`."""
 
     def __init__(self, stops: Waypoints) -> None:
         """Refuse pairs of poses that a transition cannot join."""
@@ -61,7 +61,7 @@ class Transitions(Leg):
 
 
 def _with_swings(segments: Segment, is_steady: np.ndarray) -> Segment:
-    # Transitions, but where the swing of one size at the target is wanted.
+    # Replace steady transitions by the swing of constant size at their target.
     def choose(swing, transition):
         swing = np.broadcast_to(swing, np.shape(transition))
         return np.where(is_steady.reshape(-1, *[1] * (np.ndim(transition) - 1)), swing, transition)

@@ -1,4 +1,4 @@
-"""Margins of transitions: the smallest of all pseudotensions from two functions instead of one a cable and one more."""
+"""Margins of transitions: the smallest pseudotension from two functions, not one for each cable and the depth."""
 
 import math
 

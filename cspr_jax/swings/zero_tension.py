@@ -2,7 +2,7 @@
 
 It is no motion, since it breaks (1.27) and (1.28). On horizontal transitions it spreads the load evenly over
 the time, so that it bounds the others; on inclined ones it is a guide. w_hi and w_lo are the largest and the
-smallest weight, w_C the one of the larger size.
+smallest weight, w_C the one that is larger in size.
 """
 
 import math

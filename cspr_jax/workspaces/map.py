@@ -19,8 +19,8 @@ from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, turn_grid
 from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.schema.axes import TILT_TORSION
 from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.workspaces.clearances import surroundings
 from cspr_jax.workspaces.questions import FEASIBLE, check_cables, required_wrenches, requirement

@@ -20,8 +20,7 @@ from cspr_jax.config import catalogue
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, register, registered
-from cspr_jax.schema.quantities import AXES, QUANTITIES
-from cspr_jax.schema.quantity import Quantity
+from cspr_jax.schema.quantities import AXES, QUANTITIES, Quantity
 from cspr_jax.store.result import open_result
 from cspr_jax.sweep.definition import read_sweep
 

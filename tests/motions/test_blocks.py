@@ -28,7 +28,7 @@ def test_blocks_cover_all_of_time(name, how):
     blocks = parts_of_arcs(arcs, knots, parts)
     assert (np.diff(blocks.row) >= 0).all() and set(blocks.row) == set(range(len(arcs)))
     for row, p in enumerate(arcs):
-        own = blocks.some(blocks.row == row)
+        own = blocks.part(blocks.row == row)
         edges = np.append(own.start, own.stop[-1])
         assert edges[0] == 0.0 and edges[-1] == 1.0 and (np.diff(edges) > 0.0).all()
         np.testing.assert_array_equal(own.start[1:], own.stop[:-1])

@@ -134,7 +134,7 @@ def test_no_robot_deviates_more_than_is_bounded(name, kind, spools, centre):
     problem = problem_of(robot, Limits(uncertainty=BALLS))
     robustness = Robustness(problem, kind, batch=64, count_instants=lambda _: None)
     blocks = parts_of_arcs(arcs, np.zeros(0), 512)
-    blocks = blocks.some(rng.choice(len(blocks.row), 200, replace=False))
+    blocks = blocks.part(rng.choice(len(blocks.row), 200, replace=False))
     known = robustness.enclosure(segments, arcs, blocks)
     found, sizes = influence(known), [np.full(200, x) for x in (spools, centre)]
     off = deviations(known, found, *sizes)

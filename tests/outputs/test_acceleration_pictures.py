@@ -19,8 +19,7 @@ from cspr_jax.outputs.plots.half_planes import WINDOW, Plane, Window, section
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.meanings import line_bounds, value_attributes
-from cspr_jax.schema.motion_quantities import SEGMENTS, TRAJECTORY
-from cspr_jax.schema.quantities import QUANTITIES
+from cspr_jax.schema.quantities import QUANTITIES, SEGMENTS, TRAJECTORY
 from cspr_jax.store.netcdf import describe, dtype_of, new_hdf5
 from outputs.test_outputs import cspr, panels
 from outputs.test_pictures import GRID, bar, made, ticks

@@ -17,8 +17,7 @@ from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.outputs.plan_report import plan_object
 from cspr_jax.outputs.plots.draw import _map_figure
 from cspr_jax.outputs.plots.sections import NONE_COLOUR
-from cspr_jax.schema.motion_quantities import FLIGHT, SEGMENTS, TRAJECTORY
-from cspr_jax.schema.quantities import AXES, QUANTITIES, flag_attributes
+from cspr_jax.schema.quantities import AXES, FLIGHT, QUANTITIES, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.schema.verdicts import SENTENCES
 from cspr_jax.store.netcdf import make_datasets, new_hdf5
 from cspr_jax.store.result import Result

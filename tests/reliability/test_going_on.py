@@ -38,7 +38,7 @@ def test_going_on_computes_the_rest_only(half, tmp_path):
     sweep, directory = half
     paper = Paper(sweep)
     outcome = go(sweep, directory, paper=paper)
-    assert (outcome.computed, outcome.kept, len(paper.computed)) == (8, 4, 8)
+    assert (outcome.computed, outcome.reused, len(paper.computed)) == (8, 4, 8)
     again = Paper(sweep)
     assert go(sweep, directory, paper=again).computed == 0 and again.computed == []
     go(sweep, tmp_path / "whole")

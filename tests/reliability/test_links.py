@@ -158,6 +158,6 @@ def test_a_lock_that_is_no_longer_ours(tmp_path, how):
         go(sweep, directory, paper=paper)
     assert len(list((directory / "shards").glob("*.h5"))) == 2
     (directory / "LOCK").unlink(missing_ok=True)
-    assert go(sweep, directory).kept == 2
+    assert go(sweep, directory).reused == 2
     go(sweep, tmp_path / "whole")
     check_same(directory, content(tmp_path / "whole"))

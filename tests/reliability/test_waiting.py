@@ -188,13 +188,13 @@ def test_the_pace_of_a_sweep():
     """Cells that an earlier run has left count for nothing, nor does compiling once there are two tiles."""
     now = [100.0]
     pace = Pace(lambda: now[0])
-    pace.told(500, 1000)
+    pace.advance(500, 1000)
     assert pace.rate is None and pace.left() == ""
     now[0] = 110.0
-    pace.told(600, 1000)
+    pace.advance(600, 1000)
     assert (pace.rate, pace.left()) == (10.0, "0:00:40 left")
     now[0] = 112.0
-    pace.told(700, 1000)
+    pace.advance(700, 1000)
     assert (pace.rate, pace.left()) == (50.0, "0:00:06 left")
     now[0] = 115.0
     assert pace.left() == "0:00:03 left"

@@ -12,7 +12,7 @@ import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import StoreError
-from cspr_jax.outputs.plots.motion_source import kept
+from cspr_jax.outputs.plots.motion_source import robot_and_plan
 from cspr_jax.outputs.plots.robot_along import moving
 
 PLATFORM = """schema = 1
@@ -161,7 +161,7 @@ def test_the_platform_stands_where_its_cables_end(tmp_path):
     """Also where the mass centre, whose position a motion holds, is not the origin of the platform's points."""
     assert plan(tmp_path, PLATFORM, "-o", str(tmp_path / "motion.h5"))[0] == 0
     result = cspr_jax.open_result(tmp_path / "motion.h5")
-    robot_file, _ = kept(result, "motion.h5", "trajectory")
+    robot_file, _ = robot_and_plan(result, "motion.h5", "trajectory")
     assert np.linalg.norm(resolve_robot("cogiro", "", tmp_path).centre_of_mass) > 0.1
     robot = moving(result.data, robot_file, np.arange(len(result.axes["t"])))
     np.testing.assert_allclose(

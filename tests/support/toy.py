@@ -17,7 +17,7 @@ import numpy as np
 
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.schema.map_kinds import MapKind, registered
-from cspr_jax.schema.quantity import Quantity
+from cspr_jax.schema.quantities import Quantity
 
 SWEEP = """schema = 1
 map = "toy"

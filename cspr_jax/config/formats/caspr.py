@@ -55,7 +55,7 @@ def read(path: Path, cable_set: str | None) -> Body:
         the body.
 
     Raises:
-        ConfigError: no such set, no other file, several links, or what no robot file can say.
+        ConfigError: no such set, no other file, several links, or content that no robot file can express.
     """
     bodies, cables = _both(path)
     joint, body = _body(bodies)
@@ -175,21 +175,21 @@ def _cable(element: Element, k: int, file: Path, centre: list[float], shift: lis
     cable.base = (np.array(start) - shift).tolist()
     limits = child(element, "properties", file, place)
     for key, limit in (("tension_min", "force_min"), ("tension_max", "force_max")):
-        found = limits.find(limit)
-        if found is not None:
-            setattr(cable, key, number(text_of(found), file, f"{place}.{limit}", infinite=key == "tension_max"))
+        bound = limits.find(limit)
+        if bound is not None:
+            setattr(cable, key, number(text_of(bound), file, f"{place}.{limit}", infinite=key == "tension_max"))
     return cable
 
 
 def _ends(attachments: Element, file: Path, place: str) -> tuple[Element, Element]:
-    # That on the base, which may be a pulley, and that on the body.
-    found = [element for element in attachments if isinstance(element.tag, str)]
-    wanted = f"one attachment on link 0, or a <{_PULLEY}>, and one on link 1"
+    # Return the attachment on the base, which may be a pulley, and the one on the body.
+    ends = [element for element in attachments if isinstance(element.tag, str)]
+    allowed = f"one attachment on link 0, or a <{_PULLEY}>, and one on link 1"
     links = []
-    for element in found:
+    for element in ends:
         if element.tag not in ("attachment", _PULLEY):
-            raise ConfigError(file, f"{place}: <{element.tag}>: must be {wanted}")
+            raise ConfigError(file, f"{place}: <{element.tag}>: must be {allowed}")
         links.append("0" if element.tag == _PULLEY else text_of(child(element, "link", file, place)))
     if sorted(links) != ["0", "1"]:
-        raise ConfigError(file, f"{place}: attachments on links {', '.join(links) or 'none'}: must be {wanted}"[:300])
-    return found[links.index("0")], found[links.index("1")]
+        raise ConfigError(file, f"{place}: attachments on links {', '.join(links) or 'none'}: must be {allowed}"[:300])
+    return ends[links.index("0")], ends[links.index("1")]

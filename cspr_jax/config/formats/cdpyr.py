@@ -33,7 +33,7 @@ def read_json(path: Path) -> Body:
         the body.
 
     Raises:
-        ConfigError: no JSON, several platforms, or what no robot file can say.
+        ConfigError: no JSON, several platforms, or content that no robot file can express.
     """
     return _read(path, _json, "JSON")
 
@@ -45,7 +45,8 @@ def read_yaml(path: Path) -> Body:
         the body.
 
     Raises:
-        ConfigError: no YAML, references in it that grow, several platforms, or what no robot file can say.
+        ConfigError: no YAML, references that grow too much, several platforms, or content that no robot file can
+            express.
     """
     return _read(path, _yaml, "YAML")
 
@@ -60,11 +61,11 @@ def _json(text: str) -> Any:
 def _yaml(text: str) -> Any:
     import yaml
 
-    from cspr_jax.config.formats.yaml_text import load  # only who reads YAML waits for it
+    from cspr_jax.config.formats.yaml_text import load  # imported only where YAML is read, since it takes time
 
     try:
         data = load(text)
-    # Its constructors of numbers and dates raise what they happen to, as of "!!int ''" and "!!timestamp x".
+    # Its constructors of numbers and dates raise arbitrary errors, as of "!!int ''" and "!!timestamp x".
     except (yaml.YAMLError, LookupError, AttributeError, ArithmeticError, TypeError) as error:
         raise ValueError(" ".join(str(error).split())[:200]) from error
     if not _size(data, {}) <= LARGEST:
@@ -116,7 +117,7 @@ class _Table:
         return [_Table(one, f"{self.place}{key}[{k}]", self.file) for k, one in enumerate(rows)]
 
     def numbers(self, key: str, *shape: int, missing: Any = None) -> np.ndarray | None:
-        """Finite numbers of a shape; None where the key is absent, or what is missing is infinite."""
+        """Finite numbers of a shape; None where the key is absent, and infinite ones stand for none."""
         if not self.has(key):
             return None if missing is None else np.asarray(missing, float)
         try:
@@ -197,12 +198,12 @@ def _cables(robot: _Table, platform: _Table) -> list[Cable]:
             pulley = start.table("pulley")
             radius = pulley.numbers("radius")
             cable.radius = 0.0 if radius is None else float(radius)
-            cable.axis = (_turn(start) @ _turn(pulley))[:, 2].tolist()
+            cable.axis = (_rotation(start) @ _rotation(pulley))[:, 2].tolist()
         cables.append(cable)
     return cables
 
 
-def _turn(anchor: _Table) -> np.ndarray:
+def _rotation(anchor: _Table) -> np.ndarray:
     matrix = anchor.numbers("dcm", 3, 3)
     return np.eye(3) if matrix is None else matrix
 

@@ -16,10 +16,10 @@ OF_XY = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 OF_YZ = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 OF_X = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 NO_GRAVITY = 1e-9  # m/s^2; of robots that move in a level plane
-# Part of the size that a planar robot may miss its plane.
+# Share of the size by which points of a planar robot may miss its plane.
 OUT_OF_PLANE = 1e-9
-LARGEST = 1e9  # N; tensions beyond stand for none
-DIGITS = 15  # of numbers that are sums
+LARGEST = 1e9  # N; larger tensions stand for no limit
+DIGITS = 15  # digits of numbers that are sums
 LARGEST_NUMBER = 1e18  # of a file, whatever its unit: products of several still stay finite
 
 
@@ -34,7 +34,7 @@ class Cable:
         tension_min: N.
         tension_max: N; infinite: none.
         radius: of its pulley, m; 0: none.
-        axis: (3,) about which that swivels, in the direction in which the cable enters.
+        axis: (3,) about which the pulley swivels, in the direction in which the cable enters.
     """
 
     base: list[float]
@@ -62,8 +62,8 @@ class Body:
         axes: (3, 3) rows x, y and z of a robot file in these axes.
         is_level: whether its plane is level, so that it feels no gravity.
         cable_diameter: m.
-        warnings: what was left out.
-        notes: what stands for numbers that the file does not have, in words that begin with "placeholder".
+        warnings: items that were left out.
+        notes: placeholders for numbers that the file does not have, in words that begin with "placeholder".
     """
 
     file: object
@@ -82,7 +82,7 @@ class Body:
 
 
 def about_centre(tensor: np.ndarray, mass: float, centre: list[float]) -> np.ndarray:
-    """Inertia about the mass centre of one about the origin of the platform frame, by Steiner's theorem.
+    """Inertia about the mass centre, from the inertia about the origin of the platform frame, by Steiner's theorem.
 
     Args:
         tensor: (3, 3) about the origin, kg m^2.

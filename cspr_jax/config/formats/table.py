@@ -57,7 +57,7 @@ class Imported:
     Fields:
         keys: of its robot file.
         cable_names: in the other file.
-        warnings: what was left out, one line each.
+        warnings: items that were left out, one line each.
     """
 
     keys: dict[str, Any]
@@ -95,7 +95,7 @@ def read(path: Path, cable_set: str | None = None) -> Imported:
         the robot.
 
     Raises:
-        ConfigError: a mistake in the file, or what no robot file can say.
+        ConfigError: a mistake in the file, or content that no robot file can express.
         KeyError: another ending.
     """
     row = format_of(path.name)

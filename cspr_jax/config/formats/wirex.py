@@ -33,7 +33,7 @@ def read(path: Path) -> Body:
         the body.
 
     Raises:
-        ConfigError: no such XML, several platforms, or what no robot file can say.
+        ConfigError: no such XML, several platforms, or content that no robot file can express.
     """
     root = read_xml(path)
     if root.tag != "models":

@@ -1,4 +1,4 @@
-"""XML of somebody else: nothing is expanded or fetched; what is missing becomes one line."""
+"""XML of other programs: nothing is expanded or fetched; a missing element becomes one line."""
 
 import codecs
 import math
@@ -31,7 +31,7 @@ def read_xml(path: Path) -> Element:
     Raises:
         ConfigError: the file cannot be read, is larger than 1 MB, is no XML, or declares entities.
     """
-    from defusedxml import DefusedXmlException, ElementTree  # only who reads XML waits for it
+    from defusedxml import DefusedXmlException, ElementTree  # imported only where XML is read, since it takes time
 
     data = read_bytes(path)
     encoding, name = _encoding(data)
@@ -70,7 +70,7 @@ def child(parent: Element, tag: str, file: object, place: str = "") -> Element:
     Args:
         tag: of the kind, directly below it.
         file: named in errors.
-        place: what the parent is, for errors.
+        place: name of the parent in errors.
 
     Returns:
         the element.

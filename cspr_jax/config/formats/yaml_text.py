@@ -1,4 +1,4 @@
-"""YAML of somebody else: libyaml's loader where there is one, with limits on what a small text can stand for."""
+"""YAML of other programs: libyaml's loader where there is one, with limits on what a small text can expand to."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Feasible accelerations at an instant of a motion of a point mass, as its file tells them."""
+"""Feasible accelerations at an instant of a motion of a point mass, from its file."""
 
 import dataclasses
 
@@ -10,7 +10,7 @@ from cspr_jax.build.limits import build_limits
 from cspr_jax.build.robots import gravity_of, kernel_robot
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.labels import value
-from cspr_jax.outputs.plots.motion_source import kept
+from cspr_jax.outputs.plots.motion_source import robot_and_plan
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
@@ -18,28 +18,28 @@ from cspr_jax.robots.wrench_sets import spanning, tension_range
 from cspr_jax.store.result import Result
 from cspr_jax.workspaces.acceleration_search import faces_of, judged
 
-# Rows that are looked at together: with many cables the faces of all rows would not fit into memory.
+# Rows that are computed together: with many cables the faces of all rows would not fit into memory.
 ROWS = 1 << 14
 
 
 @dataclasses.dataclass(frozen=True)
 class AccelerationSet:
-    """Feasible accelerations at an instant. Vectors have the axes of the file, but for the third one: upward.
+    """Feasible accelerations at an instant. Vectors have the axes of the file, but the third one is upward.
 
     Fields:
         words: the instant, such as "t = 1.2 s".
         position: (3,) of the effector, as in the file, m.
         actual: (3,) its acceleration, m/s^2.
-        margin: distance of that from the nearest face, m/s^2; negative outside.
+        margin: distance of the actual acceleration from the nearest face, m/s^2; negative outside.
         normals: (n_faces, 3) unit vectors that point inside.
         offsets: (n_faces,) m/s^2; -inf of a face that bounds nothing.
         names: of the faces.
         cables: (n_cables, 3) unit vectors from the effector to the spools.
         reach: (n_cables,) acceleration from the smallest to the largest tension, m/s^2.
         apex: (3,) acceleration that the smallest tensions give, m/s^2.
-        falling: (3,) that of free fall, m/s^2.
+        falling: (3,) acceleration of free fall, m/s^2.
         motion: (n, 3) accelerations of the whole motion, m/s^2.
-        is_planar: whether the robot is.
+        is_planar: whether the robot moves in a plane.
     """
 
     words: str
@@ -58,7 +58,7 @@ class AccelerationSet:
 
     @property
     def slacks(self) -> np.ndarray:
-        """Distances of the actual acceleration from the planes of the faces, (n_faces,); inf of one that is none."""
+        """Distances of the actual acceleration from the faces, (n_faces,); inf of a face that bounds nothing."""
         return self.normals @ self.actual - self.offsets
 
     @property
@@ -86,7 +86,7 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         InputError: a platform, a file without its robot, no such instant, or cables that do not span the space there.
         ConfigError: a mistake in the plan that the file keeps.
     """
-    robot_file, keys = kept(result, file, "acceleration")
+    robot_file, keys = robot_and_plan(result, file, "acceleration")
     if robot_file.is_platform:
         fault = f'"acceleration" of {robot_file.kind}'
         raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", fault=fault)

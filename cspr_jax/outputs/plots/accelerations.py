@@ -1,8 +1,8 @@
 """Diagram of the feasible accelerations at an instant of a motion, Boralugoda figures 2.2, 2.4 and 2.8.
 
-Of a planar robot all of it is in one plane. Of a spatial one there are sections through the actual acceleration: a
-level one, a vertical one in which zero and gravity lie, too, and a vertical one across the nearest face, which is seen
-from its edge there, and the margin in its true size.
+For a planar robot, everything is in one plane. For a spatial one, there are sections through the actual acceleration: a
+level one, a vertical one that holds zero and gravity, too, and a vertical one across the nearest face, which shows that
+face from its edge, and the margin in its true size.
 """
 
 from typing import Any, NamedTuple
@@ -23,7 +23,7 @@ from cspr_jax.store.result import Result
 X, Y, UP = np.eye(3)
 # Level parts of vectors below this, over gravity or the size of a normal, have no direction.
 LEVEL = 1e-6
-# Corners that are farther away than this, in sizes of all else in the picture, do not widen it.
+# Corners that are farther away than this, in sizes of the rest of the picture, do not widen it.
 FAR = 2.0
 _INSIDE: dict[str, Any] = {"facecolor": COLOURS[5], "alpha": 0.3, "linewidth": 0.0}
 _FACE: dict[str, Any] = {"color": "black", "linewidth": 1.2}
@@ -50,7 +50,7 @@ class AccelerationView(NamedTuple):
         title: of the panel.
         plane: of the section.
         labels: of its two axes.
-        is_level: whether the section is.
+        is_level: whether the section is level.
         holds_rest: whether zero and free fall lie in it.
         across_face: whether the nearest face is seen from its edge.
     """
@@ -123,7 +123,7 @@ def _views(region: AccelerationSet) -> list[AccelerationView]:
 
 
 def _level(vector: np.ndarray, size: float) -> np.ndarray | None:
-    # Return the direction of the level part of a vector; None where that part is next to nothing beside a size.
+    # Return the direction of the level part of a vector; None where that part is negligible beside a size.
     part = np.hypot(*vector[:2])
     return np.array([*vector[:2], 0.0]) / part if part > LEVEL * size else None
 

@@ -14,7 +14,7 @@ MARGINS = ("wrench_margin", "closure_margin", "clearance", "floor_margin", "leng
 # Reasons to be outside whose margins files of earlier versions do not hold.
 LATER = {"floor_margin": Verdict.BELOW_FLOOR, "length_margin": Verdict.CABLE_TOO_LONG}
 WITHOUT_MARGIN = (Verdict.BELOW_FLOOR | Verdict.CABLE_TOO_LONG).value
-# Part of the way between two points that keeps the boundary off the points themselves.
+# Share of the distance between two points by which the boundary keeps off the points.
 OFF = 1e-6
 # Cuts of a simplex: each piece joins edges, named by their corners inside (first number) and outside (second). In a
 # simplex that is right-handed in the order inside, outside, triangles turn their outer side to the outside.
@@ -33,7 +33,7 @@ class BoundarySides(NamedTuple):
     Fields:
         points: of each of the d axes, rising.
         verdict: (n_1, ..., n_d) flags; 0: inside.
-        margins: of that shape each, positive inside; NaN where nobody asks.
+        margins: of that shape each, positive inside; NaN where not requested.
         unmeasured: flags of reasons to be outside of which there is no margin.
     """
 
@@ -49,7 +49,7 @@ class Boundary(NamedTuple):
     Fields:
         corners: (n, d) between two neighbours on different sides, or a point at the end of the grid.
         pieces: (m, d) corners of each: triangles whose outer side is that from which they run anticlockwise, or lines.
-        is_end: (m,) whether a piece lies at the end of the grid, beyond which nobody has asked.
+        is_end: (m,) whether a piece lies at the end of the grid, beyond which nothing is known.
     """
 
     corners: np.ndarray
@@ -61,7 +61,7 @@ def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Boundary
     """Points of a map of a workspace, and their sides.
 
     Args:
-        index: of the others, which point.
+        index: of the point, for each of the other axes.
 
     Returns:
         the sides, with rising axes.
@@ -81,7 +81,7 @@ def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> Boundary
 
 
 def boundary(sides: BoundarySides) -> Boundary:
-    """The boundary of what is inside, by marching simplices: six tetrahedra a cell, or two triangles.
+    """The boundary of the inside, by marching simplices: six tetrahedra, or two triangles, for each cell.
 
     It crosses every edge of the grid, and every diagonal of these simplices, between a point inside and one outside,
     and no other, so that it parts the points exactly as their verdicts do. Where margins decide it crosses where the
@@ -132,8 +132,8 @@ def _cut(is_in: np.ndarray, simplices: np.ndarray, hand: int) -> np.ndarray:
         inner, outer = ([k for k in range(count) if pattern[k] is side] for side in (True, False))
         matching = simplices[(sides == pattern).all(1)]
         for piece in CUTS.get((len(inner), len(outer)), []):
-            turned = piece if hand * _hand([*inner, *outer]) > 0 else piece[::-1]
-            ends = np.array([[inner[i], outer[j]] for i, j in turned])
+            oriented = piece if hand * _hand([*inner, *outer]) > 0 else piece[::-1]
+            ends = np.array([[inner[i], outer[j]] for i, j in oriented])
             pieces.append(matching[:, ends])
     return np.concatenate(pieces)
 

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 NONE_COLOUR = "#d0d0d0"
-# The scale ends where this part of the cells does, if all of it would be longer by this factor; of as few cells as the
-# third number all count, of more at least one may lie beyond.
+# The scale ends where this share of the cells does, if a scale of all cells would be longer by this factor. If there
+# are no more cells than the third number, all count; if there are more, at least one may lie beyond.
 MOST, STRETCH, FEW = 0.98, 1.5, 10
-# As many counts have a colour each in any case.
+# Up to so many counts always have a colour each.
 TOLD_APART = 12
 # Beyond it the arithmetic of colours overflows; no quantity of a robot is as large.
 LARGEST = 1e100
@@ -27,8 +27,8 @@ class Scale:
         colours: the colour map.
         norm: its bounds.
         extend: ends at which values lie beyond: "neither", "min", "max" or "both".
-        beyond: what lies there, in words; empty for nothing.
-        ticks: of the bar, with their texts; None: whatever suits.
+        beyond: words for the values that lie beyond; empty for none.
+        ticks: of the bar, with their texts; None: chosen automatically.
         whole: whether all values are whole numbers.
         missing: whether there are cells without a value.
     """
@@ -43,10 +43,10 @@ class Scale:
 
 
 def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
-    """The scale of what a picture shows.
+    """The scale of the values that a picture shows.
 
     Args:
-        data: all of its values.
+        data: all values of the picture.
         signed: whether both signs are alike, so that zero is in the middle.
 
     Returns:
@@ -71,7 +71,7 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
     if most <= least:
         most = least + (abs(least) or 1.0)
     extend = {(False, False): "neither", (True, False): "max", (False, True): "min"}.get((above, below), "both")
-    # An infinite value has no number to tell.
+    # An infinite value has no number to show.
     ends = data[np.isfinite(data)]
     words = [f"up to {float(ends.max()):.3g}"] if (ends > most).any() else []
     words += [f"down to {float(ends.min()):.3g}"] if (ends < least).any() else []
@@ -114,15 +114,15 @@ def _of_counts(data: np.ndarray) -> Scale:
     return Scale(colours, BoundaryNorm(bounds, len(shown)), extend, beyond, (ticks, texts), whole=True)
 
 
-def add_bar(figure: Figure, image, every: list[Axes], scale: Scale, words: str) -> None:
+def add_bar(figure: Figure, image, panels: list[Axes], scale: Scale, words: str) -> None:
     """The bar that explains the colours.
 
     Args:
-        image: what is coloured.
-        every: the panels that it belongs to.
+        image: that the bar explains.
+        panels: the panels that it belongs to.
     """
     text = f"{words}; {scale.beyond}" if scale.beyond else words
-    bar = figure.colorbar(image, ax=every, shrink=0.9, extend=scale.extend, label=text, spacing="uniform")
+    bar = figure.colorbar(image, ax=panels, shrink=0.9, extend=scale.extend, label=text, spacing="uniform")
     if scale.ticks is not None:
         bar.set_ticks(scale.ticks[0], labels=scale.ticks[1])
         bar.ax.minorticks_off()

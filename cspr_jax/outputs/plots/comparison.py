@@ -39,7 +39,7 @@ class Compared(NamedTuple):
         result: a map of a workspace.
         file: its name.
         across: axes that vary.
-        at: of the others, which point.
+        at: index of the point, for each of the other axes.
     """
 
     result: Result
@@ -54,11 +54,11 @@ class Compared(NamedTuple):
         return {axis: float(self.result.axes[axis][self.at[axis]]) for axis in fixed}
 
 
-def comparison_figure(every: list[Compared], fixed: list[str]) -> Figure:
-    """Outlines of workspaces, one a result, in the sections of the first.
+def comparison_figure(compared: list[Compared], fixed: list[str]) -> Figure:
+    """Outlines of workspaces, one for each result, in the sections of the first.
 
     Args:
-        fixed: what is constant, in words.
+        fixed: words for the constants.
 
     Returns:
         the figure.
@@ -66,13 +66,13 @@ def comparison_figure(every: list[Compared], fixed: list[str]) -> Figure:
     Raises:
         InputError: too many, of different robots, or over other places.
     """
-    plane = next((pair for pair in PLANES if set(pair) <= set(every[0].across)), [])
-    _check(every, plane)
-    first = every[0].result
-    over = next((axis for axis in every[0].across if axis not in plane), None)
-    heights = np.zeros(1) if over is None else _heights(every, over)
-    box = _box(every, plane)
-    figure = Figure(figsize=_size(box, len(heights), len(every)), layout="constrained")
+    plane = next((pair for pair in PLANES if set(pair) <= set(compared[0].across)), [])
+    _check(compared, plane)
+    first = compared[0].result
+    over = next((axis for axis in compared[0].across if axis not in plane), None)
+    heights = np.zeros(1) if over is None else _heights(compared, over)
+    box = _box(compared, plane)
+    figure = Figure(figsize=_size(box, len(heights), len(compared)), layout="constrained")
     drawn, bottom, left = panels(figure, len(heights))
     titles = [""] if over is None else values(first, over, heights)
     legend: dict[str, Artist] = {}
@@ -80,11 +80,11 @@ def comparison_figure(every: list[Compared], fixed: list[str]) -> Figure:
         panel.set(xlim=box[:, 0], ylim=box[:, 1], title=title)
         panel.set_aspect("equal")
         panel.grid(alpha=0.3)
-        place = every[0].place | ({} if over is None else {over: float(height)})
-        for one in every:
+        place = compared[0].place | ({} if over is None else {over: float(height)})
+        for one in compared:
             legend |= draw_obstacles(panel, one.result, plane, place)
         legend |= mark(panel, first, "verdict", plane, place)
-        for i, one in enumerate(every):
+        for i, one in enumerate(compared):
             here = {} if over is None else {over: int(np.abs(one.result.axes[over] - height).argmin())}
             legend |= _outline(panel, sides_of(one.result, plane, one.at | here), i)
     if plane[1] == "z" and first.attributes.get("z_axis", "down") == "down":
@@ -94,8 +94,8 @@ def comparison_figure(every: list[Compared], fixed: list[str]) -> Figure:
     for panel in left:
         panel.set_ylabel(axis_label(first, plane[1]))
     legend["band: step of the grid"] = Patch(facecolor="black", alpha=BAND)
-    _add_legend(figure, _names(every), legend)
-    robots = list(dict.fromkeys(robot_name(one.result) for one in every))
+    _add_legend(figure, _names(compared), legend)
+    robots = list(dict.fromkeys(robot_name(one.result) for one in compared))
     figure.suptitle("\n".join([f"{', '.join(robots)}: workspaces", ", ".join(fixed)]).strip())
     return figure
 
@@ -167,7 +167,7 @@ def _size(box: np.ndarray, count: int, lines: int) -> tuple[float, float]:
 
 
 def _outline(panel: Axes, sides: BoundarySides, number: int) -> dict[str, Artist]:
-    # Along the end of the grid it is thin: nobody has asked what lies beyond.
+    # The line is thin along the end of the grid, beyond which nothing is known.
     # Margins of different conditions have different scales, so that zeros between their values would not compare: the
     # line runs half-way between points on different sides, as volumes count them, in a band as wide as that step.
     plain, ends = sides._replace(margins=[]), False

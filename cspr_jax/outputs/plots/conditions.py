@@ -5,11 +5,11 @@ import numpy as np
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.outputs.plots.fixed_axes import table
-from cspr_jax.outputs.plots.robot_at import asked, robot_of
+from cspr_jax.outputs.plots.robot_at import robot_of, workspace_of
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.result import Result
 
-# Margins of the conditions of a workspace: a pose is inside where all that are asked for are positive.
+# Margins of the conditions of a workspace: a pose is inside where all requested margins are positive.
 MARGINS = {
     "static": "wrench_margin",
     "wrench-feasible": "wrench_margin",
@@ -40,17 +40,17 @@ def said(result: Result) -> list[str]:
 
 
 def shown_first(result: Result) -> str:
-    """The quantity of a map that a picture shows where nobody says which.
+    """The quantity of a map that a picture shows by default.
 
     Returns:
         of a workspace with one margin that margin, with several the verdict, which alone counts all conditions; else
         the one that its kind of map is about.
     """
     known = [name for name in MAP_KINDS[result.attributes["map"]].pictured if name in result.data]
-    if is_workspace(result) and len({MARGINS[name] for name in asked(result).conditions}) > 1:
+    if is_workspace(result) and len({MARGINS[name] for name in workspace_of(result).conditions}) > 1:
         return "verdict"
     names = [*known, *result.data]
-    # A margin that nobody asks for has no picture.
+    # A margin that is not requested has no picture.
     return next((name for name in names if not np.isnan(result.data[name]).all()), names[0])
 
 
@@ -67,7 +67,7 @@ def excluded(result: Result, name: str) -> np.ndarray:
     """Cells that a margin of a workspace counts as inside, but other conditions exclude.
 
     Returns:
-        whether a cell is such a one, as the quantity; nowhere if it is no margin of a workspace.
+        a mask of the shape of the quantity; nowhere if it is no margin of a workspace.
     """
     data = result.data[name]
     if not is_margin(result, name):
@@ -79,9 +79,9 @@ def conditions(result: Result) -> str:
     """Conditions that the poses of a map of a workspace have to meet.
 
     Returns:
-        the conditions with their numbers, and the orientations that they are asked of if the map says which.
+        the conditions with their numbers, and the orientations that must meet them, if the map says which.
     """
-    workspace, limits, robot = asked(result), table(result.settings, "limits"), robot_of(result)
+    workspace, limits, robot = workspace_of(result), table(result.settings, "limits"), robot_of(result)
     words = []
     for name in workspace.conditions:
         words.append(name + (f" {_tensions(limits, robot)}" if name == "wrench-feasible" else ""))

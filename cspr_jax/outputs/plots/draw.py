@@ -19,7 +19,7 @@ from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.sections import POLAR, Section, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.outputs.plots.solid import SPACE, solid_figure
-from cspr_jax.schema.axes import TILT_TORSION
+from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.store.result import Result
 
 
@@ -28,10 +28,10 @@ class MapView(NamedTuple):
 
     Fields:
         name: of the quantity.
-        data: it, one dimension for each of `across`.
-        excluded: of data's shape, the cells that other conditions exclude than the quantity tells.
+        data: its values, one dimension for each of `across`.
+        excluded: of data's shape, the cells that are excluded by other conditions than that of the quantity.
         across: axes that vary.
-        fixed: what was fixed, in words.
+        fixed: words for the fixed axes.
         place: the axes that were fixed, and where.
     """
 
@@ -57,8 +57,8 @@ def drawn(
 
     Args:
         results: of `cspr run`, or motions of `cspr plan -o`.
-        quantity: which one of a map; None: the one that its kind of map is about. Of a motion a
-            name of `motion_pictures.MOTION_PICTURES`; None: its path and tensions.
+        quantity: of a map; None: the one that its kind of map is about. For a motion, a name of
+            `motion_pictures.MOTION_PICTURES`; None: its path and tensions.
         at: fixed values of axes, within their ranges; the nearest point is taken.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
@@ -137,7 +137,7 @@ def _varying(result: Result, at: dict[str, float]) -> list[str]:
 
 
 def _fixed(result: Result, at: dict[str, float], across: list[str]) -> tuple[dict[str, int], list[str]]:
-    # Return the point of each other axis, the first where nobody says which, and the words of the picture for it.
+    # Return the point of each other axis, by default the first, and the words of the picture for it.
     chosen_points = {axis: nearest(result, axis, coordinate) for axis, coordinate in at.items()}
     others = {axis: (0, first_of(result, axis)) for axis in result.axes if axis not in across}
     point_of_axis = others | chosen_points

@@ -17,12 +17,12 @@ _ACCESSIBLE, _ATTAINED = ("#b0b0b0", 2.6), (COLOURS[0], 1.0)
 
 
 def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> Figure:
-    """Outlines of what is accessible and of what is attained, at some torsions.
+    """Outlines of the accessible and of the attained orientations, at some torsions.
 
     Args:
         result: gives axes, labels and constants.
         verdicts: (n_torsions, n_azimuths, n_tilts) flags.
-        fixed: what is constant, in words.
+        fixed: words for the constants.
 
     Returns:
         the figure.

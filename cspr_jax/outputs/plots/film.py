@@ -32,7 +32,7 @@ RANDOM = re.compile(rb"_anim_img([0-9a-f]{32})")
 # are whole hundredths of a second. The pictures of a page are whole ones each.
 RATES, MOST, OF_PAGES = (20, 10, 5, 2, 1), 600, 150
 SIZE, DPI = (10.0, 5.6), 90
-# Nobody opens a page of more MB than this.
+# Browsers hardly open a page of more MB than this.
 LARGEST = 100.0
 MARK = "#D55E00"
 
@@ -49,7 +49,7 @@ def film(
 
     Args:
         ending: of its file, one of `ENDINGS`.
-        columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, in the axes of the robot file.
+        columns: rows by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file.
         robot_file: the robot whose cables have these tensions.
         keys: the plan, for the limits.
         speed: times real time, positive.
@@ -68,7 +68,7 @@ def film(
     seconds = float(time[-1] - time[0]) / speed
     most = OF_PAGES if ending == ".html" else MOST
     rate = next((rate for rate in RATES if seconds * rate <= most), RATES[-1])
-    # The end is seen, if a part of a picture later.
+    # The end is shown, at most a part of a picture too late.
     count = int(np.ceil(seconds * rate - 1e-9)) + 1
     instants = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])
     rows = np.clip(np.searchsorted(time, instants - 1e-9), 0, len(time) - 1)
@@ -119,7 +119,7 @@ def _writer(ending: str, rate: int) -> AbstractMovieWriter:
 
 
 class _Picture:
-    # A figure whose artists are moved from row to row.
+    # This figure has artists that are moved from row to row.
 
     def __init__(
         self, title: str, columns: Mapping[str, np.ndarray], robot_file: RobotFile, keys: PlanFile, rows: np.ndarray

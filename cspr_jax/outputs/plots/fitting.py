@@ -17,9 +17,9 @@ LONGEST_NAME = 40
 SHORTEST = 8
 # A hyphen before a number, and not within a word.
 HYPHEN = re.compile(r"(?<![\w.\-])-(?=\.?\d)")
-# The line of a title that says what is not proved begins so.
+# Beginning of the line of a title that names segments without a proof.
 DOUBT = "NOT PROVED FEASIBLE"
-# Part of a panel's place that its tick labels leave free.
+# Share of a panel's place that its tick labels leave free.
 BETWEEN_LABELS = 0.82
 ABOVE = "legend above its panel"
 
@@ -28,7 +28,7 @@ def shortened(text: str, most: int = LONGEST_NAME) -> str:
     """A text from a file, on one line and not too long.
 
     Args:
-        most: how many letters at most.
+        most: number of letters.
 
     Returns:
         the text, or its beginning and its end.
@@ -46,7 +46,7 @@ def fit(figure: Figure, *, has_title: bool = True, lines: int | None = None) -> 
     Numbers get a real minus sign.
 
     Args:
-        has_title: whether the title stays; what it says of a doubt stays in any case.
+        has_title: whether the title stays; its line about a doubt stays in any case.
         lines: of the title, at most: 1, or None for as many as it needs.
     """
     width, height = figure.bbox.width, figure.bbox.height
@@ -82,7 +82,7 @@ def share_of_panels(figure: Figure) -> float:
         figure: the picture, drawn.
 
     Returns:
-        the part that some panel covers, at most 1; colour bars are none.
+        the share that panels cover, at most 1; colour bars do not count.
     """
     spans = sorted(
         (panel.get_position(original=panel.name == "3d").intervaly for panel in figure.axes if _is_panel(panel)),
@@ -143,8 +143,16 @@ def legend_above(panel: Axes, columns: int, handles: list | None = None, words: 
         the legend.
     """
     entries: Any = panel.get_legend_handles_labels() if handles is None or words is None else (handles, words)
-    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
-    legend = panel.legend(*entries, ncols=columns, frameon=False, columnspacing=1.2, handlelength=1.8, **place)
+    legend = panel.legend(
+        *entries,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.2,
+        ncols=columns,
+        frameon=False,
+        columnspacing=1.2,
+        handlelength=1.8,
+    )
     legend.set_gid(ABOVE)
     return legend
 

@@ -25,7 +25,7 @@ def start(result: Result) -> dict[str, float]:
     """Start of all segments of a map, if it is one place.
 
     Returns:
-        its coordinates; empty if it is none.
+        its coordinates; empty if there is no single start.
     """
     coordinates = table(table(result.settings, "trajectory"), "from").get("position") or ()
     moving = any(axis.startswith("from_") for axis in (*result.axes, *result.choices))
@@ -49,7 +49,7 @@ def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[
 
     Args:
         name: of the quantity; empty where the picture shows several.
-        fixed: what was fixed for the picture, in words.
+        fixed: words for the axes that were fixed for the picture.
         used: axes that the picture shows, or of which `fixed` speaks.
 
     Returns:
@@ -79,7 +79,7 @@ def _best(result: Result, axis: str) -> str:
 
 
 def first_of(result: Result, axis: str) -> str:
-    """A coordinate that the picture shows because nobody chose another one.
+    """A coordinate that the picture shows by default.
 
     Returns:
         its value, and of how many points it is the first.

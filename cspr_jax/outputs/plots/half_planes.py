@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Owner of a side that is the window's.
+# Owner of a side that belongs to the window.
 WINDOW = -1
 
 
@@ -62,8 +62,8 @@ def section(plane: Plane, normals: np.ndarray, offsets: np.ndarray, window: Wind
 
     Args:
         normals: (n, 3).
-        offsets: (n,); -inf of what bounds nothing.
-        window: what is seen of the plane.
+        offsets: (n,); -inf of a half-space that bounds nothing.
+        window: the visible part of the plane.
 
     Returns:
         the polygon.

@@ -21,7 +21,7 @@ LONGEST_LABEL = 80
 PANELS = 6
 # Okabe and Ito: told apart by the colour-blind; the dashes help in grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-# Units as people write them.
+# Units as pictures show them.
 WRITTEN = {
     **{"m s-1": "m/s", "m s-2": "m/s²", "rad s-1": "rad/s", "rad s-2": "rad/s²"},
     **{"m m-1": "m/m", "rad m-1": "rad/m"},
@@ -106,7 +106,7 @@ def unit(result: Result, name: str) -> str:
     """The unit that a picture shows.
 
     Args:
-        result: gives that of the file.
+        result: gives the unit of the file.
         name: of the axis or the quantity.
 
     Returns:
@@ -135,19 +135,19 @@ def as_drawn(result: Result, name: str, values: np.ndarray) -> np.ndarray:
         values: as in the file.
 
     Returns:
-        the same, angles in degrees.
+        the values, angles in degrees.
     """
     return np.degrees(values) if is_angle(result, name) else values
 
 
-def turned(degrees: float) -> float:
-    """An angle without whole turns.
+def principal_angle(degrees: float) -> float:
+    """An angle without whole revolutions.
 
     Args:
         degrees: any.
 
     Returns:
-        between -180 and 180; what lies there already stays.
+        the angle between -180 and 180.
     """
     return degrees if abs(degrees) <= 180.0 + 1e-9 else (degrees + 180.0) % 360.0 - 180.0
 
@@ -165,7 +165,7 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
     drawn = float(as_drawn(result, axis, np.asarray(point, float)))
     symbol = unit(result, axis)
     if is_angle(result, axis):
-        drawn = turned(drawn)
+        drawn = principal_angle(drawn)
     # A range that passes zero may miss it by rounding.
     drawn = 0.0 if abs(drawn) <= 1e-12 else drawn
     name = WORDS.get(axis, shortened(axis))
@@ -175,13 +175,13 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
 
 
 def values(result: Result, axis: str, points: np.ndarray) -> list[str]:
-    """Coordinates with their values, in as few digits as tell them apart, but three.
+    """Coordinates with their values, in as few digits as tell them apart, but at least three.
 
     Args:
         points: (n,) values, as in the file.
 
     Returns:
-        one text a point.
+        one text for each point.
     """
     texts: list[str] = []
     for digits in range(3, 17):
@@ -195,7 +195,7 @@ def chosen(count: int, most: int) -> np.ndarray:
     """Evenly chosen points of many.
 
     Args:
-        most: how many at most.
+        most: number of points.
 
     Returns:
         their indices.

@@ -9,11 +9,11 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
-from cspr_jax.outputs.plots.labels import turned
+from cspr_jax.outputs.plots.labels import principal_angle
 
 # Steps between ticks of angles, degrees.
 DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
-# Width, inches, that a panel takes at least of the picture, its part of labels and colour bar included.
+# Least width of a panel, inches, with its share of labels and colour bar.
 LEAST_WIDTH = 1.6
 
 
@@ -21,7 +21,7 @@ def columns_of(count: int) -> int:
     """Number of panels side by side in a picture of the width that `in_style` has set.
 
     Returns:
-        at most three and what the width has room for, in a full rectangle where that is possible.
+        at most three, as many as the width has room for, in a full rectangle where that is possible.
     """
     room = max(1, int(matplotlib.rcParams["figure.figsize"][0] / LEAST_WIDTH))
     return min(room, 2 if count == 4 else min(3, count))
@@ -33,11 +33,11 @@ def panels(
     """Panels with common axes, or common horizontal ones.
 
     Args:
-        count: how many.
+        count: number of panels.
         same: whether their vertical axes are the same.
 
     Returns:
-        all of them, those with nothing below, those at the left.
+        all panels, those with nothing below, and those at the left.
     """
     columns = columns_of(count)
     lines = -(-count // columns)
@@ -54,14 +54,14 @@ def panels(
 
 
 def in_degrees(axis: Axis, span: float) -> None:
-    """Ticks of an angle, without whole turns.
+    """Ticks of an angle, without whole revolutions.
 
     Args:
         span: of its values, degrees.
     """
     step = next((step for step in DEGREES if span <= 7.0 * step), None)
     axis.set_major_locator(MaxNLocator(5) if step is None or span < 2.0 else MultipleLocator(step))
-    axis.set_major_formatter(FuncFormatter(lambda tick, _: f"{turned(tick) + 0.0:.6g}"))
+    axis.set_major_formatter(FuncFormatter(lambda tick, _: f"{principal_angle(tick) + 0.0:.6g}"))
 
 
 def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
@@ -74,23 +74,25 @@ def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
     axis.set_major_formatter(FuncFormatter(lambda tick, _: "none" if none and tick == 0.0 else f"{tick:.0f}"))
 
 
-def reach_polar(every: list[Axes], reach: float, unit: str) -> None:
+def reach_polar(axes: list[Axes], reach: float, unit: str) -> None:
     """Ticks around and outward.
 
     Args:
-        every: polar panels with a common radius.
+        axes: polar panels with a common radius.
         reach: the largest radius shown.
     """
     step = next((step for step in DEGREES if reach <= 4.5 * step), None)
     even = step is None or unit != "°"
-    every_tick = np.asarray(MaxNLocator(4).tick_values(0.0, reach)) if even else np.arange(0.0, reach, step)
-    ticks = every_tick[(every_tick > 0.0) & (every_tick < 0.95 * reach)]
+    all_ticks = np.asarray(MaxNLocator(4).tick_values(0.0, reach)) if even else np.arange(0.0, reach, step)
+    ticks = all_ticks[(all_ticks > 0.0) & (all_ticks < 0.95 * reach)]
     around = range(0, 360, 45)
     gap = " " if unit.isalpha() else ""
-    for panel in every:
+    for panel in axes:
         panel.set_ylim(0.0, reach)
         panel.set_yticks(ticks, labels=[""] * len(ticks))
-        panel.set_xticks([math.radians(angle) for angle in around], labels=[f"{turned(angle):g}°" for angle in around])
+        panel.set_xticks(
+            [math.radians(angle) for angle in around], labels=[f"{principal_angle(angle):g}°" for angle in around]
+        )
         panel.tick_params(pad=0.0, labelsize="small")
         panel.grid(True, color="black", alpha=0.25, linewidth=0.5)
         panel.set_axisbelow(False)

@@ -28,7 +28,7 @@ from cspr_jax.outputs.plots.word_ticks import worded
 from cspr_jax.store.result import Result
 
 LINES = len(COLOURS)
-# A point of a margin that other conditions exclude.
+# Mark of a point of a margin that other conditions exclude.
 CROSSES: dict[str, Any] = {"marker": "x", "linestyle": "", "color": "black", "markersize": 5}
 
 
@@ -40,7 +40,7 @@ class PlottedLine:
         points: (n,) along the axis.
         values: (n,).
         name: for the legend; empty for none.
-        excluded: (n,) points that other conditions exclude than the values tell; None: no point.
+        excluded: (n,) points that are excluded by other conditions than that of the values; None: no point.
     """
 
     points: np.ndarray
@@ -56,7 +56,7 @@ def line_figure(
 
     Args:
         groups: the lines of each panel, by its title; as in the file.
-        fixed: what is constant, in words.
+        fixed: words for the constants.
 
     Returns:
         the figure.
@@ -165,7 +165,7 @@ def names_of(results: list[Result], stems: list[str]) -> list[str]:
         stems: names of their files, all different.
 
     Returns:
-        one name a result.
+        one name for each result.
     """
     if len(results) > 1:
         for words in (_amplitude, robot_name):
@@ -186,10 +186,10 @@ def _amplitude(result: Result) -> str:
 
 
 def overlaid(names: list[str], results: list[tuple[Result, str, PlottedLine]]) -> tuple[str, list[PlottedLine]]:
-    """One line a result, over the same axis.
+    """One line for each result, over the same axis.
 
     Args:
-        results: of each itself, its axis, its line.
+        results: for each, the result, its axis and its line.
 
     Returns:
         the axis and the lines.

@@ -21,7 +21,7 @@ _EDGE: dict[str, Any] = {"color": "white", "markeredgecolor": "black", "linestyl
 
 
 class _Section(NamedTuple):
-    # A section as its marks need it: its space, its axes, their names without "from_", where it is, the spools.
+    # A section, for its marks: its space, its axes, their names without "from_", where it is, the spools.
     panel: Axes | None
     result: Result
     space: tuple[str, ...]
@@ -48,7 +48,7 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
         place: the other axes, and where the section is.
 
     Returns:
-        what to show in the legend, by its words.
+        entries of the legend, by their words.
     """
     section = _section(panel, result, across, place)
     if section is None:
@@ -133,7 +133,7 @@ def _coordinate(name: str, points: np.ndarray, centre: np.ndarray, azimuth: floa
 
 
 def _drawn(section: _Section, points: np.ndarray) -> np.ndarray:
-    # Return (n, 2) of (n, 3), in the units of the picture; an azimuth lies within the turn that the axis shows.
+    # Return (n, 2) of (n, 3), in the units of the picture; an azimuth lies within the revolution that the axis shows.
     columns = []
     for axis, name in zip(section.across, section.names, strict=True):
         column = _coordinate(name, points, section.centre, section.place.get("azimuth"))
@@ -158,7 +158,7 @@ def _contains(section: _Section, point: np.ndarray) -> bool:
         gaps = points - _coordinate(name, point[None], section.centre, None)[0]
         if name == "azimuth":
             if np.hypot(*(point - section.centre)[:2]) < 1e-9:
-                continue  # on the vertical about which it turns
+                continue  # on the vertical about which the azimuth turns
             gaps = (gaps + np.pi) % (2.0 * np.pi) - np.pi
         nearest = int(np.argmin(np.abs(gaps)))
         ordered = np.unique(points)

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
-from cspr_jax.outputs.plots.motion_source import keeps_plan, kept
+from cspr_jax.outputs.plots.motion_source import keeps_plan, robot_and_plan
 from cspr_jax.outputs.plots.robot_along import limits_of
-from cspr_jax.schema.motion_quantities import PARTS
+from cspr_jax.schema.quantities import PARTS
 from cspr_jax.store.result import Result
 
 # In longer plans the lines would hide the rest.
@@ -36,7 +36,7 @@ def motion_figure(result: Result) -> Figure:
     # The spools and the path of a planar robot lie in one vertical plane y = constant. Old files lack the spools.
     points = np.vstack([position, result.attributes.get("base_points", np.empty((0, 3)))])
     is_planar = np.ptp(points[:, 1]) <= ONE_PLANE * np.ptp(points[:, 0])
-    # A file without P0 is of straight lines, of which the accelerations are worth seeing.
+    # A file without P0 holds straight lines, of which the accelerations are worth seeing.
     z0 = result.attributes.get("z0")
     more = [
         name
@@ -97,7 +97,7 @@ def draw_limits(
 
     Args:
         limits: words and values.
-        values: that the panel shows.
+        values: shown by the panel.
         signed: whether a limit bounds both signs.
     """
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
@@ -116,7 +116,7 @@ def draw_limits(
 
 def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
     tension = result.data["tension"]
-    robot_file, keys = kept(result, "plan", "tension")
+    robot_file, keys = robot_and_plan(result, "plan", "tension")
     draw_limits(drawn["tension"], limits_of(robot_file, keys), tension, "N")
     legend_above(drawn["tension"], len(tension.T) + 2)
     if "tension_residual" in result.data:

@@ -1,4 +1,4 @@
-"""Pictures of a motion by the names that `--quantity` takes: a row each."""
+"""Pictures of a motion by the names that `--quantity` takes: one row for each."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.landings import landing_figure
 from cspr_jax.outputs.plots.motion import motion_figure
-from cspr_jax.outputs.plots.motion_source import kept
+from cspr_jax.outputs.plots.motion_source import robot_and_plan
 from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION, SUMMARY, TENSIONS, TRAJECTORY
 from cspr_jax.outputs.plots.path_accelerations import path_figure
 from cspr_jax.outputs.plots.summary import summary_figure
@@ -21,9 +21,9 @@ class MotionPicture(NamedTuple):
     """A picture of a motion.
 
     Fields:
-        draw: makes it, of the motion, the name of its file, and the instant asked for.
-        needs: quantity of the file without which there is none; empty for none.
-        at_instant: whether it is of an instant, "t".
+        draw: makes it from the motion, the name of its file, and the instant.
+        needs: quantity that the file must have; empty for none.
+        at_instant: whether it shows one instant, "t".
     """
 
     draw: Callable[[Result, str, dict[str, float]], Figure]
@@ -38,9 +38,11 @@ def _acceleration(result: Result, file: str, at: dict[str, float]) -> Figure:
 
 
 MOTION_PICTURES = {
-    TRAJECTORY: MotionPicture(lambda result, file, _: trajectory_figure(result, kept(result, file, TRAJECTORY)[0])),
-    TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, *kept(result, file, TENSIONS))),
-    SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *kept(result, file, SUMMARY))),
+    TRAJECTORY: MotionPicture(
+        lambda result, file, _: trajectory_figure(result, robot_and_plan(result, file, TRAJECTORY)[0])
+    ),
+    TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, *robot_and_plan(result, file, TENSIONS))),
+    SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *robot_and_plan(result, file, SUMMARY))),
     ACCELERATION: MotionPicture(_acceleration, at_instant=True),
     PATH_ACCELERATION: MotionPicture(lambda result, file, _: path_figure(result, file), needs=PATH_ACCELERATION),
     LANDING: MotionPicture(lambda result, *_: landing_figure(result), needs=LANDING),
@@ -48,12 +50,12 @@ MOTION_PICTURES = {
 
 
 def motion_picture(result: Result, file: str, quantity: str | None, at: dict[str, float]) -> Figure:
-    """The picture of a motion that is asked for.
+    """The requested picture of a motion.
 
     Args:
         file: its name, for errors.
         quantity: a name of `MOTION_PICTURES`; None: path and tensions.
-        at: the instant, as "t", of a picture that is of one.
+        at: the instant, as "t", for a picture of one instant.
 
     Returns:
         the figure.

@@ -1,4 +1,4 @@
-"""Robot and plan of a motion, which its file keeps or which go with it, for pictures that need more than its rows."""
+"""Robot and plan of a motion, from its file or from one beside it, for pictures that need more than its rows."""
 
 import dataclasses
 import json
@@ -16,7 +16,7 @@ from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.store.result import Result
 
-# Lengths of cables in a table and those of a robot in its poses are the same but for rounding, in parts of the longest.
+# Lengths of cables in a table and of the robot in its poses differ by rounding alone, over the longest one.
 SAME_LENGTH = 1e-6
 
 
@@ -24,7 +24,7 @@ def keeps_plan(result: Result) -> bool:
     """Tell whether a motion has its robot and its plan.
 
     Returns:
-        not of tables read without their plan, and of files of earlier versions.
+        false for tables read without their plan, and for files of earlier versions.
     """
     return bool(result.attributes.get("robot_settings") and result.attributes.get("plan"))
 
@@ -78,18 +78,18 @@ def _check_cables(result: Result, file: str, robot_file: RobotFile, path: Path) 
             raise ConfigError(path, f"its robot {robot_file.name} is not that of {file}, where {fault}")
 
 
-def kept(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]:
+def robot_and_plan(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]:
     """Robot and plan of a motion.
 
     Args:
         file: its name, for errors.
-        quantity: that is asked for, for errors.
+        quantity: of the picture, for errors.
 
     Returns:
         the robot that was planned, and the plan.
 
     Raises:
-        InputError: the file keeps none, as those of earlier versions.
+        InputError: the file keeps none, as files of earlier versions.
         ConfigError: a mistake in the plan.
     """
     if not keeps_plan(result):

@@ -5,7 +5,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch, Polygon
 
-from cspr_jax.outputs.plots.robot_at import asked, hull_of
+from cspr_jax.outputs.plots.robot_at import hull_of, workspace_of
 from cspr_jax.robots.shapes import Box, Cylinder, Obstacle
 from cspr_jax.store.result import Result
 
@@ -19,11 +19,11 @@ def obstacles(result: Result) -> list[np.ndarray]:
     """Obstacles of a map of a workspace; all are convex.
 
     Returns:
-        (n, 3) of each, points in the axes of the file whose hull it is, m; none of another map.
+        for each (n, 3) points, in the axes of the file, whose hull it is, m; none of another map.
     """
     if result.attributes.get("map") != "workspace" or not result.settings:
         return []
-    return [_points(table.shape()) for table in asked(result).obstacle or ()]
+    return [_points(table.shape()) for table in workspace_of(result).obstacle or ()]
 
 
 def _points(shape: Obstacle) -> np.ndarray:
@@ -62,7 +62,7 @@ def section_of(points: np.ndarray, across: list[str], place: float) -> np.ndarra
         place: of the plane on the third axis, m.
 
     Returns:
-        (m, 2) corners, coordinates in the order of `across`; empty where they do not meet.
+        (m, 2) corners, coordinates in the order of `across`; empty where body and plane do not meet.
     """
     axis = next(k for k, name in enumerate("xyz") if name not in across)
     _, edges = hull_of(points)
@@ -75,7 +75,7 @@ def section_of(points: np.ndarray, across: list[str], place: float) -> np.ndarra
 
 
 def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
-    """Draw obstacles into a section over two of x, y and z: filled where it cuts them, dashed what it only hides.
+    """Draw obstacles into a section over two of x, y and z: filled where it cuts them, dashed where they are hidden.
 
     Args:
         panel: the section, with its cells.
@@ -83,7 +83,7 @@ def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[s
         place: the other axes, and where the section is.
 
     Returns:
-        what to show in the legend, by its words.
+        entries of the legend, by their words.
     """
     if not set(across) < set("xyz"):
         return {}

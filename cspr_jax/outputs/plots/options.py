@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-# Names that `--quantity` takes of motions.
+# Names that `--quantity` takes for motions.
 ACCELERATION, PATH_ACCELERATION, LANDING = "acceleration", "path_acceleration", "landing"
 TRAJECTORY, TENSIONS, SUMMARY = "trajectory", "tensions", "summary"
 

@@ -1,4 +1,4 @@
-"""Acceleration along straight lines over the way, between its bounds, Boralugoda figure 4.1."""
+"""Acceleration along straight lines over the path, between its bounds, Boralugoda figure 4.1."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.labels import COLOURS, PANELS, chosen, robot_name
 from cspr_jax.outputs.plots.layout import columns_of, panels
 from cspr_jax.outputs.plots.motion import doubt
-from cspr_jax.outputs.plots.motion_source import kept
+from cspr_jax.outputs.plots.motion_source import robot_and_plan
 from cspr_jax.store.result import Result
 
 # Bounds beyond so many times the largest acceleration of the motion leave the picture.
@@ -28,8 +28,8 @@ class PathSamples(NamedTuple):
         number: of the segment, from 1 on.
         length: of the line, m.
         duration: s.
-        s: (n,) part of the way at each row.
-        rates: (n, 3) s'': the least feasible one, that of the motion, the largest feasible one, 1/s^2.
+        s: (n,) share of the path at each row.
+        rates: (n, 3) s'': the least feasible value, that of the motion, and the largest feasible value, 1/s^2.
     """
 
     number: int
@@ -40,7 +40,7 @@ class PathSamples(NamedTuple):
 
 
 def path_figure(result: Result, file: str) -> Figure:
-    """The acceleration along each line of a motion over the way, at most six of them.
+    """The acceleration along each line of a motion over the path, for at most six lines.
 
     Args:
         result: a motion along straight lines.
@@ -53,7 +53,7 @@ def path_figure(result: Result, file: str) -> Figure:
         InputError: the file keeps no plan, or its rows do not fit it.
         ConfigError: a mistake in the plan that it keeps.
     """
-    robot_file, keys = kept(result, file, "path_acceleration")
+    robot_file, keys = robot_and_plan(result, file, "path_acceleration")
     ways = _ways(result, robot_file, keys)
     shown = [ways[k] for k in chosen(len(ways), PANELS)]
     columns = columns_of(len(shown))

@@ -1,12 +1,12 @@
-"""Plane of a map that pictures show: which two of its axes."""
+"""Plane of a map that pictures show: two of its axes."""
 
 from collections.abc import Sequence
 
 from cspr_jax.outputs.plots.sections import AROUND, POLAR
 from cspr_jax.store.result import Result
 
-# Pairs of axes that belong into one plane, the second upward or, in polar coordinates, outward: the first of these that
-# vary, or the one of the others that has the most cells.
+# Pairs of axes that make a plane, the second upward or, in polar coordinates, outward. A picture shows the first pair
+# that varies, or else the pair with the most cells.
 PLANES = (("x", "y"), POLAR, ("from_x", "from_y"))
 OTHERS = (AROUND, ("x", "z"), ("y", "z"), ("radius", "z"))
 

@@ -1,4 +1,4 @@
-"""A plan beside what MuJoCo makes of it: both paths, and over time how far paths and tensions are apart."""
+"""A plan beside its motion in MuJoCo: both paths, and over time how far paths and tensions are apart."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ def replay_figure(replay: PlayedPlan) -> Figure:
     """Planned and played path, and deviations of path and tensions.
 
     Args:
-        replay: what MuJoCo made of a plan.
+        replay: motion of a plan in MuJoCo.
 
     Returns:
         the figure.

@@ -13,7 +13,7 @@ from cspr_jax.schema.limits import LIMITS
 
 
 class Moving(NamedTuple):
-    """A robot on its way, in the axes of its file.
+    """A robot in motion, in the axes of its file.
 
     Fields:
         base: (n_cables, 3) where the cables leave, m.
@@ -29,12 +29,12 @@ class Moving(NamedTuple):
 
 
 def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows: np.ndarray) -> Moving:
-    """The robot at some rows of its motion.
+    """The robot at rows of its motion.
 
     Args:
-        columns: by the names of `schema.motion_quantities.TRAJECTORY`.
+        columns: by the names of `schema.quantities.TRAJECTORY`.
         robot_file: the robot whose cables have these tensions; None: it is not known, and has no cables here.
-        rows: (n,) which.
+        rows: (n,) their numbers.
 
     Returns:
         the robot.
@@ -46,27 +46,29 @@ def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows
     body = np.zeros_like(base) if robot_file.platform_points is None else np.asarray(robot_file.platform_points, float)
     if robot_file.centre_of_mass is not None:  # whose position a motion holds
         body = body - np.asarray(robot_file.centre_of_mass, float)
-    edges, turn = np.empty((0, 2, 3)), np.eye(3)[None]
+    edges, rotations = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
-        edges, turn = hull_of(body)[1], np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
+        edges, rotations = hull_of(body)[1], np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
     # These points turn with the platform, at each row.
-    attached, corners = (position[:, None] + np.einsum("rij,kj->rki", turn, x) for x in (body, edges.reshape(-1, 3)))
+    attached, corners = (
+        position[:, None] + np.einsum("rij,kj->rki", rotations, x) for x in (body, edges.reshape(-1, 3))
+    )
     return Moving(base, position, attached, corners)
 
 
-def limits_of(robot_file: RobotFile, asked: PlanFile, quantity: str = "tension") -> list[tuple[str, float]]:
+def limits_of(robot_file: RobotFile, plan: PlanFile, quantity: str = "tension") -> list[tuple[str, float]]:
     """Limits of a quantity, to be drawn beside its values.
 
     Args:
-        asked: the plan, whose limits go before the robot's.
+        plan: the plan, whose limits go before the robot's.
         quantity: of `schema.limits.LIMITS`.
 
     Returns:
-        words and values, in the axes of the file; each value once, and none that bounds nothing.
+        words and values, in the axes of the file; each finite value once.
     """
     limits = []
     for row in LIMITS:
-        limit_of_plan = getattr(asked, row.name, None)
+        limit_of_plan = getattr(plan, row.name, None)
         limit = getattr(robot_file, row.name, None) if limit_of_plan is None else limit_of_plan
         if row.quantity != quantity or limit is None:
             continue

@@ -20,7 +20,7 @@ class Posed(NamedTuple):
 
     Fields:
         base: (n_cables, 3) where the cables leave, m.
-        attached: (n_cables, 3) where they are attached; of a point mass its place, m.
+        attached: (n_cables, 3) where they are attached, for a point mass its place, m.
         faces: (m, 3, 3) triangles of the hull of these points, m; empty where they lie on a line.
         edges: (k, 2, 3) edges of it, m.
     """
@@ -35,16 +35,16 @@ def robot_of(result: Result) -> RobotFile:
     """The robot of a map.
 
     Returns:
-        it, as its file has it.
+        the robot, with the keys of its file.
     """
     return RobotFile(**result.settings["robot"])
 
 
-def asked(result: Result) -> WorkspaceTable:
+def workspace_of(result: Result) -> WorkspaceTable:
     """Requirements of a map of a workspace on its poses.
 
     Returns:
-        its table.
+        the [workspace] table.
     """
     return WorkspaceTable(**table(result.settings, "workspace"))
 
@@ -60,20 +60,20 @@ def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
         the robot, turned as the map says, from the orientation of its sets where it has one.
 
     Raises:
-        InputError: the map has no orientation there, but numbers that are none.
+        InputError: the orientation of the map is no unit quaternion.
     """
     robot_file = robot_of(result)
     azimuth, tilt, torsion = (angles.get(name, 0.0) for name in ("tilt_azimuth", "tilt", "torsion"))
-    turn = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
-    quaternion = np.array(asked(result).orientation or IDENTITY)
+    rotation = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
+    quaternion = np.array(workspace_of(result).orientation or IDENTITY)
     size = np.linalg.norm(quaternion)
     if abs(size - 1.0) > UNIT_TOLERANCE:
         raise InputError("workspace.orientation", quaternion.tolist(), "of length 1")
-    turn = turn @ rotation_matrix(quaternion / size)
+    rotation = rotation @ rotation_matrix(quaternion / size)
     base = np.array(robot_file.base_points, float)
     body = np.zeros_like(base) if robot_file.platform_points is None else np.array(robot_file.platform_points, float)
     faces, edges = hull_of(body)
-    return Posed(base, place + body @ turn.T, place + faces @ turn.T, place + edges @ turn.T)
+    return Posed(base, place + body @ rotation.T, place + faces @ rotation.T, place + edges @ rotation.T)
 
 
 def _about(axis: str, angle: float) -> np.ndarray:
@@ -81,7 +81,7 @@ def _about(axis: str, angle: float) -> np.ndarray:
 
 
 def hull_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Hull of the points of a platform; of points in a plane a polygon, of points on a line its ends.
+    """Hull of the points of a platform; a polygon for points in a plane, the two ends for points on a line.
 
     Args:
         points: (n, 3) m.

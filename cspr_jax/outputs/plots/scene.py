@@ -1,4 +1,4 @@
-"""Axes in space for a robot on its way, and the colours of its cables by tension."""
+"""Axes in space for a robot in motion, and the colours of its cables by tension."""
 
 import itertools
 from typing import Any
@@ -13,7 +13,7 @@ from matplotlib.transforms import Bbox, TransformedBbox
 from mpl_toolkits.mplot3d import proj3d
 
 ELEVATION, AZIMUTH = 18.0, -62.0  # degrees, of the eye
-# Around what is drawn, of its size.
+# Room around the drawn points, over their size.
 ROOM = 0.04
 # Ticks of an axis at most, and steps that make a picture fit.
 MOST_TICKS, STEPS = 5, 4
@@ -53,7 +53,7 @@ def set_space(panel: Any, points: np.ndarray, *, is_down: bool) -> None:
     panel.set_box_aspect(tuple(size))
     panel.set_proj_type("ortho")
     panel.view_init(elev=ELEVATION, azim=AZIMUTH)
-    # Its square is larger than its place, and lies over what is beside it.
+    # The square of the panel is larger than its place, and lies over its neighbours.
     panel.patch.set_visible(False)
     panel.set_gid(FILLS)
 
@@ -65,7 +65,7 @@ def shape_of(points: np.ndarray) -> float:
         points: (n, 3) what is drawn, m.
 
     Returns:
-        the part.
+        the ratio.
     """
     sizes = np.ptp(points, axis=0)
     right, back, up = np.maximum(sizes, 0.1 * sizes.max())
@@ -76,7 +76,7 @@ def shape_of(points: np.ndarray) -> float:
 
 
 def fill_places(figure: Figure) -> None:
-    """Make each robot in space as large as its place allows, with as many ticks as do not meet.
+    """Make each robot in space as large as its place allows, with as many ticks as do not overlap.
 
     Args:
         figure: the picture, with its final size; its layout is final afterwards.
@@ -142,7 +142,7 @@ def words_in_space(panel: Any) -> list[Bbox]:
         panel: axes in three dimensions.
 
     Returns:
-        a rectangle each, pixels.
+        one rectangle for each, pixels.
     """
     texts = [tick.label1 for axis in _axes(panel) for tick in axis.get_major_ticks() if tick.label1.get_text()]
     texts += [axis.label for axis in _axes(panel)]

@@ -38,8 +38,9 @@ class Section(NamedTuple):
         across: the two axes of a panel.
         over: the axis that differs between the panels; None: there is one panel.
         place: axes fixed for the picture, and where.
-        fixed: what is constant, in words.
-        excluded: (n_first, n_second, n_panels) cells that other conditions exclude than the quantity tells.
+        fixed: words for the constants.
+        excluded: (n_first, n_second, n_panels) cells that are excluded by other conditions than that of the
+            quantity.
     """
 
     name: str
@@ -50,20 +51,20 @@ class Section(NamedTuple):
     excluded: np.ndarray
 
 
-def section_figure(result: Result, section: Section, data: np.ndarray, told: np.ndarray | None = None) -> Figure:
-    """Sections of a map, one a panel.
+def section_figure(result: Result, section: Section, data: np.ndarray, informative: np.ndarray | None = None) -> Figure:
+    """Sections of a map, one in each panel.
 
     Args:
         result: gives axes, labels and constants.
         data: (n_first, n_second, n_panels).
-        told: of data's shape, the cells that say more than that there is nothing; None: all.
+        informative: of data's shape, the cells that say more than "nothing here"; None: all.
 
     Returns:
         the figure.
     """
     name, across, over = section.name, section.across, section.over
     polar = tuple(across) in (POLAR, AROUND)
-    says = np.ones(data.shape, bool) if told is None else told
+    says = np.ones(data.shape, bool) if informative is None else informative
     saying = np.flatnonzero(says.any((0, 1)))
     shown = saying[chosen(len(saying), PANELS)] if len(saying) else chosen(data.shape[2], PANELS)
     alone = {axis: float(points[0]) for axis, points in result.axes.items() if len(points) == 1} | section.place
@@ -76,7 +77,7 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
     points = [as_drawn(result, axis, result.axes[axis][order]) for axis, order in zip(across, orders, strict=True)]
     data = as_drawn(result, name, data[np.ix_(*orders, shown)])
     excluded = section.excluded[np.ix_(*orders, shown)]
-    # An infinite deficit is beyond every scale, and has no colour.
+    # An infinite deficit is beyond all scales, and has no colour.
     endless = np.isneginf(data) if data.dtype.kind == "f" else np.zeros(data.shape, bool)
     data = np.where(endless, np.nan, data) if endless.any() else data
     quantity = EVERY[name]
@@ -117,7 +118,7 @@ def section_figure(result: Result, section: Section, data: np.ndarray, told: np.
 
 
 def _moved(shown: np.ndarray, marked_indices: list[int]) -> np.ndarray:
-    # Move, of evenly chosen sections, the nearest ones to where there is something to mark.
+    # Among evenly chosen sections, move the nearest ones to where there is something to mark.
     indices = shown.tolist()
     for index in marked_indices:
         if index not in indices:
@@ -155,10 +156,10 @@ def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list
 
 
 def tells(name: str, data: np.ndarray) -> np.ndarray:
-    """Cells that say more than that there is nothing: most of all orientations are none that a robot can take.
+    """Cells that say more than "nothing here": most orientations of a grid are impossible for the robot.
 
     Args:
-        data: it.
+        data: values of the quantity.
 
     Returns:
         of data's shape.

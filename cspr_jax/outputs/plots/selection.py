@@ -17,7 +17,7 @@ def result_at(path: Path) -> Path:
     """The file to draw.
 
     Args:
-        path: it, or the directory of its run.
+        path: the file, or the directory of its run.
 
     Returns:
         the file.
@@ -57,15 +57,15 @@ def places(words: list[str], option: str = "--at") -> dict[str, float]:
     return at
 
 
-def nearest(result: Result, axis: str, wanted: float, option: str = "--at") -> tuple[int, str]:
-    """The point of an axis that is drawn where a value is asked for.
+def nearest(result: Result, axis: str, coordinate: float, option: str = "--at") -> tuple[int, str]:
+    """The point of an axis that is drawn for a coordinate.
 
     Args:
-        wanted: the value.
+        coordinate: that is asked for, in the unit of the axis.
         option: that gave it, for errors.
 
     Returns:
-        the index of the point, and how the picture says it: with the value where that is another one.
+        the index of the point, and the words of the picture for it, with the coordinate if the point is another one.
 
     Raises:
         InputError: no such axis, or a value out of its range.
@@ -75,11 +75,11 @@ def nearest(result: Result, axis: str, wanted: float, option: str = "--at") -> t
     points = result.axes[axis]
     low, high = float(points.min()), float(points.max())
     rounding = SAME * max(abs(low), abs(high))
-    if not low - rounding <= wanted <= high + rounding:
+    if not low - rounding <= coordinate <= high + rounding:
         allowed = f"{axis} in [{low:.6g}, {high:.6g}]" if high > low else f"{axis} = {low:.6g}, its one point"
-        raise InputError(option, f"{axis}={wanted:.6g}", allowed)
-    place = int(np.argmin(np.abs(points - wanted)))
+        raise InputError(option, f"{axis}={coordinate:.6g}", allowed)
+    place = int(np.argmin(np.abs(points - coordinate)))
     words = value(result, axis, points[place])
-    if abs(points[place] - wanted) > rounding:
-        words += f" (nearest to {value(result, axis, wanted).partition(' = ')[2]})"
+    if abs(points[place] - coordinate) > rounding:
+        words += f" (nearest to {value(result, axis, coordinate).partition(' = ')[2]})"
     return place, words

@@ -27,10 +27,10 @@ SPACE = ["x", "y", "z"]
 ELEVATION, AZIMUTH = 20.0, -62.0  # degrees, of the eye
 SURFACE, END, LINES, CABLES = COLOURS[5], "#9a9a9a", COLOURS[0], COLOURS[1]
 BACK, FRONT = 0.4, 0.3  # opacities
-# Inches, and parts of the figure: width and least height; what the box takes, the rest is for ticks, title and legend.
+# Width and least height, inches, and the share of the box in the figure; the rest is for ticks, title and legend.
 WIDTH, LEAST_HEIGHT = 7.2, 4.4
 WIDE, HIGH, MIDDLE = 0.76, 0.68, 0.51
-MARGIN = 0.02  # around what is drawn, of its largest side
+MARGIN = 0.02  # room around the drawn points, over their largest side
 # Share of the side of a panel that the diagonal of a box takes where mplot3d shows it without zoom.
 DIAGONAL = 1.03
 
@@ -46,8 +46,8 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
 
     Args:
         result: a map of a workspace over x, y and z.
-        index: of its other axes, which point.
-        fixed: what is constant, in words.
+        index: of the point, for each of its other axes.
+        fixed: words for the constants.
 
     Returns:
         the figure.
@@ -154,7 +154,7 @@ def _level_lines(triangles: np.ndarray, heights: np.ndarray) -> np.ndarray:
     for height in heights:
         above = triangles[..., 2] > height
         cut = above.any(1) & ~above.all(1)
-        # The corner that is alone on its side comes first.
+        # The corner that lies alone on its side comes first.
         alone = np.argmax(above[cut] == (above[cut].sum(1, keepdims=True) == 1), axis=1)
         first, *others = (triangles[cut, (alone + k) % 3] for k in range(3))
         parts = [(height - first[:, 2:]) / (other[:, 2:] - first[:, 2:]) for other in others]
@@ -205,8 +205,8 @@ def _draw_obstacles(panel: Axes3D, bodies: list[np.ndarray], eye: _Eye, surface:
     for points in bodies:
         faces = faces_of(points)
         normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-        turned = np.abs(normals @ eye.towards) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
-        shades = 1.0 - (1.0 - np.array(to_rgb(OBSTACLE))) * (0.55 + 0.45 * turned[:, None])
+        facing = np.abs(normals @ eye.towards) / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+        shades = 1.0 - (1.0 - np.array(to_rgb(OBSTACLE))) * (0.55 + 0.45 * facing[:, None])
         layer = 3.5 if points.mean(0) @ eye.towards > middle else 0.8
         panel.add_collection3d(
             Poly3DCollection(faces, facecolors=shades, edgecolors=shades, linewidths=0.3, zorder=layer)

@@ -1,4 +1,4 @@
-"""Points of an axis as colours: the edges between them, and the scale of a quantity whose values they are."""
+"""Points of an axis as colours: the edges between them, and the scale of a quantity that takes these values."""
 
 import matplotlib
 import numpy as np
@@ -6,8 +6,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from cspr_jax.outputs.plots.colours import NONE_COLOUR, TOLD_APART, Scale, scale_of
 from cspr_jax.outputs.plots.labels import as_drawn
-from cspr_jax.schema.axes import best_name
-from cspr_jax.schema.quantities import EVERY
+from cspr_jax.schema.quantities import EVERY, best_name
 from cspr_jax.store.result import Result
 
 
@@ -18,7 +17,7 @@ def number_scale(result: Result, name: str, values: np.ndarray) -> Scale:
         values: all of the picture, as drawn.
 
     Returns:
-        the scale: of the best points of an axis a colour each, where they are few.
+        the scale; the best points of an axis, where they are few, have a colour each.
     """
     choice = next((choice for axis, choice in result.choices.items() if best_name(axis) == name), None)
     points = np.zeros(0) if choice is None else np.unique(as_drawn(result, name, choice.points))

@@ -40,11 +40,11 @@ LOOK = {
 METADATA: dict[str, dict] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 INCH = 2.54  # cm
 SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
-# Width and letters of pictures for papers, cm and points; their heights follow from what they show.
+# Width and letters of pictures for papers, cm and points; their heights follow from their content.
 PRESETS = {"column": (8.5, 8.0), "page": (17.5, 9.0)}
 # Panels take at least this share of the height; where they have less the picture gets higher, at most so often.
 LEAST_SHARE, HIGHER, TRIES = 0.5, 1.2, 6
-# Letters that nobody chose get smaller instead where the size is given, down to so many points.
+# Letters of the default size get smaller instead where the size of the picture is given, down to so many points.
 SMALLER, LEAST_LETTERS = 0.92, 5.0
 # Below this width, cm, a title has one line.
 NARROW = 12.0
@@ -60,7 +60,7 @@ class Style(NamedTuple):
         dpi: pixels an inch, of PNG and of the coloured cells in PDF and SVG.
         font_size: points.
         width: of a picture whose height follows, cm; None: what suits the picture.
-        has_title: whether titles are drawn; what is not proved is said in any case.
+        has_title: whether titles are drawn; a line about a missing proof is drawn in any case.
         is_free: whether letters may get smaller than `font_size`.
     """
 
@@ -80,7 +80,7 @@ def style_of(
     *,
     title: bool = True,
 ) -> Style:
-    """The style that is asked for.
+    """The style that options ask for.
 
     Args:
         size: such as "16x10" or (16, 10), cm; None: what suits the picture.
@@ -172,7 +172,7 @@ def laid_out(figure: Figure, style: Style) -> None:
 
 
 def _give_room(figure: Figure, style: Style) -> None:
-    # Panels take their part of the height of a narrow picture, or one whose height nobody chose.
+    # Panels take their share of the height in a narrow picture, or one of the default height.
     if figure.get_layout_engine() is None or (style.width is None and figure.get_figwidth() * INCH >= NARROW):
         return
     letters, before = style.font_size, -1.0

@@ -17,7 +17,7 @@ from cspr_jax.outputs.plots.trajectory import draw_trajectory, legend_of
 from cspr_jax.outputs.plots.verdict_colours import reasons
 from cspr_jax.store.result import Result
 
-# Lines of the table; of a longer plan the first ones.
+# Lines of the table, which shows the first segments of a longer plan.
 SEGMENTS = 8
 WIDTHS = (0.15, 0.12, 0.22, 0.18, 0.33)
 HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
@@ -46,9 +46,9 @@ def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fig
     if cells:
         table = figure.add_subplot(parts[3])
         table.axis("off")
-        place: Any = {"bbox": (0.0, 0.0, 1.0, 1.0), "colWidths": WIDTHS}
         # Its letters get smaller where the picture is narrow.
-        table.table(cells, colLabels=HEADS, cellLoc="center", edges="horizontal", **place)
+        bbox: Any = (0.0, 0.0, 1.0, 1.0)
+        table.table(cells, colLabels=HEADS, cellLoc="center", edges="horizontal", bbox=bbox, colWidths=WIDTHS)
     figure.suptitle(f"{robot_name(result)}: {result.axes['t'][-1]:.4g} s\n{extremes(result)}{doubt(result)}")
     return figure
 
@@ -76,7 +76,7 @@ def _cells(result: Result) -> list[list[str]]:
         arcs, duration = int(data["segment_arcs"][k]), data["segment_end"][k] - data["segment_start"][k]
         margin = f"{data['segment_margin'][k]:.4g}" if np.isfinite(data["segment_margin"][k]) else "none"
         number = f"{k + 1}" if count <= SEGMENTS else f"{k + 1} of {count}"
-        # Straight lines and Bezier segments have no arcs; a segment that is not feasible has none that will do.
+        # Straight lines and Bezier segments have no arcs; a segment that is not feasible has no feasible number.
         arcs_text = f"{arcs}" if arcs else "none" if data["segment_verdict"][k] else "-"
         cells.append([number, arcs_text, f"{duration:.4g}", margin, words[int(numbers[0])]])
     return cells

@@ -18,9 +18,9 @@ from cspr_jax.store.result import Result
 
 # The robot is drawn where segments begin and end, at most so often.
 SHOWN = 6
-# Inches: width of the robot, height of what stands above and below it, and heights of the picture.
+# Inches: width of the robot, height of the texts above and below it, and heights of the picture.
 ACROSS, BESIDE, LOW, HIGH = 5.2, 1.2, 3.6, 7.2
-# Spools nearer to each other than this part of the largest distance have one label.
+# Spools nearer to each other than this share of the largest distance have one label.
 TOGETHER = 0.08
 
 

@@ -1,10 +1,10 @@
-"""Verdicts as colours: one reason a cell, the first of those that its flags name."""
+"""Verdicts as colours: one reason for each cell, the first of those that its flags name."""
 
 import numpy as np
 
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 
-# In this order: what lies deeper comes first, and what is refuted before what is left open. The colours are Okabe and
+# Deeper reasons come first, and refutations before open verdicts. The colours are Okabe and
 # Ito's, and greys.
 REASONS = {
     Verdict.NOT_ACCESSIBLE: ("not accessible", "#f4f4f4"),
@@ -32,7 +32,7 @@ def reasons(verdicts: np.ndarray, unflagged: str) -> tuple[np.ndarray, list[str]
 
     Args:
         verdicts: (...) flags.
-        unflagged: what is said where no flag is set.
+        unflagged: word where no flag is set.
 
     Returns:
         (...) number of the reason, from 0 on; the words of those that occur; their colours.

@@ -11,7 +11,7 @@ from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import meanings_of
 from cspr_jax.store.result import Result
 
-# Okabe and Ito's, too; of more words the colours follow each other.
+# Okabe and Ito's colours, too; if there are more words, the colours follow each other.
 MORE = (*COLOURS, "#F0E442", "#000000")
 
 
@@ -20,7 +20,7 @@ def worded(result: Result, name: str, values: np.ndarray) -> tuple[np.ndarray, l
 
     Args:
         result: gives the settings, on which the words may depend.
-        values: (...) of it.
+        values: (...) of the quantity.
 
     Returns:
         (...) numbers of the words, from 0 on; the words of those that occur; their colours. None: it has no words.

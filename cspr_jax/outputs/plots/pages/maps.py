@@ -13,7 +13,7 @@ from cspr_jax.outputs.plots.labels import WORDS, as_drawn, axis_label, label, un
 from cspr_jax.outputs.plots.obstacles import COLOUR, obstacles, outline, section_of
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.planes import in_order
-from cspr_jax.outputs.plots.robot_at import asked, robot_of
+from cspr_jax.outputs.plots.robot_at import robot_of, workspace_of
 from cspr_jax.outputs.plots.verdict_colours import FEASIBLE_COLOUR, REASONS
 from cspr_jax.outputs.plots.word_ticks import word_scale, worded
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
@@ -31,7 +31,7 @@ def order_of(result: Result) -> tuple[list[str], list[np.ndarray]]:
     """Order of the axes in a page, the last one that of a row, and of their points.
 
     Returns:
-        names: those of the plane last, upward before across.
+        names: axes of the plane last, upward before across.
         points: indices of each axis' points, ascending, each value once.
     """
     varying = [axis for axis, points in result.axes.items() if len(np.unique(points)) > 1]
@@ -47,7 +47,7 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
     """Content of the page of a map.
 
     Args:
-        quantity: that it shows first; None: the one that its kind of map is about.
+        quantity: shown first; None: the one that its kind of map is about.
 
     Returns:
         plain values, for JSON; the names of quantities that are left out, since a page of all would be too large.
@@ -94,14 +94,14 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
 
 
 def _is_asked(result: Result, name: str) -> bool:
-    # A quantity that a map was not asked for has no value anywhere; in workspaces some follow from the verdict alone.
+    # A quantity that was not requested has no value anywhere; in workspaces some follow from the verdict alone.
     data = result.data[name]
     if data.dtype.kind == "f" and np.isnan(data).all():
         return False
     if result.attributes["map"] != WORKSPACE:
         return True
     if name == "orientation_fraction":
-        return asked(result).orientations is not None
+        return workspace_of(result).orientations is not None
     return name != "cell_side" or bool(data.any())
 
 
@@ -115,7 +115,7 @@ def _spools(result: Result, plane: list[str]) -> dict[str, list[float]] | None:
 
 
 def _obstacles(result: Result, names: list[str], points: list[np.ndarray]) -> dict[str, Any] | None:
-    # Their outlines as they are seen along the axis out of the plane, and what each point of that axis cuts of them.
+    # Return outlines of obstacles, seen along the axis out of the plane, and their section at each point of that axis.
     plane = names[-2:]
     bodies = obstacles(result) if set(plane) <= set(SPACE) else []
     if not bodies:

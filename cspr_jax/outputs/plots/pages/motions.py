@@ -1,4 +1,4 @@
-"""Content of a page about a motion: the robot at its rows, its tensions, and what there is of its segments."""
+"""Content of a page about a motion: the robot at its rows, its tensions, and its segments."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -33,8 +33,8 @@ def motion_content(
     """Content of the page of a motion.
 
     Args:
-        columns: rows by the names of `schema.motion_quantities.TRAJECTORY`, and the flight if there is one.
-        segments: by the names of `schema.motion_quantities.SEGMENTS`.
+        columns: rows by the names of `schema.quantities.TRAJECTORY`, and the flight if there is one.
+        segments: by the names of `schema.quantities.SEGMENTS`.
         robot_file: the robot whose cables have these tensions; None: the file does not keep it.
         keys: the plan, for the limits; None: the file does not keep it.
 

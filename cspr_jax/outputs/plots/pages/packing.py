@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-# Names of typed arrays of browsers by NumPy's.
+# Names of the typed arrays of browsers, by NumPy's names.
 TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}
 
 
@@ -31,15 +31,15 @@ def packed(values: np.ndarray) -> dict[str, Any]:
     return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}
 
 
-def unpacked(given: dict[str, Any]) -> np.ndarray:
+def unpacked(array: dict[str, Any]) -> np.ndarray:
     """Values of a page, as a browser has them.
 
     Args:
-        given: of `packed`.
+        array: of `packed`.
 
     Returns:
         (n,) numbers.
     """
-    name = next(name for name, other in TYPES.items() if other == given["type"])
-    data = gzip.decompress(base64.b64decode(given["data"]))
+    name = next(name for name, other in TYPES.items() if other == array["type"])
+    data = gzip.decompress(base64.b64decode(array["data"]))
     return np.frombuffer(data, np.dtype(name).newbyteorder("<"))

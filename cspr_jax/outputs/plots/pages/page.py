@@ -1,4 +1,4 @@
-"""A page in one file: its content, the library of its charts, and what joins the two."""
+"""A page in one file: its content, the library of its charts, and the scripts that join the two."""
 
 import html
 import json

@@ -1,16 +1,16 @@
-"""Cells of a map whose motions tell most: those at the edges of what is feasible, and others far from these."""
+"""Cells of a map whose motions are most instructive: those at the edges of the feasible region, and others far away."""
 
 import numpy as np
 
-# Quantities whose extremes tell something.
+# Quantities whose extremes are instructive.
 EXTREME = ("margin", "duration", "arcs", "oscillations")
 
 
 def telling(data: dict[str, np.ndarray], verdict: np.ndarray, count: int) -> list[tuple[int, ...]]:
     """Cells to look at, all of them feasible.
 
-    First the extremes of margins, durations and counts, and of each count the cell with the smallest margin; then one
-    after the other the cell that is farthest from those chosen, in steps of the grid over its size.
+    First come the extremes of margins, durations and counts, and for each count the cell with the smallest margin;
+    then, one after the other, the cell that is farthest from the chosen ones, in steps of the grid over its size.
 
     Args:
         data: quantities of the map, each of the shape of `verdict`.
