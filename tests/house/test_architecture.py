@@ -38,10 +38,8 @@ KERNELS = ("errors", "arithmetic", "schema", "robots", "motions", "workspaces", 
 GUIDES = ("motions", "workspaces", *FAMILIES)
 # Folders, all of them, and modules that never import jax.
 WITHOUT_JAX = (
-    "api.examples",
-    "config.mappings",
+    "api.listings",
     "api.pictures",
-    "api.runs",
     "api.sweeps",
     "arithmetic.frames",
     "cli",
