@@ -137,7 +137,8 @@ def platform_robot(  # noqa: PLR0913
         gravity: m/s^2, positive.
         z_axis: where z points, "down" or "up".
         limits: limits beyond taut cables; None: none.
-        pattern: "3R3T", "1R2T", "2R3T" or "3R".
+        pattern: "3R3T"; "1R2T" in the plane y = 0; "2R3T" of a rod, platform_points on one line; "3R" about a fixed
+            joint, the origin of the platform axes.
 
     Returns:
         the robot, float64 NumPy leaves.
