@@ -9,7 +9,7 @@ TESTS := $(VENV)/.installed-tests
 # What another folder, or another version, is tried in: environments of their own, made anew.
 WHEEL := build/wheel
 LOWEST := build/lowest
-BEGIN := tests/outputs/test_templates.py tests/config/test_reading.py tests/outputs/test_outputs.py tests/plans/test_of_cells.py tests/api/test_python.py
+BEGIN := tests/outputs/test_templates.py tests/config/test_reading.py tests/outputs/test_outputs.py tests/plans/test_of_cells.py tests/api/test_searches.py
 
 .PHONY: demo test thorough soak check bench bench-record docs images gallery site wheel lowest clean
 

@@ -75,7 +75,7 @@ def section(name: str, cells: list[Cell]) -> str:
     """
     printed = [cell for cell in cells if cell.printed]
     differ = sum(cell.differs for cell in printed)
-    title = cspr_jax.table_names()[name]
+    title = cspr_jax.list_tables()[name]
     said = f"{title}." + (f" Published cells compared: {len(printed)}, of which {differ} differ." if printed else "")
     parts = [f"## Table {name}\n\n{textwrap.fill(said, 118)}\n"]
     for variant in dict.fromkeys(cell.variant for cell in printed):

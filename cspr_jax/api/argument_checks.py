@@ -7,21 +7,24 @@ that jax may trace pass where jax traces them.
 import functools
 import inspect
 import os
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 
-from cspr_jax.api import argument_rules
-from cspr_jax.api.argument_rules import Rule, choice, integer, kind_of, many, real
-from cspr_jax.schema.given_numbers import ANY
-from cspr_jax.schema.limits import LARGEST_MAX_ARCS
+from cspr_jax.errors import InputError
+from cspr_jax.schema.given_numbers import ANY, Numbers, whole
+from cspr_jax.schema.limits import LARGEST_MAX_ARCS, LIMITS, UNCERTAINTIES
 
+# A rule refuses what an argument, named in errors, may not be.
+Rule = Callable[[str, Any], None]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 LARGEST_LENGTH = 1e6  # m
 LARGEST_POPULATION, LARGEST_DIVISIONS, LARGEST_SAMPLES = 4096, 128, 1_000_000
 MOST = 10**9  # of what functions bound more narrowly by themselves
+NESTED = 4  # lists in a list are searched so deep for what jax traces
 
 
 def checked(function: Function, name: str = "", module: str = "") -> Function:
@@ -36,7 +39,11 @@ def checked(function: Function, name: str = "", module: str = "") -> Function:
         the function; its signature and docstring stay.
     """
     signature = inspect.signature(function)
-    rules = {key: _rule(function.__qualname__, key) for key in signature.parameters if key != "self"}
+    rules = {
+        key: OF_FUNCTIONS.get(f"{name or function.__qualname__}.{key}") or ARGUMENTS[key]
+        for key in signature.parameters
+        if key != "self"
+    }
 
     @functools.wraps(function)
     def with_checks(*arguments: Any, **keywords: Any) -> Any:
@@ -54,119 +61,240 @@ def checked(function: Function, name: str = "", module: str = "") -> Function:
     return with_checks  # type: ignore[return-value]
 
 
-def _rule(function: str, key: str) -> Rule:
-    special = OF_FUNCTIONS.get(f"{function}.{key}")
-    return special or ARGUMENTS[key]
+def _real(
+    allowed: str, *shapes: tuple[int | None, ...], traced: bool = False, none: bool = False, **bounds: Any
+) -> Rule:
+    # Real numbers of one of the shapes, or of any; bounds are those of `Numbers`.
+    kind = Numbers(allowed, shapes or None, **bounds)
+
+    def check(key: str, value: Any) -> None:
+        if not ((none and value is None) or (traced and _is_traced(value, NESTED))):
+            kind.array(key, value)
+
+    return check
 
 
-_NUMBER = real("a number", (), infinite=True, nan=True)
-_NUMBER_OR_NONE = real("a number, or None", (), none=True, infinite=True, nan=True)
-_TEXT = kind_of("a string", str)
-_TEXT_OR_NONE = kind_of("a string, or None", str, none=True)
-_FLAG = kind_of("True or False", bool, np.bool_)
-_PATH = kind_of("a path", str, os.PathLike)
-_PATH_OR_NONE = kind_of("a path, or None", str, os.PathLike, none=True)
-_FILE = kind_of("the path of a file, or a dictionary of what it holds", str, os.PathLike, Mapping)
+def _integer(least: int, largest: int, *, none: bool = False) -> Rule:
+    def check(key: str, value: Any) -> None:
+        if not (none and value is None):
+            whole(key, value, least, largest)
+
+    return check
+
+
+def _kind_of(allowed: str, *kinds: type, none: bool = False, has: tuple[str, ...] = ()) -> Rule:
+    # One of some types, or of a further one that need not be imported for this: it has these attributes.
+    def check(key: str, value: Any) -> None:
+        is_kind = isinstance(value, kinds) or (bool(has) and all(hasattr(value, name) for name in has))
+        if not (is_kind or (none and value is None)):
+            raise InputError(key, value, allowed)
+        if isinstance(value, str | os.PathLike) and "\0" in str(value):
+            raise InputError(key, value, f"{allowed}, without a NUL character")
+
+    return check
+
+
+def _choice(rule: Rule, *others: Any) -> Rule:
+    # The others are strings, or None.
+    def check(key: str, value: Any) -> None:
+        if not (value is None or isinstance(value, str)) or value not in others:
+            rule(key, value)
+
+    return check
+
+
+def _many(rule: Rule, allowed: str) -> Rule:
+    def check(key: str, value: Any) -> None:
+        if isinstance(value, str | bytes | Mapping) or not isinstance(value, Collection):
+            raise InputError(key, value, allowed)
+        for i, one in enumerate(value):
+            rule(f"{key}[{i}]", one)
+
+    return check
+
+
+def _is_traced(value: Any, depth: int) -> bool:
+    jax = sys.modules.get("jax")
+    if jax is None or not depth:
+        return False
+    if isinstance(value, list | tuple):
+        return any(_is_traced(part, depth - 1) for part in value)
+    return isinstance(value, jax.core.Tracer)
+
+
+def _record(allowed: str, names: Iterable[str]) -> Rule:
+    # An object whose attributes of these names are real numbers.
+    kind, field = _kind_of(allowed, has=tuple(names)), _real("real numbers", traced=True, none=True, infinite=True)
+
+    def check(key: str, value: Any) -> None:
+        kind(key, value)
+        for name in names:
+            field(f"{key}.{name}", getattr(value, name))
+
+    return check
+
+
+def _limits(key: str, value: Any) -> None:
+    if value is not None:
+        _record("Limits(...), or None", [row.name for row in LIMITS])(key, value)
+        if value.uncertainty is not None:
+            names = [row.name for row in UNCERTAINTIES]
+            _record("Uncertainty(...), or None", names)(f"{key}.uncertainty", value.uncertainty)
+
+
+def _pose(key: str, value: Any) -> None:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise InputError(key, value, "a position (3,) in m, and a unit quaternion (4,), scalar first")
+    _real("a position: three finite numbers, m", (3,))(key, value[0])
+    _real("a unit quaternion: four numbers, scalar first", (4,))(key, value[1])
+
+
+def _coordinates(key: str, value: Any) -> None:
+    if value is None:
+        return
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise InputError(key, value, "a number by the name of each axis")
+    for name, number in value.items():
+        _real("a finite number", ())(f"{key}[{name!r}]", number)
+
+
+def _results(key: str, value: Any) -> None:
+    if isinstance(value, list | tuple):
+        for i, one in enumerate(value):
+            _RESULT(f"{key}[{i}]", one)
+    else:
+        _RESULT(key, value)
+
+
+def _result(key: str, value: Any) -> None:
+    if not hasattr(value, "data_vars"):  # of xarray
+        _RESULT(key, value)
+
+
+def _size(key: str, value: Any) -> None:
+    if value is not None and not isinstance(value, str):
+        _real('a width and a height in cm, as (16, 10) or "16x10"', (2,))(key, value)
+
+
+def _names(key: str, value: Any) -> None:
+    # An iterator can be read only once: the function that reads it looks at its names.
+    if not isinstance(value, str | Iterator):
+        _many(_kind_of("a string", str), "a name, or several")(key, value)
+
+
+_NUMBER = _real("a number", (), infinite=True, nan=True)
+_NUMBER_OR_NONE = _real("a number, or None", (), none=True, infinite=True, nan=True)
+_TEXT = _kind_of("a string", str)
+_TEXT_OR_NONE = _kind_of("a string, or None", str, none=True)
+_FLAG = _kind_of("True or False", bool, np.bool_)
+_PATH = _kind_of("a path", str, os.PathLike)
+_PATH_OR_NONE = _kind_of("a path, or None", str, os.PathLike, none=True)
+_FILE = _kind_of("the path of a file, or a dictionary of what it holds", str, os.PathLike, Mapping)
+_RESULT = _kind_of("a result, or the path of one", str, os.PathLike, has=("data", "axes"))
+_ROBOT = _kind_of(
+    "a point mass or a platform, as load_robot, point_mass or platform gives it",
+    has=("base_points", "n_cables", "limits", "pattern"),
+)
 _PLAN = ("answers", "points", "robot_file")  # attributes of a plan
 _MOTION = ("state", "duration")
-_POSITIVE = real("a finite number > 0", (), least=0.0, above=True)
-_POSITIVE_OR_NONE = real("a finite number > 0, or None", (), least=0.0, above=True, none=True)
-_TIME = real("a finite number > 0, s", (), least=0.0, above=True, traced=True, none=True)
-_LENGTHS: dict[str, Any] = {"least": -LARGEST_LENGTH, "largest": LARGEST_LENGTH}
-_POINT = real("three finite numbers, at most 1e6 m", (3,), traced=True, **_LENGTHS)
-_POINT_OR_NONE = real("three finite numbers, at most 1e6 m, or None", (3,), traced=True, none=True, **_LENGTHS)
-_POINTS_WORDS = "finite numbers of shape (n, 3), n >= 1, at most 1e6 m"
-_POINTS = real(_POINTS_WORDS, (ANY, 3), **_LENGTHS)
-_POINTS_OR_NONE = real(f"{_POINTS_WORDS}, or None", (ANY, 3), none=True, **_LENGTHS)
-_STARTS = real("finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), **_LENGTHS)
-_STARTS_OR_NONE = real(
-    "None, or finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), none=True, **_LENGTHS
+_POSITIVE = _real("a finite number > 0", (), least=0.0, above=True)
+_POSITIVE_OR_NONE = _real("a finite number > 0, or None", (), least=0.0, above=True, none=True)
+_TIME = _real("a finite number > 0, s", (), least=0.0, above=True, traced=True, none=True)
+LENGTHS: dict[str, Any] = {"least": -LARGEST_LENGTH, "largest": LARGEST_LENGTH}
+_POINT = _real("three finite numbers, at most 1e6 m", (3,), traced=True, **LENGTHS)
+_POINT_OR_NONE = _real("three finite numbers, at most 1e6 m, or None", (3,), traced=True, none=True, **LENGTHS)
+POINTS_WORDS = "finite numbers of shape (n, 3), n >= 1, at most 1e6 m"
+_POINTS = _real(POINTS_WORDS, (ANY, 3), **LENGTHS)
+_POINTS_OR_NONE = _real(f"{POINTS_WORDS}, or None", (ANY, 3), none=True, **LENGTHS)
+_STARTS = _real("finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), **LENGTHS)
+_STARTS_OR_NONE = _real(
+    "None, or finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), none=True, **LENGTHS
 )
-_GEOMETRY = real("finite numbers of shape (n, 3), one row a cable, at most 1e6 m", (ANY, 3), traced=True, **_LENGTHS)
-_DEPTH: dict[str, Any] = {"least": 0.0, "above": True, "largest": LARGEST_LENGTH}
-_DEPTH_WORDS = "a number > 0, at most 1e6 m"
-_QUATERNIONS = real("None, or unit quaternions of shape (n, 4), scalar first", (ANY, 4), none=True)
-_TENSIONS = real("a number in N, or one a cable", (), (ANY,), none=True, infinite=True)
-_RANGE = real("[least, largest], at most 1e6 m", (2,), none=True, **_LENGTHS)
-_AMPLITUDE = kind_of("the name of an amplitude function, or one of amplitude(...)", str, has=("coefficients", "knots"))
-_ARCS = integer(1, LARGEST_MAX_ARCS)
-_WORKERS = integer(-MOST, MOST, none=True)
+_GEOMETRY = _real("finite numbers of shape (n, 3), one row a cable, at most 1e6 m", (ANY, 3), traced=True, **LENGTHS)
+DEPTH: dict[str, Any] = {"least": 0.0, "above": True, "largest": LARGEST_LENGTH}
+DEPTH_WORDS = "a number > 0, at most 1e6 m"
+_QUATERNIONS = _real("None, or unit quaternions of shape (n, 4), scalar first", (ANY, 4), none=True)
+_TENSIONS = _real("a number in N, or one a cable", (), (ANY,), none=True, infinite=True)
+_RANGE = _real("[least, largest], at most 1e6 m", (2,), none=True, **LENGTHS)
+_AMPLITUDE = _kind_of("the name of an amplitude function, or one of amplitude(...)", str, has=("coefficients", "knots"))
+_ARCS = _integer(1, LARGEST_MAX_ARCS)
+_WORKERS = _integer(-MOST, MOST, none=True)
 
 # By the name of the argument; what is there is checked in all functions that have one of this name.
 ARGUMENTS: dict[str, Rule] = {
-    "acceleration": real("a number >= 0, in m/s^2, or None", (), least=0.0, none=True),
+    "acceleration": _real("a number >= 0, in m/s^2, or None", (), least=0.0, none=True),
     "acceleration_time": _TIME,
     "accelerations": _POINTS_OR_NONE,
     "accept_environment_change": _FLAG,
     "amplitude": _AMPLITUDE,
     "anyway": _FLAG,
-    "arcs": real("a whole number from 1 on", (), least=1.0, largest=MOST, traced=True),
-    "at": argument_rules.coordinates,
+    "arcs": _real("a whole number from 1 on", (), least=1.0, largest=MOST, traced=True),
+    "at": _coordinates,
     "base_points": _GEOMETRY,
-    "best": argument_rules.names,
-    "beta_hat": choice(
-        real('a finite number, "preferred", or None', (), least=-100.0, largest=100.0), "preferred", None
+    "best": _names,
+    "beta_hat": _choice(
+        _real('a finite number, "preferred", or None', (), least=-100.0, largest=100.0), "preferred", None
     ),
-    "cable_diameter": real("a number >= 0, in m, or None", (), least=0.0, none=True),
-    "cable_error": real("a number >= 0, in m, or one a place", (), (ANY,), least=0.0),
+    "cable_diameter": _real("a number >= 0, in m, or None", (), least=0.0, none=True),
+    "cable_error": _real("a number >= 0, in m, or one a place", (), (ANY,), least=0.0),
     "cable_set": _TEXT_OR_NONE,
-    "capacity_length": real("a number > 0, in m, or None", (), least=0.0, above=True, none=True),
-    "cells": many(argument_rules.coordinates, "a list of coordinates by axis"),
-    "centre_of_mass": real("three coordinates, at most 1e6 m, or None", (3,), none=True, **_LENGTHS),
+    "capacity_length": _real("a number > 0, in m, or None", (), least=0.0, above=True, none=True),
+    "cells": _many(_coordinates, "a list of coordinates by axis"),
+    "centre_of_mass": _real("three coordinates, at most 1e6 m, or None", (3,), none=True, **LENGTHS),
     "condition": _TEXT,
     "control_point": _POINT,
     "control_points": _POINTS_OR_NONE,
     "definition": _TEXT,
     "directory": _PATH_OR_NONE,
-    "divisions": integer(4, LARGEST_DIVISIONS),
+    "divisions": _integer(4, LARGEST_DIVISIONS),
     "dpi": _NUMBER_OR_NONE,
     "drum_radius": _POSITIVE,
-    "duration": real("a finite number > 0, s", (), least=0.0, above=True, traced=True),
-    "durations": real("finite numbers > 0 of shape (n,), s", (ANY,), least=0.0, above=True),
+    "duration": _real("a finite number > 0, s", (), least=0.0, above=True, traced=True),
+    "durations": _real("finite numbers > 0 of shape (n,), s", (ANY,), least=0.0, above=True),
     "end": _POINT,
     "ends": _POINTS,
     "envelope": _FLAG,
     "epsilon": _NUMBER_OR_NONE,
-    "errors": kind_of("LaunchErrors(...)", has=("throws", "encoder", "seed")),
+    "errors": _kind_of("LaunchErrors(...)", has=("throws", "encoder", "seed")),
     "family": _TEXT,
     "fine": _FLAG,
     "folder": _PATH,
     "font_size": _NUMBER_OR_NONE,
     "given": _FILE,
     "gravity": _POSITIVE,
-    "inertia": real("three rows of three finite numbers, kg m^2", (3, 3), traced=True),
+    "inertia": _real("three rows of three finite numbers, kg m^2", (3, 3), traced=True),
     "kernels": _PATH_OR_NONE,
     "law": _TEXT,
     "like": _TEXT,
-    "limits": argument_rules.limits,
+    "limits": _limits,
     "lines": _TEXT_OR_NONE,
     "map": _TEXT,
     "mass": _POSITIVE,
     "max_acceleration": _POSITIVE_OR_NONE,
     "max_arcs": _ARCS,
     "max_duration": _POSITIVE_OR_NONE,
-    "motion": kind_of("a motion, as hypocycloid, a plan or answers give it", has=_MOTION),
+    "motion": _kind_of("a motion, as hypocycloid, a plan or answers give it", has=_MOTION),
     "name": _TEXT,
-    "names": argument_rules.names,
-    "on_tile": kind_of("a function, or None", none=True, has=("__call__",)),
+    "names": _names,
+    "on_tile": _kind_of("a function, or None", none=True, has=("__call__",)),
     "orientations": _QUATERNIONS,
-    "oscillations": real("a number > 0", (), least=0.0, above=True, largest=MOST, traced=True),
+    "oscillations": _real("a number > 0", (), least=0.0, above=True, largest=MOST, traced=True),
     "output": _PATH_OR_NONE,
     "path": _PATH,
     "pattern": _TEXT_OR_NONE,
-    "place": real("three finite numbers, at most 1e6 m", (3,), **_LENGTHS),
+    "place": _real("three finite numbers, at most 1e6 m", (3,), **LENGTHS),
     "plan": _PATH_OR_NONE,
     "planar": _FLAG,
     "platform_points": _GEOMETRY,
     "platform_radius": _POSITIVE,
-    "population": integer(16, LARGEST_POPULATION),
+    "population": _integer(16, LARGEST_POPULATION),
     "positions": _POINTS,
     "precision": _TEXT,
     "preset": _TEXT_OR_NONE,
-    "problem": kind_of("a problem, as make_problem gives it", has=("robot", "limits", "amplitude")),
+    "problem": _kind_of("a problem, as make_problem gives it", has=("robot", "limits", "amplitude")),
     "prune": _FLAG,
-    "pulley_axes": real("a vector [x, y, z], or one a cable, or None", (3,), (ANY, 3), none=True),
-    "pulley_radius": real("a number >= 0, in m, or one a cable, or None", (), (ANY,), none=True),
+    "pulley_axes": _real("a vector [x, y, z], or one a cable, or None", (3,), (ANY, 3), none=True),
+    "pulley_radius": _real("a number >= 0, in m, or one a cable, or None", (), (ANY,), none=True),
     "pulses": _POSITIVE,
     "quantity": _TEXT_OR_NONE,
     "rate": _NUMBER_OR_NONE,
@@ -174,65 +302,66 @@ ARGUMENTS: dict[str, Rule] = {
     "release_x": _RANGE,
     "release_y": _RANGE,
     "release_z": _RANGE,
-    "result": argument_rules.result,
-    "results": argument_rules.results,
-    "robot": argument_rules.robot,
+    "result": _result,
+    "results": _results,
+    "robot": _ROBOT,
     "rule": _TEXT,
-    "samples": integer(1, LARGEST_SAMPLES),
+    "samples": _integer(1, LARGEST_SAMPLES),
     "scheduler": _TEXT_OR_NONE,
-    "size": argument_rules.size,
+    "size": _size,
     "solid": _FLAG,
     "speed": _NUMBER,
     "spool_radius": _POSITIVE,
     "start": _POINT_OR_NONE,
     "starts": _POINTS,
-    "state": argument_rules.state,
+    "state": _record("a state, as a motion gives it", ("position", "velocity", "acceleration")),
     "step": _NUMBER,
     "target": _POINT,
     "targets": _POINTS,
-    "tau": real("a number from 0 to 1", (), least=0.0, largest=1.0, traced=True),
+    "tau": _real("a number from 0 to 1", (), least=0.0, largest=1.0, traced=True),
     "tension_max": _TENSIONS,
     "tension_min": _TENSIONS,
     "title": _FLAG,
-    "trajectories": integer(-MOST, MOST),
-    "values": integer(1, MOST, none=True),
+    "trajectories": _integer(-MOST, MOST),
+    "values": _integer(1, MOST, none=True),
     "variable": _FLAG,
     "what": _TEXT,
     "workers": _WORKERS,
-    "wrench_box": real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
-    "wrench_ellipsoid": real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
-    "wrenches": real("finite numbers of shape (k, dof), or None", (ANY, ANY), none=True),
-    "z0": real(f"{_DEPTH_WORDS}, or (n,) of them", (), (ANY,), **_DEPTH),
+    "wrench_box": _real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
+    "wrench_ellipsoid": _real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
+    "wrenches": _real("finite numbers of shape (k, dof), or None", (ANY, ANY), none=True),
+    "z0": _real(f"{DEPTH_WORDS}, or (n,) of them", (), (ANY,), **DEPTH),
     "z_axis": _TEXT,
 }
 # These rules hold for functions whose argument differs from the usual one of the same name.
-_ONE_DEPTH = real(_DEPTH_WORDS, (), traced=True, **_DEPTH)
+_ONE_DEPTH = _real(DEPTH_WORDS, (), traced=True, **DEPTH)
 OF_FUNCTIONS: dict[str, Rule] = {
-    "AvailableAccelerations.margin.accelerations": real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
-    "AvailableAccelerations.verdict.accelerations": real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
-    "attainable.z0": real(f"{_DEPTH_WORDS}, or None", (), none=True, **_DEPTH),
+    "AvailableAccelerations.margin.accelerations": _real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
+    "AvailableAccelerations.verdict.accelerations": _real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
+    "attainable.z0": _real(f"{DEPTH_WORDS}, or None", (), none=True, **DEPTH),
     "bezier.start": _POINT,
     "hypocycloid.z0": _ONE_DEPTH,
     "keep_compiled_code.folder": _PATH_OR_NONE,
     "launch_range.start": _STARTS,
-    "list_robots.names": many(kind_of("a string, or a path", str, os.PathLike), "names and paths of robots"),
+    "list_robots.names": _many(_kind_of("a string, or a path", str, os.PathLike), "names and paths of robots"),
     "least_time.start": _STARTS,
-    "minimum_arcs.amplitude": choice(_AMPLITUDE, None),
+    "minimum_arcs.amplitude": _choice(_AMPLITUDE, None),
     "minimum_arcs.start": _STARTS_OR_NONE,
-    "minimum_pose_arcs.start": choice(argument_rules.pose, None),
-    "parallel_pair_robot.inertia": real("three rows of three finite numbers, kg m^2, or None", (3, 3), none=True),
+    "minimum_pose_arcs.start": _choice(_pose, None),
+    "parallel_pair_robot.inertia": _real("three rows of three finite numbers, kg m^2, or None", (3, 3), none=True),
     "platform.pattern": _TEXT,
-    "platform_motion.beta_hat": real("two finite numbers", (2,), traced=True),
-    "platform_motion.orientations": real("two unit quaternions, scalar first", (2, 4), traced=True),
+    "point_mass_robot.pattern": _TEXT,
+    "platform_motion.beta_hat": _real("two finite numbers", (2,), traced=True),
+    "platform_motion.orientations": _real("two unit quaternions, scalar first", (2, 4), traced=True),
     "platform_motion.z0": _ONE_DEPTH,
-    "replay.given": kind_of("a plan, its file, or a dictionary of that", str, os.PathLike, Mapping, has=_PLAN),
-    "report.given": kind_of("a result, a plan, or the path of one", str, os.PathLike, has=("to_xarray",)),
+    "replay.given": _kind_of("a plan, its file, or a dictionary of that", str, os.PathLike, Mapping, has=_PLAN),
+    "report.given": _kind_of("a result, a plan, or the path of one", str, os.PathLike, has=("to_xarray",)),
     "report.output": _PATH,
     "status.directory": _PATH,
     "straight_line.start": _POINT,
     "table.amplitude": _TEXT_OR_NONE,
     "table.definition": _TEXT_OR_NONE,
     "table.name": _TEXT_OR_NONE,
-    "table.max_arcs": integer(1, LARGEST_MAX_ARCS, none=True),
+    "table.max_arcs": _integer(1, LARGEST_MAX_ARCS, none=True),
     "transition.z0": _ONE_DEPTH,
 }

@@ -1,4 +1,4 @@
-"""Arguments of the functions from Python, checked, and motions of many answers."""
+"""Arguments of the functions from Python as kernels take them, and motions of many answers."""
 
 import warnings
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from cspr_jax.api.argument_checks import DEPTH, DEPTH_WORDS, LENGTHS, POINTS_WORDS
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
 from cspr_jax.config.near_rest import almost_at_rest
@@ -17,14 +18,12 @@ from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import LARGEST_LENGTH, PointMassRobot
+from cspr_jax.robots.point_mass import PLANAR, PointMassRobot
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.schema.given_numbers import ANY, Numbers
 
-POINTS = Numbers(
-    "finite numbers of shape (n, 3), n >= 1, at most 1e6 m", ((ANY, 3),), least=-LARGEST_LENGTH, largest=LARGEST_LENGTH
-)
-DEPTHS = Numbers("a number > 0, at most 1e6 m", ((), (ANY,)), least=0.0, above=True, largest=LARGEST_LENGTH)
+POINTS = Numbers(POINTS_WORDS, ((ANY, 3),), **LENGTHS)
+DEPTHS = Numbers(DEPTH_WORDS, ((), (ANY,)), **DEPTH)
 
 
 def check_point_mass(robot: Any) -> None:
@@ -37,7 +36,44 @@ def check_point_mass(robot: Any) -> None:
         raise InputError("robot", getattr(robot, "name", robot), "a point mass")
 
 
-def amplitude_of(given: str | Amplitude, *, free_end: bool | None = None) -> Amplitude:
+def check_in_plane(key: str, points: np.ndarray, *, is_planar: bool) -> None:
+    """Refuse points beside the plane of a planar robot.
+
+    Args:
+        key: named in errors.
+        points: (n, 3) in the robot's axes, m.
+        is_planar: whether the robot is one.
+
+    Raises:
+        InputError: some y is not 0.
+    """
+    if is_planar and points[:, 1].any():
+        raise InputError(key, "y not 0", "y = 0: the plane of a planar robot")
+
+
+def starts_and_ends(robot: Any, start, targets) -> tuple[np.ndarray, np.ndarray]:
+    """Ends of many motions of a point mass.
+
+    Args:
+        start: (3,) of all motions, or (n, 3), in the robot's axes, m.
+        targets: (n, 3) likewise.
+
+    Returns:
+        (n, 3) starts and (n, 3) ends, m.
+
+    Raises:
+        InputError: another kind of robot, shapes that do not fit, values that are not finite, or points beside the
+            plane of a planar robot.
+    """
+    check_point_mass(robot)
+    ends, starts = points_of("targets", targets), points_of("start", np.atleast_2d(np.asarray(start, float)))
+    if len(starts) not in (1, len(ends)):
+        raise InputError("start", f"shape {starts.shape}", f"finite numbers of shape (3,) or {ends.shape}")
+    check_in_plane("targets", np.concatenate([ends, starts]), is_planar=robot.dof == PLANAR)
+    return np.broadcast_to(starts, ends.shape).copy(), ends
+
+
+def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) -> Amplitude:
     """Amplitude function that is given by its name, or itself.
 
     Args:
@@ -50,10 +86,10 @@ def amplitude_of(given: str | Amplitude, *, free_end: bool | None = None) -> Amp
         InputError: an unknown name, or conditions that it breaks.
     """
     try:
-        function = named(given) if isinstance(given, str) else given
+        function = named(amplitude) if isinstance(amplitude, str) else amplitude
     except InputError as error:
         allowed = f"one of {', '.join(NAMES)}; those with an epsilon are amplitude(name, epsilon)"
-        raise InputError("amplitude", given, allowed) from error
+        raise InputError("amplitude", amplitude, allowed) from error
     if free_end is not None and isinstance(function.coefficients, np.ndarray):
         broken = boundary_errors(function, free_end=free_end)
         if broken:
@@ -129,7 +165,7 @@ def depths(z0, count: int) -> np.ndarray:
 
     Args:
         z0: () or (count,) m.
-        count: how many are wanted.
+        count: number of motions.
 
     Returns:
         (count,) m.
@@ -142,13 +178,13 @@ def depths(z0, count: int) -> np.ndarray:
     return np.broadcast_to(DEPTHS.array("z0", z0), (count,)).copy()
 
 
-def quaternions(key: str, given, count: int) -> np.ndarray:
+def quaternions(key: str, orientations, count: int) -> np.ndarray:
     """Orientations.
 
     Args:
         key: named in errors.
-        given: (count, 4) unit quaternions, scalar first; None: the reference orientation.
-        count: how many are wanted.
+        orientations: (count, 4) unit quaternions, scalar first; None: the reference orientation.
+        count: number of poses.
 
     Returns:
         (count, 4).
@@ -156,20 +192,20 @@ def quaternions(key: str, given, count: int) -> np.ndarray:
     Raises:
         InputError: another shape, or not of unit length.
     """
-    if given is None:
+    if orientations is None:
         return np.tile(IDENTITY, (count, 1))
-    turns = np.asarray(given, float)
-    if turns.shape != (count, 4) or not np.abs(np.linalg.norm(turns, axis=1) - 1.0).max() <= UNIT_TOLERANCE:
-        raise InputError(key, f"shape {turns.shape}", f"({count}, 4) unit quaternions, scalar first")
-    return turns / np.linalg.norm(turns, axis=1, keepdims=True)
+    values = np.asarray(orientations, float)
+    if values.shape != (count, 4) or not np.abs(np.linalg.norm(values, axis=1) - 1.0).max() <= UNIT_TOLERANCE:
+        raise InputError(key, f"shape {values.shape}", f"({count}, 4) unit quaternions, scalar first")
+    return values / np.linalg.norm(values, axis=1, keepdims=True)
 
 
-def points_of(key: str, given) -> np.ndarray:
+def points_of(key: str, points) -> np.ndarray:
     """Points.
 
     Args:
         key: named in errors.
-        given: (n, 3) m, n >= 1.
+        points: (n, 3) m, n >= 1.
 
     Returns:
         (n, 3) m.
@@ -177,4 +213,4 @@ def points_of(key: str, given) -> np.ndarray:
     Raises:
         InputError: another shape, not finite, or beyond 1e6 m.
     """
-    return POINTS.array(key, given)
+    return POINTS.array(key, points)

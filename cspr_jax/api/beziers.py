@@ -1,23 +1,27 @@
-"""Bezier segments of point masses from Python: one motion in pure jax, verdicts and feasible durations of many."""
+"""Bezier segments of point masses from Python: one motion in pure jax, verdicts, durations and launches of many."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.arguments import check_point_mass, kernel_problem, points_of
+from cspr_jax.api.arguments import check_in_plane, check_point_mass, kernel_problem, points_of, starts_and_ends
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.beziers.duration_roots import Ends
 from cspr_jax.beziers.durations import feasible_durations
+from cspr_jax.beziers.launch_range import POPULATION, LaunchRange
+from cspr_jax.beziers.launch_range import launch_range as search_launches
 from cspr_jax.beziers.margins import depths_of
 from cspr_jax.beziers.motion import Bezier
+from cspr_jax.beziers.release_bounds import bounds_of
 from cspr_jax.beziers.verdicts import verdicts
 from cspr_jax.errors import InputError
 from cspr_jax.motions.motion import Placed
 from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
+from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, plane_normal
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.schema.columns import Columns
 
@@ -92,8 +96,7 @@ def bezier_verdicts(
             not finite.
     """
     check_point_mass(robot)
-    names = ("starts", "control_points", "ends")
-    points = _points(robot, dict(zip(names, (starts, control_points, ends), strict=True)))
+    points = _points(robot, {"starts": starts, "control_points": control_points, "ends": ends})
     times = np.asarray(durations, float)
     if times.shape != (len(points[0]),):
         raise InputError("durations", f"shape {times.shape}", f"finite numbers > 0 of shape ({len(points[0])},)")
@@ -137,8 +140,54 @@ def bezier_durations(
         prepared_robot, frame = prepared(robot)
         first, last = (np.asarray(frame.inward(points[name])) for name in ("starts", "ends"))
         middle = first if control_points is None else np.asarray(frame.inward(points["control_points"]))
-        turn = np.zeros_like(first) if accelerations is None else np.asarray(frame.turned(points["accelerations"]))
-        return feasible_durations(prepared_robot, Ends(first, last, middle, turn), depths_of(prepared_robot, first))
+        vectors = np.zeros_like(first) if accelerations is None else np.asarray(frame.turned(points["accelerations"]))
+        return feasible_durations(prepared_robot, Ends(first, last, middle, vectors), depths_of(prepared_robot, first))
+
+
+@checked
+def launch_range(
+    robot: PointMassRobot,
+    targets: np.ndarray,
+    *,
+    start: np.ndarray,
+    release_x: Sequence[float] | None = None,
+    release_y: Sequence[float] | None = None,
+    release_z: Sequence[float] | None = None,
+    max_duration: float | None = None,
+    population: int = POPULATION,
+    limits: Limits | None = None,
+) -> LaunchRange:
+    """Launches of least speed to landing places, by one Bezier segment from rest, launch paper (26) and (29).
+
+    Args:
+        robot: a point mass on three cables, or on two in a plane.
+        targets: (n, 3) where the object is to land, in the robot's axes, m.
+        start: (3,) or (n, 3) where the segments start at rest, likewise.
+        release_x: least and largest x of the release, m; None: twice the robot's size to each side of the centroid of
+            the spools.
+        release_y: likewise.
+        release_z: likewise; None: from the centroid down to four times the robot's size below it.
+        max_duration: longest segment tried, s; None: 40 times the root of the robot's size over gravity.
+        population: of the search, at least 16; one twice as large takes four times as long.
+        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+
+    Returns:
+        the launches, in the robot's axes. Those found are proved feasible; that there is no other is not proved.
+
+    Raises:
+        InputError: another kind of robot, more cables than degrees of freedom, limits that contradict each other,
+            shapes that do not fit, values that are not finite, bounds that leave no release.
+    """
+    starts, ends = starts_and_ends(robot, start, targets)
+    ranges = {"release_x": release_x, "release_y": release_y, "release_z": release_z}
+    for name, values in ranges.items():
+        if values is not None and not values[0] <= values[1]:
+            raise InputError(name, list(values), "[least, largest], the first not above the second, at most 1e6 m")
+    with double_precision():
+        problem, frame = kernel_problem(robot, "quintic", limits, free_end=None)
+        bounds = bounds_of(problem, frame, list(ranges.values()), max_duration)
+        launches = search_launches(problem, frame.inward(starts), frame.inward(ends), bounds, int(population))
+        return launches.placed(frame)
 
 
 def _points(robot: PointMassRobot, arguments: dict[str, object]) -> list[np.ndarray]:
@@ -146,6 +195,5 @@ def _points(robot: PointMassRobot, arguments: dict[str, object]) -> list[np.ndar
     for name, points in zip(arguments, arrays, strict=True):
         if points.shape != arrays[0].shape:
             raise InputError(name, f"shape {points.shape}", f"finite numbers of shape {arrays[0].shape}")
-        if robot.dof == 2 and points[:, 1].any():
-            raise InputError(name, "y not 0", "y = 0: the plane of a planar robot")
+        check_in_plane(name, points, is_planar=robot.dof == PLANAR)
     return arrays

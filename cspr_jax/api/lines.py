@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.arguments import check_point_mass, points_of
+from cspr_jax.api.arguments import check_point_mass, starts_and_ends
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
 from cspr_jax.lines.least_time import LeastTimes, least_times
@@ -74,16 +74,9 @@ def least_time(
         InputError: another kind of robot, limits that contradict each other, shapes that do not fit, values that are
             not finite.
     """
-    check_point_mass(robot)
-    ends = points_of("targets", targets)
-    starts = points_of("start", np.atleast_2d(np.asarray(start, float)))
-    if len(starts) not in (1, len(ends)):
-        raise InputError("start", f"shape {starts.shape}", f"finite numbers of shape (3,) or {ends.shape}")
-    if robot.dof == 2 and (ends[:, 1].any() or starts[:, 1].any()):
-        raise InputError("targets", "y not 0", "y = 0: the plane of a planar robot")
+    starts, ends = starts_and_ends(robot, start, targets)
     largest = np.inf if max_acceleration is None else max_acceleration
     with double_precision():
         prepared_robot, frame = prepared(robot)
-        first = np.broadcast_to(frame.inward(starts), ends.shape).copy()
         problem = Problem(prepared_robot, limits_over(robot, limits), named("quintic"))
-        return least_times(problem, first, frame.inward(ends), max_acceleration=largest)
+        return least_times(problem, frame.inward(starts), frame.inward(ends), max_acceleration=largest)

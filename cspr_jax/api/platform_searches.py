@@ -1,13 +1,14 @@
 """Searches of platforms from Python: poses and orientations in, answers out; see `api.searches`."""
 
+import dataclasses
 from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
-from cspr_jax.api.answers import PlatformAnswers
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, quaternions
+from cspr_jax.api.searches import WithMotions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
@@ -28,6 +29,11 @@ from cspr_jax.platforms.pose_targets import pose_arcs, rest_poses, start_beta_ha
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.reference_pose import reference_pose
+
+
+@dataclasses.dataclass(frozen=True)
+class PlatformAnswers(PlatformMotionAnswers, WithMotions):
+    """Answers of `minimum_pose_arcs`; see `platforms.answers.PlatformMotionAnswers`."""
 
 
 @checked

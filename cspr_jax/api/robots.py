@@ -3,7 +3,6 @@
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.build.robots import MAKERS
 from cspr_jax.build.robots import load_robot as _load_robot
 from cspr_jax.errors import InputError
 from cspr_jax.motions.given_limits import pair_limits
@@ -15,6 +14,7 @@ from cspr_jax.robots.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot
 from cspr_jax.robots.point_mass import point_mass_robot as _point_mass_robot
 
 load_robot = checked(_load_robot, "load_robot", __name__)
+platform = checked(platform_robot, "platform", __name__)
 point_mass_robot = checked(_point_mass_robot, "point_mass_robot", __name__)
 with_cables = checked(_with_cables, "with_cables", __name__)
 
@@ -49,58 +49,10 @@ def point_mass(
         InputError: what a robot file with these numbers would be refused for.
     """
     pattern_name = pattern or ("2T" if planar else "3T")
-    if pattern_name not in MAKERS or (planar and pattern_name != "2T"):
-        allowed = '"2T", or None, beside planar' if planar else '"1T", "2T" or "3T"'
-        raise InputError("pattern", pattern, allowed)
-    return MAKERS[pattern_name](base_points, mass=mass, gravity=gravity, name=name, z_axis=z_axis, limits=limits)
-
-
-@checked
-def platform(  # noqa: PLR0913
-    base_points,
-    platform_points,
-    *,
-    mass: float,
-    inertia,
-    centre_of_mass=None,
-    gravity: float = STANDARD_GRAVITY,
-    z_axis: Axis = "down",
-    name: str = "robot",
-    limits: Limits | None = None,
-    pattern: str = RIGID,
-) -> PlatformRobot:
-    """A platform on cables.
-
-    Args:
-        base_points: (n_cables, 3) spool points, at least as many as degrees of freedom; m.
-        platform_points: (n_cables, 3) attachment points in platform axes, cable by cable; m.
-        mass: kg, positive.
-        inertia: (3, 3) about the mass centre, platform axes, kg m^2.
-        centre_of_mass: (3,) in platform axes, m; None: their origin.
-        gravity: m/s^2, positive.
-        z_axis: where z points, "down" or "up".
-        limits: limits beyond taut cables; None: none.
-        pattern: "3R3T"; "1R2T" in the plane y = 0; "2R3T" of a rod, platform_points on one line; "3R" about a fixed
-            joint, the origin of the platform axes.
-
-    Returns:
-        the robot.
-
-    Raises:
-        InputError: what a robot file with these numbers would be refused for.
-    """
-    centre = (0.0, 0.0, 0.0) if centre_of_mass is None else centre_of_mass
-    return platform_robot(
-        base_points,
-        platform_points,
-        mass=mass,
-        inertia=inertia,
-        centre_of_mass=centre,
-        gravity=gravity,
-        name=name,
-        z_axis=z_axis,
-        limits=limits,
-        pattern=pattern,
+    if planar and pattern_name != "2T":
+        raise InputError("pattern", pattern, '"2T", or None, beside planar')
+    return _point_mass_robot(
+        base_points, mass=mass, gravity=gravity, name=name, z_axis=z_axis, limits=limits, pattern=pattern_name
     )
 
 

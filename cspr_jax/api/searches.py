@@ -1,30 +1,82 @@
 """Searches from Python: arrays of targets in, answers out.
 
-In the axes of the robot, and in float64 whatever jax is set to. They give NumPy arrays, which cannot be differentiated.
+In the axes of the robot, and in float64 whatever jax is set to. They give NumPy arrays, which cannot be differentiated,
+and know the motions that belong to them.
 """
 
+import dataclasses
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from cspr_jax.api.answers import ArcsAnswers, TransitionAnswers
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of
+from cspr_jax.api.arguments import batched, check_point_mass, depths, kernel_problem, points_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.demands import SAMPLES
+from cspr_jax.motions.leg import each
 from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.problem import Problem
+from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
 from cspr_jax.swings.arcs import minimum_arcs as search_arcs
 from cspr_jax.swings.arcs import segments_between
 from cspr_jax.swings.hypocycloid import Hypocycloid, Segment
+from cspr_jax.swings.oscillations import OscillationAnswers, transitions_to
 from cspr_jax.swings.oscillations import minimum_oscillations as search_oscillations
-from cspr_jax.swings.oscillations import transitions_to
 from cspr_jax.swings.parities import pick
+
+
+@dataclasses.dataclass(frozen=True)
+class WithMotions:
+    """Answers that can make the motions that belong to them.
+
+    Fields:
+        make: motions of the answers; a function of a module, bound to its arguments, so that answers can be pickled
+            and copied.
+        problem: that was searched.
+    """
+
+    make: Callable[[Any], Placed] = dataclasses.field(kw_only=True, repr=False, compare=False)
+    problem: Problem = dataclasses.field(kw_only=True, repr=False, compare=False)
+
+    def motions(self) -> Any:
+        """Motions that the answers belong to: of the number of arcs found, else of the one that comes nearest.
+
+        Returns:
+            one motion whose leaves have a leading dimension (n,), in the robot's axes: `jax.vmap` takes it apart.
+        """
+        return self.make(self)
+
+    def causes(self: Any) -> list[tuple[Cause, ...]]:
+        """Find what keeps motions from being feasible, in numbers.
+
+        Returns:
+            the causes for each of the n motions, the worst one first; a feasible motion has none.
+        """
+        with double_precision():
+            placed, count = self.make(self), len(self.verdict)
+            if not count:
+                return []
+            frame = each(placed.frame, count)[0]
+            samples = SAMPLES * np.maximum(self.tried_arcs, 1) + 1
+            return causes(self.problem, frame, self, each(placed.motion, count), samples)
+
+
+@dataclasses.dataclass(frozen=True)
+class ArcsAnswers(Answers, WithMotions):
+    """Answers of `minimum_arcs`; see `motions.answers.Answers`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TransitionAnswers(OscillationAnswers, WithMotions):
+    """Answers of `minimum_oscillations`; see `swings.oscillations.OscillationAnswers`."""
 
 
 @checked
@@ -70,16 +122,16 @@ def minimum_arcs(
         starts = (
             rest_point(depth) if start_points is None else frame.inward(points_of("start", np.atleast_2d(start_points)))
         )
-        given_points = (np.broadcast_to(starts, ends.shape).copy(), frame.inward(ends), depth)
-        answers = search_arcs(problem, *given_points, max_arcs=max_arcs)
-    make = partial(_motions_between, problem, frame, given_points)
+        endpoints = (np.broadcast_to(starts, ends.shape).copy(), frame.inward(ends), depth)
+        answers = search_arcs(problem, *endpoints, max_arcs=max_arcs)
+    make = partial(_motions_between, problem, frame, endpoints)
     return ArcsAnswers(**vars(answers), make=make, problem=problem)
 
 
 def _motions_between(
-    problem: Problem, frame: Frame, given_points: tuple[np.ndarray, ...], answers: Answers
+    problem: Problem, frame: Frame, endpoints: tuple[np.ndarray, ...], answers: Answers
 ) -> Placed[Hypocycloid]:
-    parities, _ = segments_between(problem, *given_points)
+    parities, _ = segments_between(problem, *endpoints)
     chosen = pick(parities, np.arange(len(answers.tried_arcs)), answers.tried_arcs)
     return batched(Hypocycloid, chosen, problem, answers, frame)
 
@@ -110,8 +162,7 @@ def minimum_oscillations(
     Raises:
         InputError: as `minimum_arcs` does.
     """
-    if not isinstance(robot, PointMassRobot):
-        raise InputError("robot", getattr(robot, "name", robot), "a point mass")
+    check_point_mass(robot)
     ends = points_of("targets", targets)
     depth = depths(z0, len(ends))
     with double_precision():

@@ -1,4 +1,4 @@
-"""Sweeps from Python: run into a directory as `cspr run` does it, or computed in memory."""
+"""Sweeps from Python: run into a directory as `cspr run` does it, or computed in memory; runs and results looked at."""
 
 import contextlib
 import dataclasses
@@ -10,14 +10,19 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.config.hints import robot_hints, sweep_hints
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.errors import ConfigError
+from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.runtime.processes import check_count
+from cspr_jax.runtime.xla import keep_compiled_code as _keep_compiled_code
 from cspr_jax.schema import labelled
-from cspr_jax.store.result import open_result
-from cspr_jax.sweep import engine
+from cspr_jax.store.result import Result
+from cspr_jax.store.result import open_result as _open_result
+from cspr_jax.sweep import engine, inspection
 from cspr_jax.sweep.definition import Sweep, read_sweep, run_directory, sweep_of
 from cspr_jax.sweep.work import Executor
 
@@ -26,6 +31,9 @@ if TYPE_CHECKING:
 
 # Errors and files are named after this where there is no sweep file; paths are relative to the current folder.
 NAME = Path("sweep")
+
+keep_compiled_code = checked(_keep_compiled_code, "keep_compiled_code", __name__)
+open_result = checked(_open_result, "open_result", __name__)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,11 +118,11 @@ def _executor(job: Job, prepare: Callable[[], None]) -> Iterator[Executor]:
     yield executors.ThisProcess(tile_map) if count == 1 else executors.Processes(job.sweep, count)
 
 
-def sweep_given(given: str | Path | Mapping[str, Any]) -> Sweep:
+def checked_sweep(source: str | Path | Mapping[str, Any]) -> Sweep:
     """A sweep, checked without computing anything.
 
     Args:
-        given: path of a sweep file, or what it holds.
+        source: path of a sweep file, or what it holds.
 
     Returns:
         the sweep.
@@ -122,9 +130,9 @@ def sweep_given(given: str | Path | Mapping[str, Any]) -> Sweep:
     Raises:
         ConfigError: a mistake in it.
     """
-    if not isinstance(given, Mapping):
-        return read_sweep(Path(given))
-    data = plain(given)
+    if not isinstance(source, Mapping):
+        return read_sweep(Path(source))
+    data = plain(source)
     return sweep_of(data, NAME, text=text_of(data))
 
 
@@ -161,7 +169,7 @@ def run(
         ResourceError: memory or workers do not suffice.
         SelfCheckError: the computed numbers contradict each other.
     """
-    sweep = sweep_given(given)
+    sweep = checked_sweep(given)
     hooks = engine.Hooks(warn=lambda line: warnings.warn(line, stacklevel=2))
     if on_tile is not None:
         hooks.on_tile = on_tile
@@ -172,7 +180,7 @@ def run(
 
 
 @checked
-def compute(given: str | Path | Mapping[str, Any]) -> "xarray.Dataset":
+def compute_sweep(given: str | Path | Mapping[str, Any]) -> "xarray.Dataset":
     """Compute a small sweep and keep no file; `run` is for those that take long, since it can resume.
 
     Args:
@@ -188,3 +196,56 @@ def compute(given: str | Path | Mapping[str, Any]) -> "xarray.Dataset":
     labelled.need_xarray()
     with tempfile.TemporaryDirectory() as folder:
         return open_result(run(given, Path(folder) / "run")).to_xarray()
+
+
+@checked
+def status(directory: str | Path) -> dict[str, Any]:
+    """How far a run has come, without touching it.
+
+    Returns:
+        what `cspr status --json` prints: "identity", "tiles", "shards", "result" and more.
+
+    Raises:
+        StoreError: no run directory.
+    """
+    return inspection.status(Path(directory))
+
+
+@checked
+def verify(path: str | Path) -> dict[str, Any]:
+    """Read again everything of a run, or of a result or motion file, and check it.
+
+    Args:
+        path: a run directory, or a file.
+
+    Returns:
+        what `cspr verify --json` prints: counts, and "faults", one line each; none where all is whole.
+
+    Raises:
+        StoreError: neither a run directory nor a file.
+    """
+    return inspection.verify(Path(path))
+
+
+@checked
+def workspace_volume(result: "Result | xarray.Dataset | str | Path") -> WorkspaceVolume:
+    """Volume of the workspace that a map has found, or its area where the map is a section.
+
+    Args:
+        result: of a sweep of a map with verdicts: its file, what `open_result` or `compute_sweep` gave.
+
+    Returns:
+        the volume; arrays over the axes that are no coordinates of places, () without any.
+
+    Raises:
+        InputError: no map, no stored verdicts, or a single place.
+        StoreError: no result file.
+    """
+    if isinstance(result, Result):
+        return volume_of(result)
+    if isinstance(result, str | Path):
+        return volume_of(open_result(Path(result)))
+    data = {str(name): np.asarray(values) for name, values in result.data_vars.items()}
+    dims = result["verdict"].dims if "verdict" in data else ()
+    axes = {str(name): np.asarray(result[name]) for name in dims}
+    return volume_of(Result(axes, data, {}, {}, dict(result.attrs), {}))

@@ -1,25 +1,29 @@
-"""Workspaces from Python: which poses a robot on any number of cables can hold."""
+"""Poses at rest from Python: which ones a robot can hold, how exactly, and which accelerations it has there."""
+
+import dataclasses
+import math
 
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.arguments import points_of, quaternions
+from cspr_jax.api.arguments import check_in_plane, check_point_mass, points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
 from cspr_jax.motions.given_limits import limits_over
-from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.kernel_axes import centred, prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.point_mass import PLANAR, PointMassRobot
+from cspr_jax.robots.wrench_sets import Faces, spanning
 from cspr_jax.schema.given_numbers import numbers
+from cspr_jax.schema.verdicts import FLAGS
+from cspr_jax.workspaces.acceleration_search import faces_of, judged
 from cspr_jax.workspaces.geometry import mass_centres
 from cspr_jax.workspaces.questions import CONDITIONS, FEASIBLE, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceAnswers, WorkspaceSearch
-
-__all__ = ["WorkspaceAnswers", "workspace"]
-
+from cspr_jax.workspaces.sensitivities import SensitivitySearch
 
 PRECISIONS = ("float64", "float32")
 
@@ -71,8 +75,7 @@ def workspace(  # noqa: PLR0913
             moments of a rod, accelerations of a robot on a joint, limits or wrenches where the condition has none,
             limits that contradict each other.
     """
-    if not isinstance(robot, PointMassRobot | PlatformRobot):
-        raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
+    _check_kind(robot)
     check_cables(robot)
     if condition not in CONDITIONS:
         raise InputError("condition", condition, " or ".join(f'"{name}"' for name in CONDITIONS))
@@ -83,7 +86,8 @@ def workspace(  # noqa: PLR0913
     for key, value in (*requirements.items(), ("capacity_length", capacity_length)):
         if value is not None and condition != FEASIBLE:
             raise InputError(key, value, f'None with condition "{condition}"')
-    places = _places(robot, positions)
+    places = points_of("positions", positions)
+    check_in_plane("positions", places, is_planar=PATTERNS[robot.pattern].is_planar)
     with double_precision():
         centred_robot, frame = centred(robot)
         limits = _limits(robot, tension_min, tension_max)
@@ -95,12 +99,9 @@ def workspace(  # noqa: PLR0913
         return WorkspaceSearch(centred_robot, posed, precision=precision)(inner, turns)
 
 
-def _places(robot, positions) -> np.ndarray:
-    places = points_of("positions", positions)
-    row = PATTERNS[robot.pattern]
-    if row.is_planar and places[:, 1].any():
-        raise InputError("positions", "y not 0", "y = 0: the plane of a planar robot")
-    return places
+def _check_kind(robot) -> None:
+    if not isinstance(robot, PointMassRobot | PlatformRobot):
+        raise InputError("robot", getattr(robot, "name", robot), "a point mass or a platform")
 
 
 def _limits(robot, tension_min, tension_max) -> Limits:
@@ -121,3 +122,182 @@ def _poses(robot, frame: Frame, places: np.ndarray, orientations) -> tuple[np.nd
             raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
         turns = frame.turned_quaternions(unit_quaternions)
     return mass_centres(robot, inner, turns), turns
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensitivity:
+    """Sensitivities of a robot to errors of its cable lengths at n places, Machines 11 (2), 2023, 224, (7).
+
+    Fields:
+        positions: (n, 3) of the mass centre, in the robot's axes, m.
+        sigma_p: (n,) largest displacement over the largest error of a cable length, m/m; infinite at a singular place.
+        sigma_r: (n,) largest turn of a platform over that error, rad/m, all six errors independent; NaN for a point
+            mass.
+    """
+
+    positions: np.ndarray
+    sigma_p: np.ndarray
+    sigma_r: np.ndarray
+
+    @checked
+    def errors(self, cable_error) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the errors of the pose, to first order.
+
+        Args:
+            cable_error: () or (n,) largest error of the length of a cable, m.
+
+        Returns:
+            (n,) displacement, m, and (n,) turn, rad.
+
+        Raises:
+            InputError: another shape, not finite, or negative.
+        """
+        error = np.asarray(cable_error, float)
+        if error.shape not in ((), self.sigma_p.shape):
+            raise InputError("cable_error", cable_error, f"a number >= 0, in m, or {len(self.sigma_p)} of them")
+        return self.sigma_p * error, self.sigma_r * error
+
+
+@checked
+def sensitivity(robot: PointMassRobot | PlatformRobot, positions, orientations=None) -> Sensitivity:
+    """Sensitivities of a robot to errors of its cable lengths.
+
+    Args:
+        robot: a point mass on three cables, or two in a plane, or a platform on six.
+        positions: (n, 3) of the mass centre, in the robot's axes, m.
+        orientations: (n, 4) unit quaternions of a platform in these axes, scalar first, from the reference orientation,
+            or from that of its file if its cables are parallel in three pairs there; None: that.
+
+    Returns:
+        the sensitivities.
+
+    Raises:
+        InputError: more cables than degrees of freedom, pulleys, or another pattern of motion; shapes that do not fit,
+            values that are not finite, quaternions that are not of unit length, or orientations of a point mass.
+    """
+    _check_kind(robot)
+    places = points_of("positions", positions)
+    check_in_plane("positions", places, is_planar=robot.dof == PLANAR)
+    if orientations is not None and isinstance(robot, PointMassRobot):
+        raise InputError("orientations", None, "must be None", fault="a point mass has none")
+    with double_precision():
+        centred_robot, frame = centred(robot)
+        turns = None
+        if orientations is not None:
+            turns = frame.turned_quaternions(quaternions("orientations", orientations, len(places)))
+        answers = SensitivitySearch(centred_robot)(frame.inward(places), turns)
+    return Sensitivity(places, np.asarray(answers.sigma_p), np.asarray(answers.sigma_r))
+
+
+@checked
+def encoder_error(drum_radius: float, pulses: float) -> float:
+    """Error of a cable's length from the resolution of its winch's encoder, 2 pi r / pulses.
+
+    Args:
+        drum_radius: of the drum or pulley that the cable is wound on, m.
+        pulses: of the encoder, a turn of the drum.
+
+    Returns:
+        m.
+
+    Raises:
+        InputError: a number that is not positive.
+    """
+    return 2.0 * math.pi * drum_radius / pulses
+
+
+@dataclasses.dataclass(frozen=True)
+class AvailableAccelerations:
+    """Accelerations that the cables of a point mass can give at n places, as faces; float64.
+
+    An acceleration a is feasible where `normals @ a >= offsets`.
+
+    Fields:
+        positions: (n, 3) in the robot's axes, m.
+        normals: (n, n_faces, 3) unit normals that point inside, in the robot's axes; 0 of a face that bounds nothing.
+        offsets: (n, n_faces) m/s^2; -inf of a face that bounds nothing.
+        cables: (n_faces, dof - 1) numbers of the cables that are parallel to the face, from 0 on.
+        of_largest: (n, n_faces) whether a cable has its largest tension on the face.
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    offsets: np.ndarray
+    cables: np.ndarray
+    of_largest: np.ndarray
+    _robot: PointMassRobot
+    _faces: Faces
+    _frame: Frame
+
+    @checked
+    def margin(self, accelerations) -> np.ndarray:
+        """Distance of accelerations from the nearest face.
+
+        Args:
+            accelerations: (3,) one for all places, or (n, 3) one a place, in the robot's axes, m/s^2.
+
+        Returns:
+            (n,) m/s^2: positive where they are feasible, inf where nothing bounds them; negative where they are not,
+            and then no smaller than the distance from those that are.
+
+        Raises:
+            InputError: another shape, or not finite.
+        """
+        return self._judged(accelerations)[0]
+
+    @checked
+    def verdict(self, accelerations) -> np.ndarray:
+        """Verdicts of accelerations.
+
+        Args:
+            accelerations: as for `margin`.
+
+        Returns:
+            (n,) flags of `Verdict`; 0 is feasible. A margin within 1e-9 of gravity, or of its rounding, is undecided.
+
+        Raises:
+            InputError: another shape, or not finite.
+        """
+        return self._judged(accelerations)[1].astype(FLAGS)
+
+    def _judged(self, accelerations) -> tuple[np.ndarray, np.ndarray]:
+        vectors = np.asarray(accelerations, float)
+        if vectors.shape not in ((3,), self.positions.shape):
+            allowed = f"finite numbers of shape (3,) or {self.positions.shape}"
+            raise InputError("accelerations", f"shape {vectors.shape}", allowed)
+        if self._robot.dof == PLANAR and vectors[..., 1].any():
+            raise InputError("accelerations", "y not 0", "y = 0: the plane of a planar robot")
+        turned = np.asarray(self._frame.turned(np.broadcast_to(vectors, self.positions.shape)))
+        with double_precision():
+            return judged(self._robot, self._faces, self._frame.inward(self.positions), turned)
+
+
+@checked
+def available_accelerations(
+    robot: PointMassRobot, positions, *, tension_min=None, tension_max=None
+) -> AvailableAccelerations:
+    """Feasible accelerations of a point mass on any number of cables, Boralugoda (2) to (6) and beyond.
+
+    Args:
+        robot: a point mass in space or in a plane.
+        positions: (n, 3) in the robot's axes, m.
+        tension_min: smallest tension, () or (n_cables,) N; None: the robot's, else 0.
+        tension_max: largest tension, likewise; None: the robot's, else none.
+
+    Returns:
+        the set at each place.
+
+    Raises:
+        InputError: another kind of robot, shapes that do not fit, values that are not finite, tensions that contradict
+            each other.
+    """
+    check_point_mass(robot)
+    places = points_of("positions", positions)
+    check_in_plane("positions", places, is_planar=robot.dof == PLANAR)
+    with double_precision():
+        limits = limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max))
+        prepared_robot, frame = prepared(robot)
+        faces = faces_of(prepared_robot, limits, frame.inward(places))
+    cables = np.tile(spanning(robot.n_cables, robot.dof), (2, 1))
+    normals, offsets, of_largest = map(np.asarray, (frame.turned(faces.normals), faces.offsets, faces.of_largest))
+    return AvailableAccelerations(places, normals, offsets, cables, of_largest, prepared_robot, faces, frame)

@@ -11,16 +11,13 @@ from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.given_limits import check_bounded
-from cspr_jax.robots import point_mass
 from cspr_jax.robots.cables import with_cables
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.platform import PlatformRobot, platform_robot
-from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot
+from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot, point_mass_robot
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.robot import MOVED, check_moved
 from cspr_jax.robots.static_equilibrium import slack_at_rest
-
-MAKERS = {"1T": point_mass.guided_robot, "2T": point_mass.planar_robot, "3T": point_mass.point_mass_robot}
 
 
 def gravity_of(robot_file: RobotFile, keys: TrajectoryKeys) -> float:
@@ -45,21 +42,14 @@ def build_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object) -> Po
     Raises:
         ConfigError: its geometry, inertia or limits cannot be used.
     """
-    settings: dict[str, Any] = {
-        "mass": robot_file.mass,
-        "gravity": gravity_of(robot_file, keys),
-        "name": robot_file.name,
-    }
-    settings |= {"z_axis": robot_file.z_axis, "limits": build_limits(robot_file, LimitKeys(), file)}
+    settings: dict[str, Any] = {name: getattr(robot_file, name) for name in ("mass", "name", "z_axis")}
+    settings |= {"gravity": gravity_of(robot_file, keys), "limits": build_limits(robot_file, LimitKeys(), file)}
+    settings |= {"pattern": robot_file.own_pattern}
     try:
         if not robot_file.is_platform:
-            return with_cables(
-                MAKERS[robot_file.own_pattern](robot_file.base_points, **settings), **_of_cables(robot_file)
-            )
-        settings |= {"inertia": robot_file.inertia, "centre_of_mass": robot_file.centre_of_mass or [0.0, 0.0, 0.0]}
-        robot = platform_robot(
-            robot_file.base_points, robot_file.platform_points, pattern=robot_file.own_pattern, **settings
-        )
+            return with_cables(point_mass_robot(robot_file.base_points, **settings), **_of_cables(robot_file))
+        settings |= {"inertia": robot_file.inertia, "centre_of_mass": robot_file.centre_of_mass}
+        robot = platform_robot(robot_file.base_points, robot_file.platform_points, **settings)
         return with_cables(robot, **_of_cables(robot_file))
     except InputError as error:
         raise ConfigError(file, robot_file.typed(error)) from error

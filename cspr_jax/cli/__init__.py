@@ -7,10 +7,11 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 from cspr_jax import __version__
-from cspr_jax.cli import listings, pictures, plans, runs, tables
+from cspr_jax.cli import listings, pictures, plans, published, sweeps
 from cspr_jax.cli.command import Command, printing, warn, write
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, StoreError, printable
 from cspr_jax.runtime import compile_cache, surroundings, terminal
@@ -142,15 +143,28 @@ def _add_completion(parser: argparse.ArgumentParser) -> None:
 
 
 def _completion(options: argparse.Namespace) -> int:
-    from cspr_jax.api.completions import completion
-
-    write(completion(options.shell, _parser()))
+    try:
+        import shtab
+    except ImportError as error:
+        raise ConfigError("shtab", "is not installed: pip install 'cspr_jax[completion]'") from error
+    parser = _parser()
+    _complete_files(parser, shtab.FILE)
+    write(str(shtab.complete(parser, options.shell)))
     return ExitCode.DONE
+
+
+def _complete_files(parser: argparse.ArgumentParser, files: dict[str, Any]) -> None:
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for inner in action.choices.values():
+                _complete_files(inner, files)
+        elif action.type is Path:
+            action.complete = files  # type: ignore[attr-defined]
 
 
 # Commands come in the order of the help. A new command is a row of one of these modules.
 COMMANDS = (
-    *(*runs.COMMANDS, *plans.COMMANDS, *pictures.COMMANDS, *tables.COMMANDS, *listings.COMMANDS),
+    *(*sweeps.COMMANDS, *plans.COMMANDS, *pictures.COMMANDS, *published.COMMANDS, *listings.COMMANDS),
     Command("completion", "print a script for a shell that completes commands", _add_completion, _completion),
 )
 

@@ -1,9 +1,7 @@
 """Commands about files to start from, and what there is: new, import, robots, quantities, examples."""
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from cspr_jax.cli.command import Command, add_json, add_output, print_json, print_path, print_table, warn, write
 from cspr_jax.errors import ConfigError, ExitCode
@@ -42,31 +40,28 @@ def _add_robots(parser: argparse.ArgumentParser) -> None:
 
 
 def _robots(options: argparse.Namespace) -> int:
-    from cspr_jax.outputs import listings
+    from cspr_jax.outputs.listings import catalogue_table, robot_details
 
     if not options.names and not options.json:  # what takes long to import is not needed
-        print_table(listings.catalogue_table())
+        print_table(catalogue_table())
         return ExitCode.DONE
-    from cspr_jax.api import lists
+    from cspr_jax.api.listings import list_robots
 
-    listed = lists.list_robots(options.names)
+    robots = list_robots(options.names)
     if options.json:
-        print_json(listed)
+        print_json(robots)
     else:
-        for robot in listed:
-            print_table(listings.robot_details(robot))
+        for robot in robots:
+            print_table(robot_details(robot))
     return ExitCode.DONE
 
 
 def _quantities(options: argparse.Namespace) -> int:
-    from cspr_jax.api import lists
+    from cspr_jax.api.listings import list_quantities
     from cspr_jax.outputs.listings import quantities_table
 
-    return _listed(options, lists.list_quantities(), quantities_table)
-
-
-def _listed(options: argparse.Namespace, listed: Any, table: Callable[[Any], Any]) -> int:
-    print_json(listed) if options.json else print_table(table(listed))
+    quantities = list_quantities()
+    print_json(quantities) if options.json else print_table(quantities_table(quantities))
     return ExitCode.DONE
 
 
@@ -78,11 +73,11 @@ def _add_examples(parser: argparse.ArgumentParser) -> None:
 
 
 def _examples(options: argparse.Namespace) -> int:
-    from cspr_jax.api import examples
+    from cspr_jax.api.listings import copy_examples, list_examples
 
-    known = examples.list_examples()
+    known = list_examples()
     names = list(known) if options.all else options.name
-    shown = [str(path) for path in examples.copy_examples(names, options.output)] if names else known
+    shown = [str(path) for path in copy_examples(names, options.output)] if names else known
     lines = shown if names else [f"{name:<21} {purpose}" for name, purpose in known.items()]
     if options.json:
         print_json(shown)
@@ -103,11 +98,9 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 
 def _new(options: argparse.Namespace) -> int:
-    from cspr_jax.api.templates import new_file
+    from cspr_jax.api.listings import new_file
 
-    names = ("like", "map", "family")
-    path = new_file(options.what, options.path, **{name: getattr(options, name) for name in names})
-    print_path(path)
+    print_path(new_file(options.what, options.path, like=options.like, map=options.map, family=options.family))
     return ExitCode.DONE
 
 

@@ -118,7 +118,7 @@ def platform_robot(  # noqa: PLR0913
     *,
     mass: float,
     inertia,
-    centre_of_mass=(0.0, 0.0, 0.0),
+    centre_of_mass=None,
     gravity: float = STANDARD_GRAVITY,
     name: str = "robot",
     z_axis: Axis = "down",
@@ -133,11 +133,12 @@ def platform_robot(  # noqa: PLR0913
             one line with the mass centre, of a robot on a joint from the joint.
         mass: kg, positive.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2; symmetric, positive definite, of a real body.
-        centre_of_mass: (3,) in platform axes, m.
+        centre_of_mass: (3,) in platform axes, m; None: their origin.
         gravity: m/s^2, positive.
         z_axis: where z points, "down" or "up".
         limits: limits beyond taut cables; None: none.
-        pattern: "3R3T", "1R2T", "2R3T" or "3R".
+        pattern: "3R3T"; "1R2T" in the plane y = 0; "2R3T" of a rod, platform_points on one line; "3R" about a fixed
+            joint, the origin of the platform axes.
 
     Returns:
         the robot, float64 NumPy leaves.
@@ -155,7 +156,7 @@ def platform_robot(  # noqa: PLR0913
     platform = checked_platform(platform_points, len(base), row)
     if row.is_planar and (base[:, 1] != 0.0).any():
         raise InputError("base_points", base.tolist(), "points with y = 0: the plane of a planar robot")
-    centre = checked_centre(centre_of_mass, platform, row)
+    centre = checked_centre((0.0, 0.0, 0.0) if centre_of_mass is None else centre_of_mass, platform, row)
     check_numbers(mass, gravity)
     check_axis(z_axis)
     tensor = checked_inertia(inertia, row)

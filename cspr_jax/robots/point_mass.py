@@ -5,6 +5,7 @@ down, as `robots.kernel_axes.centred` gives it.
 """
 
 import dataclasses
+import functools
 from typing import Literal
 
 import jax
@@ -100,56 +101,45 @@ def point_mass_robot(
     name: str = "robot",
     z_axis: Axis = "down",
     limits: Limits | None = None,
+    pattern: str = "3T",
 ) -> PointMassRobot:
     """A point-mass robot, its geometry checked.
 
     Args:
-        base_points: (n_cables, 3) spool points, one a row, three or more, m. Anywhere, as long as their plane (of more
-            than three: that of least squares) is not vertical.
+        base_points: (n_cables, 3) spool points, one a row, m. In space three or more, anywhere, as long as their plane
+            (of more than three: that of least squares) is not vertical; in the plane y = 0 two or more, not on a
+            vertical line, if they are two on a level one; of a guide one or more.
         mass: kg, positive.
         gravity: m/s^2, positive.
         z_axis: where z points, "down" or "up".
         limits: limits beyond taut cables; None: none.
+        pattern: "3T" in space, "2T" in the plane y = 0, "1T" along a vertical guide.
 
     Returns:
         the robot, float64 NumPy leaves.
 
     Raises:
-        InputError: wrong shape, not finite, spools on a line, a vertical spool plane, mass or gravity not positive,
-            another z_axis.
+        InputError: wrong shape, not finite, spools that lie otherwise, mass or gravity not positive, another z_axis,
+            another pattern.
     """
-    points = checked_points("base_points", base_points, SPATIAL)
-    if is_vertical(points):
+    row = PATTERNS.get(pattern)
+    if row is None or row.is_body:
+        raise InputError("pattern", pattern, '"1T", "2T" or "3T"')
+    points = (checked_coordinates if row.dof == GUIDED else checked_points)("base_points", base_points, row.dof)
+    if row.dof == SPATIAL and is_vertical(points):
         raise InputError("base_points", points.tolist(), "spools whose plane is not vertical")
-    return _robot(points, mass, gravity, limits, name, z_axis, SPATIAL)
+    if row.is_planar:
+        _check_planar(points)
+    check_numbers(mass, gravity)
+    check_axis(z_axis)
+    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, row.dof)
 
 
-def planar_robot(
-    base_points,
-    *,
-    mass: float,
-    gravity: float = STANDARD_GRAVITY,
-    name: str = "robot",
-    z_axis: Axis = "down",
-    limits: Limits | None = None,
-) -> PointMassRobot:
-    """A point mass on cables, moving in the plane y = 0, its geometry checked.
+planar_robot = functools.partial(point_mass_robot, pattern="2T")
+guided_robot = functools.partial(point_mass_robot, pattern="1T")
 
-    Args:
-        base_points: (n_cables, 3) spool points, two or more, y = 0, two of them on a level line; m.
-        mass: kg, positive.
-        gravity: m/s^2, positive.
-        z_axis: where z points, "down" or "up".
-        limits: limits beyond taut cables; None: none.
 
-    Returns:
-        the robot, float64 NumPy leaves.
-
-    Raises:
-        InputError: wrong shape, not finite, y not 0, spools on a vertical line, two that are not on a level one, mass
-            or gravity, another z_axis.
-    """
-    points = checked_points("base_points", base_points, PLANAR)
+def _check_planar(points: np.ndarray) -> None:
     if (points[:, 1] != 0.0).any():
         raise InputError("base_points", points.tolist(), "points with y = 0: the plane of a planar robot")
     width, _, height = np.ptp(points, axis=0)
@@ -157,41 +147,6 @@ def planar_robot(
         raise InputError("base_points", points.tolist(), "spools that are not on a vertical line")
     if len(points) == PLANAR and not height <= LEVEL * width:
         raise InputError("base_points", points.tolist(), "two spools on a level line")
-    return _robot(points, mass, gravity, limits, name, z_axis, PLANAR)
-
-
-def guided_robot(
-    base_points,
-    *,
-    mass: float,
-    gravity: float = STANDARD_GRAVITY,
-    name: str = "robot",
-    z_axis: Axis = "down",
-    limits: Limits | None = None,
-) -> PointMassRobot:
-    """A point mass on cables that moves along a vertical guide, its geometry checked.
-
-    Args:
-        base_points: (n_cables, 3) spool points, one or more, m.
-        mass: kg, positive.
-        gravity: m/s^2, positive.
-        z_axis: where z points, "down" or "up".
-        limits: limits beyond taut cables; None: none.
-
-    Returns:
-        the robot, float64 NumPy leaves.
-
-    Raises:
-        InputError: wrong shape, not finite, mass or gravity not positive, another z_axis.
-    """
-    points = checked_coordinates("base_points", base_points, GUIDED)
-    return _robot(points, mass, gravity, limits, name, z_axis, GUIDED)
-
-
-def _robot(points: np.ndarray, mass, gravity, limits: Limits | None, name: str, z_axis: Axis, dof: int):
-    check_numbers(mass, gravity)
-    check_axis(z_axis)
-    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, dof)
 
 
 def checked_points(key: str, given, least: int) -> np.ndarray:

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.api import accelerations, imports, plans, replays, sensitivities
+from cspr_jax.api import imports, plans, replays, workspaces
 from cspr_jax.errors import CsprError, InputError
 from cspr_jax.schema.given_numbers import numbers
 
 PUBLIC = {name: getattr(cspr_jax, name) for name in cspr_jax.__all__}
 METHODS = {
-    "AvailableAccelerations.margin": accelerations.AvailableAccelerations.margin,
-    "AvailableAccelerations.verdict": accelerations.AvailableAccelerations.verdict,
+    "AvailableAccelerations.margin": workspaces.AvailableAccelerations.margin,
+    "AvailableAccelerations.verdict": workspaces.AvailableAccelerations.verdict,
     "ImportedRobot.save": imports.ImportedRobot.save,
     "Plan.animate": plans.Plan.animate,
     "Plan.rows": plans.Plan.rows,
@@ -27,7 +27,7 @@ METHODS = {
     "Plan.scatter": plans.Plan.scatter,
     "Plan.to_xarray": plans.Plan.to_xarray,
     "Replay.plot": replays.Replay.plot,
-    "Sensitivity.errors": sensitivities.Sensitivity.errors,
+    "Sensitivity.errors": workspaces.Sensitivity.errors,
 }
 FUNCTIONS = {name: one for name, one in PUBLIC.items() if not inspect.isclass(one)} | METHODS
 TAKING = {name: one for name, one in FUNCTIONS.items() if set(inspect.signature(one).parameters) - {"self"}}
@@ -128,7 +128,7 @@ def test_bad_arguments(function, good, tmp_path, monkeypatch):
     assert count >= 10 and not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("function", ["plan", "run", "compute", "replay"])
+@pytest.mark.parametrize("function", ["plan", "run", "compute_sweep", "replay"])
 def test_dictionaries_that_hold_themselves(function):
     with pytest.raises(CsprError, match=r"given: nested too deep|mujoco") as raised:
         TAKING[function](DEEP)

@@ -40,10 +40,8 @@ GUIDES = ("motions", "workspaces", *FAMILIES)
 TABLES = ("schema.quantities",)
 # Folders, all of them, and modules that never import jax.
 WITHOUT_JAX = (
-    "api.examples",
-    "config.mappings",
+    "api.listings",
     "api.pictures",
-    "api.runs",
     "api.sweeps",
     "arithmetic.frames",
     "cli",

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from api.test_api import PLAN, folder
+from support.folder import PLAN, folder
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision

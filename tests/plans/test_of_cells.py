@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cspr_jax import compute, plan
+from cspr_jax import compute_sweep, plan
 from cspr_jax.plans.cell_plan import cell_plan
 
 POSES = {
@@ -65,7 +65,7 @@ def cells_of(result):
     ],
 )
 def test_the_plan_of_a_cell_has_its_numbers(sweep):
-    result = compute({"schema": 1, **sweep})
+    result = compute_sweep({"schema": 1, **sweep})
     settings = json.loads(result.attrs["settings"])
     feasible = 0
     for place, values in cells_of(result):

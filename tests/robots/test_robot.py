@@ -142,6 +142,8 @@ UPRIGHT = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]
         (planar_robot, [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], "not on a vertical line"),
         (planar_robot, [[1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, 2.0]], "not on a vertical line"),
         (planar_robot, [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.1]], "two spools on a level line"),
+        (planar_robot, [[1.0, 0.0, 0.0], [-1.0, 0.1, 0.0]], "points with y = 0"),
+        (lambda points, mass: point_mass_robot(points, mass=mass, pattern="3R"), RING[:3], 'pattern = "3R": must be'),
         (lambda points, mass: platform_robot(points, RING[:6], **BODY), RING[:5], "base_points: 5 points: must be 6"),
         (lambda points, mass: platform_robot(points, RING[:6], **BODY), RING, "platform_points: 6 points: must be 8"),
         (lambda points, mass: platform_robot(RING, points, **BODY), np.tile(RING[0], (8, 1)), "or coincident"),

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from cspr_jax.robots import point_mass
+from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import platform_robot
+from cspr_jax.robots.point_mass import point_mass_robot
 from support.cable_robots import GRAVITY
 
 ROUND = np.diag([0.05, 0.05, 0.05])
@@ -11,9 +12,7 @@ ROUND = np.diag([0.05, 0.05, 0.05])
 
 def made(drawn):
     """The package's robot of a drawn one, z up."""
-    name = {"1T": "guided_robot", "2T": "planar_robot", "3T": "point_mass_robot"}
-    common = {"mass": drawn.mass, "gravity": GRAVITY, "z_axis": "up", "name": drawn.name}
-    if drawn.pattern in name:
-        return getattr(point_mass, name[drawn.pattern])(drawn.base, **common)
-    more = {"inertia": ROUND, "centre_of_mass": drawn.arm, "pattern": drawn.pattern}
-    return platform_robot(drawn.base, drawn.platform, **common, **more)
+    common = {"mass": drawn.mass, "gravity": GRAVITY, "z_axis": "up", "name": drawn.name, "pattern": drawn.pattern}
+    if not PATTERNS[drawn.pattern].is_body:
+        return point_mass_robot(drawn.base, **common)
+    return platform_robot(drawn.base, drawn.platform, inertia=ROUND, centre_of_mass=drawn.arm, **common)

@@ -1,22 +1,28 @@
-"""Published tables from Python, computed again as by `cspr table`."""
+"""Published tables from Python, computed again as by `cspr table`, and raw speed, measured as by `cspr bench`."""
 
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.outputs.table_layout import Cell
-from cspr_jax.published import tables
 from cspr_jax.runtime.processes import LARGEST, check_count, usual_count
 
+if TYPE_CHECKING:
+    from cspr_jax.outputs.table_layout import Cell
 
-def table_names() -> dict[str, str]:
+# Tables and rates rest on much that the other does not need: each is imported where it is used.
+
+
+def list_tables() -> dict[str, str]:
     """The published tables that can be computed again.
 
     Returns:
         title, with its source, by name.
     """
-    return {name: source.title for name, source in tables.TABLES.items()}
+    from cspr_jax.published.tables import TABLES
+
+    return {name: source.title for name, source in TABLES.items()}
 
 
 @checked
@@ -29,11 +35,11 @@ def table(
     max_arcs: int | None = None,
     values: int | None = None,
     workers: int | None = 1,
-) -> list[Cell]:
+) -> "list[Cell]":
     """Compute a published table again.
 
     Args:
-        name: of `table_names`.
+        name: of `list_tables`.
         definition: of accessible orientations in tables 3.3 and 3.4: "grid", "scan", "equal-volume" or "all"; None: the
             usual one.
         amplitude: in these: "quintic", "effective", "effective-c3" or "all"; None: the usual one.
@@ -50,13 +56,34 @@ def table(
         ConfigError: no such table, or a choice that it does not have.
         ResourceError: a worker died.
     """
-    if name not in tables.TABLES:
-        raise ConfigError("table", f"{shown(name)}: must be one of {', '.join(tables.TABLES)}")
+    from cspr_jax.published.tables import TABLES, chosen, table_cells
+
+    if name not in TABLES:
+        raise ConfigError("table", f"{shown(name)}: must be one of {', '.join(TABLES)}")
     check_count(workers)
     options: dict[str, Any] = {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None}
     options |= {"--max-arcs": max_arcs, "--values": values}
-    choice = tables.chosen(name, options | {"--workers": None if workers == 1 else workers})
+    choice = chosen(name, options | {"--workers": None if workers == 1 else workers})
     if workers is None:
-        workers = usual_count(LARGEST) if tables.TABLES[name].by_processes else 1
+        workers = usual_count(LARGEST) if TABLES[name].by_processes else 1
     with double_precision():
-        return tables.table_cells(name, choice, workers)
+        return table_cells(name, choice, workers)
+
+
+@checked
+def benchmark(kernels: str | Path | None = None) -> dict[str, Any]:
+    """Measure checks per second, beside a NumPy version of the same check; it takes a minute.
+
+    Args:
+        kernels: folder of C++ kernels to measure beside, such as `benchmarks` of a checkout; None: without them.
+
+    Returns:
+        what `cspr bench --json` prints.
+
+    Raises:
+        ConfigError: there is no compiler, or it refuses a kernel, or that computes something else.
+    """
+    from cspr_jax.bench import bench
+
+    with double_precision():
+        return bench(None if kernels is None else Path(kernels))

@@ -50,7 +50,7 @@ def _run(options: argparse.Namespace) -> int:
 
     if options.scheduler is not None and options.device is not None:
         raise ConfigError("--device", f"{options.device}: cannot be combined with --scheduler, whose workers choose")
-    sweep = sweeps.sweep_given(options.sweep)
+    sweep = sweeps.checked_sweep(options.sweep)
     if options.scheduler is not None:
         surroundings.quiet_scheduler()
     directory = options.output or sweeps.run_directory(sweep)
@@ -73,7 +73,7 @@ def _add_status(parser: argparse.ArgumentParser) -> None:
 
 
 def _status(options: argparse.Namespace) -> int:
-    from cspr_jax.api.runs import status
+    from cspr_jax.api.sweeps import status
 
     state = status(options.path)
     if options.json:
@@ -111,7 +111,7 @@ def _add_verify(parser: argparse.ArgumentParser) -> None:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    from cspr_jax.api.runs import verify
+    from cspr_jax.api.sweeps import verify
 
     report = verify(options.path)
     if options.json:
@@ -135,10 +135,10 @@ def _add_volume(parser: argparse.ArgumentParser) -> None:
 
 
 def _volume(options: argparse.Namespace) -> int:
-    from cspr_jax.api import volumes
+    from cspr_jax.api.sweeps import workspace_volume
     from cspr_jax.outputs.plots.selection import result_at
 
-    volume = volumes.workspace_volume(result_at(options.path))
+    volume = workspace_volume(result_at(options.path))
     if options.json:
         print_json(volume.to_dict())
     else:

@@ -28,18 +28,18 @@ def _add_table(parser: argparse.ArgumentParser) -> None:
 def _table(options: argparse.Namespace) -> int:
     with waiting():
         prepare_jax(options)
-        from cspr_jax.api import tables
+        from cspr_jax.api import published
         from cspr_jax.published.tables import table_for_people, table_object
 
     if options.list:
-        for name, title in tables.table_names().items():
+        for name, title in published.list_tables().items():
             print_line(f"{name}  {title}")
         return ExitCode.DONE
     choices = {
         name: getattr(options, name) for name in ("definition", "amplitude", "fine", "max_arcs", "values", "workers")
     }
     with waiting():
-        cells = tables.table(options.name, **choices)
+        cells = published.table(options.name, **choices)
     if options.json:
         print_json(table_object(options.name, cells))
     else:
@@ -57,7 +57,7 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
 
 def _bench(options: argparse.Namespace) -> int:
     prepare_jax(options)
-    from cspr_jax.api.speed import benchmark
+    from cspr_jax.api.published import benchmark
     from cspr_jax.bench import lines
 
     report = benchmark(options.kernels)

@@ -1,0 +1,151 @@
+"""The public names: each command has its function, and a mistake is one line."""
+
+import argparse
+import ast
+import importlib
+import inspect
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from outputs.test_outputs import made
+from support.folder import PLAN, SWEEP, folder
+
+import cspr_jax
+from cspr_jax import cli
+from cspr_jax.api import plans
+from cspr_jax.errors import ConfigError, CsprError, StoreError
+
+__all__ = ["folder"]  # a fixture
+
+FUNCTIONS = {
+    "run": ("run", "compute_sweep"),
+    "status": ("status",),
+    "verify": ("verify",),
+    "volume": ("workspace_volume",),
+    "plan": ("plan",),
+    "replay": ("replay",),
+    "plot": ("plot", "open_result"),
+    "report": ("report",),
+    "table": ("table", "list_tables"),
+    "bench": ("benchmark",),
+    "import": ("import_robot",),
+    "robots": ("list_robots",),
+    "quantities": ("list_quantities",),
+    "examples": ("list_examples", "copy_examples"),
+    "new": ("new_file",),
+}
+# Options that say how to print, or what the process is set to, and what another function does.
+PRINTING = {"help", "json", "device", "all_errors", "list", "all"}
+NAMES = {"sweep": "given", "plan": "given", "result": "results"}
+
+
+def commands() -> dict[str, argparse.ArgumentParser]:
+    (action,) = (a for a in cli._parser()._actions if isinstance(a, argparse._SubParsersAction))
+    return action.choices
+
+
+def test_every_command_has_its_function():
+    # What shells complete is no matter of Python.
+    assert set(FUNCTIONS) == set(commands()) - {"completion"}
+    for name in FUNCTIONS:
+        parser = commands()[name]
+        functions = [getattr(cspr_jax, function) for function in FUNCTIONS[name]]
+        functions += [plans.Plan.save, plans.Plan.save_mjcf, plans.Plan.animate] if name == "plan" else []
+        functions += [cspr_jax.Replay.plot] if name == "replay" else []
+        functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
+        known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
+        own = NAMES | {
+            "run": {"output": "directory"},
+            "plan": {"output": "path", "mjcf": "path", "animate": "path"},
+        }.get(name, {})
+        own |= {"name": "names", "output": "folder"} if name == "examples" else {}
+        own |= {"names": "names"} if name == "robots" else {}
+        own |= {"path": {"status": "directory", "volume": "result"}[name]} if name in ("status", "volume") else {}
+        own |= {"result": "given", "cell": "cells"} if name == "report" else {}
+        own |= {"plan": "plan"} if name in ("plot", "report") else {}
+        own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
+        options = {action.dest for action in parser._actions} - PRINTING
+        assert {own.get(option, option) for option in options} <= known, name
+
+
+def test_public_names_hide_no_module():
+    """A module that is imported becomes an attribute of the package, in place of a function of its name."""
+    for name in cspr_jax.__all__:
+        with pytest.raises(ModuleNotFoundError):
+            importlib.import_module(f"cspr_jax.{name}")
+
+
+def test_type_checkers_see_what_is_loaded():
+    """The stub says of each name the module of the table; `__all__` is the table; both know the older names."""
+    stub = Path(cspr_jax.__file__).with_suffix(".pyi")
+    modules, aliases = {}, {}
+    for node in ast.parse(stub.read_text("utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            modules |= {name.asname: node.module.removeprefix("cspr_jax.") for name in node.names}
+        elif isinstance(node, ast.Assign):
+            aliases[node.targets[0].id] = node.value.id
+    assert modules == cspr_jax._MODULES and aliases == cspr_jax._ALIASES
+    assert cspr_jax.__all__ == sorted(cspr_jax._MODULES)
+    assert stub.with_name("py.typed").is_file()
+
+
+def test_older_names_work():
+    assert cspr_jax.compute is cspr_jax.compute_sweep and cspr_jax.table_names is cspr_jax.list_tables
+    with pytest.raises(AttributeError, match="no attribute 'computed'"):
+        _ = cspr_jax.computed
+
+
+def test_without_xarray(tmp_path, monkeypatch):
+    result = cspr_jax.open_result(made(tmp_path / "map.h5"))
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    for call in (result.to_xarray, lambda: cspr_jax.compute_sweep(tmp_path / "none.toml")):
+        with pytest.raises(ConfigError, match=re.escape("pip install 'cspr_jax[xarray]'")) as raised:
+            call()
+        assert len(str(raised.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "words"),
+    [
+        (lambda plan, sweep: cspr_jax.plan(plan | {"z0": -1.0}), ConfigError, "plan: z0 = -1.0: must be"),
+        (lambda plan, sweep: cspr_jax.plan(plan | {"robot": "no.toml"}), ConfigError, 'plan: robot = "no.toml": no su'),
+        (lambda plan, sweep: cspr_jax.plan(plan | {1: 2}), ConfigError, "plan: unknown key 1 = 2"),
+        (lambda plan, sweep: cspr_jax.plan(plan | {"robot": object()}), ConfigError, "plan: robot = <object"),
+        (lambda plan, sweep: cspr_jax.plan(sweep), ConfigError, "plan: is a sweep file"),
+        (lambda plan, sweep: cspr_jax.plan("no.toml"), ConfigError, "no.toml: cannot be read"),
+        (lambda plan, sweep: cspr_jax.plan(plan).save("motion.txt"), ConfigError, "motion.txt: must end in .csv or"),
+        (lambda plan, sweep: cspr_jax.plan(plan).rows(-1.0), ConfigError, "--rate: -1.0: must be a number > 0, in Hz"),
+        (lambda plan, sweep: cspr_jax.plan(plan).rows(1e12), ConfigError, "--rate: 1e+12 Hz: must give at most"),
+        (lambda plan, sweep: cspr_jax.run(sweep | {"map": "arcs"}, "a"), ConfigError, 'sweep: map = "arcs": '),
+        (lambda plan, sweep: cspr_jax.compute_sweep(plan), ConfigError, "sweep: is a plan file"),
+        (lambda plan, sweep: cspr_jax.run(sweep, "a", workers=0), ConfigError, "--workers: 0: must be an integer from"),
+        (
+            lambda plan, sweep: cspr_jax.run(sweep, workers=2, scheduler="b"),
+            ConfigError,
+            "--workers: 2: cannot be combined with --scheduler",
+        ),
+        (lambda plan, sweep: cspr_jax.status("a"), StoreError, "a: is not a run directory"),
+        (lambda plan, sweep: cspr_jax.verify("a"), StoreError, "a: is not a run directory"),
+        (lambda plan, sweep: cspr_jax.table("9.9"), ConfigError, 'table: "9.9": must be one of 1.1'),
+        (lambda plan, sweep: cspr_jax.table("2.1", fine=True), ConfigError, "--fine: must be absent with table 2.1"),
+        (lambda plan, sweep: cspr_jax.table("3.3", definition="x"), ConfigError, '--definition: "x": must be one of g'),
+        (lambda plan, sweep: cspr_jax.plot("no.h5"), StoreError, "no.h5: "),
+        (lambda plan, sweep: cspr_jax.plot([]), ConfigError, "results: []: must be one result"),
+        (lambda plan, sweep: cspr_jax.plot("map.h5", at={"w": 1.0}), ConfigError, 'map.h5: --at = "w": must be one of'),
+        (lambda plan, sweep: cspr_jax.plot("map.h5", size=(1, 9)), ConfigError, '--size: "1x9": must be WIDTHxHEIGHT'),
+        (lambda plan, sweep: cspr_jax.plot("map.h5", output="a.bmp2"), ConfigError, "a.bmp2: Format"),
+        (lambda plan, sweep: cspr_jax.copy_examples("demos", "a"), ConfigError, 'examples: "demos": did you mean demo'),
+        (lambda plan, sweep: cspr_jax.list_quantities() and cspr_jax.open_result("no.h5"), StoreError, "no.h5: "),
+    ],
+)
+def test_mistakes(folder, call, kind, words):
+    """One line, with what is wrong; nothing is written."""
+    made(Path("map.h5"))
+    before = set(folder.rglob("*"))
+    with pytest.raises(CsprError) as raised:
+        call(tomllib.loads(PLAN), tomllib.loads(SWEEP))
+    assert type(raised.value) is kind and str(raised.value).startswith(words), raised.value
+    assert len(str(raised.value).splitlines()) == 1 and set(folder.rglob("*")) == before
