@@ -3,9 +3,9 @@
 A Bezier curve of the second order, run through by half a cosine, is at rest at both ends wherever these are. The
 pseudotensions along it are polynomials of low degree in the cosine of the phase, whose coefficients depend on
 r = (T / pi)^2: their minima are exact, and the durations at which a verdict can change are roots of polynomials. A
-launch releases an object on the segment through the place and with the velocity that its flight to the target asks for.
+launch releases an object from a segment that passes the place of release with the velocity that the flight requires.
 
-Source: the launch paper, section 3.1 (curve) and what follows it (release and free flight).
+Source: Machines 11 (2), 2023, 224 ("the launch paper"), from section 3.1 on (curve, release, free flight).
 
 Files, each importing only from those above it:
 
@@ -16,13 +16,13 @@ Files, each importing only from those above it:
     verdicts            verdicts of given durations
     durations           intervals of durations that keep every cable taut; the least under limits
     sequences           least sum of the durations of a sequence
-    segments            segments one after the other: answers
+    segments            answers for segments one after the other
     launch              free flight, and the segment through a release
-    launches            launches to a target: what is left to choose, and how it is chosen
+    launches            launches to a target: their free parameters, and how these are chosen
     release_bounds      bounds within which a release is looked for
     launch_range        releases for many landing places
     landings            scatter of landings
-    launch_outcome      what a plan asks of a launch, and what comes of it
+    launch_outcome      the launch of a plan: what its file asks, and the release and flight found
     leg                 Bezier segments in a plan
     launch_range_map    maps of launches
 """

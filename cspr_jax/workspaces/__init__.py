@@ -1,10 +1,11 @@
 """Workspaces: poses at which the cables of a robot can hold its effector, for any robot on any number of cables.
 
-Static, wrench-feasible and wrench-closure workspaces have one mathematics: a pose is inside if every cocircuit of its
+Static, wrench-feasible and wrench-closure workspaces rest on one test: a pose is inside if every cocircuit of its
 wrench matrix (a vector of the row space with the fewest components that are not zero) leaves the required wrenches
-within the limits of the tensions. The least of all cocircuits is the margin, in newtons, between two bounds that allow
-for rounding. Tensions over lengths make the wrench matrix affine in the position, so that whole cells of a grid can be
-proved. Beside them: clearances, speeds of cables, sets of orientations, sensitivities and feasible accelerations.
+within the limits of the tensions. The least value of all cocircuits is the margin, in newtons, between two bounds that
+allow for rounding. Tensions over lengths make the wrench matrix affine in the position, so that whole cells of a grid
+can be proved. Clearances, speeds of cables, sets of orientations, sensitivities and feasible accelerations are here
+too.
 
 Sources: hyperplane shifting by Bouchard, Gosselin and Moore (2010) and by Gouttefarde and Krut (2010); docs/theory.md
 has the formulas.
@@ -15,18 +16,18 @@ Files, each importing only from those above it:
     required                wrenches that cables must supply
     questions               conditions with their limits and wrenches
     cocircuits              which cocircuits a robot has
-    worst_cocircuits        the one that decides at a pose
+    worst_cocircuits        the cocircuit that decides at a pose
     margins                 margins, cocircuit by cocircuit, between two bounds
     exact                   margins of single poses by singular values
     kernels                 compiled margins of many poses
     search                  margins and verdicts of many poses
     cells                   boxes of positions, and bounds over them
-    inside_cells            cells whose every position keeps its tensions
-    outside_cells           cells whose every position lacks them
+    inside_cells            proofs that a cell is inside at each of its positions
+    outside_cells           proofs that a cell is outside at each of its positions
     cell_proofs             proofs of many cells
     shifts                  how far cables move within a cell
     clearances              clearances of robots at rest
-    speeds                  speeds of cables
+    speeds                  speeds of cables that velocities of the effector need
     whole_cells             cells of maps, halved where open
     rest_poses              all conditions together, and sets of orientations
     acceleration_search     feasible accelerations at many places
