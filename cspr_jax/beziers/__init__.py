@@ -3,9 +3,9 @@
 A Bezier curve of the second order, run through by half a cosine, is at rest at both ends wherever these are. The
 pseudotensions along it are polynomials of low degree in the cosine of the phase, whose coefficients depend on
 r = (T / pi)^2: their minima are exact, and the durations at which a verdict can change are roots of polynomials. A
-launch releases an object from a segment that passes the place of release with the velocity that the flight requires.
+launch releases an object on the segment through the place and with the velocity that its flight to the target asks for.
 
-Source: Machines 11 (2), 2023, 224 ("the launch paper"), from section 3.1 on (curve, release, free flight).
+Source: the launch paper, section 3.1 (curve) and what follows it (release and free flight).
 
 Files, each importing only from those above it:
 
@@ -18,7 +18,7 @@ Files, each importing only from those above it:
     sequences           least sum of the durations of a sequence
     segments            answers for segments one after the other
     launch              free flight, and the segment through a release
-    launches            launches to a target: their free parameters, and how these are chosen
+    launches            launches to a target: what is left to choose, and how it is chosen
     release_bounds      bounds within which a release is looked for
     launch_range        releases for many landing places
     landings            scatter of landings

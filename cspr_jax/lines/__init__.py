@@ -1,11 +1,11 @@
 """Straight lines of point masses from rest to rest: by the S-model, a quintic or a cubic, in the least time.
 
-Along a straight line the limits of the tensions are half-planes of path coordinate and path acceleration. Where no
-other limit binds, the least duration of a law follows from a formula, as does that of any motion along the line; other
-limits need a search over the duration and, for the S-model, over the share p / T of its acceleration. The motion found
-is proved between the samples, and answers give a lower bound of the duration of any motion beside its own.
+Along a straight line the limits of the tensions are half-planes of path coordinate and path acceleration. Where these
+and nothing else bind, the least duration of a law is a formula, and so is that of any motion along the line; other
+limits need a search over the duration and, for the S-model, over the share p / T of its acceleration. Whatever is
+found is proved between the samples, and a lower bound of any motion's duration stands beside it.
 
-Source: Boralugoda's thesis (feasible accelerations, S-model, least time; Tables 4.1 to 4.3).
+Source: Boralugoda's thesis (feasible accelerations, S-model, least time: tables 4.1 to 4.3).
 
 Files, each importing only from those above it:
 

@@ -1,1 +1,1 @@
-"""Tables of the source texts, each computed cell beside the printed one."""
+"""Tables of the source texts, computed and beside what is printed."""

@@ -1,1 +1,1 @@
-"""Processes: XLA's settings, compiled code, workers, and the progress that a terminal shows."""
+"""Processes: XLA's settings, compiled code, workers, what is being done, and how it is shown."""

@@ -1,1 +1,1 @@
-"""Sweeps: what a file asks, which processes compute its tiles, and how a stopped run resumes."""
+"""Sweeps: what a file asks, who computes its tiles, and how a run goes on after it was stopped."""

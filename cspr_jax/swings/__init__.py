@@ -20,13 +20,13 @@ Files, each importing only from those above it:
     envelopes               lower envelopes of the pseudotensions of a transition
     envelope_oscillations   numbers of oscillations for which the envelopes stay positive
     slacks                  taut cables and depth, with bounds of their second derivatives
-    limit_slacks            slacks of limits, with bounds of their second derivatives
-    criteria                the slacks of all criteria, in one order
+    limit_slacks            the same of limits
+    criteria                all of them in one order
     blocks                  cuts of a segment at the knots of its amplitude function
-    enclosures              bounds over a block of time, for robots that differ a little
+    enclosures              what is known of a block of time, for robots that differ a little
     proof                   verdicts that hold between the samples
     margins                 smallest slacks, refined
-    transition_margins      smallest slacks of transitions, from two functions of time
+    transition_margins      the same of transitions, from two functions of time
     sieve                   upper bounds of the margins of all numbers of arcs at once
     parities                segments for even and for odd numbers of arcs
     refusals                limits that refuse every number of arcs
@@ -37,5 +37,5 @@ Files, each importing only from those above it:
     transition_leg          transitions in a plan
     arcs_map                maps of numbers of arcs
     oscillations_map        maps of numbers of oscillations
-    envelopes_map           maps of the lower envelopes over the time of a transition
+    envelopes_map           maps of what each instant of a transition asks for
 """

@@ -16,18 +16,18 @@ Files, each importing only from those above it:
     required                wrenches that cables must supply
     questions               conditions with their limits and wrenches
     cocircuits              which cocircuits a robot has
-    worst_cocircuits        the cocircuit that decides at a pose
+    worst_cocircuits        the one that decides at a pose
     margins                 margins, cocircuit by cocircuit, between two bounds
     exact                   margins of single poses by singular values
     kernels                 compiled margins of many poses
     search                  margins and verdicts of many poses
     cells                   boxes of positions, and bounds over them
-    inside_cells            proofs that a cell is inside at each of its positions
-    outside_cells           proofs that a cell is outside at each of its positions
+    inside_cells            cells whose every position keeps its tensions
+    outside_cells           cells whose every position lacks them
     cell_proofs             proofs of many cells
     shifts                  how far cables move within a cell
     clearances              clearances of robots at rest
-    speeds                  speeds of cables that velocities of the effector need
+    speeds                  speeds of cables
     whole_cells             cells of maps, halved where open
     rest_poses              all conditions together, and sets of orientations
     acceleration_search     feasible accelerations at many places

@@ -1,1 +1,1 @@
-"""Pictures of maps, motions and workspaces: files, figures and films."""
+"""."""
