@@ -18,20 +18,20 @@ from cspr_jax.published import chapter_3, table_3_4
 PAGE = Path(__file__).with_name("accuracy.md")
 HEAD = """# Accuracy
 
-Do not edit: written by `python docs/generate_accuracy.py` (about 20 minutes), not by `make docs`. Every published cell
-that is known here, of every table that is computed again (`cspr table NAME`): **published / computed**, with as many
-digits as printed; of blocks with more than a hundred cells those that differ by more than one in their last digit.
-Published numbers are compared with, never computed with. In **bold**: cells that differ by more than the rounding of
-these digits. "none": no feasible number was found. Below each table is why they differ; further comparisons, with
-oracles written apart and with other simulators, are in [what was compared](comparisons.md). What other tools print is
-compared by `cspr table peers`, in [performance](performance.md).
+Do not edit: written by `python docs/generate_accuracy.py` (about 20 minutes), not by `make docs`. Each table that is
+computed again (`cspr table NAME`) is shown with its published cells, as **published / computed**, with as many digits
+as printed; blocks with more than a hundred cells show only cells that differ by more than one in their last digit.
+Published numbers are compared with, never computed with. Cells that differ by more than the rounding of these digits
+are in **bold**. "none" means that no feasible number was found. The text below each table says why cells differ.
+[What was compared](comparisons.md) has further comparisons, with independent oracles and with another simulator;
+`cspr table peers` compares with the numbers that other tools print.
 """
 # Why computed cells differ from the printed ones.
 REASONS = {
     "1.1": "No cell differs.",
-    "1.2": "The best inclination of A1 is the best of 1,001 samples of time in print; the number of oscillations is "
-    "flat there and differs by 1e-6 only, while n at its opposite, beside, follows it. A2 at v = 0 is 1.19: a "
-    "misprint.",
+    "1.2": "The printed inclination of A1 is the best for 1,001 samples of time; the number of oscillations is flat "
+    "there and differs by 1e-6 only, while n at the opposite inclination changes with it. A2 at v = 0 is 1.19: the "
+    "printed cell is a misprint.",
     "1.3": "The caption names a distance whose w_max is 10; the printed numbers belong to 5 sqrt(3), a distance along "
     "H_0. Both are computed. The printed epsilon of A_eff, 0.0399, cannot give the printed n; 0.0599 does.",
     "2.1": "No cell differs.",
@@ -39,17 +39,17 @@ REASONS = {
     "four segments. The piecewise function of chapter 1, (1.110), and its smooth relative give all of them but one, "
     "for which they need fewer arcs than printed. Pose 2 as printed, with a torsion of pi/2, can neither be reached "
     "nor left with the printed arcs; with pi/3 it can.",
-    "3.3": "How many orientations are accessible is a question of how they are counted, and no reading of the text "
+    "3.3": "The number of accessible orientations depends on how they are counted, and no reading of the text "
     "gives the printed counts "
     "([definitions](theory.md#orientations-accessible-attainable-chapter-3-sections-310-and-3123)). The proportions "
     "depend on the amplitude function, see Table 3.2.",
-    "3.4": "As Table 3.3.",
+    "3.4": "The reasons are those of Table 3.3.",
     "4.1": "The two imaginary solutions are printed with the sign of p exchanged.",
     "4.2": "No reading gives all eight numbers: -1.752 follows from the printed T and p, of three decimals, and 0.896 "
     "from exact ones.",
-    "4.3": "The source must have had boundaries of five decimals: with them all 1,240 numbers of the grid agree. The "
-    "other cell that differs is the optimum T that the source's text names, 4.35 s: it contradicts the source's own "
-    "table, where the first node without overshoot is 4.40 s.",
+    "4.3": "The source must have rounded the boundaries to five decimals: so rounded, all 1,240 numbers of the grid "
+    "agree. The other cell that differs is the optimum T that the source's text names, 4.35 s: it contradicts the "
+    "source's own table, where the first node without overshoot is 4.40 s.",
 }
 CHOICES_WORDS = (
     "The text does not say up to which number of arcs p, and with how many values of beta-hat, orientations were "

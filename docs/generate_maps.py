@@ -29,21 +29,22 @@ PAGES = {
         "minimum_arcs",
         "With how many arcs does a point mass on three cables come to a stop at each target, from rest or from another "
         "target? Every number is proved feasible. "
-        "`margin` says how far the slackest cable is from going slack, `verdict` why a target is not reached.",
+        "`margin` says how far the cable of least tension is from going slack, `verdict` why a target is not reached.",
     ),
     "minimum-oscillations": MapPage(
         "transitions",
-        "How many oscillations does a transition from rest need, until the effector oscillates at the target? Targets "
-        "at the depth of the start, at a given inclination of the plane of the swing, or at the best one.",
+        "How many oscillations does a transition from rest need, until the effector oscillates at the target? The "
+        "targets are at the depth of the start, at a given inclination of the line of the swing, or at the best "
+        "inclination.",
     ),
     "transition-envelopes": MapPage(
         "figure_1_9",
-        "How low do the pseudotensions fall in the course of a transition? Their lower envelope over normalised time, "
-        "for comparing amplitude functions: the higher it stays, the fewer oscillations are needed.",
+        "How low do the pseudotensions fall in the course of a transition? Their lower envelope over normalised time "
+        "compares amplitude functions: the higher it stays, the fewer oscillations are needed.",
     ),
     "poses": MapPage(
         "poses",
-        "With how many arcs does a platform on six cables come to each pose of a grid of positions and tilts? A motion "
+        "With how many arcs does a platform on six cables reach each pose of a grid of positions and tilts? A motion "
         "counts only if it is proved that its cables stay taut, its determinant stays away from zero, and no cable "
         "touches another cable or the platform.",
     ),

@@ -10,8 +10,9 @@ HISTORY = HERE.parent / "benchmarks" / "history.jsonl"
 HEAD = """# Rates over time
 
 Do not edit: written by `make bench-record`, which measures on the machine where it is called and appends a line to
-`benchmarks/history.jsonl`. Rates are million checks a second; ratios are to NumPy in the same run, and carry over to
-other machines better; on a shared host single figures vary by 15 %, and more. What a check is, and what limits it, is in [performance](performance.md#a-check).
+`benchmarks/history.jsonl`. Rates are million checks a second. Ratios are to NumPy in the same run, and carry over to
+other machines better than rates; on a shared host single figures vary by 15 % and more.
+[Performance](performance.md#a-check) says what a check is, and what limits it.
 
 ![Checks a second over those of NumPy in the same run, by commit.](rates.png)
 

@@ -75,7 +75,7 @@ parts of an inertia tensor to 1e18, angles to 100 rad.
 """
 MAPS = """## Kinds of maps
 
-All take x and y, or radius and azimuth, and z of the targets; keys that only other kinds name here are refused.
+All kinds take x and y, or radius and azimuth, and z of the targets; a kind refuses keys that only other kinds name.
 Quantities in **bold** are stored by default; `run.store` chooses others.
 """
 STARTS = {
@@ -84,13 +84,13 @@ STARTS = {
     "pose": "`trajectory.from`, or P0, at rest",
 }
 
-BEST_POINTS = """With `--best AXIS` of `cspr plot` and `cspr report`, and of `open_result(...).best("z0")`, besides:
+BEST_POINTS = """Also, with `--best AXIS` of `cspr plot` and `cspr report`, and from `open_result(...).best("z0")`:
 
 """
 PLAN = """## JSON of a plan
 
-`cspr plan --json` prints one object. Numbers are in the units given, places in the axes of the robot file; what does
-not apply, or is not finite, is null.
+`cspr plan --json` prints one object. Numbers are in the units given, places in the axes of the robot file; a value that
+does not apply, or is not finite, is null.
 
 """
 
@@ -103,19 +103,18 @@ JSON), `robot`, `robot_settings` (the robot, as JSON), `base_points` (the spools
 `feasible`, 1 or 0. It carries a checksum like a result: `cspr verify FILE.h5` and `cspr plot FILE.h5` detect any
 changed byte.
 
-An infeasible or undecided plan is written only with `--anyway`, with the motion that the verdict of
-each such segment speaks of.
-Its picture says NOT PROVED FEASIBLE and for which segments; its HDF5 file has `feasible = 0` and the verdicts of its
-segments; its CSV file has a last column `feasible`, 1 in the rows of feasible segments and 0 in the others. CSV files
-of feasible plans do not have that column.
+An infeasible or undecided plan is written only with `--anyway`, with the motion that the verdict of each such segment
+describes. The plan's picture says NOT PROVED FEASIBLE and for which segments; its HDF5 file has `feasible = 0` and the
+verdicts of its segments; its CSV file has a last column `feasible`, 1 in the rows of feasible segments and 0 in the
+others. CSV files of feasible plans do not have that column.
 
 `cspr plot FILE.h5` draws path and tensions over time. With `--quantity trajectory` it draws the path in space, with the
 robot where segments begin and end and its cables coloured by tension; with `--quantity tensions` the band of tensions
 over time and the limits; with `--quantity summary` all that on one page, with a table of the segments. With `--quantity
 acceleration` (point masses) it draws all accelerations that the cables can give at one instant, `--at t=1.2` or that of
-the smallest margin, and the motion's among them; with `--quantity path_acceleration` (straight lines) that column over
-the way, between its bounds; with `--quantity landing` the landings of a sample of throws. Several motions, such as
-those of families on the same targets, are drawn in one picture: paths, smallest tensions and largest cable speeds.
+the smallest margin, and marks the motion's; with `--quantity path_acceleration` (straight lines) it draws that column
+over the path, between its bounds; with `--quantity landing` the landings of a sample of throws. Several motions, such
+as those of families on the same targets, are drawn in one picture: paths, smallest tensions and largest cable speeds.
 
 `cspr plan --mjcf NAME.xml` writes a model for MuJoCo, and `NAME_control.csv` with `t`, s, and `tension_1`, ..., N: two
 rows a step of at most `--step` seconds, and one more where steps end at a jump
@@ -165,8 +164,8 @@ def motion_text() -> str:
     ]
     return (
         f"| name | columns in CSV | units | meaning |\n|---|---|---|---|\n{rows}\n"
-        f"Of each segment, in HDF5 files:\n\n{quantities_text(SEGMENTS)}\n"
-        f"Of an object that is released, in HDF5 files:\n\n{quantities_text(FLIGHT)}\n"
+        f"For each segment, in HDF5 files:\n\n{quantities_text(SEGMENTS)}\n"
+        f"For an object that is released, in HDF5 files:\n\n{quantities_text(FLIGHT)}\n"
         + textwrap.fill(f"Further dimensions of HDF5 files, as datasets: {', '.join(words)}.", 120)
         + "\n"
     )
@@ -220,8 +219,8 @@ def kind_text(kind: MapKind) -> str:
         "needs one of": _names(kind.one_of),
         "takes": _names(kind.takes),
         "quantities": ", ".join(f"**`{name}`**" if name in kind.stored else f"`{name}`" for name in kind.quantities),
-        "stored besides": "; ".join(f"with `{key}`: {_names(names)}" for key, names in kind.stored_with),
-        "only there": "; ".join(f"with {_names(keys)}: {_names(names)}" for names, keys in kind.only_with),
+        "also stored": "; ".join(f"with `{key}`: {_names(names)}" for key, names in kind.stored_with),
+        "only available": "; ".join(f"with {_names(keys)}: {_names(names)}" for names, keys in kind.only_with),
     }
     lines = [textwrap.fill(f"- {words}: {text}", 120, subsequent_indent="  ") for words, text in asked.items() if text]
     return f"`{kind.name}`: {kind.description}\n\n" + "".join(f"{line}\n" for line in lines)

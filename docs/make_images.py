@@ -36,7 +36,7 @@ class Image(NamedTuple):
 
 
 IMAGES = {
-    "minimum_arcs": Image("Smallest number of arcs over six heights; P0 and the start on theirs.", 20),
+    "minimum_arcs": Image("Smallest number of arcs at six heights; P0 and the start are marked at their own.", 20),
     "poses": Image(
         "Smallest number of arcs from rest to poses of a rigid platform, tilted by 46° in four directions.",
         40,
@@ -45,7 +45,7 @@ IMAGES = {
     "orientation_envelope": Image("Orientations of one place: accessible, and attained from rest.", 15, "--envelope"),
     "orientations": Image("Smallest number of arcs from rest to the orientations of one place.", 15),
     "transitions": Image(
-        "Oscillations for a horizontal transition, a real number; an integer on the white hexagons (thesis Fig. 1.6).",
+        "Oscillations for a horizontal transition, as a real number; integers on the white hexagons (thesis Fig. 1.6).",
         12,
         "--quantity least_oscillations",
         ("transition_level",),
@@ -72,7 +72,7 @@ IMAGES = {
         "plan",
     ),
     "summary": Image(
-        "The launch on a page: space, tensions, speeds of the cables, and a table of its segments.",
+        "The launch on a page: path in space, tensions, speeds of the cables, and a table of its segments.",
         20,
         "--quantity summary",
         ("launch",),
@@ -84,21 +84,21 @@ IMAGES = {
         command="plan",
     ),
     "path_acceleration": Image(
-        "The same line: acceleration over the way, and what taut cables can give (Boralugoda Fig. 4.1).",
+        "The same line: acceleration over the path, and the bounds that taut cables set (Boralugoda Fig. 4.1).",
         10,
         "--quantity path_acceleration",
         ("straight_line",),
         "plan",
     ),
     "acceleration_plane": Image(
-        "What three cables in a plane can give where the margin is smallest (Boralugoda Fig. 2.4).",
+        "Accelerations that three cables in a plane can give where the margin is smallest (Boralugoda Fig. 2.4).",
         10,
         "--quantity acceleration",
         ("planar_lines",),
         "plan",
     ),
     "acceleration_sections": Image(
-        "What four cables can give at an instant of the straight line: sections of a cone (Boralugoda Fig. 2.8).",
+        "Accelerations that four cables can give at an instant of the line: sections of a cone (Boralugoda Fig. 2.8).",
         10,
         "--quantity acceleration --at t=0.5",
         ("straight_line",),
@@ -122,13 +122,13 @@ IMAGES = {
         130,
         "--quantity attainable_fraction",
     ),
-    "feasible_acceleration": Image("Margin of rest with tensions from 1 to 300 N: positive where it can rest.", 10),
+    "feasible_acceleration": Image("Margin of rest, tensions from 1 to 300 N: positive where the mass can rest.", 10),
     "bezier_sequence": Image(
         "Bezier segments through places outside the footprint, the least total time.", 10, command="plan"
     ),
     "launch": Image("The launch of the paper: path, flight, tensions, velocity, acceleration.", 20, command="plan"),
     "landing": Image(
-        "Where it lands, of 10,000 throws with errors of the release and of the cables (the paper's Fig. 15 has 30).",
+        "Landings of 10,000 throws with errors of the release and of the cables (the paper's Fig. 15 has 30).",
         20,
         "--quantity landing",
         ("launch",),

@@ -1,1 +1,1 @@
-"""Elementary functions, bounds, rotations, frames, and batches of one shape."""
+"""Elementary functions, bounds, lanes, rotations, frames, minima, and batches of one shape."""

@@ -1,4 +1,4 @@
-"""Raw speed of the checks, beside NumPy versions of the same checks in the same run, and hand-written ones if asked."""
+"""Rates of the checks, beside NumPy versions in the same run and, on request, hand-written C++ ones."""
 
 import os
 import platform

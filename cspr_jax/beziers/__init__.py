@@ -16,7 +16,7 @@ Files, each importing only from those above it:
     verdicts            verdicts of given durations
     durations           intervals of durations that keep every cable taut; the least under limits
     sequences           least sum of the durations of a sequence
-    segments            segments one after the other: answers
+    segments            answers for segments one after the other
     launch              free flight, and the segment through a release
     launches            launches to a target, with all that is left open chosen
     release_bounds      bounds within which a release is looked for

@@ -11,7 +11,7 @@ Files, each importing only from those above it:
 
     faces           feasible accelerations along a line, as half-planes
     motion          positions over time by the three laws
-    s_model         least durations by formulas: of the S-model, and of any motion
+    s_model         least durations by formulas, of the S-model and of any motion
     slacks          cables and limits as functions of s, s'^2 and s''
     lower_bounds    bound of the duration of any motion, with limits of the cables
     any_limits      least durations by search
@@ -20,7 +20,7 @@ Files, each importing only from those above it:
     verdicts        verdicts of given durations
     fastest         the fastest motions with their verdicts
     least_time      least durations of many lines
-    timed_lines     lines of given or least durations: answers
+    timed_lines     answers for lines of given or least durations
     leg             lines in a plan
     map             maps of least durations
 """

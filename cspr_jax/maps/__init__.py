@@ -1,1 +1,1 @@
-"""Maps, one module a kind: targets and parameters to verdicts, arcs, durations and margins."""
+"""Base classes of the maps of a sweep; the kinds of map are in the rooms of their subjects."""

@@ -1,1 +1,1 @@
-"""Outputs that people and other programs read: reports, motion files, lists, pictures."""
+"""Outputs that people and other programs read: reports, motion files, lists, models for MuJoCo, pictures."""

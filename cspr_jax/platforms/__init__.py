@@ -2,8 +2,8 @@
 
 Position and orientation swing together, so that the cables of a robot that is in equilibrium at P0 stay taut while its
 platform goes to poses far from it. Tensions, determinant, limits on the pose and contacts are proved on blocks of time:
-as functions of complex time they are analytic, and polynomials through their values at Chebyshev nodes leave out what
-can be bounded. Platforms on more than six cables are looked at by samples.
+they are analytic functions of complex time, so that the error of polynomials through their values at Chebyshev nodes
+can be bounded. Motions of platforms on more than six cables are judged by samples.
 
 Source: Dion-Gauvin's thesis, chapter 3 (sections 3.7 to 3.13: oscillating SLERP, beta-hat, accessible and attainable
 orientations).
@@ -19,12 +19,12 @@ Files, each importing only from those above it:
     pose_ends               the same at many poses
     slacks                  criteria of one instant
     slack_lanes             the same, one lane a case
-    motions                 many motions, and some of them
+    motions                 many motions in one record, and selections from it
     motion_checker          what searches ask of a checker, whatever the number of cables
     sieve                   a first look, in single precision
     kernels                 criteria of many motions at instants
     orientation_steps       cables at still poses, and between neighbouring ones
-    crossings               cables between samples
+    crossings               cables that cross between samples
     meetings                proofs that cables meet
     work_list               blocks that are closed, or halved
     least_nodes             node values of a block -> the few numbers that a verdict needs
@@ -38,14 +38,14 @@ Files, each importing only from those above it:
     margins                 smallest values, refined
     checker                 verdicts and margins of motions on six cables
     redundant_kernels       states of motions on more than six cables
-    redundant_checker       verdicts and margins of these, by samples
+    redundant_checker       verdicts and margins of motions on more than six cables, by samples
     checkers                the checker for a number of cables
     arcs                    smallest numbers of arcs between pairs of poses
     answers                 answers for known numbers of arcs
     pose_targets            smallest numbers of arcs to many poses
     accessible              accessible orientations, section 3.10.2
-    attainable              those that a transition from rest attains, section 3.12.3
-    leg                     poses in a plan
+    attainable              orientations that a transition from rest attains, section 3.12.3
+    leg                     platform motions in a plan
     poses_map               maps of poses
     places_map              maps of orientations that places allow
     orientations_map        maps of all orientations of places

@@ -1,1 +1,1 @@
-"""Parts of results: verdicts, quantities, tiles, identities. No jax."""
+"""Tables of families, kinds of map, limits and quantities; verdicts, tiles and identities. No jax."""

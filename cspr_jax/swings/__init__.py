@@ -2,10 +2,10 @@
 
 The effector swings like a pendulum that hangs from the centroid of the spools, with the natural frequency
 sqrt(gravity / z0), while the amplitude of the swing grows or shrinks along an amplitude function A. The acceleration
-is then proportional to the distance from the equilibrium P0 = (0, 0, z0), up to terms that fade with the number of
-arcs, and every cable stays taut far beyond the footprint of the spools. A motion is feasible if the pseudotensions of
-all cables, (2.12) to (2.14), and the depth below the spools are positive all along; bounds of their second derivatives
-turn samples into proofs.
+is then proportional to the displacement from the equilibrium P0 = (0, 0, z0), and opposite to it, up to terms that fade
+with the number of arcs, and every cable stays taut far beyond the footprint of the spools. A motion is feasible if
+the pseudotensions of all cables, (2.12) to (2.14), and the depth below the spools stay positive; bounds of their second
+derivatives turn samples into proofs.
 
 Source: Dion-Gauvin's thesis, chapter 1 (transitions: oscillations and their envelopes) and chapter 2 (standard
 hypocycloids: numbers of arcs).
@@ -15,9 +15,9 @@ Files, each importing only from those above it:
     hypocycloid             segment between two points, (2.31) to (2.55)
     transition              segment between rest and a point, chapter 1
     depths                  guides for the choice of z0
-    zero_tension            closed forms of the amplitude function A = tau, sections 1.6 and 1.10
+    zero_tension            closed forms for the amplitude function A = tau, sections 1.6 and 1.10
     envelopes               lower envelopes of the pseudotensions of a transition
-    envelope_oscillations   numbers of oscillations that the envelopes ask for
+    envelope_oscillations   numbers of oscillations for which the envelopes stay positive
     slacks                  taut cables and depth, with bounds of their second derivatives
     limit_slacks            slacks of limits, likewise
     criteria                all criteria in one order
