@@ -8,9 +8,9 @@ from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
 from cspr_jax.motions.answers import joined
 from cspr_jax.platforms.answers import PlatformMotionAnswers, reached, trials
 from cspr_jax.platforms.arcs import CANDIDATES, Candidates, smallest_arcs
+from cspr_jax.platforms.beta_hat import end_options
 from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.end_acceleration import AT_REST
-from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.symmetries import NONE, Symmetries, alike
 

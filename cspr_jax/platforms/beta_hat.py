@@ -1,10 +1,22 @@
-"""Values of beta-hat to try at the ends of segments, and the choice among them along a sequence of poses."""
+"""Values of beta-hat to try at the ends of segments, poses where none can end, and the choice along a sequence."""
 
+from functools import partial
+
+import jax
 import numpy as np
+
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.platforms.end_acceleration import endpoint
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.wrench_balance import determinant_share, is_regular
 
 # Beyond this nothing was ever gained, docs/theory.md.
 LARGEST = 12.0
 OPTIONS = 11
+# Poses that are computed in one call.
+BATCH = 1024
 # Arcs tried beyond the first number that some values allow: more are rarely better.
 BEYOND = 4
 
@@ -32,6 +44,40 @@ def options(preferred: np.ndarray, lowest: np.ndarray, highest: np.ndarray, coun
     nearest = np.argsort(np.abs(others - first), axis=1, kind="stable")
     others = np.where(low < high, np.take_along_axis(others, nearest, axis=1), np.nan)
     return np.concatenate([first, others], axis=1)
+
+
+@jax.jit
+def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
+    # Return for each pose (3.91), the interval (3.92), the determinant over that at the same depth in the middle, and
+    # the depth.
+    def one(position, quaternion, z0):
+        end, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
+        share = determinant_share(robot, position, rotations.matrix(quaternion))
+        return end.preferred, end.lowest, end.highest, share, depth
+
+    return jax.vmap(one)(*poses)
+
+
+def end_options(
+    robot: PlatformRobot, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values of beta-hat to try at poses.
+
+    Args:
+        robot: in its reference axes.
+        positions: (n, 3) m.
+        quaternions: (n, 4).
+        z0: (n,) m.
+        count: how many values for each.
+
+    Returns:
+        (n, count) of `options`; (n,) whether a motion can end there: below the spools, and not beyond a
+        singularity.
+    """
+    preferred, lowest, highest, share, depth = in_batches(
+        partial(_ends, robot), (positions, quaternions, z0), size=BATCH
+    )
+    return options(preferred, lowest, highest, count), (depth > 0.0) & is_regular(share)
 
 
 def cheapest_path(costs: list[np.ndarray]) -> list[int]:

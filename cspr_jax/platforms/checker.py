@@ -12,26 +12,30 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches, in_threads
+from cspr_jax.arithmetic.lanes import dot, smallest
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
 from cspr_jax.platforms.enclosures import Robustness
 from cspr_jax.platforms.end_acceleration import endpoint
-from cspr_jax.platforms.kernels import slacks_at
 from cspr_jax.platforms.margins import Samples, narrowed
 from cspr_jax.platforms.motion_checker import BESIDE_KNOT, FEW, MANY, MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import Motions
 from cspr_jax.platforms.place_proof import PlaceCertifier, PlaceProof
 from cspr_jax.platforms.platform_segment import PlatformSegment
+from cspr_jax.platforms.platform_segment_lanes import instant, state
 from cspr_jax.platforms.proof import Certifier, TensionProof
 from cspr_jax.platforms.sieve import FIRST, TensionSieve
-from cspr_jax.platforms.slack_lanes import order
+from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.platforms.slacks import flags
 from cspr_jax.platforms.tension_blocks import of_motion
 from cspr_jax.platforms.work_list import TOLERANCE, allowance
+from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.wrench_lanes import cables
 from cspr_jax.schema.verdicts import Verdict
 
 # Blocks of a call at most; so many arcs are held at a time.
@@ -44,6 +48,33 @@ NEAR = 0.5
 
 # One function for XLA instead of some hundred small ones.
 _end = jax.jit(endpoint)
+
+
+@partial(jax.jit, static_argnames=("pairs", "kind"))
+def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind) -> tuple[Array, ...]:
+    """Slacks and distances between cables at instants.
+
+    Args:
+        problem: robot, limits, amplitude.
+        items: segments (leaves (n, ...)), arcs (n,), instants (n,).
+        pairs: of cables that can meet.
+
+    Returns:
+        n_criteria + 1 times (n,): slacks in the order of `slacks.flags`, infinite where the fast balance has too few
+        digits; the smallest distance between cables, m.
+    """
+    segments, arcs, tau = items
+    instant_lanes = instant(problem.amplitude, segments.sense, arcs, tau)
+    here = state(segments, arcs, instant_lanes, kind)
+    wires = cables(problem.robot, here.position, here.turn)
+    slacks = [
+        *moving_slacks(problem, segments, arcs, instant_lanes, kind),
+        *still_slacks(problem, segments, here, wires),
+    ]
+    squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, wires)]
+    nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
+    # Not stacked: XLA would compute all of them for each.
+    return *(slacks[k] for k in order(problem.limits)), nearest
 
 
 class PlatformChecker(MotionChecker):

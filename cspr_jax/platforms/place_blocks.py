@@ -19,11 +19,10 @@ from cspr_jax.arithmetic.lanes import Vector, dot, largest, smallest, stored, tu
 from cspr_jax.motions.limits import limits_set, scales
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.least_nodes import least_nodes
 from cspr_jax.platforms.platform_reach import instant_beside, middle_of, reach
 from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.platform_segment_lanes import StateLanes, state
-from cspr_jax.platforms.work_list import allowance
+from cspr_jax.platforms.work_list import allowance, least_nodes
 from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal

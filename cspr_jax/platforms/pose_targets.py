@@ -9,10 +9,9 @@ from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.motions.answers import joined
 from cspr_jax.platforms.answers import PlatformMotionAnswers, reached
 from cspr_jax.platforms.arcs import CANDIDATES, Candidates
-from cspr_jax.platforms.beta_hat import OPTIONS
+from cspr_jax.platforms.beta_hat import OPTIONS, end_options
 from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.end_acceleration import AT_REST
-from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 

@@ -24,12 +24,11 @@ from cspr_jax.arithmetic.lanes import dot, stored
 from cspr_jax.motions.limits import limits_set, scales
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.least_nodes import least_nodes
 from cspr_jax.platforms.limit_blocks import QUANTITIES, STRAIGHT, Enclosed, Here, Pair, Sizes, at_most, ratio
 from cspr_jax.platforms.platform_reach import Reach, instant_beside, middle_of, reach
 from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.platform_segment_lanes import StateLanes, squared_duration, state
-from cspr_jax.platforms.work_list import allowance
+from cspr_jax.platforms.work_list import allowance, least_nodes
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES, balance, cables, inertial_wrench
 from cspr_jax.schema.limits import Limit

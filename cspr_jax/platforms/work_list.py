@@ -1,11 +1,14 @@
 """Work list of a proof: blocks of motions are closed, or halved until they are, or until their motion is refuted."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
+from cspr_jax.arithmetic.lanes import smallest
 from cspr_jax.motions.blocks import Blocks
 
 TOLERANCE = 1e-6
@@ -138,3 +141,21 @@ def allowance(limits: np.ndarray) -> np.ndarray:
         (n_criteria,).
     """
     return 2.0 * TOLERANCE * limits
+
+
+def least_nodes(nodes: Sequence[Array], allowed: np.ndarray, places: np.ndarray) -> tuple[Array, Array]:
+    """Reduce the node values of n blocks to the few numbers that a verdict needs.
+
+    Args:
+        nodes: of each criterion, (m, n).
+        allowed: (n_slacks,) how far below zero the first of these criteria, the slacks, may be; see `allowance`.
+        places: (m,) of the nodes, from -1 at the start of a block to 1 at its stop, increasing.
+
+    Returns:
+        (1, n_criteria, n) the smallest value of each criterion; (n,) the first place of the smallest of all slacks, NaN
+        where that is NaN.
+    """
+    worst = smallest([x + extra for x, extra in zip(nodes, allowed, strict=False)])
+    is_there = worst == jnp.min(worst, axis=0)[None]
+    first = jnp.min(jnp.where(is_there, places[:, None], jnp.inf), axis=0)
+    return jnp.stack([jnp.min(x, axis=0) for x in nodes])[None], jnp.where(first <= 1.0, first, jnp.nan)

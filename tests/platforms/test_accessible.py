@@ -16,8 +16,8 @@ from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.platforms import accessible as scans
 from cspr_jax.platforms.accessible import DEFINITIONS, accessible
 from cspr_jax.platforms.attainable import attainable, attained, turns
+from cspr_jax.platforms.beta_hat import end_options
 from cspr_jax.platforms.orientation_steps import OrientationSteps
-from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.orientation_grids import equal_volume_grid, tilt_torsion_grid
 from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
 

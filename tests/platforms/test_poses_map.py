@@ -30,7 +30,7 @@ from support.platforms import (
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.plans import choices, planning
-from cspr_jax.platforms.kernels import slacks_at
+from cspr_jax.platforms.checker import slacks_at
 from cspr_jax.platforms.place_proof import wires_beside
 from cspr_jax.platforms.platform_segment import motion
 from cspr_jax.platforms.platform_segment_lanes import instant, state
