@@ -35,7 +35,7 @@ from cspr_jax.platforms.tension_blocks import of_motion
 from cspr_jax.platforms.work_list import TOLERANCE, allowance
 from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.robots.wrench_lanes import cable_lanes
 from cspr_jax.schema.verdicts import Verdict
 
 # Blocks of a call at most; so many arcs are held at a time.
@@ -66,12 +66,12 @@ def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind
     segments, arcs, tau = items
     instant_lanes = instant(problem.amplitude, segments.sense, arcs, tau)
     here = state(segments, arcs, instant_lanes, kind)
-    wires = cables(problem.robot, here.position, here.turn)
+    cables = cable_lanes(problem.robot, here.position, here.turn)
     slacks = [
         *moving_slacks(problem, segments, arcs, instant_lanes, kind),
-        *still_slacks(problem, segments, here, wires),
+        *still_slacks(problem, segments, here, cables),
     ]
-    squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, wires)]
+    squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
     # Not stacked: XLA would compute all of them for each.
     return *(slacks[k] for k in order(problem.limits)), nearest

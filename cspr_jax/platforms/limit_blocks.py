@@ -27,14 +27,14 @@ class Here(NamedTuple):
 
     Fields:
         state: of the platform.
-        wires: the cables.
+        cables: their arms and rays.
         kappa: of the taut cables, one (n,) each.
         squared: T^2, s^2.
         z0: m.
     """
 
     state: StateLanes
-    wires: CableLanes
+    cables: CableLanes
     kappa: Sequence[Array]
     squared: Array
     z0: Array
@@ -128,7 +128,7 @@ def _paired(values: Sequence[Array]) -> list[Pair]:
 
 
 def _tensions(here: Here, _: Array) -> list[Pair]:
-    lengths = [jnp.sqrt(dot(ray, ray)) / here.z0 for ray in here.wires.rays]
+    lengths = [jnp.sqrt(dot(ray, ray)) / here.z0 for ray in here.cables.rays]
     return _paired([x * length for x, length in zip(here.kappa, lengths, strict=True)])
 
 
@@ -148,7 +148,7 @@ def _tension_slacks(enclosed: Enclosed, limit: Array, is_least: bool) -> Pair:
 
 def _rates(here: Here) -> list[tuple[Array, Array, Array]]:
     state = here.state
-    rows = cable_rates(here.wires, state.velocity, state.acceleration, state.omega, state.spin)
+    rows = cable_rates(here.cables, state.velocity, state.acceleration, state.omega, state.spin)
     return list(zip(*rows, strict=True))
 
 

@@ -16,7 +16,7 @@ from cspr_jax.robots.interference import Contacts, cables_cross, contacts, platf
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular, normalised_determinant
-from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.robots.wrench_lanes import cable_lanes
 
 BATCH = 512
 # Gaps between cables below this part of the platform's size are none. A cable that makes a smaller angle with the
@@ -46,13 +46,13 @@ def _sampled(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) 
     places, quaternions = poses
     one = jnp.where(robot.mass > 0.0, 1.0, 2.0)
     turn = stored(rotation([quaternions[:, i] for i in range(4)]), one)
-    wires = cables(robot, [places[:, i] for i in range(3)], turn)
-    wires = wires._replace(rays=stored(wires.rays, one))
+    cables = cable_lanes(robot, [places[:, i] for i in range(3)], turn)
+    cables = cables._replace(rays=stored(cables.rays, one))
     apart, directions = (
-        interference_lanes.gaps(robot.base_points, pairs, wires),
-        interference_lanes.cable_directions(wires, turn),
+        interference_lanes.gaps(robot.base_points, pairs, cables),
+        interference_lanes.cable_directions(cables, turn),
     )
-    return wrench_lanes.normalised_determinant(robot, wires), *interference_lanes.as_arrays(apart, directions)
+    return wrench_lanes.normalised_determinant(robot, cables), *interference_lanes.as_arrays(apart, directions)
 
 
 def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:

@@ -26,7 +26,7 @@ from cspr_jax.platforms.work_list import allowance, least_nodes
 from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
-from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cables
+from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cable_lanes
 from cspr_jax.schema.limits import Limit
 
 # Steps of a block, and the instants between them.
@@ -116,13 +116,13 @@ def place_blocks(
 
     def on(place):
         pose = at(place)
-        lines = cables(problem.robot, pose.position, pose.turn)
-        apart = _apart(problem.robot, pairs, gaps, lines, bends)
-        away = zip(left, interference_lanes.cable_directions(lines, pose.turn), strict=True)
+        cables = cable_lanes(problem.robot, pose.position, pose.turn)
+        apart = _apart(problem.robot, pairs, gaps, cables, bends)
+        away = zip(left, interference_lanes.cable_directions(cables, pose.turn), strict=True)
         clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
-        values = _slacks(problem, segments, pose, lines)
+        values = _slacks(problem, segments, pose, cables)
         if margins and pairs:
-            squares = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, lines)]
+            squares = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
             values.append(jnp.sqrt(smallest(squares)))
         # Pack two real numbers into one complex number: two numbers a loop.
         return lax.complex(clear, values[0]), *values[1:]
@@ -170,14 +170,14 @@ def _units(vectors: Vector) -> list[Vector]:
     return [tuple(x[k] for x in columns) for k in range(columns[0].shape[0])]
 
 
-def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: CableLanes, bends: _Bends) -> Array:
+def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], cables: CableLanes, bends: _Bends) -> Array:
     # Return the least over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed in between.
     if not pairs:
         return jnp.full_like(bends.centre, jnp.inf)
     sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
     values = []
     for (i, j), e in zip(pairs, gaps, strict=True):
-        first, last = dot(e, wires.rays[i]), dot(e, wires.rays[j])
+        first, last = dot(e, cables.rays[i]), dot(e, cables.rays[j])
         spools = dot(e, [robot.base_points[j, k] - robot.base_points[i, k] for k in range(3)])
         between = jnp.sqrt(jnp.sum((robot.platform_points[i] - robot.platform_points[j]) ** 2))
         values += [
@@ -189,7 +189,7 @@ def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: CableL
     return smallest(values)
 
 
-def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, wires: CableLanes) -> list[Array]:
+def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, cables: CableLanes) -> list[Array]:
     # Return the slacks of the depth below the spools, and of limits on the pose.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     normal = plane_normal(robot)
@@ -200,7 +200,7 @@ def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, wires
         if row.quantity == "depth":
             values.append((limit - here.position[2]) * factor / size)
         else:
-            values.append(smallest([1.0 - jnp.sqrt(dot(ray, ray)) / limit[k] for k, ray in enumerate(wires.rays)]))
+            values.append(smallest([1.0 - jnp.sqrt(dot(ray, ray)) / limit[k] for k, ray in enumerate(cables.rays)]))
     return values
 
 

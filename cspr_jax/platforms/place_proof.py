@@ -25,7 +25,7 @@ from cspr_jax.platforms.platform_segment_lanes import state
 from cspr_jax.platforms.work_list import BlockBounds, WorkList
 from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.interference import contacts
-from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.robots.wrench_lanes import cable_lanes
 
 # Parts of an arc that are looked at first: where margins are wanted; else, as in `proof`, at cusps and halfway
 # between two, where a platform moves fastest.
@@ -79,8 +79,8 @@ def wires_beside(problem: Problem, items, *, kind: PlatformMotionKind) -> tuple[
     segments, arcs, middles, off = items
     instant = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
     here = state(segments, arcs, instant, kind)
-    wires = cables(problem.robot, here.position, here.turn)
-    return interference_lanes.as_arrays(wires.rays, interference_lanes.cable_directions(wires, here.turn))
+    cables = cable_lanes(problem.robot, here.position, here.turn)
+    return interference_lanes.as_arrays(cables.rays, interference_lanes.cable_directions(cables, here.turn))
 
 
 class PlaceCertifier:

@@ -24,7 +24,7 @@ from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.platform_segment_lanes import instant
 from cspr_jax.platforms.slack_lanes import certain_tension, lowest_tension
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.wrench_lanes import balance, cables
+from cspr_jax.robots.wrench_lanes import balance, cable_lanes
 
 # Instants of one call; how many more motions are looked at than checked at a time, and what part of them is few.
 CHUNK, FIRST, FEWER = 8, 2, 8
@@ -98,12 +98,12 @@ def _from_rest(robot: PlatformRobot, segments: PlatformSegment):
 
     def at(row):
         here = swing(motions, row)
-        wires = cables(robot, here.position, here.turn)
+        cables = cable_lanes(robot, here.position, here.turn)
         weight = tuple(dot(line, axis_inertia) for line in here.turn)
         whirl = cross(motions.axis, weight)
         moment = tuple(here.spin * a + here.squared_speed * b for a, b in zip(weight, whirl, strict=True))
         force = (here.acceleration[0], here.acceleration[1], here.acceleration[2] - robot.gravity)
-        return certain_tension(motions.rate, segments.regular, wires, balance(wires, force, moment))
+        return certain_tension(motions.rate, segments.regular, cables, balance(cables, force, moment))
 
     return at
 

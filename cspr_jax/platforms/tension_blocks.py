@@ -30,7 +30,7 @@ from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.platform_segment_lanes import StateLanes, squared_duration, state
 from cspr_jax.platforms.work_list import allowance, least_nodes
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.wrench_lanes import CABLES, balance, cables, inertial_wrench
+from cspr_jax.robots.wrench_lanes import CABLES, balance, cable_lanes, inertial_wrench
 from cspr_jax.schema.limits import Limit
 
 # Part of a bound on real time by which a value at a node may be wrong (tests: by a tenth of that), and by which the
@@ -211,25 +211,25 @@ def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool)
     # Return the values at one node, two at a time, which XLA then computes in one loop: kappa and D, the factor of
     # rounding, the values that the limits need, and the factor that makes of D the normalised determinant.
     robot = problem.robot
-    wires = cables(robot, here.position, here.turn)
+    cables = cable_lanes(robot, here.position, here.turn)
 
     def slowed(vector):
         return tuple(x / block.squared for x in vector)
 
     force, moment = inertial_wrench(robot, slowed(here.acceleration), here.turn, here.omega, here.spin)
-    balanced = balance(wires, force, slowed(moment))
+    balanced = balance(cables, force, slowed(moment))
     inverse = 1.0 / balanced.volume
-    squares = [dot(ray, ray) for ray in wires.rays]
+    squares = [dot(ray, ray) for ray in cables.rays]
     amplified = math.prod(squares[2::2], start=squares[0]) * inverse * inverse
     share = inverse * inverse * inverse / block.regular
     kappa = [x * (share * (CABLES * block.z0 / robot.gravity)) for x in balanced.numerators]
     regular = balanced.denominator * share
     pairs = [*zip(kappa[::2], kappa[1::2], strict=True), (regular, amplified)]
-    instant = Here(here, wires, kappa, block.squared, block.z0)
+    instant = Here(here, cables, kappa, block.squared, block.z0)
     for quantity, row in _quantities(problem).items():
         pairs += QUANTITIES[quantity].values(instant, getattr(problem.limits, row[0].name))
     if margins:
-        standing = cables(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
+        standing = cable_lanes(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
         rest = [dot(ray, ray) for ray in standing.rays]
         lengths = [jnp.sqrt(a / b) for a, b in zip(rest, squares, strict=True)]
         shortened = math.prod(lengths[1:], start=lengths[0])
@@ -252,9 +252,9 @@ def _quantities(problem: Problem) -> dict[str, list[Limit]]:
 
 def _lengths(robot: PlatformRobot, here: StateLanes) -> tuple[list[Array], list[Array]]:
     # Return the lengths of the cables, and the distances from the spools to the mass centre.
-    wires = cables(robot, here.position, here.turn)
+    cables = cable_lanes(robot, here.position, here.turn)
     offs = [tuple(here.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]
-    rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (wires.rays, offs))
+    rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (cables.rays, offs))
     return rays, away
 
 

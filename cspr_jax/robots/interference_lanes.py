@@ -12,7 +12,7 @@ from cspr_jax.robots.wrench_lanes import CableLanes
 TINY = 1e-30  # m^2
 
 
-def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: CableLanes) -> list[Vector]:
+def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], cables: CableLanes) -> list[Vector]:
     """The shortest vectors between cables.
 
     Args:
@@ -25,7 +25,7 @@ def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: CableLanes
     vectors = []
     for i, j in pairs:
         apart = [base_points[j, k] - base_points[i, k] for k in range(3)]
-        vectors.append(gap(apart, wires.rays[i], wires.rays[j]))
+        vectors.append(gap(apart, cables.rays[i], cables.rays[j]))
     return vectors
 
 
@@ -80,7 +80,7 @@ def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vect
     return tuple(jnp.where(inside, w, jnp.where(is_first, a, b)) for w, a, b in zip(up, *left, strict=True))
 
 
-def cable_directions(wires: CableLanes, turn: Matrix) -> list[Vector]:
+def cable_directions(cables: CableLanes, turn: Matrix) -> list[Vector]:
     """The cables from the platform to the spools, in the platform's axes; not of unit length.
 
     Args:
@@ -89,7 +89,7 @@ def cable_directions(wires: CableLanes, turn: Matrix) -> list[Vector]:
     Returns:
         one vector a cable, platform axes, m.
     """
-    return [turned_back(turn, tuple(-x for x in ray)) for ray in wires.rays]
+    return [turned_back(turn, tuple(-x for x in ray)) for ray in cables.rays]
 
 
 def as_arrays(between: Sequence[Vector], directions: Sequence[Vector]) -> tuple[Array, Array]:

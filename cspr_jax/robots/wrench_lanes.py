@@ -45,7 +45,7 @@ class Balance(NamedTuple):
     volume: Array
 
 
-def cables(robot: PlatformRobot, position: Vector, turn: Matrix) -> CableLanes:
+def cable_lanes(robot: PlatformRobot, position: Vector, turn: Matrix) -> CableLanes:
     """The cables, (3.1).
 
     Args:
@@ -86,7 +86,7 @@ def inertial_wrench(
     return force, tuple(a + b for a, b in zip(x, y, strict=True))
 
 
-def balance(wires: CableLanes, force: Vector, moment: Vector) -> Balance:
+def balance(cables: CableLanes, force: Vector, moment: Vector) -> Balance:
     """The tensions that give a wrench, (3.11).
 
     Args:
@@ -96,8 +96,8 @@ def balance(wires: CableLanes, force: Vector, moment: Vector) -> Balance:
     Returns:
         the tensions per mass and length.
     """
-    pulls = [tuple(-x for x in ray) for ray in wires.rays]
-    moments = [cross(arm, pull) for arm, pull in zip(wires.arms, pulls, strict=True)]
+    pulls = [tuple(-x for x in ray) for ray in cables.rays]
+    moments = [cross(arm, pull) for arm, pull in zip(cables.arms, pulls, strict=True)]
     first, second = range(0, CABLES, 2), range(1, CABLES, 2)
     a, b = [pulls[k] for k in first], [pulls[k] for k in second]
     adjugate = (cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]))
@@ -119,17 +119,17 @@ def balance(wires: CableLanes, force: Vector, moment: Vector) -> Balance:
     return Balance(numerators, d * determinant, -determinant, d)
 
 
-def determinant(wires: CableLanes) -> Array:
+def determinant(cables: CableLanes) -> Array:
     """Determinant of J, (3.5), in three pairs of cables: the volumes of their forces times those of their moments.
 
     Returns:
         (...) m^9.
     """
-    moments = [cross(arm, ray) for arm, ray in zip(wires.arms, wires.rays, strict=True)]
+    moments = [cross(arm, ray) for arm, ray in zip(cables.arms, cables.rays, strict=True)]
     total = jnp.zeros(())
     for three in itertools.combinations(range(CABLES), 3):
         others = [k for k in range(CABLES) if k not in three]
-        a, b, c = (wires.rays[k] for k in three)
+        a, b, c = (cables.rays[k] for k in three)
         d, e, f = (moments[k] for k in others)
         # Laplace's expansion by the first three columns.
         sign = -1.0 if (sum(three) - 3) % 2 else 1.0
@@ -137,19 +137,19 @@ def determinant(wires: CableLanes) -> Array:
     return total
 
 
-def normalised_determinant(robot: PlatformRobot, wires: CableLanes) -> Array:
+def normalised_determinant(robot: PlatformRobot, cables: CableLanes) -> Array:
     """Determinant of J with unit cables and the platform's size as unit; see `wrench_balance.normalised_determinant`.
 
     Returns:
         (...).
     """
-    lengths = [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]
+    lengths = [jnp.sqrt(dot(ray, ray)) for ray in cables.rays]
     size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
-    return determinant(wires) / (size**3 * math.prod(lengths[1:], start=lengths[0]))
+    return determinant(cables) / (size**3 * math.prod(lengths[1:], start=lengths[0]))
 
 
 def cable_rates(
-    wires: CableLanes, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector
+    cables: CableLanes, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector
 ) -> list[list[Array]]:
     """Lengths of the cables and their first two derivatives, (3.2) and (3.3).
 
@@ -163,7 +163,7 @@ def cable_rates(
         lengths, rates, accelerations: six arrays (...) each.
     """
     rows = []
-    for arm, ray in zip(wires.arms, wires.rays, strict=True):
+    for arm, ray in zip(cables.arms, cables.rays, strict=True):
         swing = cross(omega, arm)
         pace = combined([(jnp.ones(()), velocity), (jnp.ones(()), swing)])
         across, inward = cross(spin, arm), cross(omega, swing)

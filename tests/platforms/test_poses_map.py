@@ -40,7 +40,7 @@ from cspr_jax.robots import interference, interference_lanes
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.platform import rays as rays_of
 from cspr_jax.robots.state import State
-from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.robots.wrench_lanes import cable_lanes
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import open_result
 
@@ -176,10 +176,12 @@ def as_lanes(problem, batch, p, t, *, pairs):
     """Slacks (n_criteria, n), vectors between cables and directions of cables of motions, by the fast forms."""
     now = instant(problem.amplitude, batch.sense, p, t)
     here = state(batch, p, now, USUAL)
-    wires = cables(problem.robot, here.position, here.turn)
-    slacks = moving_slacks(problem, batch, p, now, USUAL) + still_slacks(problem, batch, here, wires)
-    gaps = interference_lanes.gaps(problem.robot.base_points, pairs, wires)
-    return jnp.stack(slacks), *interference_lanes.as_arrays(gaps, interference_lanes.cable_directions(wires, here.turn))
+    cables = cable_lanes(problem.robot, here.position, here.turn)
+    slacks = moving_slacks(problem, batch, p, now, USUAL) + still_slacks(problem, batch, here, cables)
+    gaps = interference_lanes.gaps(problem.robot.base_points, pairs, cables)
+    return jnp.stack(slacks), *interference_lanes.as_arrays(
+        gaps, interference_lanes.cable_directions(cables, here.turn)
+    )
 
 
 @jax.jit
