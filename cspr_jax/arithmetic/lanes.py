@@ -75,7 +75,7 @@ def turned_back(matrix: Matrix, vector: Vector) -> Vector:
     return combined([(vector[i], matrix[i]) for i in range(3)])
 
 
-def rotation(quaternion: Sequence[Array]) -> Matrix:
+def rotation_matrix(quaternion: Sequence[Array]) -> Matrix:
     """The rotation matrix of a unit quaternion; see `arithmetic.rotations.matrix`.
 
     Args:

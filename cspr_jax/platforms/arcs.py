@@ -95,7 +95,7 @@ class _Segments:
         motion, (first, last) = self._candidates.motion[indices], self._candidates.beta_hats
         segments = rows(self._of_motions[arcs % 2], motion)
         return dataclasses.replace(
-            segments, turn=segments.turn._replace(start_beta_hat=first[indices], end_beta_hat=last[indices])
+            segments, slerp=segments.slerp._replace(start_beta_hat=first[indices], end_beta_hat=last[indices])
         )
 
 
@@ -138,14 +138,14 @@ def smallest_arcs(
         alive = _sieved(checker, segments, arcs, alive, _instants(arcs, TELLING))
         first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
         # The first candidate of each motion, then all others of motions where it fails: few and large batches.
-        for turn in (alive[first], np.delete(alive, first)):
-            turn = turn[last[motion[turn]] >= arcs]
-            turn = _sieved(checker, segments, arcs, turn, np.append(BESIDE_START / arcs, _instants(arcs, OTHERS)))
-            if not len(turn):
+        for group in (alive[first], np.delete(alive, first)):
+            group = group[last[motion[group]] >= arcs]
+            group = _sieved(checker, segments, arcs, group, np.append(BESIDE_START / arcs, _instants(arcs, OTHERS)))
+            if not len(group):
                 continue
-            got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False, margins=margins)
-            checks.put(turn, got)
-            passed, unsure = (turn[got.verdict == verdict] for verdict in (0, Verdict.UNDECIDED))
+            got = checker.check(segments(arcs, group), np.full(len(group), arcs), whole=False, margins=margins)
+            checks.put(group, got)
+            passed, unsure = (group[got.verdict == verdict] for verdict in (0, Verdict.UNDECIDED))
             smallest[passed] = arcs
             undecided[unsure] = np.where(undecided[unsure] > 0, undecided[unsure], arcs)
             last[motion[passed]] = np.minimum(last[motion[passed]], arcs + beyond)

@@ -79,21 +79,21 @@ def attained(
         z0: (n,) m.
         max_arcs: largest number tried.
         values: of beta-hat, the preferred one first.
-        tried: which of these, (k,) numbers from 0 on; None: all, in `turns`.
+        tried: which of these, (k,) numbers from 0 on; None: all, in `rounds`.
         symmetry: symmetries of the robot; orientations that they join are computed once.
 
     Returns:
         (n,).
     """
     representatives, inverse = _once(checker, places, angles, z0, symmetry)
-    each = turns(values) if tried is None else (tried,)
+    each = rounds(values) if tried is None else (tried,)
 
     def part(rows):
         rows = representatives[rows]
         motions, beta_hats = _motions(checker, places[rows], angles[rows], z0[rows], values)
         is_attained = np.zeros(len(rows), bool)
-        for turn in each:
-            left, options = np.flatnonzero(~is_attained), beta_hats[:, turn]
+        for numbers in each:
+            left, options = np.flatnonzero(~is_attained), beta_hats[:, numbers]
             size = max(CANDIDATES // max(options.shape[1], 1), 1)
             for piece in (left[k : k + size] for k in range(0, len(left), size)):
                 cell, trial = trials(motions.motions(piece), options[piece])
@@ -109,8 +109,8 @@ def attained(
     return flags[inverse]
 
 
-def turns(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Turns in which values of beta-hat are tried, each with every number of arcs, where the one before fails.
+def rounds(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rounds in which values of beta-hat are tried, each with every number of arcs, where the one before fails.
 
     Args:
         values: how many there are, the preferred one first.

@@ -66,7 +66,7 @@ def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind
     segments, arcs, tau = items
     instant_lanes = instant(problem.amplitude, segments.sense, arcs, tau)
     here = state(segments, arcs, instant_lanes, kind)
-    cables = cable_lanes(problem.robot, here.position, here.turn)
+    cables = cable_lanes(problem.robot, here.position, here.rotation)
     slacks = [
         *moving_slacks(problem, segments, arcs, instant_lanes, kind),
         *still_slacks(problem, segments, here, cables),

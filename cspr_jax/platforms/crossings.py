@@ -38,17 +38,17 @@ def passed_over(
     vectors = tuple(cable_vectors(row, tau) for tau in ends)
     for level in range(HALVINGS + 1):
         (gap, direction), (next_gap, next_direction) = vectors
-        turns = _turns_much(gap, next_gap) | _turns_much(direction, next_direction)
-        closed = ~turns if level < HALVINGS else np.ones(len(row), bool)
-        met[row[closed & cables_cross(gap, next_gap).any(1)]] = True
+        is_open = _turns_much(gap, next_gap) | _turns_much(direction, next_direction)
+        is_closed = ~is_open if level < HALVINGS else np.ones(len(row), bool)
+        met[row[is_closed & cables_cross(gap, next_gap).any(1)]] = True
         if platform is not None:
-            hit[row[closed & platform_hit(*platform, direction, next_direction).any(1)]] = True
-        row, before, after = row[~closed], ends[0][~closed], ends[1][~closed]
+            hit[row[is_closed & platform_hit(*platform, direction, next_direction).any(1)]] = True
+        row, before, after = row[~is_closed], ends[0][~is_closed], ends[1][~is_closed]
         if not len(row):
             break
         middle = 0.5 * (before + after)
         between = cable_vectors(row, middle)
-        first, last = ((gap[~closed], direction[~closed]) for gap, direction in vectors)
+        first, last = ((gap[~is_closed], direction[~is_closed]) for gap, direction in vectors)
         vectors = _joined(first, between), _joined(between, last)
         ends = np.concatenate([before, middle]), np.concatenate([middle, after])
         row = np.concatenate([row, row])

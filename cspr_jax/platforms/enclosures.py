@@ -100,14 +100,13 @@ class _Within(NamedTuple):
 
 
 def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Middle:
-    position, velocity, acceleration, omega, spin = (
-        np.stack(x, axis=1) for x in (here.position, here.velocity, here.acceleration, here.omega, here.spin)
-    )
-    turn = np.stack([np.stack(row, axis=1) for row in here.turn], axis=1)
+    vectors = here.position, here.velocity, here.acceleration, here.omega, here.angular_acceleration
+    position, velocity, acceleration, omega, angular_acceleration = (np.stack(x, axis=1) for x in vectors)
+    rotation = np.stack([np.stack(row, axis=1) for row in here.rotation], axis=1)
     base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
 
     def in_platform(vectors: np.ndarray) -> np.ndarray:
-        return np.einsum("kji,k...j->k...i", turn, vectors)
+        return np.einsum("kji,k...j->k...i", rotation, vectors)
 
     time = np.sqrt(squared)
     away, velocity, acceleration = (
@@ -115,17 +114,18 @@ def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Mid
         in_platform(velocity),
         in_platform(acceleration),
     )
-    omega, spin = in_platform(omega) / time[:, None], in_platform(spin) / squared[:, None]
+    omega = in_platform(omega) / time[:, None]
+    angular_acceleration = in_platform(angular_acceleration) / squared[:, None]
     velocity, acceleration = velocity / time[:, None], acceleration / squared[:, None]
-    whirl = _skew(spin) + _skew(omega) @ _skew(omega)
+    whirl = _skew(angular_acceleration) + _skew(omega) @ _skew(omega)
     inertia = np.asarray(robot.inertia) / float(robot.mass)
-    moment = spin @ inertia.T + np.cross(omega, omega @ inertia.T)
+    moment = angular_acceleration @ inertia.T + np.cross(omega, omega @ inertia.T)
     return _Middle(
         away + arms,
         velocity[:, None] - np.cross(omega[:, None], away),
         velocity[:, None] + np.cross(omega[:, None], arms),
         acceleration[:, None] + np.einsum("kij,nj->kni", whirl, arms),
-        acceleration - float(robot.gravity) * turn[:, 2],
+        acceleration - float(robot.gravity) * rotation[:, 2],
         moment,
         whirl,
     )
@@ -147,11 +147,12 @@ def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.nda
     away = np.linalg.norm(middle.rays - np.asarray(robot.platform_points), axis=2) + half * near.speed
     jerk = wide.bend / radius
     force = jerk / squared + near.omega * (near.bend / squared + float(robot.gravity))
-    whirl = (wide.spin / radius + 3.0 * near.omega * near.spin) / squared
+    whirl = (wide.angular_acceleration / radius + 3.0 * near.omega * near.angular_acceleration) / squared
     pace = near.speed + arms * near.omega
-    pull = near.bend + arms * (near.spin + near.omega**2)
-    steep = jerk + arms * wide.growth * (wide.spin + wide.omega**2) / radius
-    bent = 0.5 * half**2 * (near.bend + 2.0 * near.omega * near.speed + (near.spin + near.omega**2) * away)
+    turning = near.angular_acceleration + near.omega**2
+    pull = near.bend + arms * turning
+    steep = jerk + arms * wide.growth * (wide.angular_acceleration + wide.omega**2) / radius
+    bent = 0.5 * half**2 * (near.bend + 2.0 * near.omega * near.speed + turning * away)
     way = middle.pace * (half * time)[..., None]
     return _Within(
         way,

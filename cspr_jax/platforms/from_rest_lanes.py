@@ -47,16 +47,16 @@ class Swing(NamedTuple):
     Fields:
         position: m.
         acceleration: m/s^2.
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
         squared_speed: of the rotation, (n,) rad^2/s^2.
-        spin: angular acceleration about the axis, (n,) rad/s^2.
+        angular_acceleration: about the axis, (n,) rad/s^2.
     """
 
     position: Vector
     acceleration: Vector
-    turn: Matrix
+    rotation: Matrix
     squared_speed: Array
-    spin: Array
+    angular_acceleration: Array
 
 
 def swings(segments: PlatformSegment) -> Swings:
@@ -68,14 +68,14 @@ def swings(segments: PlatformSegment) -> Swings:
     Returns:
         the same motions.
     """
-    how = segments.turn
+    slerp = segments.slerp
     return Swings(
         tuple(segments.hub[:, i] for i in range(3)),
         tuple(segments.plane[:, i, 0] * segments.end_radius for i in range(3)),
-        tuple(how.across[:, i] for i in range(1, 4)),
-        how.angle * (2.0 / math.pi),
-        how.start_beta_hat,
-        how.end_beta_hat,
+        tuple(slerp.across[:, i] for i in range(1, 4)),
+        slerp.angle * (2.0 / math.pi),
+        slerp.start_beta_hat,
+        slerp.end_beta_hat,
         segments.rate,
     )
 
@@ -101,10 +101,10 @@ def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: PlatformMoti
         place = a * cosine
         bend = (a2 - a) * cosine - 2.0 * a1 * sine
     beat = _plain(sine, cosine) if kind.plain else _with_beta_hats(sine, cosine, tau, theta)
-    turns = []
+    angles = []
     for b, b1, b2 in beat:
-        turns.append((a * b, math.pi * (a1 * b + a * b1), math.pi * (a2 * b + 2.0 * a1 * b1 + a * b2)))
-    return jnp.stack([place, bend, *(turn[k] for k in range(3) for turn in turns)], axis=1)
+        angles.append((a * b, math.pi * (a1 * b + a * b1), math.pi * (a2 * b + 2.0 * a1 * b1 + a * b2)))
+    return jnp.stack([place, bend, *(angle[k] for k in range(3) for angle in angles)], axis=1)
 
 
 def _plain(sine: Array, cosine: Array) -> list[tuple[Array, ...]]:
@@ -125,7 +125,7 @@ def _with_beta_hats(sine: Array, cosine: Array, tau: Array, theta: Array) -> lis
     return [steady, *parts]
 
 
-def swing(which: Swings, row: Array) -> Swing:
+def swing(motions: Swings, row: Array) -> Swing:
     """The state at one instant.
 
     Args:
@@ -136,15 +136,15 @@ def swing(which: Swings, row: Array) -> Swing:
     """
 
     def blended(k):
-        return row[k] + which.start_beta_hat * row[k + 1] + which.end_beta_hat * row[k + 2]
+        return row[k] + motions.start_beta_hat * row[k + 1] + motions.end_beta_hat * row[k + 2]
 
-    speed, spin = which.angle * blended(5), which.angle * blended(8)
-    sine, cosine = sincospi(which.angle * blended(2))
-    pull = which.rate * row[1]
+    speed, angular_acceleration = motions.angle * blended(5), motions.angle * blended(8)
+    sine, cosine = sincospi(motions.angle * blended(2))
+    pull = motions.rate * row[1]
     return Swing(
-        tuple(h + row[0] * r for h, r in zip(which.hub, which.reach, strict=True)),
-        tuple(pull * r for r in which.reach),
-        about_axis(which.axis, sine, cosine),
-        which.rate * speed * speed,
-        which.rate * spin,
+        tuple(h + row[0] * r for h, r in zip(motions.hub, motions.reach, strict=True)),
+        tuple(pull * r for r in motions.reach),
+        about_axis(motions.axis, sine, cosine),
+        motions.rate * speed * speed,
+        motions.rate * angular_acceleration,
     )

@@ -148,7 +148,7 @@ def _tension_slacks(enclosed: Enclosed, limit: Array, is_least: bool) -> Pair:
 
 def _rates(here: Here) -> list[tuple[Array, Array, Array]]:
     state = here.state
-    rows = cable_rates(here.cables, state.velocity, state.acceleration, state.omega, state.spin)
+    rows = cable_rates(here.cables, state.velocity, state.acceleration, state.omega, state.angular_acceleration)
     return list(zip(*rows, strict=True))
 
 

@@ -10,7 +10,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.frames import IDENTITY
-from cspr_jax.arithmetic.lanes import rotation, stored
+from cspr_jax.arithmetic.lanes import rotation_matrix, stored
 from cspr_jax.robots import interference_lanes, wrench_lanes
 from cspr_jax.robots.interference import Contacts, cables_cross, contacts, platform_hit
 from cspr_jax.robots.platform import PlatformRobot
@@ -45,12 +45,12 @@ class OrientationSamples(NamedTuple):
 def _sampled(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) -> tuple[Array, Array, Array]:
     places, quaternions = poses
     one = jnp.where(robot.mass > 0.0, 1.0, 2.0)
-    turn = stored(rotation([quaternions[:, i] for i in range(4)]), one)
-    cables = cable_lanes(robot, [places[:, i] for i in range(3)], turn)
+    rotation = stored(rotation_matrix([quaternions[:, i] for i in range(4)]), one)
+    cables = cable_lanes(robot, [places[:, i] for i in range(3)], rotation)
     cables = cables._replace(rays=stored(cables.rays, one))
     apart, directions = (
         interference_lanes.gaps(robot.base_points, pairs, cables),
-        interference_lanes.cable_directions(cables, turn),
+        interference_lanes.cable_directions(cables, rotation),
     )
     return wrench_lanes.normalised_determinant(robot, cables), *interference_lanes.as_arrays(apart, directions)
 

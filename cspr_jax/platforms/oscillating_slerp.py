@@ -26,7 +26,7 @@ _SMALL, _SERIES = 0.5, 12
 _STILL = 1e-12
 
 
-class Turn(NamedTuple):
+class Slerp(NamedTuple):
     """Rotation from one pose to another, for one parity of the number of arcs.
 
     Fields:
@@ -45,8 +45,8 @@ class Turn(NamedTuple):
 
 
 @jax.jit
-def turn(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *, odd: Array) -> Turn:
-    """The turn between two orientations.
+def slerp_between(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *, odd: Array) -> Slerp:
+    """Oscillating SLERP between two orientations.
 
     Args:
         start: (4,) unit quaternion.
@@ -56,7 +56,7 @@ def turn(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *
         odd: () whether the number of arcs is odd.
 
     Returns:
-        the turn.
+        its parameters.
     """
     first, last = rotations.upper(start), rotations.upper(end)
     last = jnp.where(odd, rotations.conjugate(last), last)  # (3.58)
@@ -70,7 +70,7 @@ def turn(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *
     is_opposite = (size < _STILL) & (along < 0.0)
     across = jnp.where(size < _STILL, 0.0, beside / jnp.where(size < _STILL, 1.0, size))
     across = jnp.where(is_opposite, identity, across)
-    return Turn(first, across, jnp.where((size < _STILL) & ~is_opposite, 0.0, angle), start_beta_hat, end_beta_hat)
+    return Slerp(first, across, jnp.where((size < _STILL) & ~is_opposite, 0.0, angle), start_beta_hat, end_beta_hat)
 
 
 def beat(
@@ -105,7 +105,9 @@ def beat(
 
 
 @jax.jit
-def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Array, ...]) -> tuple[Array, Array, Array]:
+def orientation(
+    slerp: Slerp, amplitude_values: tuple[Array, ...], beats: tuple[Array, ...]
+) -> tuple[Array, Array, Array]:
     """The orientation and its first two derivatives in tau, (3.59) to (3.65).
 
     Args:
@@ -115,7 +117,7 @@ def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Arr
     Returns:
         q, q', q'', (4,) each.
     """
-    half = _half_vector(how, amplitude_values)
+    half = _half_vector(slerp, amplitude_values)
     beta, beta1, beta2 = beats
     return _exponential(
         beta * half[0],
@@ -124,13 +126,13 @@ def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Arr
     )
 
 
-def _half_vector(how: Turn, amplitude_values: tuple[Array, ...]) -> tuple[Array, Array, Array]:
+def _half_vector(slerp: Slerp, amplitude_values: tuple[Array, ...]) -> tuple[Array, Array, Array]:
     # Half of the rotation vector of the envelope, and its derivatives: the envelope turns in a plane of quaternions.
     a, a1, a2 = amplitude_values[:3]
-    sine, cosine = sincospi(how.angle * a / math.pi)
-    rate, bend = how.angle * a1, how.angle * a2
-    q = how.start * cosine + how.across * sine
-    along = how.across * cosine - how.start * sine
+    sine, cosine = sincospi(slerp.angle * a / math.pi)
+    rate, bend = slerp.angle * a1, slerp.angle * a2
+    q = slerp.start * cosine + slerp.across * sine
+    along = slerp.across * cosine - slerp.start * sine
     q1, q2 = along * rate, along * bend - q * rate**2
     s, s1, s2, v, v1, v2 = q[0], q1[0], q2[0], q[1:], q1[1:], q2[1:]
     w, w1, w2 = _angle_ratio(s, v)

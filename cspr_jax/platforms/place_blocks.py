@@ -103,22 +103,22 @@ def place_blocks(
 
     bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
     share = (2.0 * half / STEPS) ** 2 / 8.0
-    turning = bounds.spin + bounds.omega**2
+    turning = bounds.angular_acceleration + bounds.omega**2
     instant = stored(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
     here = state(segments, arcs, instant, kind, one)
-    position, turn = stored((here.position, here.turn), one)
+    position, rotation = stored((here.position, here.rotation), one)
     away = [
         dot(x, x) for x in ([position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
     ]
     seen = turning * (jnp.sqrt(largest(away)) + half * bounds.speed) + bounds.bend + 2.0 * bounds.omega * bounds.speed
     bends = stored(_Bends(bounds.bend * share, turning * share, seen * share), one)
-    gaps, left = _separators(problem.robot, platform, pairs, (position, turn), one)
+    gaps, left = _separators(problem.robot, platform, pairs, (position, rotation), one)
 
     def on(place):
         pose = at(place)
-        cables = cable_lanes(problem.robot, pose.position, pose.turn)
+        cables = cable_lanes(problem.robot, pose.position, pose.rotation)
         apart = _apart(problem.robot, pairs, gaps, cables, bends)
-        away = zip(left, interference_lanes.cable_directions(cables, pose.turn), strict=True)
+        away = zip(left, interference_lanes.cable_directions(cables, pose.rotation), strict=True)
         clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
         values = _slacks(problem, segments, pose, cables)
         if margins and pairs:
@@ -149,10 +149,10 @@ def place_blocks(
 def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array) -> tuple[list[Vector], list[Vector]]:
     # Find unit vectors between cables, one a pair, and off sectors, one a cable, by position and turn in the middle.
     # All pairs, or cables, go at a time: components (m, n), lanes last, which XLA writes with vectors, in little code.
-    position, turn = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
+    position, rotation = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
     points, base = ([x[:, k, None] for k in range(3)] for x in (robot.platform_points, robot.base_points))
-    rays = stored([position[k] + dot(turn[k], points) - base[k] for k in range(3)], one)
-    seen = turned_back(turn, [-x for x in rays])
+    rays = stored([position[k] + dot(rotation[k], points) - base[k] for k in range(3)], one)
+    seen = turned_back(rotation, [-x for x in rays])
     sides, normal = platform
     first, last = ([sides[:, side, k, None] for k in range(3)] for side in range(2))
     left = _units(interference_lanes.residual((first, last), [normal[k] for k in range(3)], seen))

@@ -79,8 +79,8 @@ def wires_beside(problem: Problem, items, *, kind: PlatformMotionKind) -> tuple[
     segments, arcs, middles, off = items
     instant = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
     here = state(segments, arcs, instant, kind)
-    cables = cable_lanes(problem.robot, here.position, here.turn)
-    return interference_lanes.as_arrays(cables.rays, interference_lanes.cable_directions(cables, here.turn))
+    cables = cable_lanes(problem.robot, here.position, here.rotation)
+    return interference_lanes.as_arrays(cables.rays, interference_lanes.cable_directions(cables, here.rotation))
 
 
 class PlaceCertifier:

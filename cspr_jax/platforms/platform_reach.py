@@ -46,17 +46,17 @@ class Reach(NamedTuple):
         speed: of |p'|, m.
         bend: of |p''|, m.
         growth: of the norm of the rotation matrix.
-        turn: of the norm of its derivative.
+        rotation_rate: of the norm of its derivative.
         omega: of |omega|, rad.
-        spin: of |omega'|, rad.
+        angular_acceleration: of |omega'|, rad.
     """
 
     speed: Array
     bend: Array
     growth: Array
-    turn: Array
+    rotation_rate: Array
     omega: Array
-    spin: Array
+    angular_acceleration: Array
 
 
 def middle_of(amplitude: Amplitude, tau: Array) -> Middle:
@@ -114,7 +114,7 @@ def reach(
         sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
         third = _trigonometric((jnp.abs(sine3), jnp.abs(cosine3)), 3.0 * phase[0], phase[1] * phase[1] * phase[1])
         beats = _beat(segment, arcs, middle, (along, aside), first, third)
-    angle = jnp.abs(segment.turn.angle)
+    angle = jnp.abs(segment.slerp.angle)
     if kind.from_rest:
         u, u1, u2 = (angle * size for size in sizes[:3])
     else:
@@ -124,10 +124,10 @@ def reach(
     grown = jnp.exp(2.0 * jnp.minimum(beta_aside * u + beta * aside * u1, beta * u))
     beside = 1.0 if kind.from_rest else grown  # then all is about one axis
     omega = beta1 * u + beside * beta * u1
-    spin = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
+    angular_acceleration = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
     if not kind.from_rest:
-        spin = spin + grown * beta * u1 * v1
-    return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * spin)
+        angular_acceleration = angular_acceleration + grown * beta * u1 * v1
+    return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * angular_acceleration)
 
 
 def _polynomial_sizes(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
@@ -202,10 +202,10 @@ def _hypotenuse(a: Array, b: Array) -> Array:
 
 def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
     # Bound (3.93) by its terms.
-    how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
+    slerp, omega, nu = segment.slerp, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
-    slope = (how.end_beta_hat - how.start_beta_hat) * share
-    h, steep = how.start_beta_hat * share + slope * middle.tau, jnp.abs(slope)
+    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * share
+    h, steep = slerp.start_beta_hat * share + slope * middle.tau, jnp.abs(slope)
     nine, one = jnp.abs(9.0 + h) + steep * axes[0], jnp.abs(1.0 + h) + steep * axes[0]
     value = nine * first.cosine + one * third.cosine
     rate = steep * (first.cosine + third.cosine) + omega * (3.0 * one * third.sine + nine * first.sine)
@@ -217,15 +217,15 @@ def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, th
 
 def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:
     # Bound |u|, |u'| and |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
-    how = segment.turn
+    slerp = segment.slerp
     rate, bend = angle * sizes[1], angle * sizes[2]
     grown = jnp.exp(axes[1] * rate)
     shrunk = 1.0 / grown
     cosh = 0.5 * (grown + shrunk)
     size = jnp.sqrt(0.5 * (grown * grown + shrunk * shrunk))
-    sine, cosine = sincospi(how.angle * middle.terms[0] / math.pi)
-    largest = _hypotenuse(how.start[:, 0], how.across[:, 0]) * cosh
-    off = jnp.abs(1.0 - how.start[:, 0] * cosine - how.across[:, 0] * sine) + axes[0] * rate * largest
+    sine, cosine = sincospi(slerp.angle * middle.terms[0] / math.pi)
+    largest = _hypotenuse(slerp.start[:, 0], slerp.across[:, 0]) * cosh
+    off = jnp.abs(1.0 - slerp.start[:, 0] * cosine - slerp.across[:, 0] * sine) + axes[0] * rate * largest
     w, w1, w2 = _angle_ratio(jnp.maximum(off, NEAREST))
     s, s1 = jnp.minimum(1.0 + off, largest), largest
     by_angle = size * (w + w1 * s1)

@@ -14,7 +14,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import polynomial, sincospi
-from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation, stored
+from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation_matrix, stored
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.platform_segment import PlatformSegment
@@ -53,17 +53,17 @@ class StateLanes(NamedTuple):
         position: m.
         velocity: p', m.
         acceleration: p'', m.
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
         omega: angular velocity, rad.
-        spin: angular acceleration, rad.
+        angular_acceleration: rad.
     """
 
     position: Vector
     velocity: Vector
     acceleration: Vector
-    turn: Matrix
+    rotation: Matrix
     omega: Vector
-    spin: Vector
+    angular_acceleration: Vector
 
 
 @jax.jit
@@ -165,14 +165,14 @@ def _beat(
     segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
 ) -> tuple[Array, Array, Array]:
     # Compute the same as `oscillating_slerp.beat`, at the phase that the instant knows.
-    how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
+    slerp, omega, nu = segment.slerp, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
     sine, cosine = segment.sense * now.sine, now.cosine
     if kind.plain:  # beta_1
         return cosine, -omega * sine, -omega * omega * cosine
     sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
-    slope = (how.end_beta_hat - how.start_beta_hat) * share
-    h = how.start_beta_hat * share + slope * now.tau
+    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * share
+    h = slerp.start_beta_hat * share + slope * now.tau
     value = ((9.0 + h) * cosine - (1.0 + h) * cosine3) * 0.125
     rate = (slope * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) * 0.125
     bend = 2.0 * slope * omega * (3.0 * sine3 - sine) + omega * omega * (9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine)
@@ -183,9 +183,9 @@ def _about_one_axis(
     segment: PlatformSegment, now: InstantLanes, beats: tuple[Array, ...], one: Array | None
 ) -> tuple[Matrix, Vector, Vector]:
     # The envelope leaves the reference orientation along one axis: the angle is 2 beta Theta_env A.
-    axis = tuple(segment.turn.across[:, i] for i in range(1, 4))
+    axis = tuple(segment.slerp.across[:, i] for i in range(1, 4))
     beta, beta1, beta2 = beats
-    whole = 2.0 * segment.turn.angle
+    whole = 2.0 * segment.slerp.angle
     sine, cosine = stored(sincospi(whole * beta * now.a / math.pi), one)
     rate = whole * (beta1 * now.a + beta * now.a1)
     bend = whole * (beta2 * now.a + 2.0 * beta1 * now.a1 + beta * now.a2)
@@ -211,11 +211,11 @@ def _half_vector(
     segment: PlatformSegment, now: InstantLanes, beats: tuple[Array, ...]
 ) -> tuple[Vector, Vector, Vector]:
     # Half of the rotation vector and its derivatives, as in `oscillating_slerp`.
-    how, (beta, beta1, beta2) = segment.turn, beats
-    sine, cosine = sincospi(how.angle * now.a / math.pi)
-    rate, bend = how.angle * now.a1, how.angle * now.a2
-    q = [how.start[:, i] * cosine + how.across[:, i] * sine for i in range(4)]
-    along = [how.across[:, i] * cosine - how.start[:, i] * sine for i in range(4)]
+    slerp, (beta, beta1, beta2) = segment.slerp, beats
+    sine, cosine = sincospi(slerp.angle * now.a / math.pi)
+    rate, bend = slerp.angle * now.a1, slerp.angle * now.a2
+    q = [slerp.start[:, i] * cosine + slerp.across[:, i] * sine for i in range(4)]
+    along = [slerp.across[:, i] * cosine - slerp.start[:, i] * sine for i in range(4)]
     q1 = [x * rate for x in along]
     q2 = [x * bend - y * rate * rate for x, y in zip(along, q, strict=True)]
     x = 1.0 - q[0]
@@ -248,4 +248,4 @@ def _exponential(v: Vector, v1: Vector, v2: Vector) -> tuple[Matrix, Vector, Vec
         across = cross(left[1:], q[1:])
         return tuple(2.0 * (q[0] * left[i + 1] - left[0] * q[i + 1] - across[i]) for i in range(3))
 
-    return rotation(q), vector_part(q1), vector_part(q2)
+    return rotation_matrix(q), vector_part(q1), vector_part(q2)

@@ -98,10 +98,12 @@ def _from_rest(robot: PlatformRobot, segments: PlatformSegment):
 
     def at(row):
         here = swing(motions, row)
-        cables = cable_lanes(robot, here.position, here.turn)
-        weight = tuple(dot(line, axis_inertia) for line in here.turn)
+        cables = cable_lanes(robot, here.position, here.rotation)
+        weight = tuple(dot(line, axis_inertia) for line in here.rotation)
         whirl = cross(motions.axis, weight)
-        moment = tuple(here.spin * a + here.squared_speed * b for a, b in zip(weight, whirl, strict=True))
+        moment = tuple(
+            here.angular_acceleration * a + here.squared_speed * b for a, b in zip(weight, whirl, strict=True)
+        )
         force = (here.acceleration[0], here.acceleration[1], here.acceleration[2] - robot.gravity)
         return certain_tension(motions.rate, segments.regular, cables, balance(cables, force, moment))
 

@@ -34,7 +34,9 @@ def _balanced(robot: PlatformRobot, here: StateLanes, cables: CableLanes, square
         return tuple(x / squared for x in vector)
 
     # The moment is of second order in time like the force: omega enters squared.
-    force, moment = inertial_wrench(robot, slowed(here.acceleration), here.turn, here.omega, here.spin)
+    force, moment = inertial_wrench(
+        robot, slowed(here.acceleration), here.rotation, here.omega, here.angular_acceleration
+    )
     return balance(cables, force, slowed(moment))
 
 
@@ -79,7 +81,7 @@ def lowest_tension(
         (n,) of `certain_tension`.
     """
     here = state(segment, arcs, now, kind)
-    cables = cable_lanes(robot, here.position, here.turn)
+    cables = cable_lanes(robot, here.position, here.rotation)
     balance = _balanced(robot, here, cables, squared_duration(segment, arcs))
     return certain_tension(segment.rate, segment.regular, cables, balance)
 
@@ -100,14 +102,14 @@ def moving_slacks(
     """
     robot, limits = problem.robot, problem.limits
     here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
-    cables = cable_lanes(robot, here.position, here.turn)
+    cables = cable_lanes(robot, here.position, here.rotation)
     balance = _balanced(robot, here, cables, squared)
     is_flat = _is_flat(cables, balance)
     values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment.rate, balance))]
     rows = _limit_rows(limits, of_motion=True)
     if not rows:
         return values
-    lengths, rates, bends = cable_rates(cables, here.velocity, here.acceleration, here.omega, here.spin)
+    lengths, rates, bends = cable_rates(cables, here.velocity, here.acceleration, here.omega, here.angular_acceleration)
     pace, scale = jnp.sqrt(squared), scales(CABLES, robot.mass * robot.gravity, robot.gravity / segment.rate)
     each = {
         "tension": [robot.mass * x / balance.denominator * y for x, y in zip(balance.numerators, lengths, strict=True)],

@@ -211,12 +211,14 @@ def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool)
     # Return the values at one node, two at a time, which XLA then computes in one loop: kappa and D, the factor of
     # rounding, the values that the limits need, and the factor that makes of D the normalised determinant.
     robot = problem.robot
-    cables = cable_lanes(robot, here.position, here.turn)
+    cables = cable_lanes(robot, here.position, here.rotation)
 
     def slowed(vector):
         return tuple(x / block.squared for x in vector)
 
-    force, moment = inertial_wrench(robot, slowed(here.acceleration), here.turn, here.omega, here.spin)
+    force, moment = inertial_wrench(
+        robot, slowed(here.acceleration), here.rotation, here.omega, here.angular_acceleration
+    )
     balanced = balance(cables, force, slowed(moment))
     inverse = 1.0 / balanced.volume
     squares = [dot(ray, ray) for ray in cables.rays]
@@ -252,7 +254,7 @@ def _quantities(problem: Problem) -> dict[str, list[Limit]]:
 
 def _lengths(robot: PlatformRobot, here: StateLanes) -> tuple[list[Array], list[Array]]:
     # Return the lengths of the cables, and the distances from the spools to the mass centre.
-    cables = cable_lanes(robot, here.position, here.turn)
+    cables = cable_lanes(robot, here.position, here.rotation)
     offs = [tuple(here.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]
     rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (cables.rays, offs))
     return rays, away
@@ -264,8 +266,8 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     robot, squared, z0 = problem.robot, block.squared, block.z0
     sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
     arm, arms = jnp.sqrt(jnp.mean(sizes**2)), [sizes[k] for k in range(CABLES)]
-    shift, turn = along * bounds.speed, jnp.minimum(along * bounds.turn, bounds.growth + 1.0)
-    moved = [shift + lever * turn for lever in arms]
+    shift, rotated = along * bounds.speed, jnp.minimum(along * bounds.rotation_rate, bounds.growth + 1.0)
+    moved = [shift + lever * rotated for lever in arms]
     rays = [ray + move for ray, move in zip(lengths[0], moved, strict=True)]
     columns = [
         jnp.sqrt(ray**2 + (lever / arm * (away + shift)) ** 2)
@@ -273,13 +275,13 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     ]
     inertia = robot.inertia / robot.mass
     apart = inertia - jnp.trace(inertia) / 3.0 * jnp.eye(3)
-    whirl = jnp.sqrt(jnp.sum(inertia**2)) * bounds.spin + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
+    whirl = jnp.sqrt(jnp.sum(inertia**2)) * bounds.angular_acceleration + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
     force = bounds.bend / squared + robot.gravity
     wrench = jnp.sqrt(force**2 + (whirl / squared / (arm * bounds.growth)) ** 2)
     whole = (arm * bounds.growth) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
     kappa = [CABLES * z0 / robot.gravity * whole * wrench / column for column in columns]
-    paces = [bounds.speed + lever * bounds.turn for lever in arms]
-    pulls = [bounds.bend + lever * bounds.growth * (bounds.spin + bounds.omega**2) for lever in arms]
+    paces = [bounds.speed + lever * bounds.rotation_rate for lever in arms]
+    pulls = [bounds.bend + lever * bounds.growth * (bounds.angular_acceleration + bounds.omega**2) for lever in arms]
     is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
     cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0)
     largest = [*kappa, whole, jnp.zeros_like(whole)]

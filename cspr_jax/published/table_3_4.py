@@ -46,13 +46,13 @@ def smallest_proportions(
     Returns:
         a part an annulus.
     """
-    preferred, likely, rest = attainable.turns(values)
+    preferred, likely, rest = attainable.rounds(values)
     sets = [one for annulus in annuli for one in annulus]
     owner = np.repeat(np.arange(len(annuli)), [len(annulus) for annulus in annuli])
     good = attained(sets, preferred)
     shares = np.array([mask.mean() for mask in good])
     smallest = np.ones(len(annuli))
-    # All values are tried at the place of each annulus with the smallest share so far; then, turn by turn, where less
+    # All values are tried at the place of each annulus with the smallest share so far; then, round by round, where less
     # is attained than there. All annuli go together, so that no process waits for the end of one.
     all_sets, rising = np.arange(len(sets)), np.argsort(shares, kind="stable")
     only = rising[np.unique(owner[rising], return_index=True)[1]]

@@ -191,20 +191,20 @@ def clearances(
 
 class _Given(NamedTuple):
     place: np.ndarray  # (n, 3)
-    turn: np.ndarray | None  # (n, 4)
+    quaternion: np.ndarray | None  # (n, 4)
     spools: np.ndarray | None  # (n, n_cables, 3)
 
     def some(self, which) -> "_Given":
-        turn, spools = (None if x is None else x[which] for x in self[1:])
-        return _Given(self.place[which], turn, spools)
+        quaternion, spools = (None if x is None else x[which] for x in self[1:])
+        return _Given(self.place[which], quaternion, spools)
 
     def lanes(self, origin: np.ndarray, dtype: np.dtype) -> kernels.PoseLanes:
         def columns(array):
             return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
-        turn = None if self.turn is None else columns(self.turn)
+        quaternion = None if self.quaternion is None else columns(self.quaternion)
         ends = None if self.spools is None else [columns(x) for x in np.swapaxes(self.spools - origin, 0, 1)]
-        return kernels.PoseLanes(columns(self.place - origin), turn, ends)
+        return kernels.PoseLanes(columns(self.place - origin), quaternion, ends)
 
 
 def _checked(scene: Scene, positions, quaternions, ends) -> _Given:
@@ -218,8 +218,8 @@ def _checked(scene: Scene, positions, quaternions, ends) -> _Given:
             raise InputError(name, None, f"must be {shape}", fault=f"an array of shape {array.shape}")
         return array
 
-    turn = checked("quaternions", quaternions, (len(place), 4))
-    return _Given(place, turn, checked("ends", ends, (len(place), len(scene.base_points), 3)))
+    quaternion = checked("quaternions", quaternions, (len(place), 4))
+    return _Given(place, quaternion, checked("ends", ends, (len(place), len(scene.base_points), 3)))
 
 
 def _all(scene: Scene, all_poses: _Given, threshold: float, dtype: np.dtype) -> Clearances:
@@ -304,7 +304,7 @@ def _solid(shape: Obstacle | Hull, origin: np.ndarray):
     if isinstance(shape, Cylinder):
         return kernels.Rod(*map(leaf, (shape.start - origin, shape.end - shape.start, shape.radius)))
     if isinstance(shape, Box):
-        return kernels.Brick(*map(leaf, (shape.centre - origin, shape.half, shape.turn)))
+        return kernels.Brick(*map(leaf, (shape.centre - origin, shape.half, shape.rotation)))
     return kernels.Polyhedron(*map(leaf, (shape.normals, shape.offsets, shape.triangles, shape.edges, shape.sides)))
 
 
@@ -312,7 +312,7 @@ def _corners(shape: Body) -> np.ndarray:
     if isinstance(shape, Hull):
         return shape.triangles.reshape(-1, 3)
     signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(-1, 3)
-    return shape.centre + (signs * shape.half) @ shape.turn.T
+    return shape.centre + (signs * shape.half) @ shape.rotation.T
 
 
 def _reach(shape: Obstacle, origin: np.ndarray) -> float:

@@ -98,12 +98,12 @@ class Brick(NamedTuple):
     Fields:
         centre: (3,) m.
         half: (3,) halves of the lengths of its edges, m.
-        turn: (3, 3) its axes, one a column.
+        rotation: (3, 3) its axes, one a column.
     """
 
     centre: Array
     half: Array
-    turn: Array
+    rotation: Array
 
 
 Solid: TypeAlias = Ball | Rod | Brick
@@ -119,15 +119,15 @@ def _less(a: Vector, b: Vector) -> Vector:
 
 
 def _rotation(poses: PoseLanes) -> Matrix | None:
-    return None if poses.quaternion is None else lanes.rotation(poses.quaternion)
+    return None if poses.quaternion is None else lanes.rotation_matrix(poses.quaternion)
 
 
 def _cables(points: Points, poses: PoseLanes) -> tuple[Sequence[Vector], Sequence[Vector]]:
     # Return the points at which cables leave their spools, and the rays from there to the platform.
-    turn, count = _rotation(poses), points.base.shape[0]
+    rotation, count = _rotation(poses), points.base.shape[0]
     arms = [_three(points.platform[k]) for k in range(count)]
-    if turn is not None:
-        arms = [lanes.turned(turn, arm) for arm in arms]
+    if rotation is not None:
+        arms = [lanes.turned(rotation, arm) for arm in arms]
     ends = [_three(points.base[k]) for k in range(count)] if poses.ends is None else list(poses.ends)
     return ends, [tuple(poses.position[i] + arms[k][i] - ends[k][i] for i in range(3)) for k in range(count)]
 
@@ -156,9 +156,9 @@ def _lines(points: Points, poses: PoseLanes) -> tuple[list[Array] | None, list[A
         ]
     shape = points.base.shape[0], len(poses.position[0])
     arms = [jnp.broadcast_to(points.platform[:, i, None], shape) for i in range(3)]
-    turn = _rotation(poses)
-    if turn is not None:
-        arms = list(lanes.turned([[jnp.broadcast_to(x[None], shape) for x in row] for row in turn], arms))
+    rotation = _rotation(poses)
+    if rotation is not None:
+        arms = list(lanes.turned([[jnp.broadcast_to(x[None], shape) for x in row] for row in rotation], arms))
     return None, [poses.position[i][None] + arms[i] - points.base[:, i, None] for i in range(3)]
 
 
@@ -208,7 +208,7 @@ def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Array:
 
 def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]:
     # A segment in the axes of a box, from its centre.
-    axes = [_three(row) for row in brick.turn]
+    axes = [_three(row) for row in brick.rotation]
     return lanes.turned_back(axes, _less(start, _three(brick.centre))), lanes.turned_back(axes, ray)
 
 
@@ -224,10 +224,10 @@ def of_platform(points: Points, poses: PoseLanes, own: Own, leave: Array) -> Arr
     Returns:
         (n,) complex: distance from the surface less half a diameter, m, and the cable.
     """
-    turn, gaps = _rotation(poses), []
+    rotation, gaps = _rotation(poses), []
     _, rays = _cables(points, poses)
     for k, ray in enumerate(rays):
-        away = tuple(-x for x in _inward(turn, ray))
+        away = tuple(-x for x in _inward(rotation, ray))
         length = jnp.sqrt(lanes.dot(away, away))
         # A cable that is shorter than that keeps only its end.
         part = jnp.where(length > leave, leave / jnp.where(length > leave, length, 1.0), 1.0)
@@ -254,10 +254,10 @@ def of_body(poses: PoseLanes, own: Own, solid: Ball | Rod) -> Array:
     Returns:
         (n,) complex: signed distance, m, and 0.
     """
-    zero, turn = jnp.zeros_like(poses.position[0]), _rotation(poses)
+    zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     rod = Rod(solid.centre, jnp.zeros_like(solid.centre), solid.radius) if isinstance(solid, Ball) else solid
-    start = _inward(turn, _less(_three(rod.start), poses.position))
-    ray = _inward(turn, [zero + x for x in _three(rod.ray)])
+    start = _inward(rotation, _less(_three(rod.start), poses.position))
+    ray = _inward(rotation, [zero + x for x in _three(rod.ray)])
     return nearest([_from_own(own, start, ray) - rod.radius])
 
 
@@ -272,10 +272,10 @@ def of_boxes(poses: PoseLanes, own: Brick, solid: Brick) -> Array:
     Returns:
         (n,) complex: no larger than the signed distance, with its sign, m, and 0.
     """
-    zero, turn = jnp.zeros_like(poses.position[0]), _rotation(poses)
-    axes = [_three(row) for row in own.turn]
-    edges = [lanes.turned_back(axes, _inward(turn, _three(column))) for column in solid.turn.T]
-    away = _inward(turn, _less(_three(solid.centre), poses.position))
+    zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
+    axes = [_three(row) for row in own.rotation]
+    edges = [lanes.turned_back(axes, _inward(rotation, _three(column))) for column in solid.rotation.T]
+    away = _inward(rotation, _less(_three(solid.centre), poses.position))
     centre, _ = _in_brick(own, away, [zero, zero, zero])
     return nearest([boxes(_three(own.half), centre, [tuple(zero + x for x in e) for e in edges], _three(solid.half))])
 
@@ -291,11 +291,11 @@ def of_hull_box(poses: PoseLanes, own: Polyhedron, solid: Brick) -> Array:
     Returns:
         (n,) complex: no larger than the signed distance, with its sign, m, and 0.
     """
-    zero, turn = jnp.zeros_like(poses.position[0]), _rotation(poses)
-    edges = [tuple(zero + x for x in _inward(turn, _three(column))) for column in solid.turn.T]
-    centre = _inward(turn, _less(_three(solid.centre), poses.position))
+    zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
+    edges = [tuple(zero + x for x in _inward(rotation, _three(column))) for column in solid.rotation.T]
+    centre = _inward(rotation, _less(_three(solid.centre), poses.position))
     return nearest([hull_box(own, centre, edges, _three(solid.half))])
 
 
-def _inward(turn: Matrix | None, vector: Vector) -> Vector:
-    return vector if turn is None else lanes.turned_back(turn, vector)
+def _inward(rotation: Matrix | None, vector: Vector) -> Vector:
+    return vector if rotation is None else lanes.turned_back(rotation, vector)

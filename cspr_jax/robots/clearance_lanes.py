@@ -241,13 +241,13 @@ def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
         normal, triangle = hull.normals[face], hull.triangles[face]
         for point in (a, tuple(x + y for x, y in zip(a, u, strict=True))):
             high = dot([normal[k] for k in range(3)], [point[k] - triangle[0, k] for k in range(3)])
-            is_above, turns = high >= 0.0, []
+            is_above, areas = high >= 0.0, []
             for i in range(3):
                 side, out = triangle[(i + 1) % 3] - triangle[i], [point[k] - triangle[i, k] for k in range(3)]
-                turns.append(dot([normal[k] for k in range(3)], cross([side[k] for k in range(3)], out)))
+                areas.append(dot([normal[k] for k in range(3)], cross([side[k] for k in range(3)], out)))
             # Either way around.
-            inside = ((turns[0] >= 0.0) & (turns[1] >= 0.0) & (turns[2] >= 0.0)) | (
-                (turns[0] <= 0.0) & (turns[1] <= 0.0) & (turns[2] <= 0.0)
+            inside = ((areas[0] >= 0.0) & (areas[1] >= 0.0) & (areas[2] >= 0.0)) | (
+                (areas[0] <= 0.0) & (areas[1] <= 0.0) & (areas[2] <= 0.0)
             )
             least = jnp.where(is_above & inside & (high < least), high, least)
         return least
@@ -332,14 +332,14 @@ def _of_edge(hull: Polyhedron, edge: Array, axes: Sequence[Vector], gap, largest
         [hull.edges[edge, 0, k] for k in range(3)],
         [[hull.sides[edge, i, k] for k in range(3)] for i in (0, 1)],
     )
-    along, turn = [hull.edges[edge, 1, k] - start[k] for k in range(3)], cross(a, b)
+    along, sense = [hull.edges[edge, 1, k] - start[k] for k in range(3)], cross(a, b)
     for axis in axes:
         line = cross(along, axis)
         # Rounding has left a part along the edge if the edges are nearly parallel.
         part = dot(line, along) / dot(along, along)
         line = tuple(x - part * y for x, y in zip(line, along, strict=True))
         square = dot(line, line)
-        from_a, to_b = dot(cross(a, line), turn), dot(cross(line, b), turn)
+        from_a, to_b = dot(cross(a, line), sense), dot(cross(line, b), sense)
         # Between the normals of both faces, one way or the other: there the edge reaches farthest.
         one = jnp.ones_like(square)
         sign = jnp.where(

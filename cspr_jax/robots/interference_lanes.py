@@ -80,16 +80,16 @@ def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vect
     return tuple(jnp.where(inside, w, jnp.where(is_first, a, b)) for w, a, b in zip(up, *left, strict=True))
 
 
-def cable_directions(cables: CableLanes, turn: Matrix) -> list[Vector]:
+def cable_directions(cables: CableLanes, rotation: Matrix) -> list[Vector]:
     """The cables from the platform to the spools, in the platform's axes; not of unit length.
 
     Args:
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
 
     Returns:
         one vector a cable, platform axes, m.
     """
-    return [turned_back(turn, tuple(-x for x in ray)) for ray in cables.rays]
+    return [turned_back(rotation, tuple(-x for x in ray)) for ray in cables.rays]
 
 
 def as_arrays(between: Sequence[Vector], directions: Sequence[Vector]) -> tuple[Array, Array]:

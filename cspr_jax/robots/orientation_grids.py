@@ -38,12 +38,12 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
         the grid; neighbours differ by one step in one angle.
     """
     count, step = 2 * divisions, math.pi / divisions
-    turn = np.arange(count) * step
-    torsion = np.where(turn > math.pi, turn - 2.0 * math.pi, turn)
+    circle = np.arange(count) * step
+    torsion = np.where(circle > math.pi, circle - 2.0 * math.pi, circle)
     tilts = np.arange(1, divisions) * step
     # Index of (tilt, azimuth, torsion), after the untilted ones.
     index = count + np.arange(len(tilts) * count * count).reshape(len(tilts), count, count)
-    mesh = np.meshgrid(tilts, turn, torsion, indexing="ij")
+    mesh = np.meshgrid(tilts, circle, torsion, indexing="ij")
     tilted = np.stack([mesh[1].ravel(), mesh[0].ravel(), mesh[2].ravel()], axis=1)
     upright = np.stack([np.zeros(count), np.zeros(count), torsion], axis=1)
     steps = [
@@ -85,8 +85,8 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
     middle[0], middle[-1] = 0.0, math.pi
     tilt = np.repeat(middle, cells)
     azimuth = np.concatenate([(np.arange(n) + 0.5 * (i % 2)) * 2.0 * math.pi / n for i, n in enumerate(cells)])
-    turn = np.arange(count) * step
-    torsion = np.where(turn > math.pi, turn - 2.0 * math.pi, turn)
+    circle = np.arange(count) * step
+    torsion = np.where(circle > math.pi, circle - 2.0 * math.pi, circle)
     angles = np.stack([np.repeat(azimuth, count), np.repeat(tilt, count), np.tile(torsion, len(tilt))], axis=1)
     return OrientationGrid(angles, np.full(len(angles), 1.0 / len(angles)), _near(angles, NEAR * step), 0)
 
@@ -111,10 +111,10 @@ def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, 
     areas = np.diff(-np.cos(edges)) if rings else np.ones(1)
     counts = [max(1, math.ceil(2.0 * math.pi * math.sin(x) / step - 1e-9)) for x in tilts]
     azimuth = np.concatenate([np.arange(n) * 2.0 * math.pi / n for n in counts])
-    turns = math.ceil(torsion / step - 1e-9)
-    sigma = np.linspace(-torsion, torsion, 2 * turns + 1)
+    steps = math.ceil(torsion / step - 1e-9)
+    sigma = np.linspace(-torsion, torsion, 2 * steps + 1)
     widths = np.ones(len(sigma))
-    if turns:
+    if steps:
         widths[[0, -1]] = 0.5
     angles = np.stack(
         [np.repeat(azimuth, len(sigma)), np.repeat(np.repeat(tilts, counts), len(sigma)), np.tile(sigma, len(azimuth))],
@@ -124,17 +124,17 @@ def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, 
     return angles, volume / volume.sum()
 
 
-def turn_grid(divisions: int, turn: float) -> tuple[np.ndarray, np.ndarray]:
-    """Turns about y, some pi / divisions apart.
+def planar_grid(divisions: int, largest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations about y, some pi / divisions apart.
 
     Args:
-        turn: the largest of either sign, in [0, pi], rad.
+        largest: angle of either sign, in [0, pi], rad.
 
     Returns:
-        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of the turns that each stands for.
+        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of the rotations that each stands for.
     """
-    steps = math.ceil(turn * divisions / math.pi - 1e-9)
-    theta, widths = np.linspace(-turn, turn, 2 * steps + 1), np.ones(2 * steps + 1)
+    steps = math.ceil(largest * divisions / math.pi - 1e-9)
+    theta, widths = np.linspace(-largest, largest, 2 * steps + 1), np.ones(2 * steps + 1)
     if steps:
         widths[[0, -1]] = 0.5
     return np.stack([np.full_like(theta, 0.5 * math.pi), theta, np.zeros_like(theta)], axis=1), widths / widths.sum()

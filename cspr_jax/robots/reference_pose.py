@@ -139,9 +139,9 @@ def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
     points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]
-    turns = [_straightest(points @ side.T, base) for side in sides]
-    best = int(np.argmax([nearness for _, nearness in turns]))
-    return about_vertical(turns[best][0]) @ sides[best]
+    torsions = [_straightest(points @ side.T, base) for side in sides]
+    best = int(np.argmax([nearness for _, nearness in torsions]))
+    return about_vertical(torsions[best][0]) @ sides[best]
 
 
 def _traced(robot: PlatformRobot) -> Any:
@@ -155,8 +155,8 @@ def _traced(robot: PlatformRobot) -> Any:
         across = x @ robot.base_points[:, 1] - y @ robot.base_points[:, 0]
         nearness = jnp.hypot(along, across)
         zero, one = jnp.zeros_like(along), jnp.ones_like(along)
-        turn = jnp.stack([along, -across, zero, across, along, zero, zero, zero, nearness]).reshape(3, 3) / nearness
-        both.append((nearness, jnp.where(nearness > ALIGNED * one, turn, jnp.eye(3)) @ side))
+        about_z = jnp.stack([along, -across, zero, across, along, zero, zero, zero, nearness]).reshape(3, 3) / nearness
+        both.append((nearness, jnp.where(nearness > ALIGNED * one, about_z, jnp.eye(3)) @ side))
     (first, rotation), (second, other) = both
     chosen = jnp.where(first >= second, rotation, other)
     return jnp.where(jnp.max(jnp.abs(chosen - jnp.eye(3))) < ALIGNED, jnp.eye(3), chosen)

@@ -52,11 +52,11 @@ def sensitivities(robot: Robot, position: Array, rotation: Array | None = None) 
         InputError: what `check_determined` refuses.
     """
     check_determined(robot)
-    turn = jnp.eye(_TRANSLATIONS) if rotation is None else rotation
-    rates = -robot.wrench_matrix(at_rest(position, turn)).T
+    rotation = jnp.eye(_TRANSLATIONS) if rotation is None else rotation
+    rates = -robot.wrench_matrix(at_rest(position, rotation)).T
     inverse, determinant = solved(rates, jnp.eye(robot.dof))
     if isinstance(robot, PlatformRobot):
-        determinant = normalised_determinant(robot, position, turn)
+        determinant = normalised_determinant(robot, position, rotation)
     return _of_inverse(inverse[:_TRANSLATIONS], inverse[_TRANSLATIONS:], determinant)
 
 

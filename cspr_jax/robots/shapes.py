@@ -57,13 +57,13 @@ class Box:
     Fields:
         centre: (3,) m.
         half: (3,) halves of the lengths of its edges, m.
-        turn: (3, 3) its axes, one a column.
+        rotation: (3, 3) its axes, one a column.
         name: for people.
     """
 
     centre: np.ndarray
     half: np.ndarray
-    turn: np.ndarray
+    rotation: np.ndarray
     name: str = "box"
 
 
@@ -139,12 +139,13 @@ def box(centre, size, quaternion=IDENTITY, *, name: str = "box") -> Box:
     Raises:
         InputError: not three coordinates or lengths, one negative, or not a unit quaternion.
     """
-    lengths, turn = _point("size", size), np.asarray(quaternion, float)
+    lengths, components = _point("size", size), np.asarray(quaternion, float)
     if not (lengths >= 0.0).all():
         raise InputError("size", size, "three lengths, none negative")
-    if turn.shape != (4,) or not abs(np.linalg.norm(turn) - 1.0) <= UNIT_TOLERANCE:
+    if components.shape != (4,) or not abs(np.linalg.norm(components) - 1.0) <= UNIT_TOLERANCE:
         raise InputError("quaternion", quaternion, "four numbers of a unit quaternion, scalar first")
-    return Box(_point("centre", centre), 0.5 * lengths, rotation_matrix(turn / np.linalg.norm(turn)), name)
+    rotation = rotation_matrix(components / np.linalg.norm(components))
+    return Box(_point("centre", centre), 0.5 * lengths, rotation, name)
 
 
 def box_between(lowest, highest, *, name: str = "box") -> Box:
@@ -223,7 +224,7 @@ def is_within(shape: Body, points: np.ndarray) -> np.ndarray:
         (n,) whether none is outside by more than `WITHIN`.
     """
     if isinstance(shape, Box):
-        out = (np.abs((points - shape.centre) @ shape.turn) - shape.half).max(1)
+        out = (np.abs((points - shape.centre) @ shape.rotation) - shape.half).max(1)
     else:
         out = (points @ shape.normals.T - shape.offsets).max(1)
     return out <= WITHIN
@@ -243,7 +244,7 @@ def inward(shape: Obstacle, frame: Frame) -> Obstacle:
         return dataclasses.replace(shape, start=frame.inward(shape.start), end=frame.inward(shape.end))
     if isinstance(shape, Sphere):
         return dataclasses.replace(shape, centre=frame.inward(shape.centre))
-    return dataclasses.replace(shape, centre=frame.inward(shape.centre), turn=frame.turned(shape.turn.T).T)
+    return dataclasses.replace(shape, centre=frame.inward(shape.centre), rotation=frame.turned(shape.rotation.T).T)
 
 
 def turned(shape: Body, frame: Frame) -> Body:
@@ -257,7 +258,7 @@ def turned(shape: Body, frame: Frame) -> Body:
         the shape, from the same point.
     """
     if isinstance(shape, Box):
-        return dataclasses.replace(shape, centre=frame.turned(shape.centre), turn=frame.turned(shape.turn.T).T)
+        return dataclasses.replace(shape, centre=frame.turned(shape.centre), rotation=frame.turned(shape.rotation.T).T)
     normals, triangles, edges, sides = map(frame.turned, (shape.normals, shape.triangles, shape.edges, shape.sides))
     return dataclasses.replace(shape, normals=normals, triangles=triangles, edges=edges, sides=sides)
 

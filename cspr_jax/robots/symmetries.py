@@ -82,8 +82,8 @@ def alike(symmetry: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.nd
         return stands
     # The axis of the tilt is no vector: phi becomes pi - phi, and sigma -sigma.
     both = np.concatenate([angles[mirrored], np.array([math.pi, 0.0, 0.0]) + angles[mirrored] * [-1.0, 1.0, -1.0]])
-    turns = [f(both[:, i]) for i in (0, 2) for f in (np.cos, np.sin)]
-    keys = np.round(np.stack([*turns, both[:, 1], *np.tile(places[mirrored], (2, 1)).T], axis=1), KEY_DIGITS) + 0.0
+    units = [f(both[:, i]) for i in (0, 2) for f in (np.cos, np.sin)]
+    keys = np.round(np.stack([*units, both[:, 1], *np.tile(places[mirrored], (2, 1)).T], axis=1), KEY_DIGITS) + 0.0
     same = np.unique(keys, axis=0, return_inverse=True)[1].reshape(2, -1).min(0)
     _, first, group = np.unique(same, return_index=True, return_inverse=True)
     stands[mirrored] = mirrored[first[group]]

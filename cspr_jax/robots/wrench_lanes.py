@@ -45,32 +45,32 @@ class Balance(NamedTuple):
     volume: Array
 
 
-def cable_lanes(robot: PlatformRobot, position: Vector, turn: Matrix) -> CableLanes:
+def cable_lanes(robot: PlatformRobot, position: Vector, rotation: Matrix) -> CableLanes:
     """The cables, (3.1).
 
     Args:
         position: of the mass centre, m.
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
 
     Returns:
         the cables.
     """
-    each = {k: turned(turn, [robot.platform_points[k, j] for j in range(3)]) for k in set(robot.joints)}
+    each = {k: turned(rotation, [robot.platform_points[k, j] for j in range(3)]) for k in set(robot.joints)}
     arms = [each[k] for k in robot.joints]
     rays = [tuple(position[i] + arm[i] - robot.base_points[k, i] for i in range(3)) for k, arm in enumerate(arms)]
     return CableLanes(arms, rays)
 
 
 def inertial_wrench(
-    robot: PlatformRobot, acceleration: Vector, turn: Matrix, omega: Vector, spin: Vector
+    robot: PlatformRobot, acceleration: Vector, rotation: Matrix, omega: Vector, angular_acceleration: Vector
 ) -> tuple[Vector, Vector]:
     """Right-hand side of (3.11), per mass.
 
     Args:
         acceleration: m/s^2.
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
         omega: rad/s.
-        spin: rad/s^2.
+        angular_acceleration: rad/s^2.
 
     Returns:
         force, m/s^2, and moment, m^2/s^2.
@@ -78,10 +78,10 @@ def inertial_wrench(
     inertia = robot.inertia / robot.mass
 
     def weighted(vector):
-        own_axes = turned_back(turn, vector)
-        return turned(turn, [dot([inertia[i, j] for j in range(3)], own_axes) for i in range(3)])
+        own_axes = turned_back(rotation, vector)
+        return turned(rotation, [dot([inertia[i, j] for j in range(3)], own_axes) for i in range(3)])
 
-    x, y = weighted(spin), cross(omega, weighted(omega))
+    x, y = weighted(angular_acceleration), cross(omega, weighted(omega))
     force = (acceleration[0], acceleration[1], acceleration[2] - robot.gravity)
     return force, tuple(a + b for a, b in zip(x, y, strict=True))
 
@@ -149,7 +149,7 @@ def normalised_determinant(robot: PlatformRobot, cables: CableLanes) -> Array:
 
 
 def cable_rates(
-    cables: CableLanes, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector
+    cables: CableLanes, velocity: Vector, acceleration: Vector, omega: Vector, angular_acceleration: Vector
 ) -> list[list[Array]]:
     """Lengths of the cables and their first two derivatives, (3.2) and (3.3).
 
@@ -157,7 +157,7 @@ def cable_rates(
         velocity: of the mass centre, per unit of time.
         acceleration: likewise.
         omega: angular velocity.
-        spin: angular acceleration.
+        angular_acceleration: likewise.
 
     Returns:
         lengths, rates, accelerations: six arrays (...) each.
@@ -166,7 +166,7 @@ def cable_rates(
     for arm, ray in zip(cables.arms, cables.rays, strict=True):
         swing = cross(omega, arm)
         pace = combined([(jnp.ones(()), velocity), (jnp.ones(()), swing)])
-        across, inward = cross(spin, arm), cross(omega, swing)
+        across, inward = cross(angular_acceleration, arm), cross(omega, swing)
         pull = tuple(acceleration[i] + across[i] + inward[i] for i in range(3))
         length = jnp.sqrt(dot(ray, ray))
         rate = dot(ray, pace) / length

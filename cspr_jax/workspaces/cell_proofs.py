@@ -129,8 +129,8 @@ def _geometry(robot: AnyRobot, quaternion: np.ndarray, unit: np.ndarray) -> tupl
     forces = np.repeat(axes[list(row.forces)].T[..., None], count, axis=2)
     if not isinstance(robot, PlatformRobot):
         return base, forces / unit[:, None]
-    turn = np.array([[float(x) for x in line] for line in lanes.rotation(tuple(quaternion))])
-    arms = np.asarray(robot.platform_points) @ turn.T
+    rotation = np.array([[float(x) for x in line] for line in lanes.rotation_matrix(tuple(quaternion))])
+    arms = np.asarray(robot.platform_points) @ rotation.T
     moments = np.cross(arms, axes[:, None])  # (3, n_cables, 3)
-    directions = turn @ np.asarray(across_line(robot)) if row.along_line else axes[:, list(row.moments)]
+    directions = rotation @ np.asarray(across_line(robot)) if row.along_line else axes[:, list(row.moments)]
     return base - arms, np.concatenate([forces, (moments @ directions).transpose(0, 2, 1)], axis=1) / unit[:, None]

@@ -48,11 +48,11 @@ def at_rest(robot: AnyRobot, around: Scene, positions: np.ndarray, quaternions: 
     Returns:
         the clearances.
     """
-    turns, ends = quaternions if PATTERNS[robot.pattern].is_body else None, None
+    body_quaternions, ends = quaternions if PATTERNS[robot.pattern].is_body else None, None
     pulleys = robot.pulleys
     if pulleys is not None:
         ends = in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
-    return clearances(around, positions, turns, ends=ends)
+    return clearances(around, positions, body_quaternions, ends=ends)
 
 
 def flags(found: Clearances) -> np.ndarray:

@@ -57,8 +57,8 @@ def turned_arms(robot: AnyRobot, quaternion: Vector) -> Vector | None:
     if not isinstance(robot, PlatformRobot):
         return None
     shape = robot.n_cables, len(quaternion[0])
-    turn = [[_along(x, shape) for x in row] for row in lanes.rotation(quaternion)]
-    return lanes.turned(turn, _down(robot.platform_points, shape))
+    rotation = [[_along(x, shape) for x in row] for row in lanes.rotation_matrix(quaternion)]
+    return lanes.turned(rotation, _down(robot.platform_points, shape))
 
 
 def _along(lane: Array, shape: tuple[int, int]) -> Array:
@@ -122,8 +122,8 @@ def _columns(
     if row.along_line:
         axes = [_down(jnp.broadcast_to(axis, (shape[0], 3)), shape) for axis in across_line(robot).T]
         if quaternion is not None:
-            turn = [[_along(x, shape) for x in line] for line in lanes.rotation(quaternion)]
-            axes = [lanes.turned(turn, axis) for axis in axes]
+            rotation = [[_along(x, shape) for x in line] for line in lanes.rotation_matrix(quaternion)]
+            axes = [lanes.turned(rotation, axis) for axis in axes]
         about: Sequence[Array] = [lanes.dot(axis, moment) for axis in axes]
     else:
         about = [moment[i] for i in row.moments]

@@ -17,7 +17,7 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, turn_grid
+from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, planar_grid
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.axes import TILT_TORSION
 from cspr_jax.schema.limits import LIMITS
@@ -53,7 +53,7 @@ class WorkspaceMap(GridMap):
             for name in ("orientation", "orientations"):
                 if getattr(self._asked, name) is not None:
                     raise ConfigError(file, f"workspace.{name}: must be absent: {robot_file.kind} has none")
-        self._turn = self._given_turns([self._asked.orientation], "workspace.orientation")
+        self._quaternion = self._unit_quaternions([self._asked.orientation], "workspace.orientation")
         self._samples, self._volume = self._orientation_set()
         try:
             check_cables(self._robot)
@@ -114,12 +114,12 @@ class WorkspaceMap(GridMap):
         values = {"speed": workspace.speed or 0.0, "angular_speed": workspace.angular_speed or 0.0}
         return cable_speeds(self._robot, np.asarray(most), **values)
 
-    def _given_turns(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
+    def _unit_quaternions(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
         # (k, 4) in the kernels' axes.
-        turns = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
-        if self._row.is_planar and turns[:, [1, 3]].any():
+        units = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
+        if self._row.is_planar and units[:, [1, 3]].any():
             raise ConfigError(self._file, f"{key}: must turn about y: that of a planar robot")
-        return self._frame.turned_quaternions(turns)
+        return self._frame.turned_quaternions(units)
 
     def _orientation_set(self) -> tuple[np.ndarray | None, np.ndarray]:
         # (k, 4) orientations and the part of the set that each stands for; None: there is no set.
@@ -127,20 +127,20 @@ class WorkspaceMap(GridMap):
         if workspace.orientations is None:
             return None, np.ones(1)
         if workspace.quaternions is not None:
-            turns = self._given_turns(workspace.quaternions, "workspace.quaternions")
-            return products(turns, self._turn), np.full(len(turns), 1.0 / len(turns))
+            quaternions = self._unit_quaternions(workspace.quaternions, "workspace.quaternions")
+            return products(quaternions, self._quaternion), np.full(len(quaternions), 1.0 / len(quaternions))
         divisions = workspace.divisions or DIVISIONS
         tilt = math.pi if workspace.tilt_max is None else workspace.tilt_max
         if self._row.is_planar:
             if workspace.torsion_max is not None:
                 raise ConfigError(self._file, "workspace.torsion_max: must be absent for a planar robot")
-            angles, volume = turn_grid(divisions, tilt)
+            angles, volume = planar_grid(divisions, tilt)
         elif workspace.tilt_max is None:
             grid = equal_volume_grid(divisions)
             angles, volume = grid.angles, grid.volume
         else:
             angles, volume = cone_grid(divisions, tilt, workspace.torsion_max or 0.0)
-        return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._turn), volume
+        return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._quaternion), volume
 
     def _search(self, name: str, capacity_length: float | None = None) -> WorkspaceSearch:
         loads = None
@@ -161,16 +161,16 @@ class WorkspaceMap(GridMap):
             kind: OrientationSet = "total" if self._asked.orientations in ("total", "dextrous") else "inclusion"
             set_answers = over_orientations(self._poses, places, self._samples, self._volume, kind)
             return set_answers | {"cell_side": np.zeros(len(places), np.int16)}
-        turns = np.repeat(self._turn, len(places), axis=0)
+        quaternions = np.repeat(self._quaternion, len(places), axis=0)
         if any(name in cells for name in TILT_TORSION):
             angles = np.stack([cells.get(name, np.zeros(len(places))) for name in TILT_TORSION], axis=1)
             if self._row.is_planar:
                 angles[:, 0] = 0.5 * math.pi
-            turns = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), turns)
-        answers = self._poses(places, turns)
+            quaternions = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), quaternions)
+        answers = self._poses(places, quaternions)
         sides = np.zeros(len(places), np.int16)
         if self._asked.prove:
-            sides = self._poses.sides(places, self._half_sizes(cells), self._turn[0])
+            sides = self._poses.sides(places, self._half_sizes(cells), self._quaternion[0])
         return answers | {"orientation_fraction": (answers["verdict"] == 0).astype(float), "cell_side": sides}
 
     def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:

@@ -101,24 +101,24 @@ class RestPoses:
         Returns:
             (n,) 0: neither is proved; 1: inside; 2: outside, as `schema.meanings.CELL_SIDES` has them.
         """
-        turns = np.repeat(quaternion[None], len(origins), axis=0)
-        places, reach = mass_centres(self.robot, origins, turns), np.linalg.norm(half, axis=1)
+        quaternions = np.repeat(quaternion[None], len(origins), axis=0)
+        places, reach = mass_centres(self.robot, origins, quaternions), np.linalg.norm(half, axis=1)
         inside, outside = np.ones(len(origins), bool), np.zeros(len(origins), bool)
         for search in self.searches.values():
-            held, lost = WorkspaceCells(self.robot, search.asked)(places, half, quaternion, search(places, turns))
+            held, lost = WorkspaceCells(self.robot, search.asked)(places, half, quaternion, search(places, quaternions))
             inside, outside = inside & held, outside | lost
-        moved = shifts(self.robot, places, turns, reach)
+        moved = shifts(self.robot, places, quaternions, reach)
         if self.robot.pulleys is not None:
             # A platform within a pulley has no cable there.
             inside &= (moved.free > 0.0).all(1)
         slacks = list[tuple[np.ndarray, np.ndarray]]()
         if self.around is not None:
-            distances = at_rest(self.robot, self.around, places, turns)
+            distances = at_rest(self.robot, self.around, places, quaternions)
             slacks += [(getattr(distances, of)[:, None], getattr(moved, of)[:, None]) for of in ("cables", "obstacles")]
             inside &= (distances.platform > moved.near_platform(self.around) + CLOSE) & ~distances.is_open
             outside |= distances.platform < -moved.platform - CLOSE
         changes = {} if self.speeds is None else {"speed_margin": self.speeds.changes(moved)}
-        slacks += [(slack, changes.get(name, reach[:, None])) for name, _, slack in self._limited(origins, turns)]
+        slacks += [(slack, changes.get(name, reach[:, None])) for name, _, slack in self._limited(origins, quaternions)]
         for slack, change in slacks:
             inside &= (slack > change + CLOSE).all(1)
             outside |= (slack < -change - CLOSE).any(1)

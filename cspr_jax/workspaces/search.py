@@ -137,9 +137,9 @@ class WorkspaceSearch:
         """
         if len(positions) == 0:
             return WorkspaceAnswers(np.zeros(0, FLAGS), np.zeros(0), np.zeros(0, bool))
-        turns = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
-        loads = self._weights(positions, turns) if wrenches is None else wrenches / self.unit
-        poses = Poses(positions, turns, loads)
+        quaternions = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
+        loads = self._weights(positions, quaternions) if wrenches is None else wrenches / self.unit
+        poses = Poses(positions, quaternions, loads)
         parts = in_parts(lambda part: self._part(poses.some(part)), len(positions), PART)
         margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
         verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
@@ -160,10 +160,10 @@ class WorkspaceSearch:
         regular = np.zeros((0, self._robot.dof, self._robot.n_cables))
         for widening in range(WIDENINGS):
             places = middle + 2.0**widening * half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
-            turns = np.array(IDENTITY) + 0.2 * rng.normal(size=(TRIALS, 4))
+            quaternions = np.array(IDENTITY) + 0.2 * rng.normal(size=(TRIALS, 4))
             if row.is_planar:
-                turns[:, [1, 3]] = 0.0
-            matrices = self._matrices(places, turns / np.linalg.norm(turns, axis=1, keepdims=True))
+                quaternions[:, [1, 3]] = 0.0
+            matrices = self._matrices(places, quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
             regular = np.concatenate([regular, matrices[np.isfinite(matrices).all((1, 2))]])
             if len(regular) >= FEW_TRIALS:
                 return regular
@@ -243,8 +243,8 @@ class WorkspaceSearch:
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
 
-        def compiled(place, turn, load):
-            columns, loss = geometry.wrench_columns(robot, place, turn, length)
+        def compiled(place, quaternion, load):
+            columns, loss = geometry.wrench_columns(robot, place, quaternion, length)
             wrenches = fixed if load is None else fixed._replace(points=[load])
             if not by_null_space:
                 return kernels.by_normals(columns, loss, wrenches, tension_limits, choices, **options)
@@ -260,9 +260,9 @@ class WorkspaceSearch:
             return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
         def stage(poses):
-            turns = lanes(poses.quaternions) if is_body else None
+            quaternions = lanes(poses.quaternions) if is_body else None
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
-            batch = lanes(poses.positions), turns, loads
+            batch = lanes(poses.positions), quaternions, loads
             # Two lengths, since each is compiled.
             size = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch(dtype)
             return in_batches(lambda x: compiled(*x), batch, size=size)

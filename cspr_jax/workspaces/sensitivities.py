@@ -27,7 +27,7 @@ def _of_point_mass(robot: PointMassRobot, places) -> Sensitivities:
 
 @jax.jit
 def _of_platform(robot: PlatformRobot, poses) -> Sensitivities:
-    return jax.vmap(lambda place, turn: sensitivities(robot, place, matrix(turn)))(*poses)
+    return jax.vmap(lambda place, quaternion: sensitivities(robot, place, matrix(quaternion)))(*poses)
 
 
 @jax.jit
@@ -75,8 +75,8 @@ class SensitivitySearch:
             first, second = points[pairs.cables[:, 0]], points[pairs.cables[:, 1]]
             geometry = (leaf(pairs.exit_points), leaf(second - first), leaf(np.sqrt((points**2).sum(1).mean())))
             return in_batches(partial(_of_pairs, geometry), positions, size=BATCH)
-        turns = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
-        return in_batches(partial(_of_platform, robot), (positions, turns), size=BATCH)
+        quaternions = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
+        return in_batches(partial(_of_platform, robot), (positions, quaternions), size=BATCH)
 
 
 def _pairs(robot: PlatformRobot) -> ParallelPairs | None:

@@ -54,18 +54,18 @@ class WorkspaceCells:
         proved = np.zeros(len(positions), bool)
         chosen = np.flatnonzero(side)
         if len(chosen) and self._robot.pulleys is None:
-            turn = np.array(IDENTITY) if quaternion is None else np.asarray(quaternion)
+            quaternion = np.array(IDENTITY) if quaternion is None else np.asarray(quaternion)
             sizes = np.broadcast_to(np.asarray(half, float), positions.shape)[chosen]
             with double_precision():
-                proofs = CellProofs(self._robot, self._asked, self._search, turn)
+                proofs = CellProofs(self._robot, self._asked, self._search, quaternion)
                 for first in range(0, len(chosen), ROUND):
                     rows = slice(first, first + ROUND)
                     numbers = chosen[rows]
                     cells = positions[numbers], sizes[rows], side[numbers], answers.margin[numbers]
-                    proved[numbers] = self._proved(proofs, turn, *cells, depth)
+                    proved[numbers] = self._proved(proofs, quaternion, *cells, depth)
         return proved & (side > 0), proved & (side < 0)
 
-    def _proved(self, proofs, turn, centres, half, side, margin, depth) -> np.ndarray:
+    def _proved(self, proofs, quaternion, centres, half, side, margin, depth) -> np.ndarray:
         """Tell whether cells lie wholly on the side of their centres, halved as often as `depth` allows."""
         is_proved = np.zeros(len(centres), bool)
         inside, outside = np.flatnonzero(side > 0), np.flatnonzero(side < 0)
@@ -79,20 +79,19 @@ class WorkspaceCells:
         corners = np.array(list(itertools.product(*[(-0.5, 0.5) if size else (0.0,) for size in half.max(0)])))
         # Only those can be proved all of whose parts have their centres on the same side.
         inner = centres[left, None] + corners * half[left, None]
-        sides, margins = self._centres(inner.reshape(-1, 3), turn)
+        sides, margins = self._centres(inner.reshape(-1, 3), quaternion)
         sides, margins = (values.reshape(inner.shape[:2]) for values in (sides, margins))
         agreeing = (sides == side[left, None]).all(1)
         if agreeing.any():
             halved, count = left[agreeing], len(corners)
             halves, part_sides = (np.repeat(values[halved], count, axis=0) for values in (0.5 * half, side))
-            parts = self._proved(
-                proofs, turn, inner[agreeing].reshape(-1, 3), halves, part_sides, margins[agreeing].ravel(), depth - 1
-            )
+            cells = inner[agreeing].reshape(-1, 3), halves, part_sides, margins[agreeing].ravel()
+            parts = self._proved(proofs, quaternion, *cells, depth - 1)
             is_proved[halved] = parts.reshape(-1, count).all(1)
         return is_proved
 
-    def _centres(self, positions: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        answers = self._search(positions, np.tile(turn, (len(positions), 1)))
+    def _centres(self, positions: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        answers = self._search(positions, np.tile(quaternion, (len(positions), 1)))
         return _sides(answers), answers.margin
 
 

@@ -176,11 +176,11 @@ def as_lanes(problem, batch, p, t, *, pairs):
     """Slacks (n_criteria, n), vectors between cables and directions of cables of motions, by the fast forms."""
     now = instant(problem.amplitude, batch.sense, p, t)
     here = state(batch, p, now, USUAL)
-    cables = cable_lanes(problem.robot, here.position, here.turn)
+    cables = cable_lanes(problem.robot, here.position, here.rotation)
     slacks = moving_slacks(problem, batch, p, now, USUAL) + still_slacks(problem, batch, here, cables)
     gaps = interference_lanes.gaps(problem.robot.base_points, pairs, cables)
     return jnp.stack(slacks), *interference_lanes.as_arrays(
-        gaps, interference_lanes.cable_directions(cables, here.turn)
+        gaps, interference_lanes.cable_directions(cables, here.rotation)
     )
 
 
