@@ -40,16 +40,9 @@ class MinimumBlocks(NamedTuple):
     start: np.ndarray
     width: np.ndarray
 
-    def some(self, which) -> "MinimumBlocks":
-        """Some of the blocks.
-
-        Args:
-            which: an index of them.
-
-        Returns:
-            these.
-        """
-        return MinimumBlocks(*(x[which] for x in self))
+    def rows(self, index) -> "MinimumBlocks":
+        """Blocks chosen by an index, or by a mask (n_blocks,)."""
+        return MinimumBlocks(*(x[index] for x in self))
 
     def halved(self) -> "MinimumBlocks":
         """Both halves of each block.
@@ -94,11 +87,11 @@ def smallest(
         np.minimum.at(done, blocks.case[~is_open], low[~is_open])
         if not is_open.any():
             break
-        blocks = blocks.some(is_open).halved()
+        blocks = blocks.rows(is_open).halved()
     return Proved(best, done)
 
 
 def _of(values, blocks: MinimumBlocks, size: int) -> tuple[np.ndarray, np.ndarray]:
-    parts = [values(blocks.some(slice(i, i + size))) for i in range(0, len(blocks.case), size)]
+    parts = [values(blocks.rows(slice(i, i + size))) for i in range(0, len(blocks.case), size)]
     low, attained = (np.concatenate(x) for x in zip(*parts, strict=True))
     return low, attained

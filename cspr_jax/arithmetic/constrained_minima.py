@@ -51,7 +51,7 @@ def _slopes(parts: Parts, arguments: Any, x: Array) -> tuple[Array, Array]:
 
 
 def least(
-    parts: Parts, given: Any, low: np.ndarray, high: np.ndarray, judged: Callable[[np.ndarray], Judged]
+    parts: Parts, arguments: Any, low: np.ndarray, high: np.ndarray, judged: Callable[[np.ndarray], Judged]
 ) -> np.ndarray:
     """Unknowns with the least objective among feasible ones: a local minimum, or the best of several.
 
@@ -68,7 +68,7 @@ def least(
 
     share = qmc.Halton(len(low), seed=0).random(LOOKED_AT)
     places = low + (high - low) * share
-    value, margin = in_batches(partial(_screened, parts, given), places, size=BATCH)
+    value, margin = in_batches(partial(_screened, parts, arguments), places, size=BATCH)
     usable = np.isfinite(value) & np.isfinite(margin)
     margin = np.where(usable, margin, -np.inf)
     # Feasible places come first, the smallest objective ahead; then the places that are nearest to being feasible.
@@ -76,8 +76,8 @@ def least(
     best, verdict = places[order[0]], judged(places[order[0]])
     size = float(value[order[0]])
     for start in places[order[:IMPROVED]]:
-        candidate = _improved(parts, given, start, list(zip(low, high, strict=True)), judged)
-        other, length = judged(candidate), float(_both(parts, given, jnp.asarray(candidate))[0])
+        candidate = _improved(parts, arguments, start, list(zip(low, high, strict=True)), judged)
+        other, length = judged(candidate), float(_both(parts, arguments, jnp.asarray(candidate))[0])
         if (other.feasible, -length if other.feasible else other.margin) > (
             verdict.feasible,
             -size if verdict.feasible else verdict.margin,

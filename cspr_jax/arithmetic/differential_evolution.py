@@ -113,26 +113,26 @@ def _rank(value: Array, margin: Array, threshold: Array) -> Array:
 
 
 def evolved(
-    parts: Parts, given: Any, questions: Any, *, unknowns: int, asked: tuple[float, ...], population: int
+    parts: Parts, arguments: Any, questions: Any, *, unknowns: int, margins: tuple[float, ...], population: int
 ) -> np.ndarray:
     """Best places of many questions.
 
     Args:
         parts: a function of a module, as it is compiled once.
         questions: pytree of NumPy arrays (n, ...).
-        asked: margins, below 1, at which the objective is to be least; inf: the margin is to be largest.
+        margins: below 1, at each of which the objective is to be least; inf: the margin is to be largest.
         population: members of it; one twice as large takes four times as long.
 
     Returns:
-        (n, n_asked, d) in [0, 1]; where no place found has the margin, the one with the largest.
+        (n, n_margins, d) in [0, 1]; where no place found has the margin, the one with the largest.
     """
     from scipy.stats import qmc  # it takes a second to import
 
     places = qmc.Halton(unknowns, seed=0).random(GROUP * population)
     base_moves = moves_of(unknowns, population)
     # Each search gets its own moves: one may find the place that another one misses.
-    moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(asked))]), base_moves)
-    kernel = partial(_evolved, parts, given, np.asarray(asked), places, moves)
+    moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(margins))]), base_moves)
+    kernel = partial(_evolved, parts, arguments, np.asarray(margins), places, moves)
 
     def part(rows: slice) -> np.ndarray:
         return in_batches(kernel, jax.tree.map(lambda x: x[rows], questions), size=BATCH)

@@ -76,18 +76,18 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
     return Accessible(grid.angles[inside], grid.volume[inside], float(inside.mean()))
 
 
-def accessible_sets(robot: PlatformRobot, asked: Sequence[tuple[np.ndarray, int]], definition: str) -> list[Accessible]:
+def accessible_sets(robot: PlatformRobot, grids: Sequence[tuple[np.ndarray, int]], definition: str) -> list[Accessible]:
     """The accessible orientations of many places, by two threads.
 
     Args:
         robot: centred, in its reference axes.
-        asked: of each its place (3,), m, and its divisions of pi.
+        grids: the place (3,), m, and the divisions of pi of each.
         definition: one of `DEFINITIONS`.
 
     Returns:
         the orientations of each; see `accessible`.
     """
-    return in_threads(lambda one: accessible(robot, one[0], definition, one[1]), asked)
+    return in_threads(lambda grid: accessible(robot, grid[0], definition, grid[1]), grids)
 
 
 def _scan(steps: OrientationSteps, towards: np.ndarray, divisions: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -58,9 +58,9 @@ class PlatformMotionAnswers(Answers):
             "beta_hat": [float(value) for value in self.beta_hat[i]],
         }
 
-    def rows(self, which: np.ndarray) -> "PlatformMotionAnswers":
+    def rows(self, index: np.ndarray) -> "PlatformMotionAnswers":
         """Answers chosen by indices, or by a mask (n,)."""
-        return PlatformMotionAnswers(**{name: values[which] for name, values in vars(self).items()})
+        return PlatformMotionAnswers(**{name: values[index] for name, values in vars(self).items()})
 
 
 def settled(

@@ -48,14 +48,14 @@ class Candidates(NamedTuple):
     motion: np.ndarray
     beta_hats: tuple[np.ndarray, np.ndarray]
 
-    def rows(self, which: np.ndarray) -> "Candidates":
+    def rows(self, index: np.ndarray) -> "Candidates":
         """Candidates chosen by indices, or by a mask (n,)."""
-        return self._replace(motion=self.motion[which], beta_hats=(self.beta_hats[0][which], self.beta_hats[1][which]))
+        return self._replace(motion=self.motion[index], beta_hats=(self.beta_hats[0][index], self.beta_hats[1][index]))
 
-    def motions(self, which: np.ndarray) -> "Candidates":
+    def motions(self, index: np.ndarray) -> "Candidates":
         """Motions of one candidate each, chosen by indices."""
-        start, end, beta_hats = ((a[which], b[which]) for a, b in (self.start, self.end, self.beta_hats))
-        return Candidates(start, end, self.z0[which], np.arange(len(which)), beta_hats)
+        start, end, beta_hats = ((a[index], b[index]) for a, b in (self.start, self.end, self.beta_hats))
+        return Candidates(start, end, self.z0[index], np.arange(len(index)), beta_hats)
 
 
 class FewestArcs(NamedTuple):

@@ -26,7 +26,7 @@ from cspr_jax.platforms.motion_checker import BESIDE_KNOT, FEW, MANY, MotionChec
 from cspr_jax.platforms.motions import Motions
 from cspr_jax.platforms.place_proof import PlaceCertifier, PlaceProof
 from cspr_jax.platforms.platform_segment import PlatformSegment
-from cspr_jax.platforms.platform_segment_lanes import instant, state
+from cspr_jax.platforms.platform_segment_lanes import instant_lanes, state
 from cspr_jax.platforms.proof import Certifier, TensionProof
 from cspr_jax.platforms.sieve import FIRST, TensionSieve
 from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
@@ -64,11 +64,11 @@ def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind
         digits; the smallest distance between cables, m.
     """
     segments, arcs, tau = items
-    instant_lanes = instant(problem.amplitude, segments.sense, arcs, tau)
-    here = state(segments, arcs, instant_lanes, kind)
+    instant = instant_lanes(problem.amplitude, segments.sense, arcs, tau)
+    here = state(segments, arcs, instant, kind)
     cables = cable_lanes(problem.robot, here.position, here.rotation)
     slacks = [
-        *moving_slacks(problem, segments, arcs, instant_lanes, kind),
+        *moving_slacks(problem, segments, arcs, instant, kind),
         *still_slacks(problem, segments, here, cables),
     ]
     squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]

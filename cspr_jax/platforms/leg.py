@@ -61,7 +61,7 @@ class _Poses(Leg):
                 if pose.beta_hat is not None:
                     raise ConfigError(path, f'{stops.name(i)}.beta_hat: must be absent with beat = "{keys.beat}"')
         super().__init__(stops)
-        self._kind = PlatformMotionKind(self.variable, keys.beat == "beta_1")
+        self._kind = PlatformMotionKind(variable=self.variable, plain=keys.beat == "beta_1")
         self._given = np.array([_orientation(stops.name(i), pose, path) for i, pose in enumerate(stops.poses)])
 
     def _quaternions(self, points: np.ndarray) -> np.ndarray:

@@ -49,7 +49,7 @@ class _Around(NamedTuple):
         return _size(self.mean) * other.off + _size(other.mean) * self.off + self.off * other.off
 
 
-def cables_meet(base: np.ndarray, pairs: np.ndarray, found: CablesOfStep) -> np.ndarray:
+def cables_meet(base: np.ndarray, pairs: np.ndarray, cables: CablesOfStep) -> np.ndarray:
     """Steps in which two cables meet for certain.
 
     Args:
@@ -59,14 +59,14 @@ def cables_meet(base: np.ndarray, pairs: np.ndarray, found: CablesOfStep) -> np.
     Returns:
         (n,) one of each block, from 0 on; -1: none.
     """
-    meets = np.full(found.rays.shape[1], -1)
+    meets = np.full(cables.rays.shape[1], -1)
     i, j = pairs.T
     apart = base[j] - base[i]
-    u, v = found.rays[:, :, i], found.rays[:, :, j]
+    u, v = cables.rays[:, :, i], cables.rays[:, :, j]
     volume = (np.cross(apart, u) * v).sum(-1)
     step, block, pair = _sign_changes(volume, _size(apart) * (_size(u) * _size(v)).max(0))
-    first = _within(found.rays, (step, block, i[pair]), found.bent)
-    second = _within(found.rays, (step, block, j[pair]), found.bent)
+    first = _within(cables.rays, (step, block, i[pair]), cables.bent)
+    second = _within(cables.rays, (step, block, j[pair]), cables.bent)
     between = _Around(apart[pair], np.zeros(len(pair)))
     normal = first.cross(second)
     least = normal.dot(normal)[0]
@@ -79,7 +79,7 @@ def cables_meet(base: np.ndarray, pairs: np.ndarray, found: CablesOfStep) -> np.
     return meets
 
 
-def cables_hit(sides: np.ndarray, normal: np.ndarray, found: CablesOfStep) -> np.ndarray:
+def cables_hit(sides: np.ndarray, normal: np.ndarray, cables: CablesOfStep) -> np.ndarray:
     """Steps in which a cable lies on the platform for certain.
 
     Args:
@@ -89,9 +89,10 @@ def cables_hit(sides: np.ndarray, normal: np.ndarray, found: CablesOfStep) -> np
     Returns:
         (n,) one of each block, from 0 on; -1: none.
     """
-    hits = np.full(found.seen.shape[1], -1)
-    step, block, cable = _sign_changes(found.seen @ normal, _size(found.seen).max(0))
-    seen = _within(found.seen, (step, block, cable), np.broadcast_to(found.seen_bent[:, None], found.seen.shape[1:3]))
+    hits = np.full(cables.seen.shape[1], -1)
+    step, block, cable = _sign_changes(cables.seen @ normal, _size(cables.seen).max(0))
+    bent = np.broadcast_to(cables.seen_bent[:, None], cables.seen.shape[1:3])
+    seen = _within(cables.seen, (step, block, cable), bent)
     one, two = sides[cable, 0], sides[cable, 1]
     # The area that a vector spans with a side changes by no more than the side's length times how far the vector moves.
     inside = np.cross(two, seen.mean) @ normal > _size(two) * seen.off

@@ -47,25 +47,25 @@ class PlatformChecks:
     tolerated: np.ndarray
     not_tolerated: np.ndarray
 
-    def put(self, which: np.ndarray, others: "PlatformChecks") -> None:
+    def put(self, index: np.ndarray, others: "PlatformChecks") -> None:
         """Write other checks into these.
 
         Args:
-            which: (m,) their places.
+            index: (m,) their places.
         """
         for column, new_column in zip(vars(self).values(), vars(others).values(), strict=True):
-            column[which] = new_column
+            column[index] = new_column
 
-    def rows(self, which: np.ndarray) -> "PlatformChecks":
+    def rows(self, index: np.ndarray) -> "PlatformChecks":
         """Checks of some of the motions.
 
         Args:
-            which: (m,) indices.
+            index: (m,) indices.
 
         Returns:
             those of m motions.
         """
-        return PlatformChecks(**{name: values[which] for name, values in vars(self).items()})
+        return PlatformChecks(**{name: values[index] for name, values in vars(self).items()})
 
 
 class Sieve(Protocol):

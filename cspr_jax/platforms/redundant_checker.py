@@ -76,8 +76,8 @@ class RedundantChecker(MotionChecker):
         self._rows = other_limits(limits)
         basic = (Verdict.WRENCH_INFEASIBLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS)
         self.flags, self.sieve = (*basic, *(row.flag for row in self._rows)), MarginSieve(self)
-        self._asked = requirement(robot, FEASIBLE, limits)
-        self._workspace = WorkspaceSearch(robot, self._asked)
+        self._requirement = requirement(robot, FEASIBLE, limits)
+        self._workspace = WorkspaceSearch(robot, self._requirement)
         self._weight = float(robot.mass * robot.gravity) / robot.n_cables
         self._pairs = np.array(pairs_apart(robot), int).reshape(-1, 2)
         size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
@@ -116,7 +116,7 @@ class RedundantChecker(MotionChecker):
         # The wrench is linear in beta-hat, and so is the distance from each plane: the margin, the least, is concave.
         matrix, wrenches = (np.asarray(x) for x in end_wrenches(self.problem.robot, position, quaternion, z0))
         unit = self._workspace.unit
-        planes = exact.margin_planes(matrix / unit[:, None], self._asked.low, self._asked.high)
+        planes = exact.margin_planes(matrix / unit[:, None], self._requirement.low, self._requirement.high)
         if exact.is_outside(wrenches / unit, planes.basis):
             return AT_REST, *NONE
         first, second = planes.offsets - (wrenches / unit) @ planes.normals.T

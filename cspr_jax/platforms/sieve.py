@@ -21,7 +21,7 @@ from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.from_rest_lanes import rest_table, swing, swings
 from cspr_jax.platforms.motions import rows
 from cspr_jax.platforms.platform_segment import PlatformSegment
-from cspr_jax.platforms.platform_segment_lanes import instant
+from cspr_jax.platforms.platform_segment_lanes import instant_lanes
 from cspr_jax.platforms.slack_lanes import certain_tension, lowest_tension
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import balance, cable_lanes
@@ -60,7 +60,7 @@ def smallest_tensions(
     if kind.from_rest:
         at, table = _from_rest(robot, segments), cast(rest_table(amplitude, arcs, tau, kind))
     else:
-        table = cast(jax.vmap(lambda t: instant(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
+        table = cast(jax.vmap(lambda t: instant_lanes(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
 
         def at(instant_lanes):
             return lowest_tension(robot, segments, number, instant_lanes, kind)
@@ -125,7 +125,8 @@ def _rough_and_certain(
     when = jnp.minimum(when, len(tau) - 1)  # there is none where all are NaN
     if kind.from_rest:
         return lowest, _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
-    return lowest, lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau[when]), kind)
+    instant = instant_lanes(amplitude, segments.sense, arcs, tau[when])
+    return lowest, lowest_tension(robot, segments, arcs, instant, kind)
 
 
 class TensionSieve(NamedTuple):

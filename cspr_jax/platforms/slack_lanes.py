@@ -68,7 +68,7 @@ def certain_tension(rate: Array, regular: Array, cables: CableLanes, balance: Ba
 
 
 def lowest_tension(
-    robot: PlatformRobot, segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
+    robot: PlatformRobot, segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind
 ) -> Array:
     """The smallest tension at one instant of many segments.
 
@@ -80,14 +80,14 @@ def lowest_tension(
     Returns:
         (n,) of `certain_tension`.
     """
-    here = state(segment, arcs, now, kind)
+    here = state(segment, arcs, instant, kind)
     cables = cable_lanes(robot, here.position, here.rotation)
     balance = _balanced(robot, here, cables, squared_duration(segment, arcs))
     return certain_tension(segment.rate, segment.regular, cables, balance)
 
 
 def moving_slacks(
-    problem: Problem, segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
+    problem: Problem, segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind
 ) -> list[Array]:
     """Smallest slacks of the criteria that depend on the motion, at one instant of many segments.
 
@@ -101,7 +101,7 @@ def moving_slacks(
         digits.
     """
     robot, limits = problem.robot, problem.limits
-    here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
+    here, squared = state(segment, arcs, instant, kind), squared_duration(segment, arcs)
     cables = cable_lanes(robot, here.position, here.rotation)
     balance = _balanced(robot, here, cables, squared)
     is_flat = _is_flat(cables, balance)

@@ -184,19 +184,19 @@ def clearances(
     answers = _all(scene, poses, threshold, np.dtype(dtype))
     again = np.flatnonzero(answers.is_open)
     if dtype == "float32" and len(again):
-        for old, new in zip(answers, _all(scene, poses.some(again), threshold, np.dtype("float64")), strict=True):
+        for old, new in zip(answers, _all(scene, poses.rows(again), threshold, np.dtype("float64")), strict=True):
             old[again] = new
     return answers
 
 
-class _Given(NamedTuple):
+class _CheckedPoses(NamedTuple):
     place: np.ndarray  # (n, 3)
     quaternion: np.ndarray | None  # (n, 4)
     spools: np.ndarray | None  # (n, n_cables, 3)
 
-    def some(self, which) -> "_Given":
-        quaternion, spools = (None if x is None else x[which] for x in self[1:])
-        return _Given(self.place[which], quaternion, spools)
+    def rows(self, index) -> "_CheckedPoses":
+        quaternion, spools = (None if x is None else x[index] for x in self[1:])
+        return _CheckedPoses(self.place[index], quaternion, spools)
 
     def lanes(self, origin: np.ndarray, dtype: np.dtype) -> kernels.PoseLanes:
         def columns(array):
@@ -207,7 +207,7 @@ class _Given(NamedTuple):
         return kernels.PoseLanes(columns(self.place - origin), quaternion, ends)
 
 
-def _checked(scene: Scene, positions, quaternions, ends) -> _Given:
+def _checked(scene: Scene, positions, quaternions, ends) -> _CheckedPoses:
     place = np.asarray(positions, float)
     if place.ndim != 2 or place.shape[1] != 3:
         raise InputError("positions", None, "must be (n, 3)", fault=f"an array of shape {place.shape}")
@@ -219,10 +219,10 @@ def _checked(scene: Scene, positions, quaternions, ends) -> _Given:
         return array
 
     quaternion = checked("quaternions", quaternions, (len(place), 4))
-    return _Given(place, quaternion, checked("ends", ends, (len(place), len(scene.base_points), 3)))
+    return _CheckedPoses(place, quaternion, checked("ends", ends, (len(place), len(scene.base_points), 3)))
 
 
-def _all(scene: Scene, all_poses: _Given, threshold: float, dtype: np.dtype) -> Clearances:
+def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dtype) -> Clearances:
     # From the centroid of the spools, so that float32 has the digits where they are needed.
     origin = scene.base_points.mean(0)
     terms = list(_terms(scene, origin, dtype))
@@ -231,7 +231,7 @@ def _all(scene: Scene, all_poses: _Given, threshold: float, dtype: np.dtype) -> 
     bound = ROUNDING * float(np.finfo(dtype).eps)
 
     def one(part: slice) -> Clearances:
-        poses = all_poses.some(part).lanes(origin, dtype)
+        poses = all_poses.rows(part).lanes(origin, dtype)
         answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, size=BATCH)
         answer = _least([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
         far = [np.abs(x) for x in poses.position]

@@ -107,7 +107,7 @@ class Brick(NamedTuple):
 
 
 Solid: TypeAlias = Ball | Rod | Brick
-Own: TypeAlias = Brick | Polyhedron
+BodyShape: TypeAlias = Brick | Polyhedron
 
 
 def _three(array: Array) -> Vector:
@@ -213,12 +213,12 @@ def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]
 
 
 @jax.jit
-def of_platform(points: Points, poses: PoseLanes, own: Own, leave: Array) -> Array:
+def of_platform(points: Points, poses: PoseLanes, body: BodyShape, leave: Array) -> Array:
     """The cable that is the nearest to its own platform.
 
     Args:
         poses: lanes (n,).
-        own: shape of the platform in its axes.
+        body: shape of the platform in its axes.
         leave: () length next to the attachment point that is left out, m.
 
     Returns:
@@ -233,23 +233,23 @@ def of_platform(points: Points, poses: PoseLanes, own: Own, leave: Array) -> Arr
         part = jnp.where(length > leave, leave / jnp.where(length > leave, length, 1.0), 1.0)
         start = tuple(x + part * y for x, y in zip(_three(points.platform[k]), away, strict=True))
         rest = tuple((1.0 - part) * x for x in away)
-        gaps.append(_from_own(own, start, rest) - 0.5 * points.diameters[k])
+        gaps.append(_from_body(body, start, rest) - 0.5 * points.diameters[k])
     return nearest(gaps)
 
 
-def _from_own(body: Own, start: Vector, ray: Vector) -> Array:
+def _from_body(body: BodyShape, start: Vector, ray: Vector) -> Array:
     if isinstance(body, Brick):
         return segment_box(*_in_brick(body, start, ray), _three(body.half))
     return segment_hull(start, ray, body)
 
 
 @jax.jit
-def of_body(poses: PoseLanes, own: Own, solid: Ball | Rod) -> Array:
+def of_body(poses: PoseLanes, body: BodyShape, solid: Ball | Rod) -> Array:
     """The platform and a sphere or a cylinder.
 
     Args:
         poses: lanes (n,).
-        own: shape of the platform in its axes.
+        body: shape of the platform in its axes.
 
     Returns:
         (n,) complex: signed distance, m, and 0.
@@ -258,35 +258,35 @@ def of_body(poses: PoseLanes, own: Own, solid: Ball | Rod) -> Array:
     rod = Rod(solid.centre, jnp.zeros_like(solid.centre), solid.radius) if isinstance(solid, Ball) else solid
     start = _inward(rotation, _less(_three(rod.start), poses.position))
     ray = _inward(rotation, [zero + x for x in _three(rod.ray)])
-    return nearest([_from_own(own, start, ray) - rod.radius])
+    return nearest([_from_body(body, start, ray) - rod.radius])
 
 
 @jax.jit
-def of_boxes(poses: PoseLanes, own: Brick, solid: Brick) -> Array:
+def of_boxes(poses: PoseLanes, body: Brick, solid: Brick) -> Array:
     """The platform, a box, and another box: the largest gap between their shadows on a line.
 
     Args:
         poses: lanes (n,).
-        own: shape of the platform in its axes.
+        body: shape of the platform in its axes.
 
     Returns:
         (n,) complex: no larger than the signed distance, with its sign, m, and 0.
     """
     zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
-    axes = [_three(row) for row in own.rotation]
+    axes = [_three(row) for row in body.rotation]
     edges = [lanes.turned_back(axes, _inward(rotation, _three(column))) for column in solid.rotation.T]
     away = _inward(rotation, _less(_three(solid.centre), poses.position))
-    centre, _ = _in_brick(own, away, [zero, zero, zero])
-    return nearest([boxes(_three(own.half), centre, [tuple(zero + x for x in e) for e in edges], _three(solid.half))])
+    centre, _ = _in_brick(body, away, [zero, zero, zero])
+    return nearest([boxes(_three(body.half), centre, [tuple(zero + x for x in e) for e in edges], _three(solid.half))])
 
 
 @jax.jit
-def of_hull_box(poses: PoseLanes, own: Polyhedron, solid: Brick) -> Array:
+def of_hull_box(poses: PoseLanes, body: Polyhedron, solid: Brick) -> Array:
     """The platform, a convex polyhedron, and a box: the largest gap between their shadows on a line.
 
     Args:
         poses: lanes (n,).
-        own: shape of the platform in its axes.
+        body: shape of the platform in its axes.
 
     Returns:
         (n,) complex: no larger than the signed distance, with its sign, m, and 0.
@@ -294,7 +294,7 @@ def of_hull_box(poses: PoseLanes, own: Polyhedron, solid: Brick) -> Array:
     zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     edges = [tuple(zero + x for x in _inward(rotation, _three(column))) for column in solid.rotation.T]
     centre = _inward(rotation, _less(_three(solid.centre), poses.position))
-    return nearest([hull_box(own, centre, edges, _three(solid.half))])
+    return nearest([hull_box(body, centre, edges, _three(solid.half))])
 
 
 def _inward(rotation: Matrix | None, vector: Vector) -> Vector:

@@ -257,11 +257,11 @@ def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
     return lax.fori_loop(0, len(hull.offsets), to_face, least)
 
 
-def boxes(own: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Array:
+def boxes(first: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Array:
     """Largest gap between the shadows of two boxes on a line, in the axes of the first, around the origin.
 
     Args:
-        own: three halves of the lengths of the edges of the first, m.
+        first: three halves of the lengths of the edges of the first, m.
         centre: of the second, m.
         axes: three unit vectors of the second.
         half: three halves of the lengths of its edges, m.
@@ -272,16 +272,16 @@ def boxes(own: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -
     """
     gap = jnp.full_like(centre[0] + axes[0][0], -jnp.inf)
     for k in range(3):
-        reach = own[k] + sum(half[j] * jnp.abs(axes[j][k]) for j in range(3))
+        reach = first[k] + sum(half[j] * jnp.abs(axes[j][k]) for j in range(3))
         gap = _greater(jnp.abs(centre[k]) - reach, gap)
-        reach = half[k] + sum(own[j] * jnp.abs(axes[k][j]) for j in range(3))
+        reach = half[k] + sum(first[j] * jnp.abs(axes[k][j]) for j in range(3))
         gap = _greater(jnp.abs(dot(centre, axes[k])) - reach, gap)
     for axis in axes:
         for i, j in ((1, 2), (2, 0), (0, 1)):
             # Across an edge of each: the line has no part along the third axis of the first.
             x, y = -axis[j], axis[i]
             square = x * x + y * y
-            reach = own[i] * jnp.abs(x) + own[j] * jnp.abs(y)
+            reach = first[i] * jnp.abs(x) + first[j] * jnp.abs(y)
             reach = reach + sum(h * jnp.abs(e[i] * x + e[j] * y) for h, e in zip(half, axes, strict=True))
             tiny = _tiny(square)
             across = (jnp.abs(centre[i] * x + centre[j] * y) - reach) / jnp.sqrt(_greater(square, tiny))

@@ -194,12 +194,12 @@ def _robot(points: np.ndarray, mass, gravity, limits: Limits | None, name: str, 
     return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, dof)
 
 
-def checked_points(key: str, given, least: int) -> np.ndarray:
+def checked_points(key: str, points, least: int) -> np.ndarray:
     """Points of a robot's geometry.
 
     Args:
         key: named in errors.
-        given: (n, 3) m.
+        points: (n, 3) m.
         least: smallest number of them.
 
     Returns:
@@ -208,18 +208,18 @@ def checked_points(key: str, given, least: int) -> np.ndarray:
     Raises:
         InputError: fewer, another shape, not finite, too far away; three or more on one line, or two at one place.
     """
-    points = checked_coordinates(key, given, least)
+    points = checked_coordinates(key, points, least)
     if least > PLANAR and is_on_line(points):
         raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
     return points
 
 
-def checked_coordinates(key: str, given, least: int) -> np.ndarray:
+def checked_coordinates(key: str, coordinates, least: int) -> np.ndarray:
     """Points, wherever they lie.
 
     Args:
         key: named in errors.
-        given: (n, 3) m.
+        coordinates: (n, 3) m.
         least: smallest number of them.
 
     Returns:
@@ -228,13 +228,13 @@ def checked_coordinates(key: str, given, least: int) -> np.ndarray:
     Raises:
         InputError: fewer, another shape, not finite, too far away.
     """
-    if isinstance(given, jax.core.Tracer):
+    if isinstance(coordinates, jax.core.Tracer):
         raise InputError(key, "a traced array", "numbers; to differentiate, dataclasses.replace(robot, ...) takes both")
-    points = np.asarray(given, float)
+    points = np.asarray(coordinates, float)
     if points.ndim != 2 or points.shape[1] != 3 or not (np.abs(points) <= LARGEST_LENGTH).all():
-        raise InputError(key, given, f"{least} points or more of three coordinates, at most 1e6 m")
+        raise InputError(key, coordinates, f"{least} points or more of three coordinates, at most 1e6 m")
     if len(points) < least:
-        raise InputError(key, given, f"must be {least} or more, one a cable", fault=f"{len(points)} points")
+        raise InputError(key, coordinates, f"must be {least} or more, one a cable", fault=f"{len(points)} points")
     return points
 
 

@@ -119,7 +119,9 @@ def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array
     return answer, jnp.where(solutions.is_regular, largest, -jnp.inf)
 
 
-def checked(matrix: Array, wrench: Array, low: Array, high: Array, every: AllTensions, tensions: Array) -> Distribution:
+def checked(
+    matrix: Array, wrench: Array, low: Array, high: Array, solutions: AllTensions, tensions: Array
+) -> Distribution:
     """Tensions with their residual and verdict.
 
     Args:
@@ -127,16 +129,16 @@ def checked(matrix: Array, wrench: Array, low: Array, high: Array, every: AllTen
         wrench: (dof,) N.
         low: (n_cables,) N.
         high: (n_cables,) N, inf for none.
-        every: of `all_tensions`.
+        solutions: of `all_tensions`.
         tensions: (n_cables,) what a rule has found, N.
 
     Returns:
         the tensions (n_cables,), those of least norm where they do not keep the limits; () residual; () whether what
         is returned does.
     """
-    tensions = jnp.where(keeps(tensions, low, high), tensions, every.least)
+    tensions = jnp.where(keeps(tensions, low, high), tensions, solutions.least)
     residual = jnp.linalg.norm(matrix @ tensions - wrench) / (1.0 + jnp.linalg.norm(wrench))
-    return Distribution(tensions, residual, every.is_regular & keeps(tensions, low, high))
+    return Distribution(tensions, residual, solutions.is_regular & keeps(tensions, low, high))
 
 
 def keeps(tensions: Array, low: Array, high: Array) -> Array:
@@ -327,14 +329,14 @@ def _at_limits(solutions: AllTensions, low: Array, high: Array, sides: Array) ->
     return projected(solutions.kernel, sides != 0.0, jnp.zeros(solutions.kernel.shape[0]), offsets)[0]
 
 
-def projected(kernel: Array, is_held: Array, vector: Array, wanted: Array) -> tuple[Array, Array]:
+def projected(kernel: Array, is_held: Array, vector: Array, products: Array) -> tuple[Array, Array]:
     """The nearest to a vector with given products with columns of the kernel, and what of each column is taken off.
 
     Args:
         kernel: (m, n_cables).
         is_held: (n_cables,) whose products are given.
         vector: (m,).
-        wanted: (n_cables,) the products.
+        products: (n_cables,).
 
     Returns:
         (m,); (n_cables,).
@@ -343,7 +345,7 @@ def projected(kernel: Array, is_held: Array, vector: Array, wanted: Array) -> tu
     held = jnp.where(is_held[None], kernel, 0.0)
     above = jnp.concatenate([jnp.eye(freedom), held], axis=1)
     below = jnp.concatenate([held.T, jnp.diag(jnp.where(is_held, 0.0, 1.0))], axis=1)
-    right = jnp.concatenate([vector, jnp.where(is_held, wanted, 0.0)])
+    right = jnp.concatenate([vector, jnp.where(is_held, products, 0.0)])
     solution = solved(jnp.concatenate([above, below]), right[:, None])[0][:, 0]
     return solution[:freedom], solution[freedom:]
 

@@ -12,7 +12,7 @@ from cspr_jax.robots.wrench_sets import spanning
 from cspr_jax.workspaces.cells import Cells, cells_about
 from cspr_jax.workspaces.inside_cells import least_margins
 from cspr_jax.workspaces.outside_cells import are_beyond, are_one_sided
-from cspr_jax.workspaces.questions import CLOSURE, Requirement
+from cspr_jax.workspaces.questions import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.worst_cocircuits import worst_cocircuits
 
@@ -26,10 +26,10 @@ KEPT = 0.98
 class CellProofs:
     """Proofs of cells at one orientation, without halving."""
 
-    def __init__(self, robot: AnyRobot, asked: Requirement, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
-        """Prepare the proofs for a robot without pulleys and the search of the same question."""
-        self._asked, self._is_closure = asked, asked.condition == CLOSURE
-        self._unbounded = tuple(np.isinf(asked.high).tolist())
+    def __init__(self, robot: AnyRobot, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
+        """Prepare the proofs of what the search of a robot without pulleys asks."""
+        self._requirement, self._is_closure = search.requirement, search.requirement.condition == CLOSURE
+        self._unbounded = tuple(np.isinf(search.requirement.high).tolist())
         self._exits, self._forces = _geometry(robot, quaternion, search.unit)
         # The required wrenches are the same at every place, for the robot does not turn.
         required = search.required(np.zeros(3), quaternion)
@@ -64,7 +64,7 @@ class CellProofs:
         if not (self._is_finite or self._is_closure):
             return np.full(len(positions), -np.inf)
         units, count = self.matrices(positions), self._exits.shape[0]
-        low, high, loads = self._asked.low, self._asked.high, self._wrenches
+        low, high, loads = self._requirement.low, self._requirement.high, self._wrenches
         if self._is_closure:  # by any tensions that pull on nothing
             low, high, loads = np.zeros(count), np.full(count, np.inf), np.zeros((1, units.shape[1]))
             room = np.ones((1, 1))
@@ -90,7 +90,7 @@ class CellProofs:
         Returns:
             (n,) whether it is proved.
         """
-        low, high = self._asked.low, self._asked.high
+        low, high = self._requirement.low, self._requirement.high
         finite = np.where(self._unbounded, 0.0, high)
         options = {"condition": "closure" if self._is_closure else "tensions", "unbounded": self._unbounded}
         worst = in_batches(

@@ -55,35 +55,35 @@ def at_rest(robot: AnyRobot, around: Scene, positions: np.ndarray, quaternions: 
     return clearances(around, positions, body_quaternions, ends=ends)
 
 
-def flags(found: Clearances) -> np.ndarray:
+def flags(distances: Clearances) -> np.ndarray:
     """Reasons why poses are not free of interference.
 
     Args:
-        found: of `at_rest`.
+        distances: of `at_rest`.
 
     Returns:
         (n,) flags of `Verdict`.
     """
-    verdict = np.zeros(len(found.clearance), FLAGS)
+    verdict = np.zeros(len(distances.clearance), FLAGS)
     for values, flag in (
-        (found.cables, Verdict.CABLE_CABLE),
-        (found.obstacles, Verdict.OBSTACLE),
-        (found.platform, Verdict.CABLE_PLATFORM),
+        (distances.cables, Verdict.CABLE_CABLE),
+        (distances.obstacles, Verdict.OBSTACLE),
+        (distances.platform, Verdict.CABLE_PLATFORM),
     ):
         # NaN is open.
         verdict |= np.where(values <= 0.0, flag, 0).astype(FLAGS)
-    return np.where(found.is_open, Verdict.UNDECIDED, verdict).astype(FLAGS)
+    return np.where(distances.is_open, Verdict.UNDECIDED, verdict).astype(FLAGS)
 
 
-def nearest_bodies(around: Scene, found: Clearances) -> np.ndarray:
+def nearest_bodies(around: Scene, distances: Clearances) -> np.ndarray:
     """Kind of the nearest bodies at each pose.
 
     Args:
         around: of `surroundings`.
-        found: of `at_rest`.
+        distances: of `at_rest`.
 
     Returns:
         (n,) numbers of `schema.meanings.NEAREST_BODIES`.
     """
     numbers = np.array([*(KINDS[meeting.kind] for meeting in around.meetings), 0], np.int16)
-    return numbers[found.nearest]
+    return numbers[distances.nearest]

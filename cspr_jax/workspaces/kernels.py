@@ -38,10 +38,10 @@ class TensionLimits(NamedTuple):
 
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
 def by_normals(
-    every: Sequence[Array],
+    components: Sequence[Array],
     loss: Array,
     wrenches: Wrenches,
-    asked: TensionLimits,
+    tension_limits: TensionLimits,
     choices: CableSubsets,
     *,
     measure: str,
@@ -50,7 +50,7 @@ def by_normals(
     """Margins of poses of any robot, by the normals to dof - 1 cables.
 
     Args:
-        every: columns of the wrench matrix, of `geometry.wrench_columns`.
+        components: of the wrench matrix, of `geometry.wrench_columns`.
         loss: (n,) their errors over rounding, likewise.
         wrenches: what the cables must supply.
         choices: of `cocircuits.choices_of`.
@@ -60,29 +60,29 @@ def by_normals(
     Returns:
         (...) lower bound + i upper bound.
     """
-    dof, template = len(every), every[0][0]
+    dof, template = len(components), components[0][0]
     lanes = wrenches._replace(
         points=[[jnp.broadcast_to(x, template.shape) for x in point] for point in wrenches.points]
     )
     noise = jnp.asarray(ROUNDING * jnp.finfo(template.dtype).eps, template.dtype) * loss
-    reach = jnp.where(jnp.isinf(asked.high), 0.0, jnp.abs(asked.high)) + jnp.abs(asked.low)
+    reach = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
     size = _size(wrenches)
 
     def pull(row, limits):
-        chosen = [[_row(component, row[i]) for component in every] for i in range(dof - 1)]
+        chosen = [[_row(component, row[i]) for component in components] for i in range(dof - 1)]
         across = normal(chosen) if chosen else [jnp.ones_like(template)]
-        rest = [[_row(component, k) for component in every] for k in row[dof - 1 :]]
+        rest = [[_row(component, k) for component in components] for k in row[dof - 1 :]]
         entries = [product(across, column) for column in rest]
         low, high, counts, scale = limits
         over = one_norm(entries)
         if measure == "capacity":
-            over = length([x * asked.measure[k] for k, x in enumerate(across)])
+            over = length([x * tension_limits.measure[k] for k, x in enumerate(across)])
         error = 2.0 * noise * (scale + size)
         return _pull(entries, low, high, counts, over, noise, error), margins.supports(across, lanes)
 
     rest = choices.table[:, dof - 1 :]
-    limits = asked.low[rest], asked.high[rest], choices.counts, jnp.sum(reach[rest], axis=1)
-    return _least(pull, choices.table, limits, template, asked, measure=measure, is_bounded=is_bounded)
+    limits = tension_limits.low[rest], tension_limits.high[rest], choices.counts, jnp.sum(reach[rest], axis=1)
+    return _least(pull, choices.table, limits, template, tension_limits, measure=measure, is_bounded=is_bounded)
 
 
 def _pull(entries: Sequence[Array], low, high, counts, size: Array, noise: Array, error: Array) -> CocircuitLimits:
@@ -144,11 +144,11 @@ class NullSpace(NamedTuple):
     largest: Array
 
 
-def null_space(every: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]) -> NullSpace:
+def null_space(components: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]) -> NullSpace:
     """Tensions that pull on nothing, and those that supply one wrench, of robots on six to eight cables in space.
 
     Args:
-        every: columns of the wrench matrix, of `geometry.wrench_columns`.
+        components: of the wrench matrix, of `geometry.wrench_columns`.
         loss: (n,) their errors over rounding, likewise.
         wrench: six components, () or (n,), moments over a length, N.
         order: of the cables, those of the base block first.
@@ -156,7 +156,7 @@ def null_space(every: Sequence[Array], loss: Array, wrench: Column, *, order: tu
     Returns:
         the tensions.
     """
-    return _joined(_by_block(every, wrench, order=order), wrench, loss)
+    return _joined(_by_block(components, wrench, order=order), wrench, loss)
 
 
 @partial(jax.jit, static_argnames=("order",))
@@ -194,13 +194,13 @@ def _joined(tensions: tuple[list[list[Array]], Array], wrench: Column, loss: Arr
 
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
 def by_null_space(
-    space: NullSpace, asked: TensionLimits, choices: CableSubsets, *, measure: str, is_bounded: bool
+    space: NullSpace, tension_limits: TensionLimits, choices: CableSubsets, *, measure: str, is_bounded: bool
 ) -> Array:
     """Margins of poses by the relations among rows of the null space.
 
     Args:
         space: of `null_space`.
-        asked: limits, the cables in the order of the block.
+        tension_limits: of the cables in the order of the block.
         choices: their tables have the cables of each cocircuit alone, in the order of the block.
         measure: "tensions" or "closure"; known when this is compiled, as what follows.
         is_bounded: whether all largest tensions are finite.
@@ -209,7 +209,7 @@ def by_null_space(
         (...) lower bound + i upper bound.
     """
     template = space.loss
-    finite = jnp.where(jnp.isinf(asked.high), 0.0, jnp.abs(asked.high)) + jnp.abs(asked.low)
+    finite = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
     reach = jnp.sum(finite) + space.largest
 
     def pull(row, limits):
@@ -222,5 +222,5 @@ def by_null_space(
         return _pull(entries, low, high, counts, size, space.noise, error), (asking, -asking)
 
     table = choices.table
-    limits = asked.low[table], asked.high[table], choices.counts
-    return _least(pull, table, limits, template, asked, measure=measure, is_bounded=is_bounded)
+    limits = tension_limits.low[table], tension_limits.high[table], choices.counts
+    return _least(pull, table, limits, template, tension_limits, measure=measure, is_bounded=is_bounded)

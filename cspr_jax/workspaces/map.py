@@ -44,25 +44,25 @@ class WorkspaceMap(GridMap):
         """Refuse what the robot cannot be asked."""
         self._keys, self._file = keys, file
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
-        self._asked = keys.workspace or WorkspaceTable()
+        self._workspace = keys.workspace or WorkspaceTable()
         self._refuse_unused()
         self._limits = build_limits(robot_file, keys.limits, file)
         self._robot = centred(build_robot(robot_file, keys.trajectory, file))[0]
         self._row = PATTERNS[self._robot.pattern]
         if not self._row.is_body:
             for name in ("orientation", "orientations"):
-                if getattr(self._asked, name) is not None:
+                if getattr(self._workspace, name) is not None:
                     raise ConfigError(file, f"workspace.{name}: must be absent: {robot_file.kind} has none")
-        self._quaternion = self._unit_quaternions([self._asked.orientation], "workspace.orientation")
+        self._quaternion = self._unit_quaternions([self._workspace.orientation], "workspace.orientation")
         self._samples, self._volume = self._orientation_set()
         try:
             check_cables(self._robot)
         except InputError as error:
             raise ConfigError(file, str(error)) from error
         try:
-            names = [name for name in self._asked.conditions if name != INTERFERENCE]
+            names = [name for name in self._workspace.conditions if name != INTERFERENCE]
             searches = {name: self._search(name) for name in names}
-            length = self._asked.capacity_length
+            length = self._workspace.capacity_length
             capacity = None if length is None else self._search(FEASIBLE, length)
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
@@ -77,12 +77,12 @@ class WorkspaceMap(GridMap):
                 raise ConfigError(
                     self._file, f"limits.{limit.name}: must be absent in this map, whose cells are at rest"
                 )
-            if limit.name in TENSIONS and FEASIBLE not in self._asked.conditions:
+            if limit.name in TENSIONS and FEASIBLE not in self._workspace.conditions:
                 allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
                 raise ConfigError(self._file, f"limits.{limit.name}: {allowed}")
 
     def _surroundings(self, robot_file: RobotFile) -> Scene | None:
-        workspace, row = self._asked, self._row
+        workspace, row = self._workspace, self._row
         if INTERFERENCE not in workspace.conditions:
             return None
         for name in ("platform_box", "platform_hull"):
@@ -98,7 +98,7 @@ class WorkspaceMap(GridMap):
         return surroundings(self._robot, self._frame, [table.shape() for table in workspace.obstacle or ()], body)
 
     def _speeds(self, robot_file: RobotFile) -> CableSpeeds | None:
-        workspace, most = self._asked, self._limits.cable_speed_max
+        workspace, most = self._workspace, self._limits.cable_speed_max
         speed_keys = [name for name in ("speed", "angular_speed") if getattr(workspace, name) is not None]
         if not speed_keys:
             if getattr(self._keys.limits, SPEED) is not None:
@@ -123,7 +123,7 @@ class WorkspaceMap(GridMap):
 
     def _orientation_set(self) -> tuple[np.ndarray | None, np.ndarray]:
         # (k, 4) orientations and the part of the set that each stands for; None: there is no set.
-        workspace = self._asked
+        workspace = self._workspace
         if workspace.orientations is None:
             return None, np.ones(1)
         if workspace.quaternions is not None:
@@ -145,7 +145,7 @@ class WorkspaceMap(GridMap):
     def _search(self, name: str, capacity_length: float | None = None) -> WorkspaceSearch:
         loads = None
         if name == FEASIBLE:
-            workspace = self._asked
+            workspace = self._workspace
             shapes = {
                 "points": workspace.wrenches,
                 "box": workspace.wrench_box,
@@ -158,7 +158,7 @@ class WorkspaceMap(GridMap):
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         places = self._targets(cells)
         if self._samples is not None:
-            kind: OrientationSet = "total" if self._asked.orientations in ("total", "dextrous") else "inclusion"
+            kind: OrientationSet = "total" if self._workspace.orientations in ("total", "dextrous") else "inclusion"
             set_answers = over_orientations(self._poses, places, self._samples, self._volume, kind)
             return set_answers | {"cell_side": np.zeros(len(places), np.int16)}
         quaternions = np.repeat(self._quaternion, len(places), axis=0)
@@ -169,7 +169,7 @@ class WorkspaceMap(GridMap):
             quaternions = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), quaternions)
         answers = self._poses(places, quaternions)
         sides = np.zeros(len(places), np.int16)
-        if self._asked.prove:
+        if self._workspace.prove:
             sides = self._poses.sides(places, self._half_sizes(cells), self._quaternion[0])
         return answers | {"orientation_fraction": (answers["verdict"] == 0).astype(float), "cell_side": sides}
 
@@ -193,7 +193,7 @@ class WorkspaceMap(GridMap):
             raise ConfigError(self._file, f"axes.{turning[0]}: must be absent: a point mass has no orientation")
         if turning and self._samples is not None:
             raise ConfigError(self._file, f"axes.{turning[0]}: cannot be combined with workspace.orientations")
-        if self._asked.prove and (turning or "radius" in grid.axes):
+        if self._workspace.prove and (turning or "radius" in grid.axes):
             name = turning[0] if turning else "radius"
             raise ConfigError(self._file, f"axes.{name}: cannot be combined with workspace.prove")
         if row.is_planar and turning not in ([], ["tilt"]):

@@ -105,7 +105,8 @@ class RestPoses:
         places, reach = mass_centres(self.robot, origins, quaternions), np.linalg.norm(half, axis=1)
         inside, outside = np.ones(len(origins), bool), np.zeros(len(origins), bool)
         for search in self.searches.values():
-            held, lost = WorkspaceCells(self.robot, search.asked)(places, half, quaternion, search(places, quaternions))
+            cells, answers = WorkspaceCells(self.robot, search.requirement), search(places, quaternions)
+            held, lost = cells(places, half, quaternion, answers)
             inside, outside = inside & held, outside | lost
         moved = shifts(self.robot, places, quaternions, reach)
         if self.robot.pulleys is not None:

@@ -75,14 +75,10 @@ class Poses(NamedTuple):
     quaternions: np.ndarray
     wrenches: np.ndarray | None
 
-    def some(self, which: Any) -> "Poses":
-        """Some of them.
-
-        Returns:
-            those.
-        """
-        wrenches = None if self.wrenches is None else self.wrenches[which]
-        return Poses(self.positions[which], self.quaternions[which], wrenches)
+    def rows(self, index: Any) -> "Poses":
+        """Poses chosen by indices, a slice or a mask (n,)."""
+        wrenches = None if self.wrenches is None else self.wrenches[index]
+        return Poses(self.positions[index], self.quaternions[index], wrenches)
 
 
 Stage = Callable[[Poses], np.ndarray]
@@ -92,28 +88,28 @@ class WorkspaceSearch:
     """A question to poses of one robot; what it needs of the robot alone is found once.
 
     Fields:
-        asked: the question.
+        requirement: what each pose has to meet.
         unit: (dof,) by what the components of wrenches are divided: moments by a length of the robot, m.
     """
 
-    def __init__(self, robot: AnyRobot, asked: Requirement, *, precision: str = "float64") -> None:
+    def __init__(self, robot: AnyRobot, requirement: Requirement, *, precision: str = "float64") -> None:
         """Prepare the search for a robot, centred, z down.
 
         With precision "float32" that decides the poses of which it can, and float64 the others; margins of the former
         are good to 1e-3 of the limits.
         """
-        self._robot, self.asked, self._precision, self._length = robot, asked, precision, _length(robot)
+        self._robot, self.requirement, self._precision, self._length = robot, requirement, precision, _length(robot)
         self.unit = np.where(geometry.scales(robot), self._length, 1.0)
-        self._wrenches = asked.wrenches.over(self.unit)
-        self._measure = "tensions" if asked.capacity_length is None else "capacity"
-        capacity_length = asked.capacity_length or self._length
+        self._wrenches = requirement.wrenches.over(self.unit)
+        self._measure = "tensions" if requirement.capacity_length is None else "capacity"
+        capacity_length = requirement.capacity_length or self._length
         self._normals_unit = np.where(geometry.scales(robot), capacity_length / self._length, 1.0)
         self._boundary = BOUNDARY
-        if asked.condition == CLOSURE:
+        if requirement.condition == CLOSURE:
             self._measure = "closure"
         else:
-            sizes = asked.wrenches.size, float(robot.mass * robot.gravity)
-            self._boundary *= np.abs([*asked.low, *asked.high[np.isfinite(asked.high)], *sizes]).max()
+            sizes = requirement.wrenches.size, float(robot.mass * robot.gravity)
+            self._boundary *= np.abs([*requirement.low, *requirement.high[np.isfinite(requirement.high)], *sizes]).max()
         matrices = self._trials()
         self._choices = cocircuits.choices_of(matrices[:FEW_TRIALS])
         self._order = tuple[int, ...]()
@@ -140,7 +136,7 @@ class WorkspaceSearch:
         quaternions = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
         loads = self._weights(positions, quaternions) if wrenches is None else wrenches / self.unit
         poses = Poses(positions, quaternions, loads)
-        parts = in_parts(lambda part: self._part(poses.some(part)), len(positions), PART)
+        parts = in_parts(lambda part: self._part(poses.rows(part)), len(positions), PART)
         margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
         verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
         verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
@@ -183,7 +179,7 @@ class WorkspaceSearch:
             places = np.flatnonzero(is_open)
             if len(places) == 0 or len(places) < min(FEW, count):
                 break
-            bounds = stage(poses.some(places))
+            bounds = stage(poses.rows(places))
             is_known = accepts(bounds)
             known = bounds[is_known]
             margin[places[is_known]] = 0.5 * (known.real + known.imag)
@@ -191,7 +187,7 @@ class WorkspaceSearch:
         is_open |= np.abs(margin) <= self._boundary
         places = np.flatnonzero(is_open)
         if len(places):
-            margin[places], is_outside[places] = self._exactly(poses.some(places))
+            margin[places], is_outside[places] = self._exactly(poses.rows(places))
         return margin, is_open, is_outside
 
     def _stages(self):
@@ -236,9 +232,9 @@ class WorkspaceSearch:
         def cast(tree):
             return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
 
-        options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.asked.high).all())}
+        options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.requirement.high).all())}
         robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
-        limits = leaf(self.asked.low[ordered]), leaf(self.asked.high[ordered]), leaf(self._normals_unit)
+        limits = leaf(self.requirement.low[ordered]), leaf(self.requirement.high[ordered]), leaf(self._normals_unit)
         tension_limits, length, fixed = cast((kernels.TensionLimits(*limits), leaf(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
@@ -319,7 +315,8 @@ class WorkspaceSearch:
                 is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
             else:
                 required = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
-                margins[i] = exact.wrench_margin(columns, required, self.asked.low, self.asked.high, measure)
+                low, high = self.requirement.low, self.requirement.high
+                margins[i] = exact.wrench_margin(columns, required, low, high, measure)
                 is_outside[i] = margins[i] == -np.inf
         return margins, is_outside
 

@@ -25,9 +25,9 @@ class WorkspaceCells:
     rounding included. Of a robot with pulleys nothing is proved.
     """
 
-    def __init__(self, robot: AnyRobot, asked: Requirement) -> None:
+    def __init__(self, robot: AnyRobot, requirement: Requirement) -> None:
         """Prepare the question for a robot, centred, z down."""
-        self._robot, self._asked, self._search = robot, asked, WorkspaceSearch(robot, asked)
+        self._robot, self._search = robot, WorkspaceSearch(robot, requirement)
 
     def __call__(
         self,
@@ -57,7 +57,7 @@ class WorkspaceCells:
             quaternion = np.array(IDENTITY) if quaternion is None else np.asarray(quaternion)
             sizes = np.broadcast_to(np.asarray(half, float), positions.shape)[chosen]
             with double_precision():
-                proofs = CellProofs(self._robot, self._asked, self._search, quaternion)
+                proofs = CellProofs(self._robot, self._search, quaternion)
                 for first in range(0, len(chosen), ROUND):
                     rows = slice(first, first + ROUND)
                     numbers = chosen[rows]

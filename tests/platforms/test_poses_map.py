@@ -33,7 +33,7 @@ from cspr_jax.plans import choices, planning
 from cspr_jax.platforms.checker import slacks_at
 from cspr_jax.platforms.place_proof import wires_beside
 from cspr_jax.platforms.platform_segment import motion
-from cspr_jax.platforms.platform_segment_lanes import instant, state
+from cspr_jax.platforms.platform_segment_lanes import instant_lanes, state
 from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.platforms.slacks import pose_slacks
 from cspr_jax.robots import interference, interference_lanes
@@ -174,10 +174,10 @@ def test_cables_beside_the_middles_of_blocks():
 @functools.partial(jax.jit, static_argnames="pairs")
 def as_lanes(problem, batch, p, t, *, pairs):
     """Slacks (n_criteria, n), vectors between cables and directions of cables of motions, by the fast forms."""
-    now = instant(problem.amplitude, batch.sense, p, t)
-    here = state(batch, p, now, USUAL)
+    instant = instant_lanes(problem.amplitude, batch.sense, p, t)
+    here = state(batch, p, instant, USUAL)
     cables = cable_lanes(problem.robot, here.position, here.rotation)
-    slacks = moving_slacks(problem, batch, p, now, USUAL) + still_slacks(problem, batch, here, cables)
+    slacks = moving_slacks(problem, batch, p, instant, USUAL) + still_slacks(problem, batch, here, cables)
     gaps = interference_lanes.gaps(problem.robot.base_points, pairs, cables)
     return jnp.stack(slacks), *interference_lanes.as_arrays(
         gaps, interference_lanes.cable_directions(cables, here.rotation)
