@@ -92,10 +92,13 @@ class CellProofs:
         """
         low, high = self._requirement.low, self._requirement.high
         finite = np.where(self._unbounded, 0.0, high)
-        options = {"condition": "closure" if self._is_closure else "tensions", "unbounded": self._unbounded}
-        worst = in_batches(
-            lambda x: worst_cocircuits(x, self._wrenches, low, finite, **options), self.matrices(positions), size=BATCH
-        )
+        condition = "closure" if self._is_closure else "tensions"
+
+        def kernel(matrices):
+            loads, unbounded = self._wrenches, self._unbounded
+            return worst_cocircuits(matrices, loads, low, finite, condition=condition, unbounded=unbounded)
+
+        worst = in_batches(kernel, self.matrices(positions), size=BATCH)
         held, loads = self._subsets[worst.subset], self._wrenches[worst.load]
 
         def proved(chosen, normals, held):

@@ -111,8 +111,8 @@ class WorkspaceMap(GridMap):
                 raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} {why}")
         if most is None:
             raise ConfigError(self._file, f"workspace.{speed_keys[0]}: must be absent without limits.cable_speed_max")
-        values = {"speed": workspace.speed or 0.0, "angular_speed": workspace.angular_speed or 0.0}
-        return cable_speeds(self._robot, np.asarray(most), **values)
+        speed, angular_speed = workspace.speed or 0.0, workspace.angular_speed or 0.0
+        return cable_speeds(self._robot, np.asarray(most), speed=speed, angular_speed=angular_speed)
 
     def _unit_quaternions(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
         # (k, 4) in the kernels' axes.
@@ -146,12 +146,14 @@ class WorkspaceMap(GridMap):
         loads = None
         if name == FEASIBLE:
             workspace = self._workspace
-            shapes = {
-                "points": workspace.wrenches,
-                "box": workspace.wrench_box,
-                "ellipsoid": workspace.wrench_ellipsoid,
-            }
-            loads = required_wrenches(self._robot, self._frame, **shapes, acceleration=workspace.acceleration)
+            loads = required_wrenches(
+                self._robot,
+                self._frame,
+                points=workspace.wrenches,
+                box=workspace.wrench_box,
+                ellipsoid=workspace.wrench_ellipsoid,
+                acceleration=workspace.acceleration,
+            )
         return WorkspaceSearch(self._robot, requirement(self._robot, name, self._limits, loads, capacity_length))
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
